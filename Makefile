@@ -1,0 +1,75 @@
+# Everything a developer does. Every target sets up what it needs; `make help` lists them.
+#
+# PYTHON       the interpreter for new environments (default: the first of python3, python3.13,
+#              ... python3.10 that runs)
+# PYTEST_ARGS  added to the command line of pytest
+
+MAKEFLAGS += --no-print-directory
+.DEFAULT_GOAL := help
+
+# With ROS 2 Jazzy sourced that one is used, from an environment of its own; otherwise Jazzy comes
+# as wheels, and nothing of another ROS may leak in.
+ifeq ($(ROS_DISTRO),jazzy)
+VENV := .venv-jazzy
+SET_UP := $(VENV) requirements/jazzy.txt system
+AMENT := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
+else
+VENV := .venv
+SET_UP := $(VENV) requirements/wheels.txt
+AMENT := $(CURDIR)/$(VENV)
+unexport PYTHONPATH
+endif
+OLDEST := .venv-oldest
+
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONHOME
+export PYTHON
+RUN := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" AMENT_PREFIX_PATH="$(AMENT)" \
+       ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
+
+.PHONY: help demo test test-oldest lint bench venv lock clean
+
+help: ## List the targets
+	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' $(MAKEFILE_LIST) | \
+	    while IFS='|' read -r target text; do printf '  make %-12s %s\n' "$$target" "$$text"; done
+
+demo: venv ## Simulate a tray, watch it cool, estimate the coefficient of restitution
+	@$(RUN) python $(VENV)/lib/nanorocks_ros/demo
+
+test: venv ## Run all tests, then those of the core with the oldest dependencies
+	@$(RUN) python -m pytest $(PYTEST_ARGS)
+	@$(MAKE) test-oldest
+
+test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
+	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
+	@env -u PYTHONPATH PATH="$(CURDIR)/$(OLDEST)/bin:$$PATH" python -m pytest \
+	    --ignore=test/nodes --ignore=test/test_colcon.py $(PYTEST_ARGS)
+
+lint: venv ## Check style, format, types and which module may import which
+	@$(RUN) ruff check .
+	@$(RUN) ruff format --check .
+	@$(RUN) mypy
+	@$(RUN) lint-imports --no-logo
+
+bench: venv ## Measure against the limits and against peers
+	@$(RUN) python -m benchmarks
+
+venv: ## Set up the environment that all of these use
+	@case '$(ROS_DISTRO)' in ''|jazzy) ;; *) \
+	    echo 'ROS 2 $(ROS_DISTRO) is sourced: use a shell without ROS, or with Jazzy' >&2; exit 1; \
+	esac
+	@sh requirements/set_up.sh $(SET_UP)
+
+# For maintainers: the other targets only read the lock files. Needs `uv` (pip install uv).
+COMPILE := uv pip compile --quiet --universal --python-version 3.10 --no-annotate \
+           --no-emit-package nanorocks-ros --custom-compile-command 'make lock' setup.cfg
+lock: ## Renew the lock files in requirements/ (needs uv)
+	@$(COMPILE) --upgrade --extra dev --extra ros --output-file requirements/wheels.txt
+	@echo "numpy < 2; python_version < '3.13'" | $(COMPILE) --upgrade --extra dev \
+	    --constraints - --output-file requirements/jazzy.txt
+	@$(COMPILE) --upgrade --extra test --resolution lowest-direct \
+	    --output-file requirements/oldest.txt
+
+clean: ## Remove the environments, builds and caches
+	@rm -rf .venv .venv-jazzy $(OLDEST) build install log ./*.egg-info \
+	    .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

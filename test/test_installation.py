@@ -1,0 +1,122 @@
+"""What an installation puts where ROS 2 and Python look for it."""
+
+import ast
+import importlib.metadata
+import os
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+import nanorocks_ros
+
+ROOT = Path(__file__).resolve().parent.parent
+EXECUTABLES = sorted(path.name for path in (ROOT / 'scripts').iterdir())
+LAUNCH_FILES = sorted((ROOT / 'launch').glob('*.xml'))
+# Run by a Python that sees the installation, and not the source tree, on its path.
+READ_PACKAGE_DATA = """
+from importlib import resources
+import nanorocks_ros
+from nanorocks_ros.records import CorEstimate
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.wire.layouts import layout
+
+print(nanorocks_ros.__file__)
+print(len(load_trays()), layout(CorEstimate).fields[0].name)
+"""
+
+
+def installed_prefix(monkeypatch):
+    """Where the index of ROS finds the package, as `ros2 run` asks for it."""
+    packages = pytest.importorskip('ament_index_python.packages', reason='there is no ROS here')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', sys.prefix)
+    return Path(packages.get_package_prefix('nanorocks_ros'))
+
+
+@pytest.mark.parametrize('name', EXECUTABLES)
+def test_ros2_run_finds_the_executable(monkeypatch, name):
+    path = installed_prefix(monkeypatch) / 'lib' / 'nanorocks_ros' / name
+    assert path.is_file()
+    assert os.access(path, os.X_OK)
+    assert path.read_text() == (ROOT / 'scripts' / name).read_text()
+
+
+def test_every_node_is_an_executable():
+    tree = ast.parse((ROOT / 'nanorocks_ros' / 'nodes' / '_run.py').read_text())
+    (nodes,) = (
+        ast.literal_eval(statement.value)
+        for statement in tree.body
+        if isinstance(statement, ast.Assign) and statement.targets[0].id == 'NODES'
+    )
+    assert sorted(nodes) == EXECUTABLES
+
+
+@pytest.mark.parametrize('name', EXECUTABLES)
+def test_an_executable_runs_the_node_of_its_name(name):
+    text = (ROOT / 'scripts' / name).read_text()
+    assert text.startswith('#!/usr/bin/env python3\n')
+    assert f"run('{name}')" in text
+
+
+def test_shared_files_are_installed_as_files(monkeypatch):
+    share = installed_prefix(monkeypatch) / 'share' / 'nanorocks_ros'
+    sources = [ROOT / 'package.xml', *(ROOT / 'config').iterdir(), *LAUNCH_FILES]
+    for source in sources:
+        installed = share / source.relative_to(ROOT)
+        assert not installed.is_symlink()
+        assert installed.read_bytes() == source.read_bytes()
+
+
+def test_the_only_command_is_nanorocks():
+    scripts = importlib.metadata.distribution('nanorocks_ros').entry_points
+    assert [script.name for script in scripts.select(group='console_scripts')] == ['nanorocks']
+
+
+def test_the_version_is_the_same_everywhere():
+    versions = {
+        'distribution': importlib.metadata.version('nanorocks_ros'),
+        'CITATION.cff': re.search(
+            r'^version: (.+)$', (ROOT / 'CITATION.cff').read_text(), re.MULTILINE
+        ).group(1),
+    }
+    for path in ('package.xml', 'msg_defs/nanorocks_msgs/package.xml'):
+        versions[path] = ElementTree.parse(ROOT / path).findtext('version')
+    assert versions == dict.fromkeys(versions, nanorocks_ros.__version__)
+
+
+@pytest.mark.parametrize('path', LAUNCH_FILES, ids=lambda path: path.name)
+def test_a_launch_file_names_what_there_is(path):
+    launch = ElementTree.parse(path).getroot()
+    arguments = {argument.get('name') for argument in launch.iter('arg')}
+    used = re.findall(r'\$\(var (\w+)\)', path.read_text())
+    assert set(used) == arguments
+    nodes = list(launch.iter('node'))
+    assert nodes
+    assert {node.get('exec') for node in nodes} <= set(EXECUTABLES)
+    assert {node.get('pkg') for node in nodes} == {'nanorocks_ros'}
+    for shared in re.findall(r'\$\(find-pkg-share nanorocks_ros\)/([\w./]+)', path.read_text()):
+        assert (ROOT / shared).is_file()
+
+
+def test_a_plain_installation_holds_its_package_data(source_copy, tmp_path):
+    pip = [sys.executable, '-m', 'pip', '--disable-pip-version-check', 'install', '--no-deps']
+    options = ['--no-build-isolation', '--no-index', '--prefix', tmp_path, source_copy]
+    subprocess.run([*pip, *options], check=True, capture_output=True, timeout=300)
+    (packages,) = tmp_path.glob('lib/python3*/site-packages')
+    result = subprocess.run(
+        [sys.executable, '-c', READ_PACKAGE_DATA],
+        cwd=tmp_path,
+        env={**os.environ, 'PYTHONPATH': str(packages)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert result.returncode == 0, result.stderr
+    module, data = result.stdout.splitlines()
+    assert Path(module).is_relative_to(packages)
+    assert data == '8 time'
+    for name in EXECUTABLES:
+        assert os.access(tmp_path / 'lib' / 'nanorocks_ros' / name, os.X_OK)
