@@ -1,0 +1,343 @@
+"""Every number a user may change: one frozen dataclass per stage, one field per number.
+
+A field yields the ROS parameter with its range, the command-line flag and the row in the
+documentation. Nothing else holds a default.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from nanorocks_ros.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+Scalar = bool | int | float | str
+Value = Scalar | tuple[int, ...] | tuple[float, ...]
+SettingsType = TypeVar('SettingsType')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """What a setting may be: a closed range, or a list of names."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    choices: tuple[str, ...] = ()
+
+
+def _setting(default: Value, doc: str, unit: str = '', **bounds: Any) -> Any:
+    return field(default=default, metadata={'doc': doc, 'unit': unit, 'bounds': Bounds(**bounds)})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PreprocessSettings:
+    """From the camera's frame to the gray crop of each tray."""
+
+    regions_px: tuple[int, ...] = _setting(
+        (),
+        'x, y, width, height of each tray in the frame, in the order of `trays`; '
+        'empty: one tray, centred',
+        'px',
+        low=0,
+    )
+    pixels_per_metre: float = _setting(
+        13500.0, 'scale of the picture', 'px/m', low=100.0, high=1e6
+    )
+    gray_mix: tuple[float, ...] = _setting(
+        (0.45, 0.45, 0.10), 'weights of blue, green and red in the gray mix', low=0.0, high=1.0
+    )
+    late_tolerance: float = _setting(
+        1.0,
+        'a frame late by less is dropped, by more means a loop or a seek and resets the stages',
+        's',
+        low=0.0,
+        high=60.0,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedSettings:
+    """From gray crops to the mean projected speed."""
+
+    method: str = _setting(
+        'structure_function',
+        'how the speed is measured',
+        choices=('structure_function', 'binarised_area'),
+    )
+    interval: float = _setting(0.1, 'time between two estimates', 's', low=0.0, high=10.0)
+    longest_lag_frames: int = _setting(
+        48, 'longest lag of the structure function', 'frames', low=1, high=300
+    )
+    saturation: float = _setting(
+        0.25,
+        'largest structure function used, as a fraction of its plateau',
+        low=0.05,
+        high=0.6,
+    )
+    geometry: str = _setting(
+        'exact',
+        'binarised_area: moving area of a disc, exact or its Taylor form',
+        choices=('exact', 'taylor'),
+    )
+    averaging: str = _setting(
+        'running_mean',
+        'binarised_area: which frames are averaged before the difference',
+        choices=('none', 'running_mean', 'block_mean'),
+    )
+    averaged_frames: int = _setting(
+        10, 'binarised_area: frames averaged', 'frames', low=1, high=100
+    )
+    time_step: str = _setting(
+        'compared',
+        'binarised_area: time between the pictures compared, or one frame as printed',
+        choices=('compared', 'one_frame'),
+    )
+    threshold: float = _setting(
+        5.0, 'binarised_area: threshold in units of the noise', low=0.5, high=50.0
+    )
+    shake_ratio: float = _setting(
+        2.0,
+        'a shaking event is a jump of the motion between two frames by this factor',
+        low=1.1,
+        high=100.0,
+    )
+    shortest_cycle: float = _setting(
+        5.0, 'two shaking events are at least this far apart', 's', low=0.0, high=3600.0
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClusterSettings:
+    """From gray crops to the width of their autocorrelation."""
+
+    interval: float = _setting(0.2, 'time between two autocorrelations', 's', low=0.0, high=60.0)
+    level: float = _setting(
+        0.5, 'level of the autocorrelation whose area is measured', low=0.05, high=0.95
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoolingSettings:
+    """From speeds to the coefficient of restitution."""
+
+    delay: float = _setting(
+        0.5, 'time from the shaking event to the first speed used', 's', low=0.0, high=600.0
+    )
+    duration: float = _setting(
+        20.0,
+        'time from the shaking event to the last speed used',
+        's',
+        low=0.5,
+        high=3600.0,
+    )
+    update_interval: float = _setting(
+        0.5, 'time between two live estimates', 's', low=0.0, high=60.0
+    )
+    fewest_samples: int = _setting(8, 'speeds needed for a fit', low=4, high=10000)
+    probability: float = _setting(0.95, 'probability of the interval', low=0.5, high=0.999)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PipelineSettings:
+    """The settings of the whole data path."""
+
+    trays: tuple[int, ...] = _setting((1,), 'trays to analyse (1 to 8)', low=1, high=8)
+    trays_file: str = _setting('', 'YAML file of trays; empty: the trays that were flown')
+    preprocess: PreprocessSettings = field(default_factory=PreprocessSettings)
+    speed: SpeedSettings = field(default_factory=SpeedSettings)
+    clusters: ClusterSettings = field(default_factory=ClusterSettings)
+    cooling: CoolingSettings = field(default_factory=CoolingSettings)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulationSettings:
+    """A simulated tray and the camera over it."""
+
+    tray: int = _setting(1, 'tray to simulate', low=1, high=8)
+    seed: int = _setting(1, 'seed of everything random', low=0, high=2**31 - 1)
+    restitution: float = _setting(
+        0.89, 'coefficient of restitution between beads', low=0.0, high=1.0
+    )
+    wall_restitution: float = _setting(
+        0.99, 'coefficient of restitution at the walls', low=0.0, high=1.0
+    )
+    mean_speed: float = _setting(
+        0.007, 'mean 3-D speed after a shaking event', 'm/s', low=0.0, high=1.0
+    )
+    first_shake: float = _setting(
+        1.0, 'time of the first shaking event; the beads rest before it', 's', low=0.0, high=3600.0
+    )
+    shake_period: float = _setting(60.0, 'time between shaking events', 's', low=0.1, high=3600.0)
+    frame_rate: float = _setting(30.0, 'frames per second', '1/s', low=0.1, high=1000.0)
+    width_px: int = _setting(1920, 'width of the picture', 'px', low=16, high=8192)
+    height_px: int = _setting(1080, 'height of the picture', 'px', low=16, high=8192)
+    pixels_per_metre: float = _setting(
+        13500.0, 'scale of the picture', 'px/m', low=100.0, high=1e6
+    )
+    noise: float = _setting(
+        2.0, 'standard deviation of the sensor noise', 'gray levels', low=0.0, high=64.0
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraSettings:
+    """Which camera topic a node listens to."""
+
+    transport: str = _setting(
+        'raw',
+        'raw: camera/image_raw, compressed: camera/image_raw/compressed',
+        choices=('raw', 'compressed'),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PacingSettings:
+    """How fast and how long frames are given out."""
+
+    rate: float = _setting(
+        1.0, 'seconds of recording per second; 0: as fast as it goes', low=0.0, high=1000.0
+    )
+    duration: float = _setting(
+        0.0, 'stop after so much of the recording; 0: never', 's', low=0.0, high=1e6
+    )
+    listeners: int = _setting(
+        0, 'subscribers of the camera to wait for before the first frame', low=0, high=100
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BagSettings:
+    """Which bag is played."""
+
+    bag: str = _setting('', 'path of the bag to play')
+    loop: bool = _setting(False, 'start again at the end')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SourceSettings:
+    """Where the frames of the composed pipeline come from."""
+
+    source: str = _setting(
+        'simulator',
+        'where the frames come from',
+        choices=('simulator', 'bag', 'topic'),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SettingRow:
+    """One setting, as the documentation, the ROS parameter and the flag need it."""
+
+    name: str
+    default: Value
+    doc: str
+    unit: str
+    bounds: Bounds
+
+
+def rows(settings: Any, prefix: str = '') -> Iterator[SettingRow]:
+    """Every setting under a dataclass of settings, nested ones with dotted names."""
+    for item in fields(settings):
+        value = getattr(settings, item.name)
+        if is_dataclass(value):
+            yield from rows(value, f'{prefix}{item.name}.')
+        else:
+            yield SettingRow(
+                name=prefix + item.name,
+                default=value,
+                doc=item.metadata['doc'],
+                unit=item.metadata['unit'],
+                bounds=item.metadata['bounds'],
+            )
+
+
+def _number_problem(value: float, bounds: Bounds) -> str | None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return f'{value!r} is not a number'
+    if not math.isfinite(value):
+        return f'{value!r} is not finite'
+    if not bounds.low <= value <= bounds.high:
+        return f'{value!r} is outside [{bounds.low:g}, {bounds.high:g}]'
+    return None
+
+
+def problem(row: SettingRow, value: Any) -> str | None:
+    """Why a value cannot be this setting, or None when it can."""
+    if isinstance(row.default, bool):
+        return None if isinstance(value, bool) else f'{value!r} is neither true nor false'
+    if isinstance(row.default, str):
+        choices = row.bounds.choices
+        if not isinstance(value, str):
+            return f'{value!r} is not a text'
+        if choices and value not in choices:
+            return f'{value!r} is none of {", ".join(choices)}'
+        return None
+    if isinstance(row.default, tuple):
+        if isinstance(value, str):
+            return f'{value!r} is not a list of numbers'
+        found = (_number_problem(item, row.bounds) for item in _listed(value))
+        return next((text for text in found if text), None)
+    if isinstance(row.default, int) and isinstance(value, float) and not value.is_integer():
+        return f'{value!r} is not a whole number'
+    return _number_problem(value, row.bounds)
+
+
+def _listed(value: Any) -> list[Any]:
+    """A list as it is; a single number does for a list of one."""
+    return list(value) if hasattr(value, '__iter__') else [value]
+
+
+def _coerced(row: SettingRow, value: Any) -> Value:
+    if isinstance(row.default, tuple):
+        whole = row.name in {'trays', 'preprocess.regions_px', 'regions_px'}
+        return tuple(int(item) if whole else float(item) for item in _listed(value))
+    kind = type(row.default)
+    return kind(value)
+
+
+def with_values(settings: SettingsType, values: Mapping[str, Any], where: str) -> SettingsType:
+    """The settings with some values replaced, all of them checked.
+
+    Parameters
+    ----------
+    settings : dataclass of settings
+    values : mapping
+        Dotted setting name to new value.
+    where : str
+        What to name in the error: a file, a node, the command line.
+
+    Raises
+    ------
+    ConfigurationError
+        For an unknown name or a value outside its range; every problem is listed.
+    """
+    known = {row.name: row for row in rows(settings)}
+    problems = [f'no setting {name!r}' for name in values if name not in known]
+    for name, value in values.items():
+        text = problem(known[name], value) if name in known else None
+        if text:
+            problems.append(f'{name}: {text}')
+    if problems:
+        raise ConfigurationError(
+            where, '; '.join(problems), 'see docs/parameters.md for names and ranges'
+        )
+    changed: SettingsType = _replaced(
+        settings, {name: _coerced(known[name], value) for name, value in values.items()}
+    )
+    return changed
+
+
+def _replaced(settings: Any, values: Mapping[str, Value]) -> Any:
+    own = {name: value for name, value in values.items() if '.' not in name}
+    for group in {name.split('.', 1)[0] for name in values if '.' in name}:
+        inner = {
+            name.split('.', 1)[1]: value
+            for name, value in values.items()
+            if name.startswith(f'{group}.')
+        }
+        own[group] = _replaced(getattr(settings, group), inner)
+    return replace(settings, **own)

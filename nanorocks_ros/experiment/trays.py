@@ -1,0 +1,289 @@
+"""The sample cells: what lay in which tray ([B19] table 1), checked when loaded."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import yaml
+
+from nanorocks_ros.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+MILLIMETRE = 1e-3
+GRAM = 1e-3
+GRAM_PER_CUBIC_CENTIMETRE = 1e3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Species:
+    """Beads of one material in one tray.
+
+    Parameters
+    ----------
+    material : str
+    diameter_low, diameter_high : float, [m]
+        Ends of the range of diameters; equal when all beads are alike.
+    density : float, [kg/m^3]
+    count : int
+    mass : float or None, [kg]
+        Total mass, where the paper gives that instead of a count.
+    """
+
+    material: str
+    diameter_low: float
+    diameter_high: float
+    density: float
+    count: int
+    mass: float | None = None
+
+    @property
+    def diameter(self) -> float:
+        """Middle of the range of diameters, [m]."""
+        return 0.5 * (self.diameter_low + self.diameter_high)
+
+    @property
+    def bead_mass(self) -> float:
+        """Mass of a bead of the middle diameter, [kg]."""
+        return self.density * math.pi / 6.0 * self.diameter**3
+
+    @property
+    def count_from_mass(self) -> float | None:
+        """Number of beads of the middle diameter that weigh `mass`."""
+        return None if self.mass is None else self.mass / self.bead_mass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tray:
+    """One sample cell.
+
+    Parameters
+    ----------
+    number : int
+    dimensions : tuple of 3 floats, [m]
+        Inner length, width and height; the camera looks along the height.
+    species : tuple of Species
+    chalk : bool
+        Whether the beads were breaded with chalk dust.
+    """
+
+    number: int
+    dimensions: tuple[float, float, float]
+    species: tuple[Species, ...]
+    chalk: bool
+
+    @property
+    def count(self) -> int:
+        """Number of beads of all species."""
+        return sum(one.count for one in self.species)
+
+    @property
+    def volume(self) -> float:
+        """Inner volume, [m^3]."""
+        return math.prod(self.dimensions)
+
+    @property
+    def number_density(self) -> float:
+        """Beads per volume, [1/m^3]."""
+        return self.count / self.volume
+
+    @property
+    def diameter(self) -> float:
+        """Mean bead diameter over all beads, [m]."""
+        return sum(one.count * one.diameter for one in self.species) / self.count
+
+    @property
+    def mean_mass(self) -> float:
+        """Mean mass of a bead, [kg]."""
+        return sum(one.count * one.bead_mass for one in self.species) / self.count
+
+
+def load_trays(path: str | Path | None = None) -> dict[int, Tray]:
+    """The trays of a YAML file, by number; those that were flown when no file is named.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file cannot be read or an entry cannot be used; names the line.
+    """
+    if path is None or str(path) == '':
+        name = 'trays.yaml'
+        text = resources.files(__package__).joinpath(name).read_text(encoding='utf-8')
+    else:
+        name = str(path)
+        text = _read(Path(path))
+    try:
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise ConfigurationError(
+            f'{name}:{line}', f'not YAML: {error.problem}', 'correct this line'
+        ) from error
+    return _TrayFile(name).trays(root)
+
+
+def tray_by_number(trays: Mapping[int, Tray], number: int) -> Tray:
+    """One tray of those loaded.
+
+    Raises
+    ------
+    ConfigurationError
+        When there is no tray of that number.
+    """
+    if number not in trays:
+        known = ', '.join(str(one) for one in sorted(trays))
+        raise ConfigurationError(f'tray {number}', 'does not exist', f'choose one of {known}')
+    return trays[number]
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding='utf-8')
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, 'strerror', None) or 'is not UTF-8 text'
+        raise ConfigurationError(
+            str(path), reason, 'name a readable YAML file of trays'
+        ) from error
+
+
+class _TrayFile:
+    """Reads the composed YAML, in which every node still knows its line."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def trays(self, root: yaml.Node | None) -> dict[int, Tray]:
+        if root is None:
+            raise self._error(None, 'is empty', 'list densities_g_cm3 and trays')
+        top = self._mapping(root, {'densities_g_cm3', 'trays'}, set())
+        densities = {
+            str(key): self._number(value) for key, value in self._pairs(top['densities_g_cm3'])
+        }
+        trays = {}
+        for key, node in self._pairs(top['trays']):
+            number = self._tray_number(key, node)
+            trays[number] = self._tray(number, node, densities)
+        if not trays:
+            raise self._error(top['trays'], 'lists no tray', 'add at least one')
+        return trays
+
+    def _tray_number(self, key: object, node: yaml.Node) -> int:
+        if isinstance(key, bool) or not isinstance(key, int) or key < 1:
+            raise self._error(node, f'tray number {key!r}', 'number the trays 1, 2, ...')
+        return key
+
+    def _tray(self, number: int, node: yaml.Node, densities: Mapping[str, float]) -> Tray:
+        entry = self._mapping(node, {'dimensions_mm', 'species'}, {'chalk'})
+        sides = self._numbers(entry['dimensions_mm'])
+        if len(sides) != 3:
+            raise self._error(
+                entry['dimensions_mm'], f'{len(sides)} dimensions', 'give length, width, height'
+            )
+        if not isinstance(entry['species'], yaml.SequenceNode) or not entry['species'].value:
+            raise self._error(entry['species'], 'species is no list', 'list at least one')
+        species = tuple(self._species(one, densities) for one in entry['species'].value)
+        for node_one, one in zip(entry['species'].value, species, strict=True):
+            if one.diameter_high > min(sides) * MILLIMETRE * (1.0 + 1e-12):
+                raise self._error(
+                    node_one,
+                    f'beads of {one.diameter_high / MILLIMETRE:g} mm in a tray of '
+                    f'{min(sides):g} mm',
+                    'correct the diameter or the dimensions',
+                )
+        return Tray(
+            number=number,
+            dimensions=(sides[0] * MILLIMETRE, sides[1] * MILLIMETRE, sides[2] * MILLIMETRE),
+            species=species,
+            chalk=self._flag(entry.get('chalk')),
+        )
+
+    def _species(self, node: yaml.Node, densities: Mapping[str, float]) -> Species:
+        entry = self._mapping(node, {'material', 'diameter_mm', 'count'}, {'mass_g'})
+        material = str(self._scalar(entry['material']))
+        if material not in densities:
+            known = ', '.join(sorted(densities))
+            raise self._error(
+                entry['material'],
+                f'no density for {material!r} (known: {known})',
+                'add it to densities_g_cm3',
+            )
+        diameters = self._numbers(entry['diameter_mm'])
+        if len(diameters) > 2 or diameters[0] > diameters[-1]:
+            raise self._error(
+                entry['diameter_mm'], f'diameter {diameters}', 'give one, or the lower and upper'
+            )
+        mass = entry.get('mass_g')
+        return Species(
+            material=material,
+            diameter_low=diameters[0] * MILLIMETRE,
+            diameter_high=diameters[-1] * MILLIMETRE,
+            density=densities[material] * GRAM_PER_CUBIC_CENTIMETRE,
+            count=self._count(entry['count']),
+            mass=None if mass is None else self._number(mass) * GRAM,
+        )
+
+    def _error(self, node: yaml.Node | None, what: str, do: str) -> ConfigurationError:
+        where = self._name if node is None else f'{self._name}:{node.start_mark.line + 1}'
+        return ConfigurationError(where, what, do)
+
+    def _pairs(self, node: yaml.Node) -> list[tuple[object, yaml.Node]]:
+        if not isinstance(node, yaml.MappingNode):
+            raise self._error(node, 'expected "name: value" entries', 'correct this line')
+        seen: set[object] = set()
+        pairs = []
+        for key_node, value in node.value:
+            key = self._scalar(key_node)
+            if key in seen:
+                raise self._error(key_node, f'{key!r} stands twice', 'remove one')
+            seen.add(key)
+            pairs.append((key, value))
+        return pairs
+
+    def _mapping(
+        self, node: yaml.Node, needed: set[str], allowed: set[str]
+    ) -> dict[str, yaml.Node]:
+        entry = {str(key): value for key, value in self._pairs(node)}
+        missing = sorted(needed - set(entry))
+        unknown = sorted(set(entry) - needed - allowed)
+        if missing:
+            raise self._error(node, f'lacks {", ".join(missing)}', 'add it')
+        if unknown:
+            names = ', '.join(sorted(needed | allowed))
+            raise self._error(entry[unknown[0]], f'unknown entry {unknown[0]!r}', f'use {names}')
+        return entry
+
+    def _scalar(self, node: yaml.Node) -> object:
+        if not isinstance(node, yaml.ScalarNode):
+            raise self._error(node, 'expected a single value', 'correct this line')
+        return yaml.safe_load(node.value) if node.style is None else node.value
+
+    def _number(self, node: yaml.Node) -> float:
+        value = self._scalar(node)
+        usable = isinstance(value, int | float) and not isinstance(value, bool)
+        if not usable or not math.isfinite(value) or value <= 0:  # type: ignore[arg-type,operator]
+            raise self._error(node, f'{value!r} is no positive number', 'correct this value')
+        return float(value)  # type: ignore[arg-type]
+
+    def _numbers(self, node: yaml.Node) -> list[float]:
+        if isinstance(node, yaml.SequenceNode) and node.value:
+            return [self._number(one) for one in node.value]
+        return [self._number(node)]
+
+    def _count(self, node: yaml.Node) -> int:
+        value = self._number(node)
+        if not value.is_integer():
+            raise self._error(node, f'count {value:g} is no whole number', 'correct it')
+        return int(value)
+
+    def _flag(self, node: yaml.Node | None) -> bool:
+        if node is None:
+            return False
+        value = self._scalar(node)
+        if not isinstance(value, bool):
+            raise self._error(node, f'chalk is {value!r}', 'say true or false')
+        return value

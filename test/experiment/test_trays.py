@@ -1,0 +1,133 @@
+"""The trays that were flown, and files that cannot be used."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+
+PAPER = json.loads((Path(__file__).parents[1] / 'paper_values.json').read_text())
+
+GOOD = """\
+densities_g_cm3: {acrylic: 1.18}
+trays:
+  1:
+    dimensions_mm: [15, 15, 3]
+    species:
+      - {material: acrylic, diameter_mm: 2, count: 15}
+"""
+
+
+@pytest.mark.parametrize('number', range(1, 9))
+def test_a_tray_is_as_table_1_of_the_paper_says(number):
+    tray = load_trays()[number]
+    printed = PAPER['table1_trays'][str(number)]
+    assert [1e3 * side for side in tray.dimensions] == pytest.approx(printed['dims_mm'])
+    assert tray.chalk == printed.get('chalk', False)
+    assert len(tray.species) == len(printed['species'])
+    for one, expected in zip(tray.species, printed['species'], strict=True):
+        diameters = expected['d_mm']
+        low, high = diameters if isinstance(diameters, list) else (diameters, diameters)
+        assert one.material == expected['material']
+        assert (one.diameter_low, one.diameter_high) == pytest.approx((1e-3 * low, 1e-3 * high))
+        if 'N' in expected:
+            assert one.count == expected['N']
+        else:
+            assert one.mass == pytest.approx(1e-3 * expected['mass_g'])
+
+
+def test_densities_are_those_of_the_paper():
+    found = {one.material: one.density for tray in load_trays().values() for one in tray.species}
+    for material, density in PAPER['densities_g_cm3'].items():
+        if material != 'where':
+            assert found[material] == pytest.approx(1e3 * density)
+
+
+@pytest.mark.parametrize('number', [6, 7, 8])
+def test_jsc1_counts_follow_from_table_3(number):
+    tray = load_trays()[number]
+    clusters, size, _, percent = PAPER['table3_clusters']['rows'][str(number)]
+    counted = sum(one.count for one in tray.species if one.mass is None)
+    grains = tray.count - counted
+    assert grains == pytest.approx(100 * clusters * size / percent - counted, abs=1.0)
+
+
+@pytest.mark.parametrize('number', [6, 7, 8])
+def test_jsc1_counts_from_mass_are_kept_beside_them_and_agree_within_a_third(number):
+    one = load_trays()[number].species[-1]
+    by_mass = one.mass / (one.density * math.pi / 6 * (0.75e-3) ** 3)
+    assert one.count_from_mass == pytest.approx(by_mass)
+    assert 0.66 < one.count_from_mass / one.count < 1.33
+
+
+def test_derived_quantities_of_tray_1_are_those_of_the_worked_example():
+    tray = load_trays()[1]
+    expected = PAPER['worked_example_tray1']['recomputed']
+    assert tray.number_density == pytest.approx(expected['n_m3'])
+    assert 1e6 * tray.mean_mass == pytest.approx(expected['m_mg_from_density'])
+
+
+def test_a_good_file_of_ones_own_is_read(tmp_path):
+    path = tmp_path / 'mine.yaml'
+    path.write_text(GOOD)
+    assert load_trays(path)[1].count == 15
+
+
+def test_a_tray_that_does_not_exist_is_named_with_those_that_do():
+    with pytest.raises(ConfigurationError, match=r'tray 9: does not exist; choose one of 1, 2, 3'):
+        tray_by_number(load_trays(), 9)
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'message'),
+    [
+        ('count: 15', 'count: 0', r':6: 0 is no positive number'),
+        ('count: 15', 'count: 1.5', r':6: count 1.5 is no whole number'),
+        ('count: 15', 'count: many', r":6: 'many' is no positive number"),
+        ('diameter_mm: 2', 'diameter_mm: .nan', r':6: nan is no positive number'),
+        ('diameter_mm: 2', 'diameter_mm: -2', r':6: -2 is no positive number'),
+        ('diameter_mm: 2', 'diameter_mm: 4', r':6: beads of 4 mm in a tray of 3 mm'),
+        ('diameter_mm: 2', 'diameter_mm: [2, 1]', r':6: diameter \[2.0, 1.0\]'),
+        ('material: acrylic', 'material: lead', r":6: no density for 'lead' \(known: acrylic\)"),
+        (', count: 15', '', r':6: lacks count; add it'),
+        ('count: 15', 'count: 15, colour: red', r":6: unknown entry 'colour'; use count"),
+        ('[15, 15, 3]', '[15, 15]', r':4: 2 dimensions; give length, width, height'),
+        ('  1:', '  one:', r":4: tray number 'one'; number the trays"),
+        ('trays:', 'trays: [', r':\d+: not YAML'),
+        ('species:', 'species: none', r':\d+: (not YAML|species is no list)'),
+    ],
+)
+def test_a_bad_file_is_refused_with_the_line_and_the_remedy(tmp_path, old, new, message):
+    path = tmp_path / 'bad.yaml'
+    assert old in GOOD
+    path.write_text(GOOD.replace(old, new, 1))
+    with pytest.raises(ConfigurationError, match=message) as caught:
+        load_trays(path)
+    assert str(caught.value).startswith(str(path))
+    assert '; ' in str(caught.value)
+    assert '\n' not in str(caught.value)
+
+
+@pytest.mark.parametrize('text', ['', '# nothing\n', '- 1\n', 'trays: {}\n'])
+def test_a_file_of_another_form_is_refused(tmp_path, text):
+    path = tmp_path / 'other.yaml'
+    path.write_text(text)
+    with pytest.raises(ConfigurationError, match=str(path)):
+        load_trays(path)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(ConfigurationError, match=r'none\.yaml: No such file'):
+        load_trays(tmp_path / 'none.yaml')
+
+
+def test_a_tray_listed_twice_is_refused(tmp_path):
+    path = tmp_path / 'twice.yaml'
+    path.write_text(GOOD + GOOD.split('trays:\n')[1])
+    with pytest.raises(ConfigurationError, match='1 stands twice; remove one'):
+        load_trays(path)
