@@ -1,0 +1,246 @@
+"""What passes between the stages: frozen values, SI units, one integer time stamp each.
+
+Estimates carry ``_error``, one standard error. NaN means "not known yet", never 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+UNKNOWN = float('nan')
+
+
+class SpeedMethod(IntEnum):
+    """How a mean projected speed was measured (the constants of ``SpeedEstimate.msg``)."""
+
+    STRUCTURE_FUNCTION = 1
+    BINARISED_AREA = 2
+
+
+class CorStatus(IntEnum):
+    """Where the fit of a cycle stands (the constants of ``CorEstimate.msg``)."""
+
+    COOLING = 1
+    FINAL = 2
+    NO_DECAY = 3
+
+
+class CorRelation(IntEnum):
+    """Which relation turned a decay into a restitution (constants of ``CorEstimate.msg``)."""
+
+    PAPER = 1
+
+
+def _freeze_arrays(record: Any) -> None:
+    for field in fields(record):
+        value = getattr(record, field.name)
+        if isinstance(value, np.ndarray) and value.flags.writeable:
+            view = value.view()
+            view.flags.writeable = False
+            object.__setattr__(record, field.name, view)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """One picture of the whole scene, as the camera gave it.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Instant of exposure, [ns].
+    encoding : str
+        ``bgr8``, ``rgb8`` or ``mono8``.
+    image : ndarray of uint8, (height, width, 3) or (height, width)
+    """
+
+    stamp_ns: int
+    encoding: str
+    image: NDArray[np.uint8]
+
+    def __post_init__(self) -> None:
+        _freeze_arrays(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrayImage:
+    """The crop of one tray, in colour where the camera gives it, and its gray mix.
+
+    Parameters
+    ----------
+    stamp_ns : int
+    tray : int
+    gray : ndarray of uint8, (rows, columns)
+    color : ndarray of uint8, (rows, columns, 3), bgr, or None for a gray camera
+    """
+
+    stamp_ns: int
+    tray: int
+    gray: NDArray[np.uint8]
+    color: NDArray[np.uint8] | None = None
+
+    def __post_init__(self) -> None:
+        _freeze_arrays(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionMask:
+    """Where something moved: 255 in moving pixels, 0 elsewhere ([B19] fig. 4d)."""
+
+    stamp_ns: int
+    tray: int
+    mask: NDArray[np.uint8]
+
+    def __post_init__(self) -> None:
+        _freeze_arrays(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedEstimate:
+    """Mean projected speed of the beads of one tray over one window.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Middle of the window.
+    tray, cycle : int
+        ``cycle`` counts the shaking events seen so far; 0 before the first.
+    mean_projected_speed, mean_projected_speed_error : float, [m/s]
+    window : float, [s]
+        Time between the two pictures compared.
+    method : SpeedMethod
+    cycle_start_ns : int or None
+        The shaking event that opened the cycle; None before the first.
+    """
+
+    stamp_ns: int
+    tray: int
+    cycle: int
+    cycle_start_ns: int | None
+    mean_projected_speed: float
+    mean_projected_speed_error: float
+    window: float
+    method: SpeedMethod
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClusterEstimate:
+    """Width of the autocorrelation of one tray image, and what it says of clusters.
+
+    Parameters
+    ----------
+    stamp_ns : int
+    tray, cycle : int
+    level_area : float, [m^2]
+        Area where the normalised autocorrelation exceeds the chosen level.
+    correlation_length : float, [m]
+        Radius of the disc of that area.
+    """
+
+    stamp_ns: int
+    tray: int
+    cycle: int
+    level_area: float
+    correlation_length: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Autocorrelation:
+    """Normalised autocorrelation of a tray image, zero lag in the centre.
+
+    Parameters
+    ----------
+    values : ndarray of float32, (rows, columns)
+        1 at zero lag.
+    """
+
+    stamp_ns: int
+    tray: int
+    values: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        _freeze_arrays(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CorEstimate:
+    """Coefficient of restitution of the collisions in one tray, with its interval.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Last speed used.
+    tray, cycle : int
+    status : CorStatus
+    relation : CorRelation
+        What turned the decay into a restitution.
+    restitution, restitution_lower, restitution_upper : float, 0 to 1
+        Estimate and interval; statistical only for ``CorRelation.PAPER``.
+    initial_speed, initial_speed_error : float, [m/s]
+        Mean projected speed at the shaking event, from the fit.
+    haff_time, haff_time_error : float, [s]
+    reduced_chi_square : float
+        Of the fit, with the errors of the speeds themselves.
+    samples : int
+        Speeds in the cooling window.
+    mean_restitution, mean_restitution_error : float
+        Running mean over the cycles finished so far and its standard error.
+    """
+
+    stamp_ns: int
+    tray: int
+    cycle: int
+    status: CorStatus
+    relation: CorRelation
+    restitution: float = UNKNOWN
+    restitution_lower: float = UNKNOWN
+    restitution_upper: float = UNKNOWN
+    initial_speed: float = UNKNOWN
+    initial_speed_error: float = UNKNOWN
+    haff_time: float = UNKNOWN
+    haff_time_error: float = UNKNOWN
+    reduced_chi_square: float = UNKNOWN
+    samples: int = 0
+    mean_restitution: float = UNKNOWN
+    mean_restitution_error: float = UNKNOWN
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroundTruth:
+    """What the simulator knows of the frame it drew.
+
+    Parameters
+    ----------
+    stamp_ns : int
+    tray, cycle : int
+    mean_projected_speed, mean_speed : float, [m/s]
+    bodies : int
+        Free bodies: beads and aggregates.
+    restitution, wall_restitution : float
+    sticking_speed : float, [m/s]
+        0 when nothing sticks.
+    """
+
+    stamp_ns: int
+    tray: int
+    cycle: int
+    mean_projected_speed: float
+    mean_speed: float
+    bodies: int
+    restitution: float
+    wall_restitution: float
+    sticking_speed: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Notice:
+    """Something the user should hear about, which is not an error."""
+
+    stamp_ns: int
+    text: str

@@ -1,0 +1,165 @@
+"""Records to arrays and back. The layouts are read from ``msg_defs``, nowhere written twice."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from functools import cache
+from importlib import resources
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from nanorocks_ros.errors import FrameError
+from nanorocks_ros.records import (
+    ClusterEstimate,
+    CorEstimate,
+    CorRelation,
+    CorStatus,
+    GroundTruth,
+    SpeedEstimate,
+    SpeedMethod,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+NS = 1_000_000_000
+ArrayRecord = SpeedEstimate | ClusterEstimate | CorEstimate | GroundTruth
+RecordType = TypeVar('RecordType', SpeedEstimate, ClusterEstimate, CorEstimate, GroundTruth)
+
+_ENUMERATIONS = {'method': SpeedMethod, 'status': CorStatus, 'relation': CorRelation}
+_COUNTS = frozenset({'cycle', 'samples', 'bodies'})
+# Fields of the array that a record keeps as an integer stamp.
+_STAMPS = {'time': 'stamp_ns', 'cycle_start': 'cycle_start_ns'}
+_FIELD = re.compile(r'^float32\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
+_CONSTANT = re.compile(r'^float32\s+([A-Z]\w*)\s*=\s*(\d+)$')
+
+
+class LayoutField(NamedTuple):
+    """One element of an array: its name, unit and meaning."""
+
+    name: str
+    unit: str
+    doc: str
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """What the elements of one kind of array are.
+
+    Parameters
+    ----------
+    name : str
+        Of the record and of the message definition.
+    doc : str
+        First sentence of the definition.
+    fields : tuple of LayoutField
+    constants : dict of str to int
+    """
+
+    name: str
+    doc: str
+    fields: tuple[LayoutField, ...]
+    constants: dict[str, int]
+
+    @property
+    def label(self) -> str:
+        """Comma-separated field names: ``layout.dim[0].label`` of the array."""
+        return ','.join(field.name for field in self.fields)
+
+
+def layout(record_type: type[ArrayRecord]) -> Layout:
+    """The layout of a record, from its message definition."""
+    return _layout(record_type.__name__)
+
+
+@cache
+def _layout(name: str) -> Layout:
+    text = resources.files(__package__).joinpath('msg', f'{name}.msg').read_text('utf-8')
+    lines = [line.strip() for line in text.splitlines()]
+    fields = [LayoutField(*match.groups()) for line in lines if (match := _FIELD.match(line))]
+    constants = [match.groups() for line in lines if (match := _CONSTANT.match(line))]
+    return Layout(
+        name=name,
+        doc=lines[0].removeprefix('# '),
+        fields=tuple(fields),
+        constants={key: int(value) for key, value in constants},
+    )
+
+
+def to_array(record: ArrayRecord, epoch_ns: int) -> NDArray[np.float32]:
+    """The elements of a record in the order of its layout.
+
+    Parameters
+    ----------
+    record : SpeedEstimate, ClusterEstimate, CorEstimate or GroundTruth
+    epoch_ns : int, [ns]
+        What `time` counts from.
+
+    Returns
+    -------
+    ndarray of float32, (n_fields,)
+        NaN where a value is not known.
+    """
+    values = [_element(record, field.name, epoch_ns) for field in layout(type(record)).fields]
+    return np.array(values, dtype=np.float32)
+
+
+def _element(record: ArrayRecord, name: str, epoch_ns: int) -> float:
+    value = getattr(record, _STAMPS.get(name, name))
+    if value is None:
+        return math.nan
+    return (value - epoch_ns) / NS if name in _STAMPS else float(value)
+
+
+def from_array(
+    record_type: type[RecordType],
+    values: Sequence[float] | NDArray[np.float32],
+    *,
+    tray: int,
+    epoch_ns: int,
+    where: str,
+) -> RecordType:
+    """The record behind an array.
+
+    Parameters
+    ----------
+    record_type : type
+    values : sequence of float
+    tray : int
+        From the topic name.
+    epoch_ns : int, [ns]
+    where : str
+        The topic, for the error.
+
+    Raises
+    ------
+    FrameError
+        When the number of elements is not that of the layout or a stamp is missing.
+    """
+    fields = layout(record_type).fields
+    if len(values) != len(fields):
+        raise FrameError(
+            where,
+            f'{len(values)} elements where {record_type.__name__} has {len(fields)}',
+            'use the same release of nanorocks_ros on both sides',
+        )
+    if not math.isfinite(values[0]):
+        raise FrameError(where, f'time is {values[0]}', 'publish the time in element 0')
+    items: dict[str, Any] = {'tray': tray}
+    for field, value in zip(fields, values, strict=True):
+        name = _STAMPS.get(field.name, field.name)
+        items[name] = _value(field.name, float(value), epoch_ns)
+    return record_type(**items)
+
+
+def _value(name: str, value: float, epoch_ns: int) -> object:
+    if name in _STAMPS:
+        return epoch_ns + round(value * NS) if math.isfinite(value) else None
+    if name in _COUNTS:
+        return int(value)
+    return _ENUMERATIONS[name](int(value)) if name in _ENUMERATIONS else value

@@ -1,0 +1,125 @@
+"""Records and arrays: one layout, read from the message definitions."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.typesys import get_types_from_msg
+
+from nanorocks_ros.errors import FrameError
+from nanorocks_ros.records import (
+    ClusterEstimate,
+    CorEstimate,
+    CorRelation,
+    CorStatus,
+    GroundTruth,
+    SpeedEstimate,
+    SpeedMethod,
+)
+from nanorocks_ros.wire.layouts import from_array, layout, to_array
+
+DEFINITIONS = Path(__file__).parents[2] / 'msg_defs' / 'nanorocks_msgs' / 'msg'
+EPOCH = 1_700_000_000_000_000_000
+
+RECORDS = (
+    SpeedEstimate(
+        stamp_ns=EPOCH + 2_500_000_000,
+        tray=3,
+        cycle=2,
+        cycle_start_ns=EPOCH + 1_000_000_000,
+        mean_projected_speed=4.5e-3,
+        mean_projected_speed_error=1e-4,
+        window=0.2,
+        method=SpeedMethod.BINARISED_AREA,
+    ),
+    ClusterEstimate(stamp_ns=EPOCH + 1, tray=1, cycle=0, level_area=2e-6, correlation_length=8e-4),
+    CorEstimate(
+        stamp_ns=EPOCH,
+        tray=1,
+        cycle=1,
+        status=CorStatus.FINAL,
+        relation=CorRelation.PAPER,
+        restitution=0.9,
+        samples=120,
+    ),
+    GroundTruth(
+        stamp_ns=EPOCH + 10**9,
+        tray=8,
+        cycle=1,
+        mean_projected_speed=1e-3,
+        mean_speed=1.2e-3,
+        bodies=15,
+        restitution=0.89,
+        wall_restitution=0.99,
+        sticking_speed=0.0,
+    ),
+)
+
+
+@pytest.mark.parametrize('record', RECORDS, ids=lambda one: type(one).__name__)
+def test_a_record_comes_back_from_its_array_to_float32_rounding(record):
+    values = to_array(record, EPOCH)
+    assert values.dtype == np.float32
+    back = from_array(type(record), values, tray=record.tray, epoch_ns=EPOCH, where='test')
+    for field in dataclasses.fields(record):
+        before, after = getattr(record, field.name), getattr(back, field.name)
+        assert type(after) is type(before)
+        if isinstance(before, float):
+            assert after == pytest.approx(before, rel=2**-23, nan_ok=True)
+        else:
+            assert after == pytest.approx(before, abs=200)
+
+
+@pytest.mark.parametrize('record', RECORDS, ids=lambda one: type(one).__name__)
+def test_the_layout_is_the_message_definition_as_an_independent_parser_reads_it(record):
+    name = type(record).__name__
+    text = (DEFINITIONS / f'{name}.msg').read_text()
+    parsed = get_types_from_msg(text, f'nanorocks_msgs/msg/{name}')
+    constants, fields = parsed[f'nanorocks_msgs/msg/{name}']
+    one = layout(type(record))
+    assert [field.name for field in one.fields] == [field for field, _ in fields]
+    assert one.label == ','.join(field for field, _ in fields)
+    assert one.constants == {key: int(value) for key, _, value in constants}
+    assert all(field.unit and field.doc for field in one.fields)
+
+
+@pytest.mark.parametrize('record', RECORDS, ids=lambda one: type(one).__name__)
+def test_every_array_starts_with_time_and_cycle_and_holds_the_whole_record(record):
+    names = [field.name for field in layout(type(record)).fields]
+    assert names[:2] == ['time', 'cycle']
+    expected = {field.name for field in dataclasses.fields(record)} - {'tray'}
+    renamed = {'stamp_ns': 'time', 'cycle_start_ns': 'cycle_start'}
+    assert set(names) == {renamed.get(name, name) for name in expected}
+
+
+@pytest.mark.parametrize(
+    ('record_type', 'enumerations'),
+    [(SpeedEstimate, (SpeedMethod,)), (CorEstimate, (CorStatus, CorRelation))],
+)
+def test_the_constants_are_those_of_the_code(record_type, enumerations):
+    expected = {one.name: one.value for kind in enumerations for one in kind}
+    assert layout(record_type).constants == expected
+
+
+def test_not_known_is_nan_and_never_zero():
+    values = to_array(RECORDS[2], EPOCH)
+    names = [field.name for field in layout(CorEstimate).fields]
+    assert math.isnan(values[names.index('haff_time')])
+    before_the_first = dataclasses.replace(RECORDS[0], cycle_start_ns=None)
+    assert math.isnan(to_array(before_the_first, EPOCH)[2])
+
+
+def test_an_array_of_another_release_is_refused():
+    with pytest.raises(FrameError, match=r'/speed: 3 elements where SpeedEstimate has 7; use the'):
+        from_array(SpeedEstimate, [1.0, 2.0, 3.0], tray=1, epoch_ns=0, where='/speed')
+
+
+def test_an_array_without_a_time_is_refused():
+    values = to_array(RECORDS[0], EPOCH)
+    values[0] = math.nan
+    with pytest.raises(FrameError, match='time is nan'):
+        from_array(SpeedEstimate, values, tray=1, epoch_ns=EPOCH, where='/speed')
