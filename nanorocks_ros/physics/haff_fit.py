@@ -1,0 +1,251 @@
+"""Fit of Haff's law to measured mean speeds, with an interval that means what it says.
+
+A gas of a few beads does not follow the mean decay: each collision takes a random share of
+the energy, and what one collision took is missing for ever after. Linearising
+dv/dt = -v^2 / (v0 tau) about its solution, a deviation of ln v dies out as 1 / (1 + t/tau)
+while collisions keep adding to it at a constant rate per unit of s = ln(1 + t/tau): an
+Ornstein-Uhlenbeck process in s, that starts from zero because v0 is free,
+
+    cov[s, s'] = q/2 (exp(-|s - s'|) - exp(-(s + s'))).
+
+Its strength q, and a scale of the errors given, are estimated with v0 and tau by maximum
+likelihood. Taking the residuals for independent would make the interval several times too narrow.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg, optimize
+
+from nanorocks_ros.errors import FitError
+from nanorocks_ros.physics.haff import haff_speed
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# A dense covariance of more points than this costs time and tells nothing new.
+_POINTS = 60
+# A Haff time of so many windows is no decay that could be told from none.
+_LONGEST_HAFF_TIME = 30.0
+_FEWEST_DEGREES = 3.0
+_LOG_HAFF_TIME = (math.log(1e-3), math.log(1e5))
+# Spread of ln v per unit of s: from a gas of 10^5 beads to one that hardly is a gas.
+_LOG_STRENGTH = (math.log(1e-6), math.log(1.0))
+# The errors given are trusted in proportion only.
+_LOG_SCALE = (math.log(0.05), math.log(20.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HaffFit:
+    """Parameters of Haff's law and their errors.
+
+    Parameters
+    ----------
+    initial_speed, initial_speed_error : float, [m/s]
+    haff_time, haff_time_error : float, [s]
+    decay_rate : float, [1/m]
+        1 / (v0 tau), which is what a restitution is read from.
+    log_decay_rate_error : float
+        One standard error of its logarithm.
+    degrees_of_freedom : float
+        Of Student's distribution that this error belongs to.
+    reduced_chi_square : float
+        With the errors of the speeds alone; above 1 where the gas itself fluctuates.
+    samples : int
+    """
+
+    initial_speed: float
+    initial_speed_error: float
+    haff_time: float
+    haff_time_error: float
+    decay_rate: float
+    log_decay_rate_error: float
+    degrees_of_freedom: float
+    reduced_chi_square: float
+    samples: int
+
+
+def fit_haff(
+    time: NDArray[np.float64], speed: NDArray[np.float64], error: NDArray[np.float64]
+) -> HaffFit:
+    """Fit v0 / (1 + t/tau) to mean speeds.
+
+    Parameters
+    ----------
+    time : ndarray (n,), [s]
+        Since the start of the cooling, in order.
+    speed, error : ndarray (n,), [m/s], > 0
+        Mean speeds and one standard error of each.
+
+    Returns
+    -------
+    HaffFit
+
+    Raises
+    ------
+    FitError
+        With fewer than 4 speeds, values that are not positive and finite, or speeds that
+        do not fall.
+
+    References
+    ----------
+    Haff 1983; covariance derived above.
+    """
+    _check(time, speed, error)
+    data = _binned(time, speed, error)
+    start = np.array([math.log(_start(time, speed)), math.log(1e-2), 0.0])
+    best = optimize.minimize(
+        data.cost, start, method='L-BFGS-B', bounds=(_LOG_HAFF_TIME, _LOG_STRENGTH, _LOG_SCALE)
+    ).x
+    tau = math.exp(best[0])
+    if tau > _LONGEST_HAFF_TIME * time[-1]:
+        raise FitError('haff fit', 'the speeds do not fall', 'give a window in which they do')
+    _, log_v0, information = data.generalised(best)
+    covariance = np.linalg.inv(information)
+    v0 = math.exp(log_v0)
+    residuals = (speed - haff_speed(time, v0, tau)) / error
+    return HaffFit(
+        initial_speed=v0,
+        initial_speed_error=v0 * math.sqrt(covariance[0, 0]),
+        haff_time=tau,
+        haff_time_error=tau * math.sqrt(covariance[1, 1]),
+        decay_rate=1.0 / (v0 * tau),
+        log_decay_rate_error=math.sqrt(data.rate_variance(best)),
+        degrees_of_freedom=_degrees_of_freedom(data, best),
+        reduced_chi_square=float(residuals @ residuals) / (residuals.size - 2),
+        samples=int(time.size),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Data:
+    """Times, and ln v averaged over groups of neighbours with its variance.
+
+    `inner_distance` [s] is the mean time between two members of a group.
+    """
+
+    time: NDArray[np.float64]
+    starts: NDArray[np.intp]
+    counts: NDArray[np.intp]
+    log_speed: NDArray[np.float64]
+    variance: NDArray[np.float64]
+    inner_distance: NDArray[np.float64]
+
+    @property
+    def _middles(self) -> NDArray[np.intp]:
+        return self.starts + self.counts // 2
+
+    def _grouped(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.add.reduceat(values, self.starts) / self.counts
+
+    def generalised(
+        self, parameters: NDArray[np.float64]
+    ) -> tuple[float, float, NDArray[np.float64]]:
+        """Minus twice the log likelihood, the best ln v0, the information on (ln v0, ln tau).
+
+        `parameters` are the logarithms of tau, of the strength q and of the scale of errors.
+        """
+        tau, strength, scale = np.exp(parameters)
+        age = self.time / tau
+        s = self._grouped(np.log1p(age))
+        covariance = np.exp(-np.abs(s[:, np.newaxis] - s)) - np.exp(-s[:, np.newaxis] - s)
+        # The average over a group varies less than the value in its middle.
+        diagonal = np.diag_indices_from(covariance)
+        covariance[diagonal] -= self.inner_distance / (self.time[self._middles] + tau)
+        covariance *= 0.5 * strength
+        covariance[diagonal] += scale**2 * self.variance
+        factor = linalg.cholesky(covariance, lower=True, check_finite=False)
+        columns = (np.ones_like(s), self._grouped(age / (1.0 + age)), self.log_speed + s)
+        whitened = linalg.solve_triangular(
+            factor, np.column_stack(columns), lower=True, check_finite=False
+        )
+        information = whitened[:, :2].T @ whitened[:, :2]
+        log_v0 = float(whitened[:, 0] @ whitened[:, 2] / information[0, 0])
+        residual = whitened[:, 2] - log_v0 * whitened[:, 0]
+        cost = float(residual @ residual) + 2.0 * float(np.log(np.diag(factor)).sum())
+        # Restricted likelihood: v0 and tau were fitted, which costs degrees of freedom.
+        cost += float(np.linalg.slogdet(information)[1])
+        return cost, log_v0, information
+
+    def cost(self, parameters: NDArray[np.float64]) -> float:
+        """Minus twice the log likelihood."""
+        return self.generalised(parameters)[0]
+
+    def rate_variance(self, parameters: NDArray[np.float64]) -> float:
+        """Variance of ln(1 / (v0 tau)) = -ln v0 - ln tau."""
+        return float(np.linalg.inv(self.generalised(parameters)[2]).sum())
+
+
+def _degrees_of_freedom(data: _Data, best: NDArray[np.float64]) -> float:
+    """How well the variance of the decay rate is itself known, after Satterthwaite.
+
+    The noise is estimated from one decay, so that a Gaussian interval would be too narrow;
+    Student's distribution with 2 / var(ln variance) degrees of freedom takes its place.
+    """
+    step = 0.2
+    shifts = [np.array([0.0, step, 0.0]), np.array([0.0, 0.0, step])]
+    centre = data.cost(best)
+    up = [data.cost(best + one) for one in shifts]
+    down = [data.cost(best - one) for one in shifts]
+    hessian = np.empty((2, 2))
+    for i in range(2):
+        hessian[i, i] = (up[i] - 2.0 * centre + down[i]) / step**2
+    both = data.cost(best + shifts[0] + shifts[1]) - up[0] - up[1] + centre
+    hessian[0, 1] = hessian[1, 0] = both / step**2
+    slope = np.array(
+        [
+            math.log(data.rate_variance(best + one) / data.rate_variance(best - one)) / (2 * step)
+            for one in shifts
+        ]
+    )
+    # The cost is -2 ln L, so its curvature is twice the information on the logarithms; a
+    # direction in which it is flat is a part of the noise that does not matter.
+    values, vectors = np.linalg.eigh(0.5 * hessian)
+    projected = (vectors.T @ slope) ** 2
+    variance = float((projected / np.maximum(values, 0.25)).sum())
+    return float(np.clip(2.0 / max(variance, 1e-6), _FEWEST_DEGREES, 1e6))
+
+
+def _check(
+    time: NDArray[np.float64], speed: NDArray[np.float64], error: NDArray[np.float64]
+) -> None:
+    if time.size < 4 or not time.size == speed.size == error.size:
+        raise FitError(
+            'haff fit',
+            f'{time.size} times, {speed.size} speeds, {error.size} errors',
+            'give at least 4 of each',
+        )
+    for name, values in (('time', time + 1.0), ('speed', speed), ('error', error)):
+        if not (np.isfinite(values).all() and (values > 0.0).all()):
+            raise FitError('haff fit', f'a {name} is not positive and finite', 'leave it out')
+    if np.polyfit(time, np.log(speed), 1)[0] >= 0.0:
+        raise FitError('haff fit', 'the speeds do not fall', 'give a window in which they do')
+
+
+def _binned(
+    time: NDArray[np.float64], speed: NDArray[np.float64], error: NDArray[np.float64]
+) -> _Data:
+    group = max(1, math.ceil(time.size / _POINTS))
+    starts = np.arange(0, time.size, group)
+    counts = np.diff(np.append(starts, time.size))
+    ends = starts + counts - 1
+    return _Data(
+        time=time,
+        inner_distance=(time[ends] - time[starts]) * (counts + 1) / (3.0 * counts),
+        starts=starts,
+        counts=counts,
+        log_speed=np.add.reduceat(np.log(speed), starts) / counts,
+        variance=np.add.reduceat((error / speed) ** 2, starts) / counts**2,
+    )
+
+
+def _start(time: NDArray[np.float64], speed: NDArray[np.float64]) -> float:
+    """Haff time from a straight line through 1/v."""
+    slope, offset = np.polyfit(time, 1.0 / speed, 1)
+    if slope <= 0.0 or offset <= 0.0:
+        return float(time[-1])
+    return float(np.clip(offset / slope, 1e-2 * time[-1], 10.0 * time[-1]))

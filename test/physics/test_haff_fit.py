@@ -1,0 +1,96 @@
+"""Haff's law from speeds: the parameters, and whether the interval means what it says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
+from scipy import special
+
+from nanorocks_ros.errors import FitError
+from nanorocks_ros.physics.haff import haff_speed
+from nanorocks_ros.physics.haff_fit import fit_haff
+
+TIME = np.arange(0.5, 20.0, 0.1)
+
+
+def fluctuating_decay(rng, strength, white, v0=6e-3, tau=6.0):
+    """A decay of a gas of few beads: the process that the fit assumes, drawn step by step."""
+    s = np.log1p(TIME / tau)
+    state, states = 0.0, []
+    for gap in np.diff(s, prepend=0.0):
+        # Exact update of an Ornstein-Uhlenbeck process of unit rate.
+        keep = math.exp(-gap)
+        state = keep * state + rng.normal(0.0, math.sqrt(0.5 * strength * (1 - keep**2)))
+        states.append(state)
+    log_v = np.log(haff_speed(TIME, v0, tau)) + states + rng.normal(0.0, white, TIME.size)
+    return np.exp(log_v)
+
+
+@settings(max_examples=25, deadline=None)
+@given(some.floats(1e-4, 2e-2), some.floats(1.0, 30.0))
+def test_an_exact_decay_gives_back_its_parameters(v0, tau):
+    speed = haff_speed(TIME, v0, tau)
+    fit = fit_haff(TIME, speed, 0.01 * speed)
+    assert fit.initial_speed == pytest.approx(v0, rel=1e-3)
+    assert fit.haff_time == pytest.approx(tau, rel=5e-3)
+    assert fit.decay_rate == pytest.approx(1.0 / (v0 * tau), rel=5e-3)
+
+
+def test_the_result_does_not_depend_on_the_unit_of_speed():
+    speed = fluctuating_decay(np.random.default_rng(3), 0.01, 0.02)
+    one = fit_haff(TIME, speed, 0.02 * speed)
+    other = fit_haff(TIME, 1e3 * speed, 20.0 * speed)
+    assert other.haff_time == pytest.approx(one.haff_time, rel=1e-4)
+    assert other.initial_speed == pytest.approx(1e3 * one.initial_speed, rel=1e-4)
+
+
+def test_the_interval_covers_the_truth_as_often_as_it_says():
+    rng = np.random.default_rng(11)
+    runs, inside_68, inside_95 = 300, 0, 0
+    for _ in range(runs):
+        speed = fluctuating_decay(rng, 0.012, 0.03)
+        fit = fit_haff(TIME, speed, 0.02 * speed)
+        pull = abs(math.log(fit.decay_rate * 6e-3 * 6.0)) / fit.log_decay_rate_error
+        inside_68 += pull < special.stdtrit(fit.degrees_of_freedom, 0.84)
+        inside_95 += pull < special.stdtrit(fit.degrees_of_freedom, 0.975)
+    assert inside_68 / runs == pytest.approx(0.68, abs=0.07)
+    assert inside_95 / runs == pytest.approx(0.95, abs=0.04)
+
+
+def test_residuals_taken_for_independent_would_be_far_too_sure():
+    rng = np.random.default_rng(7)
+    honest, naive = [], []
+    for _ in range(20):
+        speed = fluctuating_decay(rng, 0.012, 0.01)
+        honest.append(fit_haff(TIME, speed, 0.01 * speed).log_decay_rate_error)
+        s = np.log1p(TIME / 6.0)
+        design = np.column_stack((np.ones_like(s), TIME / (TIME + 6.0)))
+        rest = np.log(speed) + s
+        rest = rest - design @ np.linalg.lstsq(design, rest, rcond=None)[0]
+        covariance = np.linalg.inv(design.T @ design) * rest.var()
+        naive.append(math.sqrt(covariance.sum()))
+    assert np.median(honest) > 3.0 * np.median(naive)
+
+
+def test_speeds_that_do_not_fall_are_no_decay():
+    speed = np.full_like(TIME, 5e-3)
+    with pytest.raises(FitError, match='do not fall'):
+        fit_haff(TIME, speed * (1.0 + 0.05 * TIME), 0.01 * speed)
+
+
+@pytest.mark.parametrize('bad', [math.nan, 0.0, -1e-3, math.inf])
+def test_a_speed_that_is_not_positive_and_finite_is_refused(bad):
+    speed = haff_speed(TIME, 6e-3, 5.0)
+    speed[7] = bad
+    with pytest.raises(FitError, match='a speed is not positive and finite'):
+        fit_haff(TIME, speed, np.full_like(speed, 1e-4))
+
+
+def test_three_speeds_are_too_few():
+    few = TIME[:3]
+    with pytest.raises(FitError, match='give at least 4'):
+        fit_haff(few, haff_speed(few, 6e-3, 5.0), np.full(3, 1e-4))
