@@ -1,0 +1,112 @@
+"""The only composition of the stages: a frame in at the top, restitutions out at the bottom."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+from nanorocks_ros.records import (
+    Autocorrelation,
+    ClusterEstimate,
+    CorEstimate,
+    Frame,
+    MotionMask,
+    Notice,
+    SpeedEstimate,
+    TrayImage,
+)
+from nanorocks_ros.stages.clusters import ClusterAutocorrelator
+from nanorocks_ros.stages.cooling import HaffFitter
+from nanorocks_ros.stages.preprocess import Preprocessor
+from nanorocks_ros.stages.speed import SpeedEstimator
+
+if TYPE_CHECKING:
+    from nanorocks_ros.experiment.settings import PipelineSettings
+    from nanorocks_ros.experiment.trays import Tray
+
+Result = (
+    TrayImage
+    | MotionMask
+    | SpeedEstimate
+    | ClusterEstimate
+    | Autocorrelation
+    | CorEstimate
+    | Notice
+)
+
+
+def trays_of(settings: PipelineSettings) -> dict[int, Tray]:
+    """The trays that the settings name, by number.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file cannot be used or a tray does not exist.
+    """
+    flown = load_trays(settings.trays_file)
+    return {number: tray_by_number(flown, number) for number in settings.trays}
+
+
+class TrayStages:
+    """The stages behind one tray image.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    tray : Tray
+    """
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self.speed = SpeedEstimator(settings, tray)
+        self.clusters = ClusterAutocorrelator(settings, tray)
+        self.cooling = HaffFitter(settings, tray)
+
+    def push(self, image: TrayImage) -> tuple[Result, ...]:
+        """Everything that follows from the next image of the tray."""
+        found: list[Result] = []
+        for record in self.speed.push(image):
+            found.append(record)
+            if isinstance(record, SpeedEstimate):
+                found += self.cooling.push(record)
+        found += self.clusters.push(image)
+        return tuple(found)
+
+
+class Pipeline:
+    """All stages for all trays of the settings.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    camera : str
+        What to call the source of the frames in an error.
+
+    Raises
+    ------
+    ConfigurationError
+        When the settings cannot be used.
+    """
+
+    def __init__(self, settings: PipelineSettings, camera: str) -> None:
+        trays = trays_of(settings)
+        self.preprocessor = Preprocessor(settings, trays, camera)
+        self.trays = {number: TrayStages(settings, tray) for number, tray in trays.items()}
+
+    def push(self, frame: Frame) -> tuple[Result, ...]:
+        """Everything that follows from the next frame, tray images first.
+
+        Raises
+        ------
+        FrameError
+            For an encoding that is not supported or a size that changed.
+        """
+        found: list[Result] = []
+        for record in self.preprocessor.push(frame):
+            found.append(record)
+            if isinstance(record, TrayImage):
+                found += self.trays[record.tray].push(record)
+        return tuple(found)
+
+    def flush(self) -> tuple[CorEstimate, ...]:
+        """The final estimates of the cycles that were still cooling when the frames ended."""
+        return tuple(one for tray in self.trays.values() for one in tray.cooling.flush())
