@@ -1,0 +1,174 @@
+"""The storage files behind a path: a rosbag2 folder, or one file."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import Any
+
+import yaml
+
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.recordings import mcap_blocks, sqlite_file
+from nanorocks_ros.recordings.mcap_file import McapFile
+from nanorocks_ros.recordings.sqlite_file import SqliteFile
+from nanorocks_ros.recordings.storage import StorageFile
+
+_KINDS = 'a rosbag2 folder or an .mcap file'
+_ROS1_MAGIC = b'#ROSBAG V'
+_STORAGE_SUFFIXES = frozenset({'.mcap', '.db3'})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contents:
+    """What a path holds.
+
+    Parameters
+    ----------
+    files : tuple of StorageFile
+        At least one.
+    metadata : dict of str to str
+        Provenance kept by whoever recorded.
+    compressed_messages : bool
+        Each message is compressed on its own (zstd).
+    notices : tuple of str
+        What is wrong with the folder.
+    complete : bool
+        No file is missing.
+    """
+
+    files: tuple[StorageFile, ...]
+    metadata: dict[str, str]
+    compressed_messages: bool
+    notices: tuple[str, ...]
+    complete: bool
+
+
+def contents(path: Path) -> Contents:
+    """Open what a path holds.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Contents
+
+    Raises
+    ------
+    RecordingError
+        When there is nothing, or no recording.
+    """
+    try:
+        if not path.exists():
+            raise RecordingError(str(path), 'does not exist', f'pass {_KINDS}')
+        if path.is_dir():
+            return _folder(path)
+        return Contents(
+            files=(_open_file(path),),
+            metadata={},
+            compressed_messages=False,
+            notices=(),
+            complete=True,
+        )
+    except OSError as error:
+        raise RecordingError(
+            str(path), f'cannot be read ({error.strerror})', 'check its permissions'
+        ) from error
+
+
+def _open_file(path: Path) -> StorageFile:
+    with path.open('rb') as stream:
+        start = stream.read(16)
+    if not start:
+        raise RecordingError(
+            str(path), 'is empty (0 bytes)', 'record it again or pass another bag'
+        )
+    if start.startswith(_ROS1_MAGIC):
+        raise RecordingError(
+            str(path),
+            'is a ROS 1 bag',
+            f'convert it first: rosbags-convert --src {path} --dst {path.with_suffix("")}',
+        )
+    if start == sqlite_file.MAGIC:
+        return SqliteFile(path)
+    if path.suffix == '.mcap' or start.startswith(mcap_blocks.MAGIC):
+        return McapFile(path)
+    raise RecordingError(str(path), 'is not a bag', f'pass {_KINDS}')
+
+
+def _folder(path: Path) -> Contents:
+    notices: list[str] = []
+    information = _information(path, notices)
+    names = _names(path, information)
+    if not names:
+        raise RecordingError(
+            str(path), 'is a folder without any .mcap or .db3 file', f'pass {_KINDS}'
+        )
+    _refuse_compressed_files(path, information)
+    files = _open_files(path, names, notices)
+    mode = str(information.get('compression_mode') or '').lower()
+    custom = information.get('custom_data') or {}
+    return Contents(
+        files=tuple(files),
+        metadata={str(k): str(v) for k, v in custom.items()} if isinstance(custom, dict) else {},
+        compressed_messages=mode == 'message',
+        notices=tuple(notices),
+        complete=len(files) == len(names),
+    )
+
+
+def _information(path: Path, notices: list[str]) -> dict[str, Any]:
+    place = path / 'metadata.yaml'
+    try:
+        document = yaml.safe_load(place.read_text('utf-8'))
+        information = document['rosbag2_bagfile_information']
+        return dict(information)
+    except FileNotFoundError:
+        notices.append(f'{path}: has no metadata.yaml, as after a crash; it is read without')
+    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError):
+        notices.append(f'{place}: cannot be understood; the bag is read without')
+    return {}
+
+
+def _names(path: Path, information: dict[str, Any]) -> list[str]:
+    listed = information.get('relative_file_paths')
+    # Early versions listed paths that start with the folder.
+    names = [PurePath(str(name)).name for name in listed] if isinstance(listed, list) else []
+    if any((path / name).is_file() for name in names):
+        return names
+    found = (p.name for p in path.iterdir() if p.suffix in _STORAGE_SUFFIXES and p.is_file())
+    return sorted(found, key=_by_number)
+
+
+def _by_number(name: str) -> list[tuple[int, str]]:
+    """Sorts `run_10.mcap` behind `run_9.mcap`."""
+    return [(int(part), '') if part.isdigit() else (-1, part) for part in re.split(r'(\d+)', name)]
+
+
+def _refuse_compressed_files(path: Path, information: dict[str, Any]) -> None:
+    if str(information.get('compression_mode') or '').lower() == 'file':
+        raise RecordingError(
+            str(path),
+            "holds storage files that are compressed as a whole (compression_mode 'file')",
+            'unpack them with `zstd -d` and delete metadata.yaml',
+        )
+
+
+def _open_files(path: Path, names: list[str], notices: list[str]) -> list[StorageFile]:
+    files: list[StorageFile] = []
+    errors: list[RecordingError] = []
+    for name in names:
+        if not (path / name).is_file():
+            notices.append(f'{path / name}: is missing')
+            continue
+        try:
+            files.append(_open_file(path / name))
+        except RecordingError as error:
+            errors.append(error)
+    if not files:
+        raise errors[0]
+    notices += [f'{error.where}: {error.what}' for error in errors]
+    return files

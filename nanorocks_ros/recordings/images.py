@@ -1,0 +1,165 @@
+"""Camera messages to frames; works on messages of rosbags and of rclpy alike."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+
+from nanorocks_ros.errors import FrameError
+from nanorocks_ros.records import Frame
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+NS = 1_000_000_000
+_CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
+_JPEG_START = b'\xff\xd8'
+_JPEG_END = b'\xff\xd9'
+# Some cameras pad a JPEG with zeros; the end marker is looked for before them.
+_PADDING = b'\x00'
+_READ = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
+
+
+def stamp_ns_of(message: Any) -> int:
+    """The stamp in the header of a message, [ns].
+
+    Parameters
+    ----------
+    message : object with a ``header``
+    """
+    stamp = message.header.stamp
+    return int(stamp.sec) * NS + int(stamp.nanosec)
+
+
+def _bytes_of(data: Any) -> NDArray[np.uint8]:
+    # Neither numpy arrays (rosbags) nor array.array (rclpy) are copied.
+    return np.frombuffer(data, dtype=np.uint8) if len(data) else np.empty(0, dtype=np.uint8)
+
+
+def _channels(encoding: str, where: str) -> int:
+    channels = _CHANNELS.get(encoding)
+    if channels is None:
+        known = ', '.join(_CHANNELS)
+        raise FrameError(
+            where,
+            f"encoding '{encoding}' is not supported ({known})",
+            'let the camera publish one of these',
+        )
+    return channels
+
+
+def frame_from_image(message: Any, where: str) -> Frame:
+    """A frame that looks at the pixels of an image message, without copying them.
+
+    Parameters
+    ----------
+    message : sensor_msgs/Image
+        Rows may be padded.
+    where : str
+        The topic, for errors.
+
+    Returns
+    -------
+    Frame
+
+    Raises
+    ------
+    FrameError
+        For other encodings than bgr8, rgb8 and mono8, and for sizes that do not fit the data.
+    """
+    encoding = str(message.encoding)
+    channels = _channels(encoding, where)
+    height, width, step = int(message.height), int(message.width), int(message.step)
+    data = _bytes_of(message.data)
+    row = width * channels
+    if height < 1 or width < 1 or step < row or data.size != height * step:
+        raise FrameError(
+            where,
+            f'{data.size} bytes in rows of {step} are no {width} x {height} {encoding} image '
+            f'(expected {height * max(step, row)} bytes, rows of {row} or more)',
+            'check the driver of the camera',
+        )
+    rows = data.reshape(height, step)[:, :row]
+    image = rows.reshape(height, width, channels) if channels > 1 else rows
+    return Frame(stamp_ns=stamp_ns_of(message), encoding=encoding, image=image)
+
+
+def frame_from_compressed(message: Any, where: str) -> Frame:
+    """A frame decoded from a compressed image message.
+
+    Parameters
+    ----------
+    message : sensor_msgs/CompressedImage
+        JPEG, PNG or another 8-bit format that OpenCV reads.
+    where : str
+        The topic, for errors.
+
+    Returns
+    -------
+    Frame
+        ``bgr8``, or ``mono8`` when the picture is gray.
+
+    Raises
+    ------
+    FrameError
+        When the picture cannot be decoded or ends too early.
+    """
+    data = _bytes_of(message.data)
+    stamp_ns = stamp_ns_of(message)
+    # A JPEG that lost its end is decoded by OpenCV all the same, with gray where the rest was.
+    whole = not _is_cut_jpeg(data)
+    image = _decoded(data) if whole else None
+    if image is None:
+        what = 'cannot be decoded' if whole else 'ends too early'
+        raise FrameError(
+            where,
+            f"the picture at {stamp_ns} ns ({data.size} bytes, format '{message.format}') {what}",
+            'leave this frame out, or record it again',
+        )
+    return Frame(stamp_ns=stamp_ns, encoding='mono8' if image.ndim == 2 else 'bgr8', image=image)
+
+
+def _is_cut_jpeg(data: NDArray[np.uint8]) -> bool:
+    if data[:2].tobytes() != _JPEG_START:
+        return False
+    return not data[-64:].tobytes().rstrip(_PADDING).endswith(_JPEG_END)
+
+
+def _decoded(data: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
+    try:
+        image = cv2.imdecode(data, _READ)
+    except cv2.error:
+        return None
+    return None if image is None else np.asarray(image, dtype=np.uint8)
+
+
+def encode_jpeg(image: NDArray[np.uint8], quality: int) -> bytes:
+    """A picture as JPEG.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, (height, width, 3), bgr, or (height, width)
+    quality : int, 1 to 100
+
+    Raises
+    ------
+    FrameError
+        When the array is no picture or the quality is out of range.
+    """
+    if not 1 <= quality <= 100:
+        raise FrameError('JPEG quality', f'{quality}', 'give a number from 1 to 100')
+    pictured = image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)
+    if image.dtype != np.uint8 or not image.size or not pictured:
+        raise FrameError(
+            'JPEG',
+            f'array of {image.dtype} with shape {image.shape} is no picture',
+            'give uint8, (height, width) or (height, width, 3)',
+        )
+    done, content = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    if not done:
+        raise FrameError(
+            'JPEG', f'picture of shape {image.shape} cannot be encoded', 'give a smaller one'
+        )
+    return content.tobytes()

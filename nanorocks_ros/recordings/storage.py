@@ -1,0 +1,93 @@
+"""What every kind of storage file offers, and the values it hands out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator
+    from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TopicInfo:
+    """A topic of a recording.
+
+    Parameters
+    ----------
+    name : str
+    type : str
+        For example ``sensor_msgs/msg/Image``.
+    count : int
+        Messages, as far as the storage knows before they are read.
+    encoding : str
+        Of the messages; only ``cdr`` can be deserialised.
+    definition : str
+        Text of the message definition kept in the recording; empty where there is none.
+    definition_format : str
+        ``ros2msg`` or ``ros2idl``.
+    """
+
+    name: str
+    type: str
+    count: int
+    encoding: str = 'cdr'
+    definition: str = ''
+    definition_format: str = 'ros2msg'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BagMessage:
+    """A message as it was recorded.
+
+    Parameters
+    ----------
+    topic, type : str
+    log_time_ns : int, [ns]
+        When it was recorded; the instant that was measured stands in the message's header.
+    cdr : bytes
+    """
+
+    topic: str
+    type: str
+    log_time_ns: int
+    cdr: bytes
+
+
+class StorageFile(Protocol):
+    """One file of a recording, opened.
+
+    Attributes
+    ----------
+    path : Path
+    topics : dict of str to TopicInfo
+    start_ns, end_ns : int, [ns]
+        Log times of the first and last message; both 0 when there is none.
+    complete : bool
+        Nothing is known to be missing, so far.
+    notices : tuple of str
+        What was salvaged and what is lost, so far.
+    messages_lost : int
+        Messages known to be lost, so far.
+    """
+
+    path: Path
+    topics: dict[str, TopicInfo]
+    start_ns: int
+    end_ns: int
+
+    @property
+    def complete(self) -> bool:
+        """Nothing is known to be missing, so far."""
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What was salvaged and what is lost, so far."""
+
+    @property
+    def messages_lost(self) -> int:
+        """Messages known to be lost, so far."""
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
+        """The messages of some topics, or all, in order of log time."""

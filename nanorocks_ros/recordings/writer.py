@@ -1,0 +1,283 @@
+"""Writing recordings: rosbag2 folders with MCAP storage.
+
+How much a crash can cost: messages reach the file in chunks, compressed one by one so that
+viewers can seek. The chunk that is open when the process is killed is lost, which is at most
+one second of recorded time or 1 MiB, whichever is less, and the last message; `flush` shortens
+that. A killed recording has neither index nor ``metadata.yaml``; `reader.open_bag` reads it all
+the same. Nothing is forced to the disk: a power cut costs what the system had not yet written.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import zstandard
+from rosbags.interfaces import (
+    Connection,
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.rosbag2.errors import WriterError
+from rosbags.rosbag2.storage_mcap import McapWriter
+from rosbags.serde import SerdeError
+from rosbags.typesys import TypesysError
+
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.recordings.message_types import register, standard_types
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from types import TracebackType
+    from typing import Literal, Self
+
+# What ROS 2 calls an infinite duration.
+_FOREVER = QosTime(9223372036, 854775807)
+_CHUNK_NS = 1_000_000_000
+# Pictures are compressed already: a higher level takes time and saves nothing.
+_LEVEL = 1
+_UNFIT = (SerdeError, AttributeError, TypeError, ValueError, LookupError, AssertionError)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OfferedQos:
+    """How a topic was, or would be, offered.
+
+    Parameters
+    ----------
+    reliable : bool
+        Else best effort.
+    transient_local : bool
+        A late subscriber still gets the last messages; else volatile.
+    depth : int, >= 1
+        Messages kept.
+    """
+
+    reliable: bool = True
+    transient_local: bool = False
+    depth: int = 10
+
+    def profile(self) -> Qos:
+        """The profile that recordings keep and players offer again."""
+        durability = QosDurability.TRANSIENT_LOCAL if self.transient_local else None
+        return Qos(
+            history=QosHistory.KEEP_LAST,
+            depth=self.depth,
+            reliability=QosReliability.RELIABLE if self.reliable else QosReliability.BEST_EFFORT,
+            durability=durability or QosDurability.VOLATILE,
+            deadline=_FOREVER,
+            lifespan=_FOREVER,
+            liveliness=QosLiveliness.AUTOMATIC,
+            liveliness_lease_duration=_FOREVER,
+            avoid_ros_namespace_conventions=False,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OfferedTopic:
+    """What a topic carries, and how.
+
+    Parameters
+    ----------
+    msgtype : str
+        For example ``sensor_msgs/msg/Image``.
+    qos : OfferedQos
+    definition : str
+        Text of the message definition, for types that are not part of ROS 2 Jazzy.
+    definition_format : str
+        ``ros2msg`` or ``ros2idl``.
+    """
+
+    msgtype: str
+    qos: OfferedQos
+    definition: str = ''
+    definition_format: str = 'ros2msg'
+
+
+class BagWriter:
+    """Writes a new recording; to be used in a ``with`` statement.
+
+    Topics appear in the recording with their first message. An exception inside the ``with``
+    still closes the recording properly: what was written stays readable.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder to create, with its parents; must not exist.
+    topics : mapping of str to OfferedTopic
+        By absolute name.
+    metadata : mapping of str to str
+        Provenance, kept as the recording's ``custom_data``.
+
+    Raises
+    ------
+    RecordingError
+        On entering, when the path exists or cannot be created.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        topics: Mapping[str, OfferedTopic],
+        *,
+        metadata: Mapping[str, str],
+    ) -> None:
+        self.path = Path(path)
+        self._topics = dict(topics)
+        self._metadata = dict(metadata)
+        self._store = standard_types()
+        self._connections: dict[str, Connection] = {}
+
+    def __enter__(self) -> Self:
+        if self.path.exists():
+            raise self._exists()
+        try:
+            self._writer = Writer(self.path, version=9, storage_plugin=StoragePlugin.MCAP)
+            self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+            for key, value in self._metadata.items():
+                self._writer.set_custom_data(key, value)
+            self._writer.open()
+        except WriterError as error:
+            raise self._exists() from error
+        except OSError as error:
+            raise self._unwritable(error) from error
+        storage = self._writer.storage
+        assert isinstance(storage, McapWriter)
+        self._storage = storage
+        # With a checksum in each frame a flipped bit is noticed; rosbags writes none.
+        compressor = zstandard.ZstdCompressor(level=_LEVEL, write_checksum=True)
+        self._storage.compressor = compressor.compress
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> Literal[False]:
+        try:
+            self._writer.close()
+        except OSError as failure:
+            with suppress(OSError):
+                self._writer.abort()
+            if error is None:
+                raise self._unwritable(failure) from failure
+        return False
+
+    def write(self, topic: str, stamp_ns: int, message: object) -> None:
+        """Write a message given as an object.
+
+        Parameters
+        ----------
+        topic : str
+            One of the topics given at the start.
+        stamp_ns : int, [ns], >= 0
+            Log time.
+        message : object
+            As made by `recordings.messages`, or with the same attributes.
+
+        Raises
+        ------
+        RecordingError
+            When the topic was not announced, the message does not fit it, or the disk is full.
+        """
+        connection = self._connection(topic)
+        try:
+            cdr = self._store.serialize_cdr(message, connection.msgtype)
+        except _UNFIT as error:
+            raise RecordingError(
+                f'{self.path}: {topic}',
+                f'{type(message).__name__} is no {connection.msgtype} ({error})',
+                'write a message of the announced type',
+            ) from error
+        self._append(connection, stamp_ns, cdr)
+
+    def write_raw(self, topic: str, stamp_ns: int, cdr: bytes | memoryview) -> None:
+        """Write a message that is serialised already, as CDR.
+
+        Parameters
+        ----------
+        topic : str
+            One of the topics given at the start.
+        stamp_ns : int, [ns], >= 0
+            Log time.
+        cdr : bytes
+
+        Raises
+        ------
+        RecordingError
+            When the topic was not announced or the disk is full.
+        """
+        self._append(self._connection(topic), stamp_ns, cdr)
+
+    def flush(self) -> None:
+        """Hand everything written so far to the system, so that it survives this process."""
+        try:
+            if self._storage.chunk.bio.tell():
+                self._storage.close_chunk()
+            self._storage.bio.flush()
+        except OSError as error:
+            raise self._unwritable(error) from error
+
+    def _append(self, connection: Connection, stamp_ns: int, cdr: bytes | memoryview) -> None:
+        if stamp_ns < 0:
+            raise RecordingError(
+                f'{self.path}: {connection.topic}',
+                f'stamp {stamp_ns} ns lies before 1970',
+                'give stamps of 0 or more',
+            )
+        try:
+            self._writer.write(connection, stamp_ns, cdr)
+        except OSError as error:
+            raise self._unwritable(error) from error
+        if stamp_ns - self._storage.chunk.message_start_time >= _CHUNK_NS:
+            self.flush()
+
+    def _connection(self, topic: str) -> Connection:
+        known = self._connections.get(topic)
+        if known is not None:
+            return known
+        offered = self._topics.get(topic)
+        if offered is None:
+            raise RecordingError(
+                str(self.path),
+                f"topic '{topic}' was not announced ({', '.join(sorted(self._topics))})",
+                'add it to the topics of the writer',
+            )
+        connection = self._new_connection(topic, offered)
+        self._connections[topic] = connection
+        return connection
+
+    def _new_connection(self, topic: str, offered: OfferedTopic) -> Connection:
+        kind, text = offered.msgtype, offered.definition
+        try:
+            if text:
+                register(self._store, kind, text, offered.definition_format)
+            return self._writer.add_connection(
+                topic, kind, typestore=self._store, offered_qos_profiles=[offered.qos.profile()]
+            )
+        except (TypesysError, LookupError, ValueError) as error:
+            raise RecordingError(
+                f'{self.path}: {topic}',
+                f"type '{kind}' is not part of ROS 2 Jazzy and has no usable definition",
+                'give its definition',
+            ) from error
+
+    def _exists(self) -> RecordingError:
+        return RecordingError(
+            str(self.path), 'exists already and is not overwritten', 'pass another path'
+        )
+
+    def _unwritable(self, error: OSError) -> RecordingError:
+        return RecordingError(
+            str(self.path),
+            f'cannot be written ({error.strerror})',
+            'pass another path, or make room there',
+        )
