@@ -1,0 +1,284 @@
+"""What every node of the graph shares: parameters, diagnostics, publishers, refusals."""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+from rclpy.qos import QoSPolicyKind
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+from nanorocks_ros.errors import ConfigurationError, FrameError
+from nanorocks_ros.experiment.settings import problem, rows, with_values
+from nanorocks_ros.nodes._shell import array_message, image_message, message_class, qos_of
+from nanorocks_ros.records import (
+    Autocorrelation,
+    ClusterEstimate,
+    CorEstimate,
+    GroundTruth,
+    MotionMask,
+    Notice,
+    SpeedEstimate,
+    TrayImage,
+)
+from nanorocks_ros.wire import topics
+
+_ARRAYS = {
+    SpeedEstimate: topics.SPEED,
+    ClusterEstimate: topics.CLUSTER,
+    CorEstimate: topics.COR,
+    GroundTruth: topics.TRUTH,
+}
+_IMAGES = {
+    TrayImage: ((topics.GRAY, 'gray'), (topics.RECTIFIED, 'color')),
+    MotionMask: ((topics.MOTION, 'mask'),),
+    Autocorrelation: ((topics.AUTOCORRELATION, 'values'),),
+}
+_OVERRIDABLE = QoSOverridingOptions(
+    policy_kinds=(
+        QoSPolicyKind.HISTORY,
+        QoSPolicyKind.DEPTH,
+        QoSPolicyKind.RELIABILITY,
+        QoSPolicyKind.DURABILITY,
+    )
+)
+_PATIENCE_S = 5.0
+_THROTTLE_S = 5.0
+
+
+class NanorocksNode(Node):
+    """A node under the namespace ``nanorocks`` that keeps count of what it does."""
+
+    def __init__(self, name):
+        super().__init__(name, namespace=topics.NAMESPACE.strip('/'))
+        self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
+        self._outputs = {}
+        self._declared = {}
+        self._refused = {}
+        self._watched = []
+        self.done = False
+        self.exit_code = 0
+        self.counts = {'received': 0, 'published': 0, 'refused': 0}
+        self.busy_s = []
+        self.state = {}
+        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._last_report = (time.monotonic(), 0)
+        self.create_timer(1.0, self._report, clock=self.steady_clock)
+
+    # Parameters
+
+    def declare(self, settings, prefix=''):
+        """Declare every setting as a parameter; the settings with the values it was given."""
+        values = {}
+        for row in rows(settings):
+            name = prefix + row.name
+            try:
+                values[row.name] = self._declare_one(name, row)
+            except ParameterException as error:
+                raise ConfigurationError(
+                    f'parameter {name}',
+                    str(error).split('Reason: ')[-1],
+                    'see docs/parameters.md',
+                ) from error
+        checked = with_values(settings, values, f'node {self.get_name()}')
+        self._declared.update({prefix + row.name: row for row in rows(settings)})
+        return checked
+
+    def _declare_one(self, name, row):
+        # Typed by the default, but 13500 in a YAML file has to do for 13500.0.
+        descriptor = ParameterDescriptor(
+            description=f'{row.doc} [{row.unit}]' if row.unit else row.doc,
+            additional_constraints=', '.join(row.bounds.choices),
+            dynamic_typing=True,
+        )
+        if isinstance(row.default, float):
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=row.bounds.low, to_value=row.bounds.high)
+            ]
+        elif isinstance(row.default, int) and not isinstance(row.default, bool):
+            descriptor.integer_range = [
+                IntegerRange(from_value=int(row.bounds.low), to_value=int(row.bounds.high))
+            ]
+        default = list(row.default) if isinstance(row.default, tuple) else row.default
+        # rclpy cannot tell the type of an empty list: such a parameter is not set by default.
+        value = self.declare_parameter(name, None if default == [] else default, descriptor).value
+        return default if value is None else value
+
+    def react_to_parameters(self, rebuild):
+        """Check later changes; `rebuild(values)` once they are in force.
+
+        Parameters
+        ----------
+        rebuild : callable
+            Called without arguments after a change was accepted.
+        """
+        self.add_on_set_parameters_callback(self._check_parameters)
+        self.add_post_set_parameters_callback(lambda _: rebuild())
+
+    def _check_parameters(self, parameters):
+        for parameter in parameters:
+            row = self._declared.get(parameter.name)
+            text = problem(row, parameter.value) if row else None
+            if text:
+                return SetParametersResult(
+                    successful=False, reason=f'parameter {parameter.name}: {text}'
+                )
+        return SetParametersResult(successful=True)
+
+    def current(self, settings, prefix=''):
+        """The settings with the values that the parameters have now."""
+        values = {row.name: self.get_parameter(prefix + row.name).value for row in rows(settings)}
+        known = {name: value for name, value in values.items() if value is not None}
+        return with_values(settings, known, f'node {self.get_name()}')
+
+    # Topics
+
+    def output(self, topic, tray=0):
+        """The publisher of a topic, made once."""
+        name = topic.of(tray)
+        if name not in self._outputs:
+            self._outputs[name] = self.create_publisher(
+                message_class(topic.type),
+                name,
+                qos_of(topic),
+                qos_overriding_options=_OVERRIDABLE,
+            )
+        return self._outputs[name]
+
+    def wanted(self, topic, tray=0):
+        """Whether anybody subscribes to a topic; images are not even built otherwise."""
+        return self.output(topic, tray).get_subscription_count() > 0
+
+    def send(self, topic, message, tray=0):
+        """Publish and count."""
+        self.output(topic, tray).publish(message)
+        self.counts['published'] += 1
+
+    def publish_result(self, record, epoch_ns):
+        """Publish what came out of a stage on the topics it belongs to."""
+        if isinstance(record, Notice):
+            self.get_logger().warning(record.text)
+        elif type(record) in _ARRAYS:
+            message = array_message(record, epoch_ns)
+            self.send(_ARRAYS[type(record)], message, record.tray)
+        else:
+            for topic, field in _IMAGES[type(record)]:
+                pixels = getattr(record, field)
+                if pixels is not None and self.wanted(topic, record.tray):
+                    frame_id = f'tray_{record.tray}'
+                    message = image_message(record.stamp_ns, frame_id, pixels)
+                    self.send(topic, message, record.tray)
+        if isinstance(record, CorEstimate):
+            name = f'tray {record.tray} COR'
+            self.state[name] = f'{record.restitution:.4f} {record.status.name.lower()}'
+
+    def listen(self, topic, callback, tray=0, required=True):
+        """Subscribe; say so when nobody publishes, or not with a matching quality of service."""
+        subscription = self.create_subscription(
+            message_class(topic.type),
+            topic.of(tray),
+            partial(self.timed, callback),
+            qos_of(topic),
+            event_callbacks=SubscriptionEventCallbacks(
+                incompatible_qos=partial(self._mismatch, topic.of(tray))
+            ),
+            qos_overriding_options=_OVERRIDABLE,
+        )
+        if required:
+            self._watch(subscription.topic_name)
+        return subscription
+
+    def timed(self, work, message):
+        """Do the work on one input, count it, and refuse it when it cannot be used."""
+        start = time.perf_counter()
+        self.counts['received'] += 1
+        try:
+            work(message)
+        except FrameError as error:
+            self.refuse(error)
+        self.busy_s.append(time.perf_counter() - start)
+
+    def finish(self):
+        """End the node once what it published last has arrived."""
+        for publisher in self._outputs.values():
+            publisher.wait_for_all_acked(Duration(seconds=2))
+        self.done = True
+
+    def refuse(self, error):
+        """Say what was wrong with an input, once in a while, and go on."""
+        self.counts['refused'] += 1
+        now = time.monotonic()
+        text = str(error)
+        if now - self._refused.get(text, -_THROTTLE_S) >= _THROTTLE_S:
+            self._refused[text] = now
+            self.get_logger().error(text)
+        self.state['last refusal'] = text
+
+    def _watch(self, topic_name):
+        self._watched.append(topic_name)
+        timer = self.create_timer(
+            _PATIENCE_S, lambda: self._check_publishers(topic_name, timer), clock=self.steady_clock
+        )
+
+    def _check_publishers(self, topic_name, timer):
+        timer.cancel()
+        if self.count_publishers(topic_name) == 0:
+            self.get_logger().warning(
+                f'{topic_name}: no publisher within {_PATIENCE_S:g} s; start one, remap the '
+                'topic, or check the namespace and ROS_DOMAIN_ID'
+            )
+
+    def _mismatch(self, topic_name, event):
+        policy = QoSPolicyKind(event.last_policy_kind).name.lower()
+        offers = [
+            getattr(info.qos_profile, policy, None)
+            for info in self.get_publishers_info_by_topic(self.resolve_topic_name(topic_name))
+        ]
+        offered = ', '.join(sorted({getattr(one, 'name', str(one)) for one in offers}))
+        mine = self.get_subscriptions_info_by_topic(self.resolve_topic_name(topic_name))
+        asked = ', '.join(sorted({getattr(i.qos_profile, policy).name for i in mine}))
+        self.get_logger().warning(
+            f'{self.resolve_topic_name(topic_name)}: no data, since the publisher offers '
+            f'{policy} {offered} and I ask for {asked}; set '
+            f'qos_overrides.{self.resolve_topic_name(topic_name)}.subscription.{policy}'
+        )
+
+    # Diagnostics
+
+    def _report(self):
+        now = time.monotonic()
+        since, received = self._last_report
+        rate = (self.counts['received'] - received) / max(now - since, 1e-9)
+        self._last_report = (now, self.counts['received'])
+        busy, self.busy_s = self.busy_s, []
+        values = {
+            **self.counts,
+            'rate [1/s]': f'{rate:.2f}',
+            'processing, mean [ms]': f'{1e3 * sum(busy) / len(busy):.2f}' if busy else '',
+            'processing, longest [ms]': f'{1e3 * max(busy):.2f}' if busy else '',
+            **self.state,
+        }
+        missing = [name for name in self._watched if self.count_publishers(name) == 0]
+        level, text = DiagnosticStatus.OK, 'working'
+        if missing:
+            level, text = DiagnosticStatus.WARN, f'no publisher on {", ".join(missing)}'
+        if self.counts['refused']:
+            level, text = DiagnosticStatus.ERROR, self.state['last refusal']
+        status = DiagnosticStatus(level=level, name=self.get_fully_qualified_name(), message=text)
+        status.hardware_id = 'nanorocks'
+        status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)

@@ -1,0 +1,53 @@
+"""What the nodes behind the tray images share: one stage per tray, results as they come."""
+
+from __future__ import annotations
+
+from nanorocks_ros.experiment.settings import PipelineSettings
+from nanorocks_ros.nodes._epoch import Epoch
+from nanorocks_ros.nodes._node import NanorocksNode
+from nanorocks_ros.nodes._shell import tray_image
+from nanorocks_ros.recordings.images import frame_from_image
+from nanorocks_ros.stages.pipeline import trays_of
+from nanorocks_ros.wire import topics
+
+
+class TrayStageNode(NanorocksNode):
+    """Pushes the gray images of each tray through a stage of its own.
+
+    Parameters
+    ----------
+    name : str
+        Of the node.
+    stage : callable
+        Makes the stage from the settings and a Tray.
+    """
+
+    def __init__(self, name, stage):
+        super().__init__(name)
+        self._make = stage
+        self._settings = self.declare(PipelineSettings())
+        self._epoch = Epoch(self, may_set=False)
+        self._rebuild()
+        self.react_to_parameters(self._rebuild)
+        for tray in self._settings.trays:
+            self.listen(topics.GRAY, lambda message, tray=tray: self._take(message, tray), tray)
+
+    def _rebuild(self):
+        self._settings = self.current(self._settings)
+        trays = trays_of(self._settings)
+        self._stages = {number: self._make(self._settings, one) for number, one in trays.items()}
+
+    def _take(self, message, tray):
+        frame = frame_from_image(message, self.resolve_topic_name(topics.GRAY.of(tray)))
+        self._epoch.when_known(frame.stamp_ns, self._push, tray_image(frame, tray))
+
+    def _push(self, image):
+        stage = self._stages.get(image.tray)
+        if stage is None:
+            return
+        self.prepare(stage, image.tray)
+        for record in stage.push(image):
+            self.publish_result(record, self._epoch.ns)
+
+    def prepare(self, stage, tray):
+        """Tell the stage which pictures somebody wants to see."""

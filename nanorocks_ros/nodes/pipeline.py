@@ -1,0 +1,79 @@
+"""Node: the whole data path in one process, from a simulator, a bag or a camera topic."""
+
+from __future__ import annotations
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment import settings as st
+from nanorocks_ros.nodes import _sources
+from nanorocks_ros.nodes._camera import Camera
+from nanorocks_ros.nodes._epoch import Epoch
+from nanorocks_ros.nodes._node import NanorocksNode
+from nanorocks_ros.nodes._pacing import Pacer
+from nanorocks_ros.stages.pipeline import Pipeline
+from nanorocks_ros.wire import topics
+
+
+class PipelineNode(NanorocksNode):
+    """Composes the stages; records pass between them in memory."""
+
+    def __init__(self):
+        super().__init__('pipeline')
+        self._settings = self.declare(st.PipelineSettings())
+        self._source = self.declare(st.SourceSettings()).source
+        self._simulation = self.declare(st.SimulationSettings(), prefix='simulation.')
+        self._bag = self.declare(st.BagSettings())
+        self._pacing = self.declare(st.PacingSettings())
+        camera = self.declare(st.CameraSettings())
+        self._epoch = Epoch(self, may_set=True)
+        self._where = self._source
+        self._rebuild()
+        self.react_to_parameters(self._rebuild)
+        if self._source == 'topic':
+            self._where = Camera(self, camera, self._take).topic
+            self._rebuild()
+        else:
+            self._play(self._simulated() if self._source == 'simulator' else self._recorded())
+
+    def _rebuild(self):
+        self._settings = self.current(self._settings)
+        self._pipeline = Pipeline(self._settings, self._where)
+
+    def _simulated(self):
+        if self._simulation.tray not in self._settings.trays:
+            raise ConfigurationError(
+                'parameter simulation.tray',
+                f'{self._simulation.tray} is not among trays {self._settings.trays}',
+                'set both',
+            )
+        return _sources.simulated_moments(self, self._simulation, self._settings.trays_file)
+
+    def _recorded(self):
+        bag = _sources.opened_bag(self._bag)
+        self._where = bag.where
+        self._rebuild()
+        self._epoch.set(bag.epoch_ns())
+        return _sources.recorded_moments(bag, self._bag.loop)
+
+    def _play(self, moments):
+        self._pacer = Pacer(self, moments, self._moment, self._pacing, self._finish)
+
+    def _moment(self, stamp_ns, moment):
+        if self._epoch.ns is None:
+            self._epoch.set(stamp_ns)
+        _sources.publish_moment(self, moment, self._epoch.ns)
+        self.timed(self._push, moment[0])
+
+    def _take(self, frame):
+        self._epoch.when_known(frame.stamp_ns, self._push, frame)
+
+    def _push(self, frame):
+        for number, tray in self._pipeline.trays.items():
+            tray.speed.emit_mask = self.wanted(topics.MOTION, number)
+            tray.clusters.emit_image = self.wanted(topics.AUTOCORRELATION, number)
+        for record in self._pipeline.push(frame):
+            self.publish_result(record, self._epoch.ns)
+
+    def _finish(self):
+        for record in self._pipeline.flush():
+            self.publish_result(record, self._epoch.ns)
+        self.finish()

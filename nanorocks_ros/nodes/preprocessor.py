@@ -1,0 +1,34 @@
+"""Node: camera frames in, rectified and gray tray images out."""
+
+from __future__ import annotations
+
+from nanorocks_ros.experiment.settings import CameraSettings, PipelineSettings
+from nanorocks_ros.nodes._camera import Camera
+from nanorocks_ros.nodes._epoch import Epoch
+from nanorocks_ros.nodes._node import NanorocksNode
+from nanorocks_ros.stages.pipeline import trays_of
+from nanorocks_ros.stages.preprocess import Preprocessor
+
+
+class PreprocessorNode(NanorocksNode):
+    """Crops each tray out of the camera's frames and publishes it."""
+
+    def __init__(self):
+        super().__init__('preprocessor')
+        self._settings = self.declare(PipelineSettings())
+        self._camera = Camera(self, self.declare(CameraSettings()), self._take)
+        self._epoch = Epoch(self, may_set=True)
+        self._rebuild()
+        self.react_to_parameters(self._rebuild)
+
+    def _rebuild(self):
+        self._settings = self.current(self._settings)
+        trays = trays_of(self._settings)
+        self._stage = Preprocessor(self._settings, trays, self._camera.topic)
+
+    def _take(self, frame):
+        self._epoch.when_known(frame.stamp_ns, self._push, frame)
+
+    def _push(self, frame):
+        for record in self._stage.push(frame):
+            self.publish_result(record, self._epoch.ns)

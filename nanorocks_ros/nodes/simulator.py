@@ -1,0 +1,26 @@
+"""Node: a simulated tray filmed by a simulated camera, with the truth beside it."""
+
+from __future__ import annotations
+
+from nanorocks_ros.experiment.settings import PacingSettings, SimulationSettings
+from nanorocks_ros.nodes._epoch import Epoch
+from nanorocks_ros.nodes._node import NanorocksNode
+from nanorocks_ros.nodes._pacing import Pacer
+from nanorocks_ros.nodes._sources import publish_moment, simulated_moments
+
+
+class SimulatorNode(NanorocksNode):
+    """Publishes synthetic frames and their truth at the pace of a camera."""
+
+    def __init__(self):
+        super().__init__('simulator')
+        settings = self.declare(SimulationSettings())
+        pacing = self.declare(PacingSettings())
+        self._epoch = Epoch(self, may_set=True)
+        moments = simulated_moments(self, settings, '')
+        self._pacer = Pacer(self, moments, self._emit, pacing, self.finish)
+
+    def _emit(self, stamp_ns, moment):
+        if self._epoch.ns is None:
+            self._epoch.set(stamp_ns)
+        publish_moment(self, moment, self._epoch.ns)

@@ -1,0 +1,18 @@
+"""Node: gray tray images in, mean projected speeds and motion masks out."""
+
+from __future__ import annotations
+
+from nanorocks_ros.nodes._tray_stage import TrayStageNode
+from nanorocks_ros.stages.speed import SpeedEstimator
+from nanorocks_ros.wire import topics
+
+
+class SpeedEstimatorNode(TrayStageNode):
+    """Measures the mean projected speed of each tray."""
+
+    def __init__(self):
+        super().__init__('speed_estimator', SpeedEstimator)
+
+    def prepare(self, stage, tray):
+        """Masks are made only while somebody looks."""
+        stage.emit_mask = self.wanted(topics.MOTION, tray)

@@ -1,0 +1,116 @@
+"""Nodes in processes of their own, on a domain that no other test uses, on this host only."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+_DOMAINS = itertools.count(20)
+_PATIENCE_S = 40.0
+
+
+@dataclass
+class Finished:
+    """How a node ended."""
+
+    code: int
+    output: str
+
+
+@dataclass
+class Graph:
+    """The processes of one test, and a node that listens to them."""
+
+    domain: int
+    node: Node
+    executor: SingleThreadedExecutor
+    folder: str
+    _running: list[tuple[subprocess.Popen, str]] = field(default_factory=list)
+
+    def start(self, name, *parameters, arguments=()):
+        """Start a node; parameters as ``name:=value``."""
+        path = os.path.join(self.folder, f'{name}_{len(self._running)}.log')
+        command = [sys.executable, '-m', 'nanorocks_ros.nodes', name, '--ros-args', *arguments]
+        for one in parameters:
+            command += ['-p', one]
+        environment = dict(
+            os.environ,
+            ROS_DOMAIN_ID=str(self.domain),
+            ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST',
+            PYTHONUNBUFFERED='1',
+        )
+        with open(path, 'wb') as log:
+            process = subprocess.Popen(
+                command, env=environment, stdout=log, stderr=subprocess.STDOUT
+            )
+        self._running.append((process, path))
+        return process
+
+    def output(self, process):
+        """What a node has printed so far."""
+        path = next(path for one, path in self._running if one is process)
+        with open(path, encoding='utf-8') as log:
+            return log.read()
+
+    def wait(self, process):
+        """Spin until a node has ended by itself."""
+        self.until(lambda: process.poll() is not None)
+        return Finished(process.returncode, self.output(process))
+
+    def interrupt(self, process):
+        """Press Ctrl-C and wait for the end."""
+        process.send_signal(signal.SIGINT)
+        process.wait(_PATIENCE_S)
+        return Finished(process.returncode, self.output(process))
+
+    def until(self, condition):
+        """Spin until a condition holds; fail with what the nodes printed if it never does."""
+        end = time.monotonic() + _PATIENCE_S
+        while not condition():
+            if time.monotonic() > end:
+                logs = '\n'.join(self.output(process) for process, _ in self._running)
+                pytest.fail(f'never came true; the nodes said:\n{logs}')
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def end(self):
+        """End what is still running."""
+        for process, _ in self._running:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+        for process, _ in self._running:
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+
+@pytest.fixture
+def graph(tmp_path, monkeypatch):
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    domain = next(_DOMAINS)
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=domain)
+    node = Node('listener', context=context, namespace='nanorocks')
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    one = Graph(domain=domain, node=node, executor=executor, folder=str(tmp_path))
+    yield one
+    one.end()
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.try_shutdown(context=context)
