@@ -1,0 +1,1 @@
+"""The hard-sphere gas in its tray, and the camera over it."""

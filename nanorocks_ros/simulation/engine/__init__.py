@@ -1,0 +1,1 @@
+"""Event-driven molecular dynamics of inelastic hard spheres in a box."""

@@ -1,0 +1,193 @@
+"""A tray that is shaken now and then, and cools in between: what happens in it, frame by frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import count
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError, SimulationError
+from nanorocks_ros.experiment.settings import problem, rows
+from nanorocks_ros.records import GroundTruth
+from nanorocks_ros.simulation.engine.gas import EventCounts, HardSphereGas
+from nanorocks_ros.simulation.initial import resting_beads, rules_of, shaken_velocities, stock
+from nanorocks_ros.simulation.randomness import Purpose, key_for
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.settings import SimulationSettings
+    from nanorocks_ros.experiment.trays import Tray
+
+# A frame this much before a shaking event shows it: decimal times are not exact in binary.
+_SIMULTANEOUS = 1e-9
+
+_NS = 1e9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moment:
+    """The beads at the instant of one frame.
+
+    Parameters
+    ----------
+    positions, velocities : ndarray (n, 3), [m], [m/s]
+        From the corner of the tray.
+    truth : GroundTruth
+    """
+
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    truth: GroundTruth
+
+
+class ShakenTray:
+    """Beads in a tray: at rest, shaken at set times, cooling freely in between.
+
+    Parameters
+    ----------
+    settings : SimulationSettings
+    tray : Tray
+    run : int, >= 0
+        Runs of one seed differ.
+
+    Raises
+    ------
+    ConfigurationError
+        For a setting outside its range.
+    SimulationError
+        When the beads do not fit into the tray.
+    """
+
+    def __init__(self, settings: SimulationSettings, tray: Tray, run: int = 0) -> None:
+        check_settings(settings)
+        self._settings = settings
+        self._tray = tray
+        self._key = key_for(settings.seed, run, Purpose.VELOCITIES)
+        self.materials = stock(tray).materials
+        self._gas = HardSphereGas(resting_beads(settings, tray, run), rules_of(settings, tray))
+        self._origin = 0.0
+        self._cycle = 0
+
+    @property
+    def radii(self) -> NDArray[np.float64]:
+        """Radius of each bead, (n,), [m]."""
+        return self._gas.radii
+
+    @property
+    def cycle(self) -> int:
+        """Shaking events so far."""
+        return self._cycle
+
+    @property
+    def counts(self) -> EventCounts:
+        """Events so far."""
+        return self._gas.counts
+
+    def moments(self, frames: int | None = None, start_stamp_ns: int = 0) -> Iterator[Moment]:
+        """Go from frame to frame, from the present on; meant to be called once.
+
+        Parameters
+        ----------
+        frames : int or None, >= 0
+            How many; None goes on for ever.
+        start_stamp_ns : int, [ns]
+            Stamp of the frame at time 0.
+
+        Raises
+        ------
+        SimulationError
+            When time would go backwards.
+        """
+        if frames is not None and frames < 0:
+            raise SimulationError('frames', f'{frames}', 'give 0 or more')
+        return self._moments(count() if frames is None else range(frames), start_stamp_ns)
+
+    def _moments(self, numbers: count[int] | range, start_stamp_ns: int) -> Iterator[Moment]:
+        for number in numbers:
+            positions, velocities = self.at(number / self._settings.frame_rate)
+            stamp_ns = start_stamp_ns + round(number * _NS / self._settings.frame_rate)
+            yield Moment(
+                positions=positions,
+                velocities=velocities,
+                truth=self._truth(stamp_ns, velocities),
+            )
+
+    def at(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Follow the beads to a time, through any shaking event up to and including it.
+
+        Parameters
+        ----------
+        time : float, [s]
+
+        Returns
+        -------
+        positions, velocities : ndarray (n, 3), [m], [m/s]
+
+        Raises
+        ------
+        SimulationError
+            When the time has passed already.
+        """
+        while time >= self._next_shake() - _SIMULTANEOUS:
+            self._shake()
+        # A frame within rounding of the shake belongs to the shake.
+        since = max(time - self._origin, 0.0) if self._cycle else time
+        positions, velocities = self._gas.run_until(since, [since])
+        return positions[0], velocities[0]
+
+    def _next_shake(self) -> float:
+        return self._settings.first_shake + self._cycle * self._settings.shake_period
+
+    def _shake(self) -> None:
+        instant = self._next_shake()
+        self._gas.run_until(max(instant - self._origin, self._gas.now))
+        n = self._gas.radii.size
+        self._gas.kick(shaken_velocities(n, self._settings.mean_speed, self._key, self._cycle))
+        self._origin = instant
+        self._cycle += 1
+
+    def _truth(self, stamp_ns: int, velocities: NDArray[np.float64]) -> GroundTruth:
+        mean_speed, mean_projected_speed = mean_speeds(velocities)
+        return GroundTruth(
+            stamp_ns=stamp_ns,
+            tray=self._tray.number,
+            cycle=self._cycle,
+            mean_projected_speed=mean_projected_speed,
+            mean_speed=mean_speed,
+            bodies=self._gas.radii.size,
+            restitution=self._settings.restitution,
+            wall_restitution=self._settings.wall_restitution,
+            sticking_speed=0.0,
+        )
+
+
+def mean_speeds(velocities: NDArray[np.float64]) -> tuple[float, float]:
+    """Mean speed in space and in the image plane, [m/s], of velocities (n, 3)."""
+    squares = velocities * velocities
+    in_plane = squares[:, 0] + squares[:, 1]
+    # fsum rounds once: the same sum whatever the number of lanes of the machine.
+    in_space = math.fsum(np.sqrt(in_plane + squares[:, 2]).tolist())
+    n = velocities.shape[0]
+    return in_space / n, math.fsum(np.sqrt(in_plane).tolist()) / n
+
+
+def check_settings(settings: SimulationSettings) -> None:
+    """Refuse settings outside their ranges, all at once.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming every setting at fault.
+    """
+    found = ((row.name, problem(row, row.default)) for row in rows(settings))
+    wrong = [f'{name}: {text}' for name, text in found if text]
+    if wrong:
+        raise ConfigurationError(
+            'simulation', '; '.join(wrong), 'see docs/parameters.md for names and ranges'
+        )
