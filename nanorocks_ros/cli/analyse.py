@@ -1,0 +1,110 @@
+"""``nanorocks analyse BAG``: the coefficient of restitution behind a recording."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.experiment.settings import PipelineSettings
+
+if TYPE_CHECKING:
+    import argparse
+
+    from nanorocks_ros.records import CorEstimate
+    from nanorocks_ros.study.offline import Analysis, TrayResults
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    from nanorocks_ros.cli.flags import add_flags
+
+    parser = commands.add_parser('analyse', help='analyse a bag as fast as the machine can')
+    parser.add_argument('bag', help='rosbag2 folder or .mcap file')
+    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    parser.add_argument(
+        '-o', '--output', help='folder for tables and results bag; default BAG_results'
+    )
+    parser.add_argument('--no-output', action='store_true', help='write no files')
+    parser.add_argument('--image-topic', default='', help="the camera topic, if it isn't ours")
+    parser.add_argument('--parameters', help='ROS parameter file, as the nodes take it')
+    add_flags(parser, PipelineSettings(), skip=set())
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Analyse the bag, print, write; the exit code."""
+    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.study.export import as_json, write_results
+    from nanorocks_ros.study.offline import analyse
+
+    settings = settings_from(options, PipelineSettings(), options.parameters)
+    source = Path(options.bag)
+    with _Progress() as progress:
+        analysis = analyse(
+            source, settings, image_topic=options.image_topic, progress=progress.update
+        )
+    for notice in analysis.notices:
+        print(f'nanorocks: {notice}', file=sys.stderr)
+    if options.json:
+        print(json.dumps(as_json(analysis), allow_nan=False))
+    else:
+        _print(analysis)
+    if not options.no_output:
+        folder = Path(options.output or f'{str(source).rstrip("/")}_results')
+        write_results(analysis, folder, source, settings)
+        print(f'nanorocks: results in {folder}', file=sys.stderr)
+    if analysis.error is not None:
+        raise analysis.error
+    return 0
+
+
+class _Progress:
+    """A progress line on a terminal, silence elsewhere."""
+
+    def __enter__(self) -> _Progress:
+        self._bar: Any = None
+        return self
+
+    def update(self, done: int, total: int) -> None:
+        if self._bar is None:
+            from tqdm import tqdm
+
+            self._bar = tqdm(total=total, unit='frame', leave=False, disable=None)
+        self._bar.update(done - self._bar.n)
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+def _print(analysis: Analysis) -> None:
+    lost = f', {analysis.frames_lost} lost' if analysis.frames_lost else ''
+    print(f'{analysis.frames} frames{lost}, {analysis.seconds:.1f} s')
+    for number, results in analysis.trays.items():
+        print(f'tray {number}: {len(results.speeds)} speeds')
+        _print_cycles(results)
+
+
+def _print_cycles(results: TrayResults) -> None:
+    from nanorocks_ros.study.export import last_of_each_cycle
+
+    cycles = last_of_each_cycle(results.cors)
+    if not cycles:
+        print('  no COR: no shaking event with a decay after it was found')
+    for one in cycles:
+        print(f'  cycle {one.cycle}: {_cor_text(one)}')
+    if cycles and results.truth:
+        last = results.truth[-1]
+        print(f'  truth:   COR {last.restitution:g}, walls {last.wall_restitution:g}')
+    if cycles:
+        print("  relation 'paper': its interval is statistical only, see docs/physics.md")
+
+
+def _cor_text(cor: CorEstimate) -> str:
+    return (
+        f'COR {cor.restitution:.4f} [{cor.restitution_lower:.4f}, {cor.restitution_upper:.4f}] '
+        f'({cor.relation.name.lower()}, {cor.status.name.lower()}), '
+        f'v0 {cor.initial_speed * 1e3:.2f} mm/s, tau {cor.haff_time:.2f} s'
+    )

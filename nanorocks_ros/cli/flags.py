@@ -1,0 +1,100 @@
+"""Settings as command-line flags and parameter files."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.settings import SettingRow, rows, with_values
+
+SettingsType = TypeVar('SettingsType')
+
+
+def add_flags(parser: argparse.ArgumentParser, settings: Any, skip: set[str]) -> None:
+    """A flag for every setting: ``speed.method`` becomes ``--speed-method``."""
+    group = parser.add_argument_group('settings')
+    for row in rows(settings):
+        if row.name in skip:
+            continue
+        unit = f' [{row.unit}]' if row.unit else ''
+        group.add_argument(
+            flag_of(row.name),
+            dest=row.name,
+            metavar='V',
+            nargs='*' if isinstance(row.default, tuple) else None,
+            help=f'{row.doc}{unit}; default {_shown(row)}'.replace('%', '%%'),
+        )
+
+
+def flag_of(name: str) -> str:
+    """The flag of a setting."""
+    return '--' + name.replace('.', '-').replace('_', '-')
+
+
+def _shown(row: SettingRow) -> str:
+    if isinstance(row.default, tuple):
+        return ' '.join(str(one) for one in row.default) or 'empty'
+    return str(row.default) if row.default != '' else 'empty'
+
+
+def settings_from(
+    options: argparse.Namespace, settings: SettingsType, parameters: str | None = None
+) -> SettingsType:
+    """The settings with what a parameter file and the flags say, the flags last.
+
+    Raises
+    ------
+    ConfigurationError
+        For a file that cannot be read, an unknown name, or a value that cannot be used.
+    """
+    if parameters:
+        settings = with_values(settings, _from_file(Path(parameters)), parameters)
+    given = {
+        row.name: _parsed(row, getattr(options, row.name))
+        for row in rows(settings)
+        if getattr(options, row.name, None) is not None
+    }
+    return with_values(settings, given, 'command line')
+
+
+def _parsed(row: SettingRow, text: Any) -> Any:
+    if isinstance(row.default, str):
+        return text
+    try:
+        return yaml.safe_load(text) if isinstance(text, str) else [float(one) for one in text]
+    except (yaml.YAMLError, ValueError) as error:
+        raise ConfigurationError(
+            flag_of(row.name), f'{text!r} cannot be read', 'give a number'
+        ) from error
+
+
+def _from_file(path: Path) -> dict[str, Any]:
+    """Values of a ROS parameter file: every ``ros__parameters`` block, nested or dotted."""
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        reason = getattr(error, 'strerror', None) or 'is not YAML'
+        raise ConfigurationError(str(path), reason, 'name a ROS parameter file') from error
+    found: dict[str, Any] = {}
+    for node in content.values() if isinstance(content, dict) else ():
+        if isinstance(node, dict) and isinstance(node.get('ros__parameters'), dict):
+            found.update(_flattened(node['ros__parameters']))
+    if not found:
+        raise ConfigurationError(
+            str(path), 'holds no ros__parameters', 'see config/pipeline.yaml for the form'
+        )
+    return found
+
+
+def _flattened(block: dict[str, Any], prefix: str = '') -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in block.items():
+        if isinstance(value, dict):
+            flat.update(_flattened(value, f'{prefix}{name}.'))
+        else:
+            flat[f'{prefix}{name}'] = value
+    return flat

@@ -1,0 +1,60 @@
+"""The command ``nanorocks``: offline work without ROS."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+from nanorocks_ros import __version__
+from nanorocks_ros.errors import ConfigurationError, NanorocksError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+EXIT_INPUT = 1
+EXIT_CALL = 2
+EXIT_INTERRUPTED = 130
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The parser of the whole command; heavy imports wait until a command runs."""
+    from nanorocks_ros.cli import analyse, simulate
+
+    parser = argparse.ArgumentParser(
+        prog='nanorocks',
+        description='Coefficient of restitution, with its interval, from films of granular gases.',
+    )
+    parser.add_argument('--version', action='version', version=f'nanorocks {__version__}')
+    commands = parser.add_subparsers(dest='command', metavar='COMMAND', required=True)
+    analyse.add_parser(commands)
+    simulate.add_parser(commands)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; the exit code.
+
+    Returns
+    -------
+    int
+        0 when the work was done, 2 for a wrong call, 1 for input that cannot be used, 130
+        when interrupted.
+    """
+    options = build_parser().parse_args(arguments)
+    try:
+        code: int = options.run(options)
+    except ConfigurationError as error:
+        print(f'nanorocks: {error}', file=sys.stderr)
+        return EXIT_CALL
+    except NanorocksError as error:
+        print(f'nanorocks: {error}', file=sys.stderr)
+        return EXIT_INPUT
+    except KeyboardInterrupt:
+        print('nanorocks: interrupted; nothing half-done was kept', file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read our output has enough of it.
+        sys.stderr.close()
+        return 0
+    return code

@@ -1,0 +1,102 @@
+"""The camera in a bag: its frames in order, its epoch, and the truth where there is one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.recordings.images import frame_from_compressed, frame_from_image
+from nanorocks_ros.recordings.reader import BagMessage, BagReader, open_bag
+from nanorocks_ros.records import Frame, GroundTruth
+from nanorocks_ros.wire import topics
+from nanorocks_ros.wire.layouts import NS, from_array
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+
+class BagFrames:
+    """Reads the frames of one camera topic of a bag.
+
+    Parameters
+    ----------
+    path : str or Path
+    image_topic : str, optional
+        Empty: the camera topic of the graph, compressed or not.
+
+    Attributes
+    ----------
+    reader : BagReader
+    topic : str
+        The camera topic that was found.
+
+    Raises
+    ------
+    RecordingError
+        When the bag cannot be read or holds no such topic.
+    """
+
+    def __init__(self, path: str | Path, image_topic: str = '') -> None:
+        self.reader: BagReader = open_bag(path)
+        wanted = (
+            (image_topic,)
+            if image_topic
+            else (topics.RAW_COMPRESSED.absolute(), topics.RAW.absolute())
+        )
+        self.topic = self.reader.require_topic(wanted)
+        self.count = self.reader.topics[self.topic].count
+        self._compressed = self.reader.topics[self.topic].type == topics.COMPRESSED
+
+    @property
+    def where(self) -> str:
+        """What to call these frames in an error."""
+        return f'{self.reader.path}: {self.topic}'
+
+    def epoch_ns(self) -> int | None:
+        """What `time` counts from: as recorded, else the first frame; None without frames."""
+        name = topics.EPOCH.absolute()
+        for message in self._first(name):
+            return _nanoseconds(self.reader.deserialize(message))
+        for message in self._first(self.topic):
+            return _nanoseconds(self.reader.deserialize(message).header.stamp)
+        return None
+
+    def _first(self, topic: str) -> Iterator[BagMessage]:
+        if topic in self.reader.topics:
+            yield from self.reader.messages([topic])
+
+    def frames(self) -> Iterator[Frame]:
+        """The frames, decoded, in the order they were recorded.
+
+        Raises
+        ------
+        FrameError
+            For an encoding that is not supported or a picture that cannot be decoded.
+        """
+        read = frame_from_compressed if self._compressed else frame_from_image
+        for message in self.reader.messages([self.topic]):
+            yield read(self.reader.deserialize(message), self.where)
+
+    def truth(self, epoch_ns: int) -> dict[int, list[GroundTruth]]:
+        """What the simulator knew, by tray; empty for a real recording."""
+        names = [
+            name
+            for name, info in self.reader.topics.items()
+            if name.endswith('/truth') and info.type == topics.ARRAY and topics.tray_of(name)
+        ]
+        found: dict[int, list[GroundTruth]] = {}
+        for message in self.reader.messages(names) if names else ():
+            tray = topics.tray_of(message.topic) or 0
+            record = from_array(
+                GroundTruth,
+                self.reader.deserialize(message).data,
+                tray=tray,
+                epoch_ns=epoch_ns,
+                where=message.topic,
+            )
+            found.setdefault(tray, []).append(record)
+        return found
+
+
+def _nanoseconds(time: Any) -> int:
+    return int(time.sec) * NS + int(time.nanosec)

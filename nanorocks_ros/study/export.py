@@ -1,0 +1,200 @@
+"""Results of an analysis as a JSON object, CSV tables and a results bag."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros import __version__
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.experiment.settings import rows
+from nanorocks_ros.recordings.messages import float_array_message, time_message
+from nanorocks_ros.recordings.results import write_csv
+from nanorocks_ros.recordings.writer import BagWriter
+from nanorocks_ros.records import CorEstimate, CorStatus
+from nanorocks_ros.study.results_bag import offered
+from nanorocks_ros.wire import topics
+from nanorocks_ros.wire.layouts import NS, ArrayRecord, layout, to_array
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from nanorocks_ros.experiment.settings import PipelineSettings
+    from nanorocks_ros.study.offline import Analysis, TrayResults
+
+BAG_NAME = 'results_bag'
+_MARK = '.nanorocks_results'
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
+    """The final estimate of every cycle, or its last where none is final."""
+    latest: dict[int, CorEstimate] = {}
+    for one in cors:
+        before = latest.get(one.cycle)
+        if before is None or before.status is not CorStatus.FINAL:
+            latest[one.cycle] = one
+    return [latest[cycle] for cycle in sorted(latest)]
+
+
+def as_json(analysis: Analysis) -> dict[str, Any]:
+    """The analysis as the command-line contract wants it: SI units, null for unknown."""
+    return {
+        'frames': analysis.frames,
+        'frames_lost': analysis.frames_lost,
+        'seconds': analysis.seconds,
+        'complete': analysis.complete,
+        'notices': list(analysis.notices),
+        'trays': {
+            str(number): _tray_as_json(analysis, results)
+            for number, results in analysis.trays.items()
+        },
+    }
+
+
+def _tray_as_json(analysis: Analysis, results: TrayResults) -> dict[str, Any]:
+    def seconds(stamp_ns: int) -> float:
+        return (stamp_ns - analysis.epoch_ns) / NS
+
+    starts = {one.cycle: one.cycle_start_ns for one in results.speeds if one.cycle_start_ns}
+    return {
+        'time': [seconds(one.stamp_ns) for one in results.speeds],
+        'mean_projected_speed': [_known(one.mean_projected_speed) for one in results.speeds],
+        'mean_projected_speed_error': [
+            _known(one.mean_projected_speed_error) for one in results.speeds
+        ],
+        'cycles': [
+            _cycle_as_json(one, seconds(starts[one.cycle]))
+            for one in last_of_each_cycle(results.cors)
+        ],
+        'truth': _truth_as_json(analysis, results),
+    }
+
+
+def _cycle_as_json(cor: CorEstimate, start: float) -> dict[str, Any]:
+    return {
+        'cycle': cor.cycle,
+        'start': start,
+        'initial_speed': _known(cor.initial_speed),
+        'haff_time': _known(cor.haff_time),
+        'restitution': _known(cor.restitution),
+        'restitution_lower': _known(cor.restitution_lower),
+        'restitution_upper': _known(cor.restitution_upper),
+        'wall_restitution': None,
+        'relation': cor.relation.name.lower(),
+        'status': cor.status.name.lower(),
+        'reduced_chi_square': _known(cor.reduced_chi_square),
+        'samples': cor.samples,
+        'cluster_size': None,
+        'bodies': None,
+        'onset': None,
+        'sticking_speed': None,
+    }
+
+
+def _truth_as_json(analysis: Analysis, results: TrayResults) -> dict[str, Any] | None:
+    truth = results.truth
+    if not truth:
+        return None
+    return {
+        'time': [(one.stamp_ns - analysis.epoch_ns) / NS for one in truth],
+        'mean_projected_speed': [one.mean_projected_speed for one in truth],
+        'bodies': [one.bodies for one in truth],
+        'restitution': truth[-1].restitution,
+        'wall_restitution': truth[-1].wall_restitution,
+        'sticking_speed': truth[-1].sticking_speed,
+    }
+
+
+def write_results(
+    analysis: Analysis, folder: Path, source: Path, settings: PipelineSettings
+) -> None:
+    """CSV tables and a results bag in a folder of their own, complete or not at all.
+
+    Earlier results in the same folder are replaced, once the new ones are complete.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    folder : Path
+    source : Path
+        The bag that was analysed, for the provenance.
+    settings : PipelineSettings
+
+    Raises
+    ------
+    RecordingError
+        When the folder cannot be written, or holds something else.
+    """
+    if folder.exists() and not (folder / _MARK).is_file():
+        raise RecordingError(
+            str(folder), 'exists and holds no results of ours', 'pass another --output'
+        )
+    fresh = folder.with_name(f'{folder.name}.part')
+    try:
+        shutil.rmtree(fresh, ignore_errors=True)
+        fresh.mkdir(parents=True)
+        (fresh / _MARK).touch()
+        for number, results in analysis.trays.items():
+            _write_tables(analysis, results, fresh, number)
+        _write_bag(analysis, fresh / BAG_NAME, _provenance(source, settings))
+        if folder.exists():
+            shutil.rmtree(folder)
+        fresh.rename(folder)
+    except OSError as error:
+        raise RecordingError(
+            str(folder), f'cannot be written: {error.strerror}', 'pass a writable --output'
+        ) from error
+
+
+def _write_tables(analysis: Analysis, results: TrayResults, folder: Path, number: int) -> None:
+    tables: dict[str, Sequence[ArrayRecord]] = {
+        'speed': results.speeds,
+        'cluster': results.clusters,
+        'cor': results.cors,
+    }
+    for name, records in tables.items():
+        if not records:
+            continue
+        fields = layout(type(records[0])).fields
+        write_csv(
+            folder / f'tray_{number}_{name}.csv',
+            [field.name for field in fields],
+            [field.unit for field in fields],
+            (to_array(one, analysis.epoch_ns).tolist() for one in records),
+        )
+
+
+def _provenance(source: Path, settings: PipelineSettings) -> dict[str, str]:
+    return {
+        'nanorocks_ros': __version__,
+        'source': source.name,
+        **{row.name: str(row.default) for row in rows(settings)},
+    }
+
+
+def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> None:
+    epoch_topic = topics.EPOCH.absolute()
+    table = {epoch_topic: offered(topics.EPOCH)}
+    messages: list[tuple[int, str, ArrayRecord]] = []
+    for number, results in analysis.trays.items():
+        for topic, records in (
+            (topics.SPEED, results.speeds),
+            (topics.CLUSTER, results.clusters),
+            (topics.COR, results.cors),
+        ):
+            name = topic.absolute(number)
+            table[name] = offered(topic)
+            messages += [(one.stamp_ns, name, one) for one in records]
+    messages.sort(key=lambda item: item[0])
+    with BagWriter(path, table, metadata=provenance) as bag:
+        bag.write(epoch_topic, analysis.epoch_ns, time_message(analysis.epoch_ns))
+        for stamp_ns, name, record in messages:
+            values = to_array(record, analysis.epoch_ns)
+            labels = [field.name for field in layout(type(record)).fields]
+            bag.write(name, stamp_ns, float_array_message(labels, values))

@@ -1,0 +1,168 @@
+"""Analysis of a bag as fast as the machine can, by the same stages as the live graph."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import FrameError, RecordingError
+from nanorocks_ros.records import (
+    ClusterEstimate,
+    CorEstimate,
+    Frame,
+    GroundTruth,
+    Notice,
+    SpeedEstimate,
+)
+from nanorocks_ros.stages.pipeline import Pipeline
+from nanorocks_ros.study.bag_frames import BagFrames
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from nanorocks_ros.experiment.settings import PipelineSettings
+
+NS = 1_000_000_000
+Progress = Callable[[int, int], None]
+
+# A gap of more than this many usual intervals means that frames are missing.
+_GAP = 1.5
+
+
+@dataclass(slots=True, kw_only=True)
+class TrayResults:
+    """Everything that was measured in one tray, in order of time."""
+
+    speeds: list[SpeedEstimate] = field(default_factory=list)
+    clusters: list[ClusterEstimate] = field(default_factory=list)
+    cors: list[CorEstimate] = field(default_factory=list)
+    truth: list[GroundTruth] = field(default_factory=list)
+
+
+@dataclass(slots=True, kw_only=True)
+class Analysis:
+    """Everything that was measured in a bag.
+
+    Parameters
+    ----------
+    epoch_ns : int
+        What times count from.
+    stamps_ns : list of int
+        Of the frames analysed.
+    trays : dict of int to TrayResults
+    notices : list of str
+        What the user should know: salvage, late frames, restarts.
+    complete : bool
+        Whether every frame was analysed.
+    error : FrameError or None
+        Why the analysis ended early, if it did; what came before is kept.
+    """
+
+    epoch_ns: int
+    trays: dict[int, TrayResults]
+    stamps_ns: list[int] = field(default_factory=list)
+    notices: list[str] = field(default_factory=list)
+    complete: bool = True
+    error: FrameError | None = None
+
+    @property
+    def frames(self) -> int:
+        """Frames analysed."""
+        return len(self.stamps_ns)
+
+    @property
+    def seconds(self) -> float:
+        """Time from the first frame to the last, [s]."""
+        if not self.stamps_ns:
+            return 0.0
+        return (max(self.stamps_ns) - min(self.stamps_ns)) / NS
+
+    @property
+    def frames_lost(self) -> int:
+        """Frames missing from the sequence, judged by the usual interval between two."""
+        steps = np.diff(np.array(self.stamps_ns, dtype=np.int64)).astype(np.float64)
+        steps = steps[steps > 0]
+        if steps.size == 0:
+            return 0
+        usual = float(np.median(steps))
+        gaps = steps[steps > _GAP * usual]
+        return int(np.sum(np.rint(gaps / usual) - 1))
+
+
+def analyse(
+    path: str | Path,
+    settings: PipelineSettings,
+    *,
+    image_topic: str = '',
+    progress: Progress | None = None,
+) -> Analysis:
+    """Push every frame of a bag through the pipeline.
+
+    Parameters
+    ----------
+    path : str or Path
+    settings : PipelineSettings
+    image_topic : str, optional
+        Where the bag's camera has another name than the graph's.
+    progress : callable, optional
+        Called with the frames done and the frames there are.
+
+    Returns
+    -------
+    Analysis
+        Holds what could be analysed even if a frame in the middle could not.
+
+    Raises
+    ------
+    RecordingError
+        When the bag cannot be read or holds no camera.
+    ConfigurationError
+        When the settings cannot be used.
+    FrameError
+        When not even the first frame can be used.
+    """
+    bag = BagFrames(path, image_topic)
+    epoch_ns = bag.epoch_ns()
+    if epoch_ns is None:
+        raise RecordingError(bag.where, 'holds no frame', 'pass another bag or --image-topic')
+    pipeline = Pipeline(settings, bag.where)
+    truth = bag.truth(epoch_ns)
+    result = Analysis(
+        epoch_ns=epoch_ns,
+        trays={n: TrayResults(truth=truth.get(n, [])) for n in settings.trays},
+        complete=bag.reader.complete,
+    )
+    try:
+        for number, frame in enumerate(bag.frames(), start=1):
+            _push(result, pipeline, frame)
+            if progress is not None:
+                progress(number, bag.count)
+    except FrameError as error:
+        if not result.stamps_ns:
+            raise
+        result.error, result.complete = error, False
+    for final in pipeline.flush():
+        result.trays[final.tray].cors.append(final)
+    # Known only after reading: where a damaged bag ends.
+    result.notices[:0] = bag.reader.notices
+    result.complete = result.complete and bag.reader.complete
+    return result
+
+
+def _push(result: Analysis, pipeline: Pipeline, frame: Frame) -> None:
+    records = pipeline.push(frame)
+    late = len(records) == 1 and isinstance(records[0], Notice)
+    if not late:
+        result.stamps_ns.append(frame.stamp_ns)
+    for record in records:
+        if isinstance(record, Notice):
+            result.notices.append(record.text)
+        elif isinstance(record, SpeedEstimate):
+            result.trays[record.tray].speeds.append(record)
+        elif isinstance(record, ClusterEstimate):
+            result.trays[record.tray].clusters.append(record)
+        elif isinstance(record, CorEstimate):
+            result.trays[record.tray].cors.append(record)

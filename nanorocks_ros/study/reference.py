@@ -1,0 +1,130 @@
+"""The generated pages of the documentation: what is on the wire, and every parameter.
+
+``python -m nanorocks_ros.study.reference`` writes them; a test fails when they are stale.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nanorocks_ros.experiment import settings as st
+from nanorocks_ros.records import ClusterEstimate, CorEstimate, GroundTruth, SpeedEstimate
+from nanorocks_ros.wire import topics
+from nanorocks_ros.wire.layouts import layout
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+_NOTE = '<!-- Made by `make docs` from the code; change that instead. -->\n\n'
+_GROUPS = (
+    (
+        'All nodes behind the camera, and `nanorocks analyse`',
+        'Each node reads those it needs; one file can serve the whole graph. On the command '
+        'line `speed.method` is `--speed-method`.',
+        st.PipelineSettings(),
+    ),
+    ('`simulator`, and `pipeline` under `simulation.`', '', st.SimulationSettings()),
+    ('`simulator`, `bag_player`, `pipeline`', '', st.PacingSettings()),
+    ('`bag_player`, `pipeline`', '', st.BagSettings()),
+    ('`preprocessor`, `pipeline`', '', st.CameraSettings()),
+    ('`pipeline`', '', st.SourceSettings()),
+)
+
+
+def _table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    lines = ['| ' + ' | '.join(header) + ' |']
+    lines.append('|' + '|'.join(' --- ' for _ in lines[0].split(' | ')) + '|')
+    lines += ['| ' + ' | '.join(cell.replace('|', '\\|') for cell in row) + ' |' for row in rows]
+    return '\n'.join(lines) + '\n'
+
+
+def topics_page() -> str:
+    """Topics and array layouts."""
+    text = _NOTE + '# Topics\n\n'
+    text += (
+        f'Relative names, under `{topics.NAMESPACE}` unless the namespace is moved; `K` is the '
+        'number of a tray. All are reliable; a latched topic is transient local, so that a late '
+        'subscriber still gets the last message.\n\n'
+    )
+    text += _table(
+        ('topic', 'type', 'depth', 'latched', 'content'),
+        (
+            (
+                f'`{one.name.format(tray="K")}`',
+                one.type,
+                str(one.depth),
+                'yes' if one.latched else '',
+                one.doc,
+            )
+            for one in topics.TOPICS
+        ),
+    )
+    text += (
+        '\nBeside these, every node publishes `/diagnostics` once a second, and `bag_player` '
+        '`/clock`.\n\n# Array layouts\n\n'
+        'The arrays are `std_msgs/Float32MultiArray`: `layout.dim[0].label` holds the field '
+        'names, separated by commas. SI units; NaN means "not known yet". `epoch` tells what '
+        '`time` counts from. Read from `msg_defs/nanorocks_msgs/msg/`, which also builds as an '
+        'interface package.\n'
+    )
+    for record in (SpeedEstimate, ClusterEstimate, CorEstimate, GroundTruth):
+        one = layout(record)
+        text += f'\n## {one.name}\n\n{one.doc}\n\n'
+        text += _table(
+            ('element', 'field', 'unit', 'meaning'),
+            (
+                (str(index), f'`{field.name}`', field.unit, field.doc)
+                for index, field in enumerate(one.fields)
+            ),
+        )
+        if one.constants:
+            named = ', '.join(f'`{name}` = {value}' for name, value in one.constants.items())
+            text += f'\nConstants: {named}.\n'
+    return text
+
+
+def parameters_page() -> str:
+    """Every parameter with its default and range."""
+    text = _NOTE + '# Parameters\n'
+    for title, remark, settings in _GROUPS:
+        text += f'\n## {title}\n\n{type(settings).__doc__}\n\n'
+        text += f'{remark}\n\n' if remark else ''
+        text += _table(
+            ('parameter', 'default', 'unit', 'range', 'meaning'),
+            (
+                (f'`{row.name}`', _default(row.default), row.unit, _range(row), row.doc)
+                for row in st.rows(settings)
+            ),
+        )
+    return text
+
+
+def _default(value: st.Value) -> str:
+    if isinstance(value, tuple):
+        return ', '.join(f'{one:g}' for one in value) or 'empty'
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'{value:g}' if isinstance(value, float) else str(value) or 'empty'
+
+
+def _range(row: st.SettingRow) -> str:
+    if row.bounds.choices:
+        return ', '.join(f'`{one}`' for one in row.bounds.choices)
+    if isinstance(row.default, bool | str):
+        return ''
+    return f'{row.bounds.low:g} to {row.bounds.high:g}'
+
+
+PAGES = {'topics.md': topics_page, 'parameters.md': parameters_page}
+
+
+def write(folder: Path) -> None:
+    """Write the pages into a folder."""
+    for name, page in PAGES.items():
+        (folder / name).write_text(page(), encoding='utf-8')
+
+
+if __name__ == '__main__':
+    write(Path(sys.argv[1] if len(sys.argv) > 1 else 'docs'))
