@@ -26,7 +26,7 @@ export PYTHON
 RUN := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" AMENT_PREFIX_PATH="$(AMENT)" \
        ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 
-.PHONY: help demo test test-oldest lint bench venv lock clean
+.PHONY: help demo test test-oldest lint bench docs venv lock clean
 
 help: ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' $(MAKEFILE_LIST) | \
@@ -52,6 +52,9 @@ lint: venv ## Check style, format, types and which module may import which
 
 bench: venv ## Measure against the limits and against peers
 	@$(RUN) python -m benchmarks
+
+docs: venv ## Renew the pages of docs/ that are made from the code
+	@$(RUN) python -m nanorocks_ros.study.reference
 
 venv: ## Set up the environment that all of these use
 	@case '$(ROS_DISTRO)' in ''|jazzy) ;; *) \

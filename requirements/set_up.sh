@@ -110,7 +110,7 @@ installed='setup.py setup.cfg pyproject.toml package.xml nanorocks_ros/__init__.
 [ ! -d foxglove ] || installed="$installed foxglove"
 # shellcheck disable=SC2086  # a list of words
 wanted=$(find $installed ! -type d | LC_ALL=C sort | xargs cksum)
-if [ "$(stored package)" != "$wanted" ]; then
+if [ "$(stored package)" != "$wanted" ] || [ ! -d "$folder/lib/nanorocks_ros" ]; then
     echo "$folder: installing nanorocks_ros"
     logged 'install nanorocks_ros' pip_install --no-deps --editable .
     echo "$wanted" >"$folder/package"

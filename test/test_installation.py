@@ -103,8 +103,9 @@ def test_a_launch_file_names_what_there_is(path):
 
 def test_a_plain_installation_holds_its_package_data(source_copy, tmp_path):
     pip = [sys.executable, '-m', 'pip', '--disable-pip-version-check', 'install', '--no-deps']
-    options = ['--no-build-isolation', '--no-index', '--prefix', tmp_path, source_copy]
-    subprocess.run([*pip, *options], check=True, capture_output=True, timeout=300)
+    # Without --ignore-installed pip would remove the installation that runs this test.
+    options = ['--no-build-isolation', '--no-index', '--ignore-installed', '--prefix', tmp_path]
+    subprocess.run([*pip, *options, source_copy], check=True, capture_output=True, timeout=300)
     (packages,) = tmp_path.glob('lib/python3*/site-packages')
     result = subprocess.run(
         [sys.executable, '-c', READ_PACKAGE_DATA],

@@ -73,7 +73,7 @@ class SpeedSettings:
         48, 'longest lag of the structure function', 'frames', low=1, high=300
     )
     saturation: float = _setting(
-        0.25,
+        0.15,
         'largest structure function used, as a fraction of its plateau',
         low=0.05,
         high=0.6,

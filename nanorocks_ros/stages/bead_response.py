@@ -9,10 +9,11 @@ nor their shading has to be known.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import fft
+from scipy import fft, special
 
 from nanorocks_ros.physics.moving_area import RAYLEIGH_NODES
 
@@ -20,42 +21,64 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _GRID_POINTS = 257
+# Displacements at which the response is kept: fine enough for straight lines in between.
+_STEP_PX = 0.25
+_WAVENUMBERS = 600
 
 
-def radial_autocovariance(difference: NDArray[np.float32], longest: int) -> NDArray[np.float64]:
-    """Autocovariance of an image, averaged over directions, at whole displacements.
+@cache
+def _radial_bins(rows: int, columns: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """For each element of a half spectrum: its bin of |k|, and how often it counts."""
+    down = 2.0 * np.pi * np.fft.fftfreq(rows)
+    right = 2.0 * np.pi * np.fft.rfftfreq(columns)
+    modulus = np.hypot(down[:, np.newaxis], right[np.newaxis, :])
+    bins = (modulus * (_WAVENUMBERS / (np.pi * np.sqrt(2.0) * 1.0001))).astype(np.intp)
+    weight = np.full(bins.shape, 2.0)
+    weight[:, 0] = 1.0
+    if columns % 2 == 0:
+        weight[:, -1] = 1.0
+    return bins.ravel(), (weight / (rows * columns)).ravel()
+
+
+@cache
+def _bessel(longest: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Displacements, and 1 - J0(k d): what a wave changes when moved by d in any direction."""
+    displacements = np.arange(0.0, longest + _STEP_PX, _STEP_PX)
+    middles = (np.arange(_WAVENUMBERS) + 0.5) * (np.pi * np.sqrt(2.0) * 1.0001 / _WAVENUMBERS)
+    return displacements, 1.0 - special.j0(displacements[:, np.newaxis] * middles)
+
+
+def displacement_response(
+    difference: NDArray[np.float32], noise_power: float, longest: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """C(0) - C(d) of the autocovariance C of an image, averaged over directions.
+
+    By the spectrum: exact between whole pixels too, where the response to small displacements
+    is decided, and free of white noise, which is a constant there.
 
     Parameters
     ----------
     difference : ndarray of float32, (rows, columns), [gray levels]
-    longest : int, [px]
-        Largest displacement.
+    noise_power : float, [gray levels^2]
+        Mean square of the noise in it.
+    longest : float, [px]
 
     Returns
     -------
-    ndarray, (longest + 1,), [gray levels^2]
-        Sums over all pixels, at 0, 1, ... `longest` px.
+    displacements, response : ndarray (m,), [px], [gray levels^2]
+        From 0 to `longest`.
     """
     rows, columns = difference.shape
-    shape = (fft.next_fast_len(rows + longest, True), fft.next_fast_len(columns + longest, True))
+    # Padded, so that what leaves on one side does not come in on the other.
+    shape = tuple(
+        fft.next_fast_len(side + int(np.ceil(longest)), True) for side in (rows, columns)
+    )
     spectrum = fft.rfft2(difference, s=shape)
-    power = spectrum.real**2 + spectrum.imag**2
-    covariance = fft.irfft2(power, s=shape)
-    y = np.arange(-longest, longest + 1)
-    window = covariance[np.ix_(y, y)]
-    radius = np.hypot(y[:, np.newaxis], y[np.newaxis, :])
-    near = radius < longest
-    lower = np.floor(radius[near]).astype(np.intp)
-    share = radius[near] - lower
-    value = window[near]
-    # Linear shares to the two whole displacements on either side: a straight line through
-    # zero, which D nearly is, comes back exactly.
-    index = np.concatenate((lower, lower + 1))
-    weight = np.concatenate((1.0 - share, share))
-    total = np.bincount(index, weight * np.concatenate((value, value)), longest + 1)
-    radial: NDArray[np.float64] = total / np.bincount(index, weight, longest + 1)
-    radial[0] = covariance[0, 0]
-    return radial
+    power = (spectrum.real**2 + spectrum.imag**2).ravel() - noise_power * difference.size
+    bins, weight = _radial_bins(*shape)
+    radial = np.bincount(bins, weight * power, _WAVENUMBERS)
+    displacements, changed = _bessel(longest)
+    return displacements, changed @ radial
 
 
 class BeadResponse:
@@ -70,10 +93,11 @@ class BeadResponse:
     """
 
     def __init__(self, diameter_px: float, beads: int) -> None:
-        self._longest = max(2, int(np.ceil(diameter_px)))
+        self._longest = max(2.0, float(np.ceil(diameter_px)))
         self._beads = beads
-        self._sum = np.zeros(self._longest + 1)
-        self._squares = np.zeros(self._longest + 1)
+        self._at = _bessel(self._longest)[0]
+        self._sum = np.zeros_like(self._at)
+        self._squares = np.zeros_like(self._at)
         self.pairs = 0
         self._grid = np.linspace(0.0, 2.0 * self._longest, _GRID_POINTS)
         self._power = np.zeros(_GRID_POINTS)
@@ -98,9 +122,7 @@ class BeadResponse:
             up for.
         """
         difference = later.astype(np.float32) - earlier.astype(np.float32)
-        covariance = radial_autocovariance(difference, self._longest)
-        covariance[0] -= noise_power * difference.size
-        response = covariance[0] - covariance
+        response = displacement_response(difference, noise_power, self._longest)[1]
         response /= self._moved_share(response, path_px)
         self._sum += response
         self._squares += response**2
@@ -110,12 +132,12 @@ class BeadResponse:
     def _moved_share(self, response: NDArray[np.float64], path_px: float) -> float:
         if not np.isfinite(path_px) or response[-1] <= 0.0:
             return 1.0
-        moved = np.interp(path_px * RAYLEIGH_NODES, np.arange(response.size), response)
+        moved = np.interp(path_px * RAYLEIGH_NODES, self._at, response)
         return float(max(moved.mean() / response[-1], 0.1))
 
     def _tabulate(self) -> None:
         mean = np.maximum.accumulate(self._sum / self.pairs)
-        at = np.interp(self._grid[:, np.newaxis] * RAYLEIGH_NODES, np.arange(mean.size), mean)
+        at = np.interp(self._grid[:, np.newaxis] * RAYLEIGH_NODES, self._at, mean)
         self._power = at.mean(axis=1)
         slope = np.gradient(self._power, self._grid)
         residual = at - slope[:, np.newaxis] * self._grid[:, np.newaxis] * RAYLEIGH_NODES
@@ -150,16 +172,18 @@ class BeadResponse:
 
         Three parts: a finite number of beads, whose squared differences are not
         proportional to their displacements; sensor noise; the spread of the response over
-        the image pairs it was learnt from.
+        the image pairs it was learnt from, for it differs from one arrangement of the beads
+        to the next.
         """
         displacement = self.displacement(power)
         finite = np.interp(displacement, self._grid, self._scatter)
         noise_sd = noise_power * np.sqrt(2.0 * pixels)
         noise = 0.5 * (self.displacement(power + noise_sd) - self.displacement(power - noise_sd))
-        return np.sqrt(finite**2 + noise**2 + (self._learning_error() * displacement) ** 2)
+        return np.sqrt(finite**2 + noise**2 + (self._arrangement_error() * displacement) ** 2)
 
-    def _learning_error(self) -> float:
+    def _arrangement_error(self) -> float:
         mean = self._sum / self.pairs
-        middle = self._longest // 4
+        middle = self._at.size // 4
         variance = max(0.0, float(self._squares[middle] / self.pairs - mean[middle] ** 2))
-        return float(np.sqrt(variance / self.pairs) / mean[middle]) if mean[middle] > 0 else 1.0
+        spread = np.sqrt(variance * (1.0 + 1.0 / self.pairs))
+        return float(spread / mean[middle]) if mean[middle] > 0 else 1.0

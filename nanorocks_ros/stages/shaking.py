@@ -15,6 +15,8 @@ NS = 1_000_000_000
 
 # Half a second of pictures at 30 Hz: longer than a jump takes, shorter than a decay.
 _MEMORY_FRAMES = 15
+_NOISE_FRAMES = 300
+_NOISE_QUANTILE = 0.2
 # Beyond 3 sigma a difference counts as motion; what is left of a Gaussian has this variance.
 _CLIP = 3.0
 _CLIPPED_VARIANCE = 0.9733
@@ -68,6 +70,7 @@ class ShakeDetector:
         self._ratio = ratio
         self._shortest_ns = round(shortest_cycle * NS)
         self._recent: deque[float] = deque(maxlen=_MEMORY_FRAMES)
+        self._noise: deque[float] = deque(maxlen=_NOISE_FRAMES)
         self._last: tuple[int, NDArray[np.uint8]] | None = None
         self.cycle = 0
         self.cycle_start_ns: int | None = None
@@ -78,7 +81,10 @@ class ShakeDetector:
         last, self._last = self._last, (stamp_ns, gray)
         if last is None:
             return False
-        self.noise_power = noise_power(gray, last[1])
+        self._noise.append(noise_power(gray, last[1]))
+        # Slow motion hides in the noise, and a frame stored twice has none: neither the mean
+        # nor the least will do.
+        self.noise_power = float(np.quantile(self._noise, _NOISE_QUANTILE))
         quiet = self.noise_power * gray.size
         motion = difference_power(gray, last[1]) - quiet
         # 15 frames rather than all: the gas may have been shaken harder long ago.

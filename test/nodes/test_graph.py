@@ -10,6 +10,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+import itertools
+
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
@@ -48,7 +50,8 @@ class Arrays:
 
     def records(self, kind):
         return [
-            from_array(kind, one.data, tray=1, epoch_ns=0, where='test') for one in self.found[kind]
+            from_array(kind, one.data, tray=1, epoch_ns=0, where='test')
+            for one in self.found[kind]
         ]
 
     def finals(self):
@@ -180,7 +183,7 @@ def test_the_bag_player_gives_the_clock_and_starts_again_at_the_end(graph):
     clock = []
     graph.node.create_subscription(Clock, '/clock', lambda m: clock.append(stamp_of(m.clock)), 100)
     player = graph.start('bag_player', f'bag:={SAMPLE}', 'rate:=0.0', 'loop:=true')
-    graph.until(lambda: any(after < before for before, after in zip(clock, clock[1:], strict=False)))
+    graph.until(lambda: any(after < before for before, after in itertools.pairwise(clock)))
     assert graph.interrupt(player).code == 0
 
 

@@ -1,0 +1,26 @@
+"""``python -m benchmarks [NAME ...]``: run the benchmarks, all or those named."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+
+ALL = ('offline', 'live', 'speed_accuracy', 'cor_coverage')
+
+
+def main() -> int:
+    """Run each benchmark and print its report."""
+    names = sys.argv[1:] or ALL
+    unknown = [name for name in names if name not in ALL]
+    if unknown:
+        print(f'benchmarks: no {", ".join(unknown)}; choose of {", ".join(ALL)}', file=sys.stderr)
+        return 2
+    for name in names:
+        module = import_module(f'benchmarks.{name}')
+        print(f'\n## {name}: {module.__doc__.splitlines()[0]}\n', flush=True)
+        module.report()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
