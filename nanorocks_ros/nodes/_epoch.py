@@ -41,7 +41,7 @@ class Epoch:
         stamp_ns : int
             Of the message: the epoch, if it falls to this node to set it.
         """
-        if self.ns is None and self._may_set and not self._someone_else():
+        if self.ns is None and self._may_set and not self._node.others_offer(topics.EPOCH):
             self.set(stamp_ns)
         if self.ns is None:
             # Nothing is lost while discovery takes its time; 10 s of frames at most.
@@ -53,6 +53,3 @@ class Epoch:
         """Tell everybody the epoch."""
         self.ns = stamp_ns
         self._node.send(topics.EPOCH, time_message(stamp_ns))
-
-    def _someone_else(self):
-        return self._node.count_publishers(topics.EPOCH.name) > 0

@@ -46,6 +46,7 @@ _IMAGES = {
     MotionMask: ((topics.MOTION, 'mask'),),
     Autocorrelation: ((topics.AUTOCORRELATION, 'values'),),
 }
+RESULT_TOPICS = (*_ARRAYS.values(), *(topic for both in _IMAGES.values() for topic, _ in both))
 _OVERRIDABLE = QoSOverridingOptions(
     policy_kinds=(
         QoSPolicyKind.HISTORY,
@@ -117,15 +118,16 @@ class NanorocksNode(Node):
         return default if value is None else value
 
     def react_to_parameters(self, rebuild):
-        """Check later changes; `rebuild(values)` once they are in force.
+        """Check later changes, and call `rebuild` once one of ours is in force."""
 
-        Parameters
-        ----------
-        rebuild : callable
-            Called without arguments after a change was accepted.
-        """
+        def changed(parameters):
+            # A new publisher declares its quality of service as parameters: not our business.
+            if any(one.name in self._declared for one in parameters):
+                rebuild()
+                self.get_logger().info('the parameters changed; starting afresh')
+
         self.add_on_set_parameters_callback(self._check_parameters)
-        self.add_post_set_parameters_callback(lambda _: rebuild())
+        self.add_post_set_parameters_callback(changed)
 
     def _check_parameters(self, parameters):
         for parameter in parameters:
@@ -156,6 +158,15 @@ class NanorocksNode(Node):
                 qos_overriding_options=_OVERRIDABLE,
             )
         return self._outputs[name]
+
+    def offer(self, offered, tray=0):
+        """Make the publishers of some topics."""
+        for topic in offered:
+            self.output(topic, tray)
+
+    def others_offer(self, topic):
+        """Whether another node publishes a topic."""
+        return self.count_publishers(topic.name) > int(topic.name in self._outputs)
 
     def wanted(self, topic, tray=0):
         """Whether anybody subscribes to a topic; images are not even built otherwise."""

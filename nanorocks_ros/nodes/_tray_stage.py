@@ -20,9 +20,11 @@ class TrayStageNode(NanorocksNode):
         Of the node.
     stage : callable
         Makes the stage from the settings and a Tray.
+    outputs : tuple of Topic
+        What it publishes, offered at once: a late offer would lose the first messages.
     """
 
-    def __init__(self, name, stage):
+    def __init__(self, name, stage, outputs):
         super().__init__(name)
         self._make = stage
         self._settings = self.declare(PipelineSettings())
@@ -30,6 +32,7 @@ class TrayStageNode(NanorocksNode):
         self._rebuild()
         self.react_to_parameters(self._rebuild)
         for tray in self._settings.trays:
+            self.offer(outputs, tray)
             self.listen(topics.GRAY, lambda message, tray=tray: self._take(message, tray), tray)
 
     def _rebuild(self):

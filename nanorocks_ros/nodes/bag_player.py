@@ -26,7 +26,7 @@ class BagPlayerNode(NanorocksNode):
         for notice in self._bag.reader.notices:
             self.get_logger().warning(notice)
         self._loop = settings.loop
-        self._clock = self.create_publisher(Clock, '/clock', QoSProfile(depth=10))
+        self._clock_output = self.create_publisher(Clock, '/clock', QoSProfile(depth=10))
         epoch_ns = self._bag.epoch_ns()
         self.send(topics.EPOCH, time_message(epoch_ns))
         self._pacer = Pacer(
@@ -55,7 +55,7 @@ class BagPlayerNode(NanorocksNode):
 
     def _emit(self, stamp_ns, moment):
         message, topic, tray = moment
-        self._clock.publish(Clock(clock=time_message(stamp_ns)))
+        self._clock_output.publish(Clock(clock=time_message(stamp_ns)))
         self.send(topic, message.cdr, tray)
         if topic is topics.RAW_COMPRESSED and self.wanted(topics.RAW):
             self.timed(self._decoded, message)

@@ -11,7 +11,8 @@ class ClusterAutocorrelatorNode(TrayStageNode):
     """Follows the width of the autocorrelation of each tray."""
 
     def __init__(self):
-        super().__init__('cluster_autocorrelator', ClusterAutocorrelator)
+        outputs = (topics.CLUSTER, topics.AUTOCORRELATION)
+        super().__init__('cluster_autocorrelator', ClusterAutocorrelator, outputs)
 
     def prepare(self, stage, tray):
         """The autocorrelation itself is sent only while somebody looks."""

@@ -18,6 +18,8 @@ from nanorocks_ros.wire.layouts import from_array
 
 _TRAY = 1
 _GRAPH = ('preprocessor', 'speed_estimator', 'cluster_autocorrelator', 'haff_fitter', 'simulator')
+# All frames, from the first: the nodes listen before the camera starts.
+_SIMULATOR = ('--ros-args', '-p', 'listeners:=1')
 _FIGURE = Path('nanorocks_demo.png')
 _NODE_ENDS_WITHIN_S = 10.0
 
@@ -60,6 +62,9 @@ class DemoNode(NanorocksNode):
         truth = self._records[GroundTruth]
         seconds = (cor.stamp_ns - self._epoch.ns) / 1e9
         known = f'  truth {truth[-1].restitution:g}' if truth else ''
+        if cor.status is CorStatus.NO_DECAY:
+            print(f'\r{seconds:5.1f} s  no decay to be seen yet           ', flush=True)
+            return
         print(
             f'\r{seconds:5.1f} s  COR {cor.restitution:.4f} '
             f'[{cor.restitution_lower:.4f}, {cor.restitution_upper:.4f}] '
@@ -110,9 +115,10 @@ class DemoNode(NanorocksNode):
 
 
 def _started(name):
+    arguments = _SIMULATOR if name == 'simulator' else ()
     # A session of its own, so that a Ctrl-C here reaches it once, from us.
     return subprocess.Popen(
-        [sys.executable, '-m', 'nanorocks_ros.nodes', name, *sys.argv[1:]],
+        [sys.executable, '-m', 'nanorocks_ros.nodes', name, *arguments],
         env=dict(os.environ, ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST'),
         start_new_session=True,
     )

@@ -23,6 +23,7 @@ class HaffFitterNode(NanorocksNode):
         self._rebuild()
         self.react_to_parameters(self._rebuild)
         for tray in self._settings.trays:
+            self.offer((topics.COR,), tray)
             self.listen(topics.SPEED, lambda message, tray=tray: self._take(message, tray), tray)
 
     def _rebuild(self):

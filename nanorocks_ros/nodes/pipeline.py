@@ -7,7 +7,7 @@ from nanorocks_ros.experiment import settings as st
 from nanorocks_ros.nodes import _sources
 from nanorocks_ros.nodes._camera import Camera
 from nanorocks_ros.nodes._epoch import Epoch
-from nanorocks_ros.nodes._node import NanorocksNode
+from nanorocks_ros.nodes._node import RESULT_TOPICS, NanorocksNode
 from nanorocks_ros.nodes._pacing import Pacer
 from nanorocks_ros.stages.pipeline import Pipeline
 from nanorocks_ros.wire import topics
@@ -26,6 +26,7 @@ class PipelineNode(NanorocksNode):
         camera = self.declare(st.CameraSettings())
         self._epoch = Epoch(self, may_set=True)
         self._where = self._source
+        self._offer_everything()
         self._rebuild()
         self.react_to_parameters(self._rebuild)
         if self._source == 'topic':
@@ -33,6 +34,11 @@ class PipelineNode(NanorocksNode):
             self._rebuild()
         else:
             self._play(self._simulated() if self._source == 'simulator' else self._recorded())
+
+    def _offer_everything(self):
+        self.offer((topics.EPOCH, topics.RAW))
+        for tray in self._settings.trays:
+            self.offer(RESULT_TOPICS, tray)
 
     def _rebuild(self):
         self._settings = self.current(self._settings)

@@ -8,6 +8,7 @@ from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.stages.pipeline import trays_of
 from nanorocks_ros.stages.preprocess import Preprocessor
+from nanorocks_ros.wire import topics
 
 
 class PreprocessorNode(NanorocksNode):
@@ -18,6 +19,8 @@ class PreprocessorNode(NanorocksNode):
         self._settings = self.declare(PipelineSettings())
         self._camera = Camera(self, self.declare(CameraSettings()), self._take)
         self._epoch = Epoch(self, may_set=True)
+        for tray in self._settings.trays:
+            self.offer((topics.GRAY, topics.RECTIFIED), tray)
         self._rebuild()
         self.react_to_parameters(self._rebuild)
 

@@ -7,6 +7,7 @@ from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.nodes._pacing import Pacer
 from nanorocks_ros.nodes._sources import publish_moment, simulated_moments
+from nanorocks_ros.wire import topics
 
 
 class SimulatorNode(NanorocksNode):
@@ -17,6 +18,7 @@ class SimulatorNode(NanorocksNode):
         settings = self.declare(SimulationSettings())
         pacing = self.declare(PacingSettings())
         self._epoch = Epoch(self, may_set=True)
+        self.offer((topics.EPOCH, topics.RAW, topics.TRUTH), settings.tray)
         moments = simulated_moments(self, settings, '')
         self._pacer = Pacer(self, moments, self._emit, pacing, self.finish)
 

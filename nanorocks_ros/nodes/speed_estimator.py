@@ -11,7 +11,7 @@ class SpeedEstimatorNode(TrayStageNode):
     """Measures the mean projected speed of each tray."""
 
     def __init__(self):
-        super().__init__('speed_estimator', SpeedEstimator)
+        super().__init__('speed_estimator', SpeedEstimator, (topics.SPEED, topics.MOTION))
 
     def prepare(self, stage, tray):
         """Masks are made only while somebody looks."""

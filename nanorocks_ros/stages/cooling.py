@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
 
 
+# Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
+_STAMP_ROUNDING_NS = 1_000_000
+
+
 class HaffFitter:
     """Fits Haff's law to the speeds of each cycle and reads a restitution from the decay.
 
@@ -79,7 +83,8 @@ class HaffFitter:
         if len(self._samples) < self._settings.fewest_samples:
             return False
         last = self._last_update_ns
-        if last is not None and stamp_ns - last < self._settings.update_interval * NS:
+        interval = self._settings.update_interval * NS - _STAMP_ROUNDING_NS
+        if last is not None and stamp_ns - last < interval:
             return False
         self._last_update_ns = stamp_ns
         return True

@@ -14,11 +14,12 @@ import itertools
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Float32MultiArray
 
 from nanorocks_ros.experiment.settings import PipelineSettings
-from nanorocks_ros.nodes._shell import qos_of, stamp_of
+from nanorocks_ros.nodes._shell import compressed_message, qos_of, stamp_of
+from nanorocks_ros.recordings.images import encode_jpeg
 from nanorocks_ros.records import (
     ClusterEstimate,
     CorEstimate,
@@ -26,6 +27,7 @@ from nanorocks_ros.records import (
     GroundTruth,
     SpeedEstimate,
 )
+from nanorocks_ros.study.bag_frames import BagFrames
 from nanorocks_ros.study.offline import analyse
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import from_array, layout, to_array
@@ -77,7 +79,7 @@ def assert_same_numbers(arrays, rounding):
         found = np.array([one.data for one in arrays.found[kind]], dtype=np.float32)
         # What was still provisional when the bag ended is final offline alone.
         assert len(expected) - len(found) in (0, 1), kind
-        assert len(found) > 50
+        assert len(found) > 30
         np.testing.assert_allclose(found, expected[: len(found)], rtol=rounding, atol=1e-9)
 
 
@@ -96,6 +98,7 @@ def test_a_bag_through_the_pipeline_gives_the_same_numbers_live_as_offline(graph
 
 
 def test_a_bag_through_separate_nodes_gives_the_same_numbers_as_offline(graph):
+    """And a subscriber that comes when all is over still gets the final restitution."""
     arrays = Arrays(graph.node)
     stages = [graph.start(name) for name in STAGES]
     listening_to(graph, topics.GRAY, 2)
@@ -105,12 +108,15 @@ def test_a_bag_through_separate_nodes_gives_the_same_numbers_as_offline(graph):
     finished = graph.wait(player)
     assert finished.code == 0, finished.output
     graph.until(lambda: arrays.finals())
+    late = Arrays(graph.node)
+    graph.until(lambda: late.finals())
+    assert not late.found[SpeedEstimate]
     for stage in stages:
         ended = graph.interrupt(stage)
         assert ended.code == 0, ended.output
         assert 'Traceback' not in ended.output
     # The fitter gets speeds rounded to float32, which the fit amplifies.
-    assert_same_numbers(arrays, rounding=2e-4)
+    assert_same_numbers(arrays, rounding=2e-5)
 
 
 def test_the_simulator_drives_the_graph_and_tells_the_truth(graph):
@@ -125,7 +131,7 @@ def test_the_simulator_drives_the_graph_and_tells_the_truth(graph):
     assert graph.wait(simulator).code == 0
     graph.until(lambda: arrays.found[CorEstimate])
     truth = arrays.records(GroundTruth)
-    assert len(truth) >= 265
+    assert truth[-1].stamp_ns / 1e9 == pytest.approx(9.0, abs=0.05)
     steps = np.diff([one.stamp_ns for one in truth]) / 1e9
     assert steps == pytest.approx(1 / 30, abs=1e-4)
     speeds = arrays.records(SpeedEstimate)
@@ -137,19 +143,6 @@ def test_the_simulator_drives_the_graph_and_tells_the_truth(graph):
     assert names >= {f'/nanorocks/{name}' for name in STAGES}
     for stage in stages:
         assert graph.interrupt(stage).code == 0
-
-
-def test_a_late_subscriber_still_gets_the_final_cor(graph):
-    process = graph.start('pipeline', 'source:=bag', f'bag:={SAMPLE}', 'rate:=0.0', 'loop:=true')
-    first = Arrays(graph.node)
-    graph.until(first.finals)
-    name = graph.node.resolve_topic_name(topics.COR.of(1))
-    late = []
-    graph.node.create_subscription(Float32MultiArray, name, late.append, qos_of(topics.COR))
-    graph.until(lambda: len(late) > 20)
-    records = [from_array(CorEstimate, m.data, tray=1, epoch_ns=0, where='') for m in late]
-    assert any(one.status is CorStatus.FINAL for one in records[:100])
-    assert graph.interrupt(process).code == 0
 
 
 def test_images_are_made_when_somebody_looks(graph):
@@ -193,4 +186,24 @@ def test_a_namespace_moves_the_whole_graph(graph):
     names = lambda: {name for name, _ in graph.node.get_topic_names_and_types()}  # noqa: E731
     graph.until(lambda: '/lab/tray_1/speed' in names())
     assert not any(name.startswith('/nanorocks/tray') for name in names())
+    assert graph.interrupt(process).code == 0
+
+
+def test_the_pipeline_takes_a_camera_topic_and_sets_the_epoch_itself(graph):
+    arrays = Arrays(graph.node)
+    process = graph.start('pipeline', 'source:=topic', 'transport:=compressed')
+    name = graph.node.resolve_topic_name(topics.RAW_COMPRESSED.name)
+    publisher = graph.node.create_publisher(
+        CompressedImage, topics.RAW_COMPRESSED.name, qos_of(topics.RAW_COMPRESSED)
+    )
+    graph.until(lambda: graph.node.count_subscribers(name) == 1)
+    graph.until(lambda: publisher.get_subscription_count() == 1)
+    first = None
+    for frame in itertools.islice(BagFrames(SAMPLE).frames(), 60):
+        first = frame.stamp_ns if first is None else first
+        jpeg = encode_jpeg(frame.image, 90)
+        publisher.publish(compressed_message(frame.stamp_ns, 'camera', jpeg))
+    graph.until(lambda: len(arrays.found[ClusterEstimate]) == 10)
+    times = [one.data[0] for one in arrays.found[ClusterEstimate]]
+    assert times == pytest.approx([0.2 * k for k in range(10)], abs=0.04)
     assert graph.interrupt(process).code == 0
