@@ -57,6 +57,8 @@ _OVERRIDABLE = QoSOverridingOptions(
 )
 _PATIENCE_S = 5.0
 _THROTTLE_S = 5.0
+# Acknowledgements come with heartbeats, every 3 s.
+_FAREWELL_S = 3.5
 
 
 class NanorocksNode(Node):
@@ -223,8 +225,11 @@ class NanorocksNode(Node):
 
     def finish(self):
         """End the node once what it published last has arrived."""
+        end = time.monotonic() + _FAREWELL_S
         for publisher in self._outputs.values():
-            publisher.wait_for_all_acked(Duration(seconds=2))
+            if publisher.get_subscription_count() > 0:
+                left = max(0.0, end - time.monotonic())
+                publisher.wait_for_all_acked(Duration(nanoseconds=int(1e9 * left)))
         self.done = True
 
     def refuse(self, error):
