@@ -99,6 +99,7 @@ class HaffFitter:
                 np.array([(one.stamp_ns - start_ns) / NS for one in self._samples]),
                 np.array([one.mean_projected_speed for one in self._samples]),
                 np.array([one.mean_projected_speed_error for one in self._samples]),
+                self._tray.count,
             )
         except FitError:
             # Nothing is known of the restitution then, and that is what is published.

@@ -67,13 +67,14 @@ class SpeedEstimator:
             self._restart()
         self._last_stamp_ns = image.stamp_ns
         shaken = self._shakes.push(image.stamp_ns, image.gray)
+        by_area = self._settings.method == 'binarised_area'
         if shaken:
-            self._structure.shaken()
             self._masker.clear()
+            if not by_area:
+                self._structure.shaken()
         self._masker.push(image.stamp_ns, image.gray)
         noise = self._shakes.noise_power
         found: list[SpeedEstimate | MotionMask] = []
-        by_area = self._settings.method == 'binarised_area'
         if self._masker.full and (by_area or self.emit_mask):
             mask = self._masker.mask(noise)
             if self.emit_mask:

@@ -1,0 +1,102 @@
+"""Mean projected speed from frames over the truth, tray 1, by method and speed.
+
+Four shaken trays a speed, JPEG 85, started at three means so that the range is covered; each
+estimate is compared with the true speed averaged over its own window, and binned by the truth.
+The first row is the default, the second its own error; below, readings of the paper's recipe.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from itertools import pairwise
+
+import cv2
+import numpy as np
+
+from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings, with_values
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.records import Frame, SpeedEstimate
+from nanorocks_ros.simulation.film import film
+from nanorocks_ros.stages.pipeline import trays_of
+from nanorocks_ros.stages.preprocess import Preprocessor
+from nanorocks_ros.stages.speed import SpeedEstimator
+
+_NS = 1e9
+_SEEDS = range(1, 5)
+_SECONDS = 22.0
+_MEAN_SPEEDS = (0.004, 0.0085, 0.017)
+_BINS = (0.5e-3, 1e-3, 2e-3, 4e-3, 7e-3, 12e-3)
+_DEFAULT = 'structure function'
+_METHODS = {
+    _DEFAULT: {},
+    'lag 1, exact': {'speed.averaging': 'none'},
+    'lag 1, Taylor': {'speed.averaging': 'none', 'speed.geometry': 'taylor'},
+    'running mean 10, exact, dt 1/3 s': {},
+    'running mean 10, Taylor, dt 1/3 s': {'speed.geometry': 'taylor'},
+    'running mean 10, Taylor, dt 1/30 s': {
+        'speed.geometry': 'taylor',
+        'speed.time_step': 'one_frame',
+    },
+    'block mean 10, exact, dt 1/3 s': {'speed.averaging': 'block_mean'},
+}
+
+
+_OWN_ERROR = 'its own error / truth'
+
+
+def _estimators() -> dict[str, SpeedEstimator]:
+    found = {}
+    for name, values in _METHODS.items():
+        method = 'structure_function' if name == _DEFAULT else 'binarised_area'
+        settings = with_values(PipelineSettings(), {**values, 'speed.method': method}, 'benchmark')
+        found[name] = SpeedEstimator(settings, load_trays()[1])
+    return found
+
+
+def _recompressed(frame: Frame) -> Frame:
+    jpeg = cv2.imencode('.jpg', frame.image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
+    image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR)
+    return Frame(stamp_ns=frame.stamp_ns, encoding='bgr8', image=image)
+
+
+def _ratios(seed: int, mean_speed: float, found: dict) -> None:
+    settings = SimulationSettings(seed=seed, mean_speed=mean_speed, width_px=220, height_px=220)
+    estimators = _estimators()
+    stages = PipelineSettings()
+    preprocessor = Preprocessor(stages, trays_of(stages), 'film')
+    speeds: dict[str, list[SpeedEstimate]] = {name: [] for name in estimators}
+    truth = []
+    for frame, true in film(settings, load_trays()[1], round(_SECONDS * settings.frame_rate)):
+        truth.append((true.stamp_ns / _NS, true.mean_projected_speed))
+        for image in preprocessor.push(_recompressed(frame)):
+            for name, estimator in estimators.items():
+                speeds[name] += estimator.push(image)
+    time, value = np.array(truth).T
+    for name, estimates in speeds.items():
+        for one in estimates:
+            if one.cycle == 0:
+                continue
+            inside = np.abs(time - one.stamp_ns / _NS) <= 0.5 * one.window + 1e-6
+            true = value[inside].mean()
+            column = int(np.digitize(true, _BINS))
+            found[name, column].append(one.mean_projected_speed / true)
+            if name == _DEFAULT:
+                found[_OWN_ERROR, column].append(one.mean_projected_speed_error / true)
+
+
+def report() -> None:
+    """Print the table."""
+    found: dict[tuple[str, int], list[float]] = defaultdict(list)
+    for mean_speed in _MEAN_SPEEDS:
+        for seed in _SEEDS:
+            _ratios(seed, mean_speed, found)
+    edges = [f'{1e3 * low:g}-{1e3 * high:g}' for low, high in pairwise(_BINS)]
+    print('| estimate / truth (sd of one estimate), at v [mm/s] | ' + ' | '.join(edges) + ' |')
+    print('| --- |' + ' --- |' * len(edges))
+    for name in (_DEFAULT, _OWN_ERROR, *list(_METHODS)[1:]):
+        cells = []
+        for number in range(1, len(_BINS)):
+            ratios = np.array(found[name, number])
+            known = ratios[np.isfinite(ratios)]
+            cells.append(f'{known.mean():.3f} ({known.std():.3f})' if known.size else 'unknown')
+        print(f'| {name} | ' + ' | '.join(cells) + ' |')
