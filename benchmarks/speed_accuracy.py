@@ -24,7 +24,7 @@ from nanorocks_ros.stages.speed import SpeedEstimator
 _NS = 1e9
 _SEEDS = range(1, 5)
 _SECONDS = 22.0
-_MEAN_SPEEDS = (0.004, 0.0085, 0.017)
+_MEAN_SPEEDS = (0.0022, 0.0045, 0.0085, 0.017)
 _BINS = (0.5e-3, 1e-3, 2e-3, 4e-3, 7e-3, 12e-3)
 _DEFAULT = 'structure function'
 _METHODS = {

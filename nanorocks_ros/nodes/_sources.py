@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.nodes._shell import image_message
@@ -10,12 +12,35 @@ from nanorocks_ros.study.bag_frames import BagFrames
 from nanorocks_ros.wire import topics
 
 
-def simulated_moments(node, simulation, trays_file):
-    """Stamp and (frame, truth) of each simulated frame, from now on."""
-    tray = tray_by_number(load_trays(trays_file), simulation.tray)
-    start_ns = node.get_clock().now().nanoseconds
-    for frame, truth in film(simulation, tray, start_stamp_ns=start_ns):
-        yield frame.stamp_ns, (frame, truth)
+class Simulated:
+    """Simulated frames that begin when the first is given out.
+
+    Compiling takes seconds, and listeners may have to be waited for: a stamp taken before
+    would make every frame look late.
+
+    Parameters
+    ----------
+    node : NanorocksNode
+    simulation : SimulationSettings
+    trays_file : str
+    """
+
+    def __init__(self, node, simulation, trays_file):
+        self._node = node
+        self._start_ns = None
+        tray = tray_by_number(load_trays(trays_file), simulation.tray)
+        self._film = film(simulation, tray)
+
+    def moments(self):
+        """Stamp, from 0, and (frame, truth) of each frame."""
+        for frame, truth in self._film:
+            yield frame.stamp_ns, (frame, truth)
+
+    def dated(self, moment):
+        """The moment with the stamps of the node's clock."""
+        if self._start_ns is None:
+            self._start_ns = self._node.get_clock().now().nanoseconds - moment[0].stamp_ns
+        return tuple(replace(one, stamp_ns=one.stamp_ns + self._start_ns) for one in moment)
 
 
 def recorded_moments(bag, loop):

@@ -32,8 +32,10 @@ class PipelineNode(NanorocksNode):
         if self._source == 'topic':
             self._where = Camera(self, camera, self._take).topic
             self._rebuild()
+        elif self._source == 'simulator':
+            self._play_simulated()
         else:
-            self._play(self._simulated() if self._source == 'simulator' else self._recorded())
+            self._play_recorded()
 
     def _offer_everything(self):
         self.offer((topics.EPOCH, topics.RAW))
@@ -44,30 +46,32 @@ class PipelineNode(NanorocksNode):
         self._settings = self.current(self._settings)
         self._pipeline = Pipeline(self._settings, self._where)
 
-    def _simulated(self):
+    def _play_simulated(self):
         if self._simulation.tray not in self._settings.trays:
             raise ConfigurationError(
                 'parameter simulation.tray',
                 f'{self._simulation.tray} is not among trays {self._settings.trays}',
                 'set both',
             )
-        return _sources.simulated_moments(self, self._simulation, self._settings.trays_file)
+        source = _sources.Simulated(self, self._simulation, self._settings.trays_file)
+        self._play(source.moments(), source.dated)
 
-    def _recorded(self):
+    def _play_recorded(self):
         bag = _sources.opened_bag(self._bag)
         self._where = bag.where
         self._rebuild()
         self._epoch.set(bag.epoch_ns())
-        return _sources.recorded_moments(bag, self._bag.loop)
+        self._play(_sources.recorded_moments(bag, self._bag.loop), tuple)
 
-    def _play(self, moments):
-        self._pacer = Pacer(self, moments, self._moment, self._pacing, self._finish)
+    def _play(self, moments, dated):
+        def emit(_, moment):
+            frame, truth = dated(moment)
+            if self._epoch.ns is None:
+                self._epoch.set(frame.stamp_ns)
+            _sources.publish_moment(self, (frame, truth), self._epoch.ns)
+            self.timed(self._push, frame)
 
-    def _moment(self, stamp_ns, moment):
-        if self._epoch.ns is None:
-            self._epoch.set(stamp_ns)
-        _sources.publish_moment(self, moment, self._epoch.ns)
-        self.timed(self._push, moment[0])
+        self._pacer = Pacer(self, moments, emit, self._pacing, self._finish)
 
     def _take(self, frame):
         self._epoch.when_known(frame.stamp_ns, self._push, frame)

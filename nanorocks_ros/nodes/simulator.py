@@ -6,7 +6,7 @@ from nanorocks_ros.experiment.settings import PacingSettings, SimulationSettings
 from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.nodes._pacing import Pacer
-from nanorocks_ros.nodes._sources import publish_moment, simulated_moments
+from nanorocks_ros.nodes._sources import Simulated, publish_moment
 from nanorocks_ros.wire import topics
 
 
@@ -19,10 +19,11 @@ class SimulatorNode(NanorocksNode):
         pacing = self.declare(PacingSettings())
         self._epoch = Epoch(self, may_set=True)
         self.offer((topics.EPOCH, topics.RAW, topics.TRUTH), settings.tray)
-        moments = simulated_moments(self, settings, '')
-        self._pacer = Pacer(self, moments, self._emit, pacing, self.finish)
+        self._simulated = Simulated(self, settings, '')
+        self._pacer = Pacer(self, self._simulated.moments(), self._emit, pacing, self.finish)
 
-    def _emit(self, stamp_ns, moment):
+    def _emit(self, _, moment):
+        frame, truth = self._simulated.dated(moment)
         if self._epoch.ns is None:
-            self._epoch.set(stamp_ns)
-        publish_moment(self, moment, self._epoch.ns)
+            self._epoch.set(frame.stamp_ns)
+        publish_moment(self, (frame, truth), self._epoch.ns)

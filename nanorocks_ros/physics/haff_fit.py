@@ -193,7 +193,9 @@ class _Data:
         cost = float(residual @ residual) + 2.0 * float(np.log(np.diag(factor)).sum())
         cost += float(((parameters[1:3] - self.usual) ** 2 / _LOG_SPREAD**2).sum())
         # Restricted likelihood: v0 and tau were fitted, which costs degrees of freedom.
-        cost += float(np.linalg.slogdet(information)[1])
+        # In (ln v0, 1 / (v0 tau)), where the model is nearly linear: in ln tau the information
+        # depends on tau itself, and would pull it up.
+        cost += float(np.linalg.slogdet(information)[1]) + 2.0 * (log_v0 + parameters[0])
         return cost, log_v0, information
 
     def cost(self, parameters: NDArray[np.float64]) -> float:
