@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
-from importlib import resources
+from importlib import import_module, resources
 
 NODES = (
     'simulator',
@@ -18,6 +19,24 @@ NODES = (
 )
 
 _PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+
+
+class _Interrupts:
+    """Notes Ctrl-C and SIGTERM instead of raising wherever the program happens to be.
+
+    An exception out of the blue gets lost in a destructor, or leaves a context half shut down.
+    The second Ctrl-C ends the process at once.
+    """
+
+    def __init__(self):
+        self.asked = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._note)
+
+    def _note(self, number, _):
+        if self.asked:
+            os._exit(128 + number)
+        self.asked = True
 
 
 def run(name):
@@ -34,11 +53,26 @@ def run(name):
     int
         0 at the end or when interrupted, 1 for input that cannot be used, 2 for a wrong call.
     """
+    interrupts = _Interrupts()
+    _use_large_segments()
+    import rclpy
+    from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
+    from rclpy.exceptions import NameValidationException
+    from rclpy.signals import SignalHandlerOptions
+
+    from nanorocks_ros.errors import ConfigurationError, NanorocksError
+
     try:
-        _use_large_segments()
-        return _spin(name)
-    except KeyboardInterrupt:
-        return 0
+        rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
+        return _spin(name, interrupts)
+    except NanorocksError as error:
+        print(f'{name}: {error}', file=sys.stderr)
+        return 2 if isinstance(error, ConfigurationError) else 1
+    except (RCLError, UnknownROSArgsError, NameValidationException) as error:
+        print(f'{name}: wrong ROS arguments: {str(error).splitlines()[0]}', file=sys.stderr)
+        return 2
+    finally:
+        rclpy.try_shutdown()
 
 
 def _use_large_segments():
@@ -52,39 +86,19 @@ def _use_large_segments():
         os.environ.setdefault(_PROFILES, str(profile))
 
 
-def _spin(name):
-    from importlib import import_module
+def _spin(name, interrupts):
+    from rclpy.executors import SingleThreadedExecutor
 
-    import rclpy
-    from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
-    from rclpy.exceptions import ROSInterruptException
-    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-
-    from nanorocks_ros.errors import ConfigurationError, NanorocksError
-
-    node = None
-    try:
-        module = import_module(f'nanorocks_ros.nodes.{name}')
-        node_class = getattr(module, f'{name.title().replace("_", "")}Node')
-        rclpy.init(args=sys.argv)
-        node = node_class()
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        while rclpy.ok() and not node.done:
-            executor.spin_once(timeout_sec=0.2)
-    except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
+    module = import_module(f'nanorocks_ros.nodes.{name}')
+    if interrupts.asked:
         return 0
-    except NanorocksError as error:
-        print(f'{name}: {error}', file=sys.stderr)
-        return 2 if isinstance(error, ConfigurationError) else 1
-    except (RCLError, UnknownROSArgsError) as error:
-        # Context shut down under us: the same as Ctrl-C. Anything else: wrong ROS arguments.
-        if node is not None and not rclpy.ok():
-            return 0
-        print(f'{name}: wrong ROS arguments: {str(error).splitlines()[0]}', file=sys.stderr)
-        return 2
+    node = getattr(module, f'{name.title().replace("_", "")}Node')()
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        while not node.done and not interrupts.asked:
+            executor.spin_once(timeout_sec=0.2)
+        return node.exit_code
     finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return node.exit_code
+        executor.shutdown()
+        node.destroy_node()
