@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'nanorocks: {error}', file=sys.stderr)
         return EXIT_INPUT
     except KeyboardInterrupt:
-        print('nanorocks: interrupted; nothing half-done was kept', file=sys.stderr)
+        print('nanorocks: interrupted; what was written until now can be read', file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         # Whoever read our output has enough of it.

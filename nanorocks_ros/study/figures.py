@@ -49,7 +49,7 @@ def cooling_figure(
     Upper panel after [B19] fig. 7.
     """
     figure = Figure(figsize=(8.0, 7.5), layout='constrained')
-    energy, convergence = figure.subplots(2, 1, height_ratios=(3, 2))
+    energy, convergence = figure.subplots(2, 1, height_ratios=(3, 2), sharex=True)
     start_ns = next(one.cycle_start_ns for one in speeds if one.cycle_start_ns is not None)
     _draw_energy(energy, tray, (speeds, cors, truth), start_ns)
     _draw_convergence(convergence, cors, truth, start_ns)
