@@ -24,7 +24,7 @@ OLDEST := .venv-oldest
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONHOME
 export PYTHON
 RUN := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" AMENT_PREFIX_PATH="$(AMENT)" \
-       ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
+       ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST OPENBLAS_NUM_THREADS=1
 
 .PHONY: help demo test test-oldest lint bench docs venv lock clean
 
@@ -41,7 +41,7 @@ test: venv ## Run all tests, then those of the core with the oldest dependencies
 
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
-	@env -u PYTHONPATH PATH="$(CURDIR)/$(OLDEST)/bin:$$PATH" python -m pytest \
+	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 PATH="$(CURDIR)/$(OLDEST)/bin:$$PATH" python -m pytest \
 	    --ignore=test/nodes --ignore=test/test_colcon.py $(PYTEST_ARGS)
 
 lint: venv ## Check style, format, types and which module may import which

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from typing import TYPE_CHECKING
 
@@ -41,6 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 when the work was done, 2 for a wrong call, 1 for input that cannot be used, 130
         when interrupted.
     """
+    # Before numpy is loaded: no array here is worth a second thread.
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     options = build_parser().parse_args(arguments)
     try:
         code: int = options.run(options)

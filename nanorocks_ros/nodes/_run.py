@@ -54,6 +54,9 @@ def run(name):
         0 at the end or when interrupted, 1 for input that cannot be used, 2 for a wrong call.
     """
     interrupts = _Interrupts()
+    # Before numpy is loaded: no array here is worth a second thread, which would wait for the
+    # first on a machine whose cores are all in use.
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     _use_large_segments()
     import rclpy
     from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError

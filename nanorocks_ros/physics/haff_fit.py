@@ -23,9 +23,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg, optimize
+from scipy import optimize
 
 from nanorocks_ros.errors import FitError
+from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.physics.haff import haff_speed
 
 if TYPE_CHECKING:
@@ -182,15 +183,13 @@ class _Data:
         covariance *= 0.5 * strength
         covariance += quick * np.exp(-gap / _QUICK_RANGE)
         covariance[diagonal] += scale**2 * self.variance
-        factor = linalg.cholesky(covariance, lower=True, check_finite=False)
         columns = (np.ones_like(s), self._grouped(age / (1.0 + age)), self.log_speed + s)
-        whitened = linalg.solve_triangular(
-            factor, np.column_stack(columns), lower=True, check_finite=False
-        )
+        whitened = np.column_stack(columns)
+        log_determinant = _whiten(covariance, whitened)
         information = whitened[:, :2].T @ whitened[:, :2]
         log_v0 = float(whitened[:, 0] @ whitened[:, 2] / information[0, 0])
         residual = whitened[:, 2] - log_v0 * whitened[:, 0]
-        cost = float(residual @ residual) + 2.0 * float(np.log(np.diag(factor)).sum())
+        cost = float(residual @ residual) + log_determinant
         cost += float(((parameters[1:3] - self.usual) ** 2 / _LOG_SPREAD**2).sum())
         # Restricted likelihood: v0 and tau were fitted, which costs degrees of freedom.
         # In (ln v0, 1 / (v0 tau)), where the model is nearly linear: in ln tau the information
@@ -205,6 +204,33 @@ class _Data:
     def rate_variance(self, parameters: NDArray[np.float64]) -> float:
         """Variance of ln(1 / (v0 tau)) = -ln v0 - ln tau."""
         return float(np.linalg.inv(self.generalised(parameters)[2]).sum())
+
+
+@compiled
+def _whiten(covariance: NDArray[np.float64], columns: NDArray[np.float64]) -> float:
+    """Solve with the Cholesky factor of a covariance, in place; its log determinant.
+
+    Matrices this small are no work for a threaded BLAS: its threads wait for one another, which
+    on a busy machine made a fit take seconds, and their order may change the last digit.
+    """
+    n = covariance.shape[0]
+    log_determinant = 0.0
+    for j in range(n):
+        for k in range(j):
+            factor = covariance[j, k]
+            for i in range(j, n):
+                covariance[i, j] -= covariance[i, k] * factor
+        pivot = math.sqrt(covariance[j, j])
+        log_determinant += 2.0 * math.log(pivot)
+        for i in range(j, n):
+            covariance[i, j] /= pivot
+    for column in range(columns.shape[1]):
+        for i in range(n):
+            rest = columns[i, column]
+            for k in range(i):
+                rest -= covariance[i, k] * columns[k, column]
+            columns[i, column] = rest / covariance[i, i]
+    return log_determinant
 
 
 def _degrees_of_freedom(data: _Data, best: NDArray[np.float64]) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.simulation.compiled import compiled
+from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.simulation.ordering import rising
 from nanorocks_ros.simulation.randomness import hashed, nearly_normal
 

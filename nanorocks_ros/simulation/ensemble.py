@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.compiled import compiled
+from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.simulation.engine.checks import check_room, check_times
 from nanorocks_ros.simulation.engine.gas import MOST_EVENTS
 from nanorocks_ros.simulation.engine.kernel import run_until

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.simulation.compiled import compiled
+from nanorocks_ros.physics.compiled import compiled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -17,7 +17,7 @@ from enum import IntEnum
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.compiled import compiled
+from nanorocks_ros.physics.compiled import compiled
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _FACTOR_1 = np.uint64(0xBF58476D1CE4E5B9)

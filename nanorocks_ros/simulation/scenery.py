@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.simulation.compiled import compiled
+from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.simulation.drawing import to_levels
 from nanorocks_ros.simulation.randomness import nearly_normal
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from nanorocks_ros.simulation.compiled import compiled
+from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.simulation.engine.prediction import is_rounding, speed_square
 from nanorocks_ros.simulation.engine.state import (
     ELASTIC_PAIR,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.simulation.compiled import compiled
+from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.simulation.engine.collisions import bounce_off_wall, collide_pair
 from nanorocks_ros.simulation.engine.prediction import predict
 from nanorocks_ros.simulation.engine.state import (
