@@ -65,11 +65,25 @@ def _parsed(row: SettingRow, text: Any) -> Any:
     if isinstance(row.default, str):
         return text
     try:
-        return yaml.safe_load(text) if isinstance(text, str) else [float(one) for one in text]
+        if isinstance(row.default, bool):
+            return yaml.safe_load(text)
+        numbers = [_number(one) for one in _words(text)]
+        return numbers if isinstance(row.default, tuple) else numbers[0]
     except (yaml.YAMLError, ValueError) as error:
         raise ConfigurationError(
             flag_of(row.name), f'{text!r} cannot be read', 'give a number'
         ) from error
+
+
+def _number(text: str) -> int | float:
+    if text.lstrip('+-').isdigit():
+        return int(text)
+    # YAML writes .nan
+    return float(text.removeprefix('.') if text.endswith('nan') else text)
+
+
+def _words(text: str | list[str]) -> list[str]:
+    return [text] if isinstance(text, str) else text
 
 
 def _from_file(path: Path) -> dict[str, Any]:
@@ -85,7 +99,7 @@ def _from_file(path: Path) -> dict[str, Any]:
             found.update(_flattened(node['ros__parameters']))
     if not found:
         raise ConfigurationError(
-            str(path), 'holds no ros__parameters', 'see config/pipeline.yaml for the form'
+            str(path), 'holds no ros__parameters', 'see config/parameters.yaml for the form'
         )
     return found
 

@@ -44,8 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     # Before numpy is loaded: no array here is worth a second thread.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-    options = build_parser().parse_args(arguments)
     try:
+        options = build_parser().parse_args(arguments)
         code: int = options.run(options)
     except ConfigurationError as error:
         print(f'nanorocks: {error}', file=sys.stderr)
@@ -60,4 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Whoever read our output has enough of it.
         sys.stderr.close()
         return 0
+    except OSError as error:
+        print(f'nanorocks: {error.strerror}; make room, or write elsewhere', file=sys.stderr)
+        return EXIT_INPUT
     return code

@@ -27,6 +27,7 @@ class Bounds:
     low: float = -math.inf
     high: float = math.inf
     choices: tuple[str, ...] = ()
+    whole: bool = False
 
 
 def _setting(default: Value, doc: str, unit: str = '', **bounds: Any) -> Any:
@@ -43,6 +44,7 @@ class PreprocessSettings:
         'empty: one tray, centred',
         'px',
         low=0,
+        whole=True,
     )
     pixels_per_metre: float = _setting(
         13500.0, 'scale of the picture', 'px/m', low=100.0, high=1e6
@@ -145,7 +147,7 @@ class CoolingSettings:
 class PipelineSettings:
     """The settings of the whole data path."""
 
-    trays: tuple[int, ...] = _setting((1,), 'trays to analyse (1 to 8)', low=1, high=8)
+    trays: tuple[int, ...] = _setting((1,), 'trays to analyse', low=1, high=8, whole=True)
     trays_file: str = _setting('', 'YAML file of trays; empty: the trays that were flown')
     preprocess: PreprocessSettings = field(default_factory=PreprocessSettings)
     speed: SpeedSettings = field(default_factory=SpeedSettings)
@@ -260,6 +262,8 @@ def _number_problem(value: float, bounds: Bounds) -> str | None:
         return f'{value!r} is not a number'
     if not math.isfinite(value):
         return f'{value!r} is not finite'
+    if bounds.whole and not float(value).is_integer():
+        return f'{value!r} is not a whole number'
     if not bounds.low <= value <= bounds.high:
         return f'{value!r} is outside [{bounds.low:g}, {bounds.high:g}]'
     return None
@@ -293,8 +297,7 @@ def _listed(value: Any) -> list[Any]:
 
 def _coerced(row: SettingRow, value: Any) -> Value:
     if isinstance(row.default, tuple):
-        whole = row.name in {'trays', 'preprocess.regions_px', 'regions_px'}
-        return tuple(int(item) if whole else float(item) for item in _listed(value))
+        return tuple(int(item) if row.bounds.whole else float(item) for item in _listed(value))
     kind = type(row.default)
     return kind(value)
 

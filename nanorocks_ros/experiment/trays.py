@@ -119,10 +119,12 @@ def load_trays(path: str | Path | None = None) -> dict[int, Tray]:
         text = _read(Path(path))
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
+    except yaml.YAMLError as error:
+        mark = getattr(error, 'problem_mark', None)
+        line = mark.line + 1 if mark else 1
+        what = getattr(error, 'problem', None) or getattr(error, 'reason', 'cannot be read')
         raise ConfigurationError(
-            f'{name}:{line}', f'not YAML: {error.problem}', 'correct this line'
+            f'{name}:{line}', f'not YAML: {what}', 'correct this line'
         ) from error
     return _TrayFile(name).trays(root)
 
@@ -260,7 +262,10 @@ class _TrayFile:
     def _scalar(self, node: yaml.Node) -> object:
         if not isinstance(node, yaml.ScalarNode):
             raise self._error(node, 'expected a single value', 'correct this line')
-        return yaml.safe_load(node.value) if node.style is None else node.value
+        try:
+            return yaml.safe_load(node.value) if node.style is None else node.value
+        except (yaml.YAMLError, ValueError) as error:
+            raise self._error(node, f'{node.value!r} cannot be read', 'correct it') from error
 
     def _number(self, node: yaml.Node) -> float:
         value = self._scalar(node)

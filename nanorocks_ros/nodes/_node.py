@@ -20,8 +20,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from nanorocks_ros.errors import ConfigurationError, FrameError
-from nanorocks_ros.experiment.settings import problem, rows, with_values
+from nanorocks_ros.errors import ConfigurationError, FrameError, NanorocksError
+from nanorocks_ros.experiment.settings import rows, with_values
 from nanorocks_ros.nodes._shell import array_message, image_message, message_class, qos_of
 from nanorocks_ros.records import (
     Autocorrelation,
@@ -55,6 +55,7 @@ _OVERRIDABLE = QoSOverridingOptions(
         QoSPolicyKind.DURABILITY,
     )
 )
+_BUILT_AROUND = {'trays', 'trays_file'}
 _PATIENCE_S = 5.0
 _THROTTLE_S = 5.0
 # Acknowledgements come with heartbeats, every 3 s.
@@ -82,13 +83,17 @@ class NanorocksNode(Node):
 
     # Parameters
 
-    def declare(self, settings, prefix=''):
-        """Declare every setting as a parameter; the settings with the values it was given."""
+    def declare(self, settings, prefix='', fixed=True):
+        """Declare every setting as a parameter; the settings with the values it was given.
+
+        Those that the node is built around, `fixed` and the trays, are read-only afterwards.
+        """
         values = {}
         for row in rows(settings):
             name = prefix + row.name
             try:
-                values[row.name] = self._declare_one(name, row)
+                read_only = fixed or row.name in _BUILT_AROUND
+                values[row.name] = self._declare_one(name, row, read_only)
             except ParameterException as error:
                 raise ConfigurationError(
                     f'parameter {name}',
@@ -99,12 +104,13 @@ class NanorocksNode(Node):
         self._declared.update({prefix + row.name: row for row in rows(settings)})
         return checked
 
-    def _declare_one(self, name, row):
+    def _declare_one(self, name, row, read_only):
         # Typed by the default, but 13500 in a YAML file has to do for 13500.0.
         descriptor = ParameterDescriptor(
             description=f'{row.doc} [{row.unit}]' if row.unit else row.doc,
             additional_constraints=', '.join(row.bounds.choices),
             dynamic_typing=True,
+            read_only=read_only,
         )
         if isinstance(row.default, float):
             descriptor.floating_point_range = [
@@ -119,33 +125,40 @@ class NanorocksNode(Node):
         value = self.declare_parameter(name, None if default == [] else default, descriptor).value
         return default if value is None else value
 
-    def react_to_parameters(self, rebuild):
-        """Check later changes, and call `rebuild` once one of ours is in force."""
+    def react_to_parameters(self, settings, build, adopt):
+        """Try every later change on new stages; keep the old ones when it cannot be used.
+
+        Parameters
+        ----------
+        settings : dataclass of settings
+            As declared.
+        build : callable
+            Makes the stages from settings; raises NanorocksError when it cannot.
+        adopt : callable
+            Takes the settings and what `build` made of them.
+        """
+        proposal = []
+
+        def check(parameters):
+            ours = [one for one in parameters if one.name in self._declared]
+            try:
+                values = {row.name: self.get_parameter(row.name).value for row in rows(settings)}
+                values.update({one.name: one.value for one in ours})
+                known = {name: value for name, value in values.items() if value is not None}
+                changed = with_values(settings, known, 'parameters')
+                proposal[:] = [(changed, build(changed))]
+            except NanorocksError as error:
+                return SetParametersResult(successful=False, reason=str(error))
+            return SetParametersResult(successful=True)
 
         def changed(parameters):
             # A new publisher declares its quality of service as parameters: not our business.
             if any(one.name in self._declared for one in parameters):
-                rebuild()
+                adopt(*proposal[0])
                 self.get_logger().info('the parameters changed; starting afresh')
 
-        self.add_on_set_parameters_callback(self._check_parameters)
+        self.add_on_set_parameters_callback(check)
         self.add_post_set_parameters_callback(changed)
-
-    def _check_parameters(self, parameters):
-        for parameter in parameters:
-            row = self._declared.get(parameter.name)
-            text = problem(row, parameter.value) if row else None
-            if text:
-                return SetParametersResult(
-                    successful=False, reason=f'parameter {parameter.name}: {text}'
-                )
-        return SetParametersResult(successful=True)
-
-    def current(self, settings, prefix=''):
-        """The settings with the values that the parameters have now."""
-        values = {row.name: self.get_parameter(prefix + row.name).value for row in rows(settings)}
-        known = {name: value for name, value in values.items() if value is not None}
-        return with_values(settings, known, f'node {self.get_name()}')
 
     # Topics
 

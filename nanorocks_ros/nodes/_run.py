@@ -30,12 +30,16 @@ class _Interrupts:
 
     def __init__(self):
         self.asked = False
+        # While a node is built, kernels may be compiling for seconds, and nothing is at stake.
+        self.at_once = False
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._note)
 
     def _note(self, number, _):
         if self.asked:
             os._exit(128 + number)
+        if self.at_once:
+            os._exit(0)
         self.asked = True
 
 
@@ -95,7 +99,9 @@ def _spin(name, interrupts):
     module = import_module(f'nanorocks_ros.nodes.{name}')
     if interrupts.asked:
         return 0
+    interrupts.at_once = True
     node = getattr(module, f'{name.title().replace("_", "")}Node')()
+    interrupts.at_once = False
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.nodes._shell import image_message
 from nanorocks_ros.simulation.film import film
@@ -46,8 +46,10 @@ class Simulated:
 def recorded_moments(bag, loop):
     """Stamp and (frame, None) of each frame of a bag."""
     while True:
+        last = 0
         for frame in bag.frames():
-            yield frame.stamp_ns, (frame, None)
+            last = last if isinstance(frame, FrameError) else frame.stamp_ns
+            yield last, (frame, None)
         if not loop:
             return
 

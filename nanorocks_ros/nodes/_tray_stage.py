@@ -27,27 +27,26 @@ class TrayStageNode(NanorocksNode):
     def __init__(self, name, stage, outputs):
         super().__init__(name)
         self._make = stage
-        self._settings = self.declare(PipelineSettings())
+        self._settings = self.declare(PipelineSettings(), fixed=False)
         self._epoch = Epoch(self, may_set=False)
-        self._rebuild()
-        self.react_to_parameters(self._rebuild)
+        self._adopt(self._settings, self._build(self._settings))
+        self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
         for tray in self._settings.trays:
             self.offer(outputs, tray)
             self.listen(topics.GRAY, lambda message, tray=tray: self._take(message, tray), tray)
 
-    def _rebuild(self):
-        self._settings = self.current(self._settings)
-        trays = trays_of(self._settings)
-        self._stages = {number: self._make(self._settings, one) for number, one in trays.items()}
+    def _build(self, settings):
+        return {number: self._make(settings, one) for number, one in trays_of(settings).items()}
+
+    def _adopt(self, settings, stages):
+        self._settings, self._stages = settings, stages
 
     def _take(self, message, tray):
         frame = frame_from_image(message, self.resolve_topic_name(topics.GRAY.of(tray)))
         self._epoch.when_known(frame.stamp_ns, self._push, tray_image(frame, tray))
 
     def _push(self, image):
-        stage = self._stages.get(image.tray)
-        if stage is None:
-            return
+        stage = self._stages[image.tray]
         self.prepare(stage, image.tray)
         for record in stage.push(image):
             self.publish_result(record, self._epoch.ns)

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 from nanorocks_ros.experiment.trays import load_trays
@@ -22,6 +23,7 @@ _GRAPH = ('preprocessor', 'speed_estimator', 'cluster_autocorrelator', 'haff_fit
 _SIMULATOR = ('--ros-args', '-p', 'listeners:=1')
 _FIGURE = Path('nanorocks_demo.png')
 _NODE_ENDS_WITHIN_S = 10.0
+_DEADLINE_S = 120.0
 
 
 class DemoNode(NanorocksNode):
@@ -38,6 +40,7 @@ class DemoNode(NanorocksNode):
         ):
             self.listen(topic, lambda m, kind=kind: self._take(kind, m), _TRAY, required=False)
         print('starting the nodes: ' + ', '.join(_GRAPH), flush=True)
+        self._deadline = time.monotonic() + _DEADLINE_S
         self._processes = [_started(name) for name in _GRAPH]
         self.create_timer(0.5, self._watch, clock=self.steady_clock)
 
@@ -95,8 +98,11 @@ class DemoNode(NanorocksNode):
         print(f'figure: {_FIGURE.resolve()}', flush=True)
 
     def _watch(self):
+        if time.monotonic() > self._deadline:
+            print('demo: no final COR in time; see what the nodes said above', file=sys.stderr)
+            self.exit_code, self.done = 1, True
         for name, process in zip(_GRAPH, self._processes, strict=True):
-            if process.poll() not in (None, 0):
+            if process.poll() is not None:
                 print(f'demo: node {name} ended with code {process.returncode}', file=sys.stderr)
                 self.exit_code = 1
                 self.done = True

@@ -19,17 +19,18 @@ class HaffFitterNode(NanorocksNode):
 
     def __init__(self):
         super().__init__('haff_fitter')
-        self._settings = self.declare(PipelineSettings())
-        self._rebuild()
-        self.react_to_parameters(self._rebuild)
+        self._settings = self.declare(PipelineSettings(), fixed=False)
+        self._adopt(self._settings, self._build(self._settings))
+        self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
         for tray in self._settings.trays:
             self.offer((topics.COR,), tray)
             self.listen(topics.SPEED, lambda message, tray=tray: self._take(message, tray), tray)
 
-    def _rebuild(self):
-        self._settings = self.current(self._settings)
-        trays = trays_of(self._settings)
-        self._stages = {n: HaffFitter(self._settings, tray) for n, tray in trays.items()}
+    def _build(self, settings):
+        return {number: HaffFitter(settings, one) for number, one in trays_of(settings).items()}
+
+    def _adopt(self, settings, stages):
+        self._settings, self._stages = settings, stages
 
     def _take(self, message, tray):
         where = self.resolve_topic_name(topics.SPEED.of(tray))

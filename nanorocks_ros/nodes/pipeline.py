@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.experiment import settings as st
 from nanorocks_ros.nodes import _sources
 from nanorocks_ros.nodes._camera import Camera
@@ -18,20 +18,20 @@ class PipelineNode(NanorocksNode):
 
     def __init__(self):
         super().__init__('pipeline')
-        self._settings = self.declare(st.PipelineSettings())
+        self._settings = self.declare(st.PipelineSettings(), fixed=False)
         self._source = self.declare(st.SourceSettings()).source
         self._simulation = self.declare(st.SimulationSettings(), prefix='simulation.')
         self._bag = self.declare(st.BagSettings())
         self._pacing = self.declare(st.PacingSettings())
         camera = self.declare(st.CameraSettings())
-        self._epoch = Epoch(self, may_set=True)
+        self._epoch = Epoch(self, may_set=True, follow=self._source == 'topic')
+        self._reader = None
         self._where = self._source
         self._offer_everything()
-        self._rebuild()
-        self.react_to_parameters(self._rebuild)
+        self._adopt(self._settings, self._build(self._settings))
+        self.react_to_parameters(st.PipelineSettings(), self._build, self._adopt)
         if self._source == 'topic':
-            self._where = Camera(self, camera, self._take).topic
-            self._rebuild()
+            self._name_source(Camera(self, camera, self._take).topic)
         elif self._source == 'simulator':
             self._play_simulated()
         else:
@@ -42,9 +42,15 @@ class PipelineNode(NanorocksNode):
         for tray in self._settings.trays:
             self.offer(RESULT_TOPICS, tray)
 
-    def _rebuild(self):
-        self._settings = self.current(self._settings)
-        self._pipeline = Pipeline(self._settings, self._where)
+    def _build(self, settings):
+        return Pipeline(settings, self._where)
+
+    def _adopt(self, settings, pipeline):
+        self._settings, self._pipeline = settings, pipeline
+
+    def _name_source(self, where):
+        self._where = where
+        self._pipeline = self._build(self._settings)
 
     def _play_simulated(self):
         if self._simulation.tray not in self._settings.trays:
@@ -58,14 +64,17 @@ class PipelineNode(NanorocksNode):
 
     def _play_recorded(self):
         bag = _sources.opened_bag(self._bag)
-        self._where = bag.where
-        self._rebuild()
+        self._name_source(bag.where)
+        self._reader = bag.reader
         self._epoch.set(bag.epoch_ns())
         self._play(_sources.recorded_moments(bag, self._bag.loop), tuple)
 
     def _play(self, moments, dated):
         def emit(_, moment):
             frame, truth = dated(moment)
+            if isinstance(frame, FrameError):
+                self.refuse(frame)
+                return
             if self._epoch.ns is None:
                 self._epoch.set(frame.stamp_ns)
             _sources.publish_moment(self, (frame, truth), self._epoch.ns)
@@ -84,6 +93,9 @@ class PipelineNode(NanorocksNode):
             self.publish_result(record, self._epoch.ns)
 
     def _finish(self):
+        if self._reader is not None:
+            for notice in self._reader.notices:
+                self.get_logger().warning(notice)
         for record in self._pipeline.flush():
             self.publish_result(record, self._epoch.ns)
         self.finish()

@@ -16,18 +16,19 @@ class PreprocessorNode(NanorocksNode):
 
     def __init__(self):
         super().__init__('preprocessor')
-        self._settings = self.declare(PipelineSettings())
+        self._settings = self.declare(PipelineSettings(), fixed=False)
         self._camera = Camera(self, self.declare(CameraSettings()), self._take)
         self._epoch = Epoch(self, may_set=True)
         for tray in self._settings.trays:
             self.offer((topics.GRAY, topics.RECTIFIED), tray)
-        self._rebuild()
-        self.react_to_parameters(self._rebuild)
+        self._adopt(self._settings, self._build(self._settings))
+        self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
 
-    def _rebuild(self):
-        self._settings = self.current(self._settings)
-        trays = trays_of(self._settings)
-        self._stage = Preprocessor(self._settings, trays, self._camera.topic)
+    def _build(self, settings):
+        return Preprocessor(settings, trays_of(settings), self._camera.topic)
+
+    def _adopt(self, settings, stage):
+        self._settings, self._stage = settings, stage
 
     def _take(self, frame):
         self._epoch.when_known(frame.stamp_ns, self._push, frame)

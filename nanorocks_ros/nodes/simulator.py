@@ -17,7 +17,7 @@ class SimulatorNode(NanorocksNode):
         super().__init__('simulator')
         settings = self.declare(SimulationSettings())
         pacing = self.declare(PacingSettings())
-        self._epoch = Epoch(self, may_set=True)
+        self._epoch = Epoch(self, may_set=True, follow=False)
         self.offer((topics.EPOCH, topics.RAW, topics.TRUTH), settings.tray)
         self._simulated = Simulated(self, settings, '')
         self._pacer = Pacer(self, self._simulated.moments(), self._emit, pacing, self.finish)

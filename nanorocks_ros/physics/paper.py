@@ -1,7 +1,7 @@
 """The closed form of [B19], kept under its own name because people compare with it.
 
-It is precise and wrong: on simulated gases it returns 0.91 to 0.98 whatever the truth between
-0.5 and 0.9 (``docs/physics.md``). Its interval therefore covers statistics only.
+It is precise and wrong: on simulated gases it returns 0.94 to 0.99 whatever the truth between
+0.6 and 0.95 (``docs/physics.md``). Its interval therefore covers statistics only.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import special
 
-from nanorocks_ros.errors import FitError
+from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.physics.haff_fit import HaffFit, fit_haff
 from nanorocks_ros.physics.paper import paper_restitution_of_decay
 from nanorocks_ros.records import CorEstimate, CorRelation, CorStatus, SpeedEstimate
@@ -37,6 +37,13 @@ class HaffFitter:
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.cooling
+        if self._settings.delay >= self._settings.duration:
+            raise ConfigurationError(
+                'cooling.delay',
+                f'{self._settings.delay:g} s is not before cooling.duration, '
+                f'{self._settings.duration:g} s',
+                'choose a window that holds speeds',
+            )
         self._tray = tray
         self._restart()
 

@@ -96,6 +96,12 @@ class Preprocessor:
         if self._shape is None:
             self._regions = self._regions_in(frame.image.shape)
             self._shape, self._encoding = frame.image.shape, frame.encoding
+        elif frame.encoding != self._encoding:
+            raise FrameError(
+                self._camera,
+                f'the encoding changed from {self._encoding} to {frame.encoding}',
+                'record each on its own, or restart after changing the camera',
+            )
         elif frame.image.shape != self._shape:
             height, width = frame.image.shape[:2]
             raise FrameError(

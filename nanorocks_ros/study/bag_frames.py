@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.recordings.images import frame_from_compressed, frame_from_image
 from nanorocks_ros.recordings.reader import BagMessage, BagReader, open_bag
 from nanorocks_ros.records import Frame, GroundTruth
@@ -45,6 +46,11 @@ class BagFrames:
         )
         self.topic = self.reader.require_topic(wanted)
         self.count = self.reader.topics[self.topic].count
+        kind = self.reader.topics[self.topic].type
+        if kind not in (topics.RAW.type, topics.COMPRESSED):
+            raise RecordingError(
+                self.where, f'holds {kind}, not images', 'pass the topic of a camera'
+            )
         self._compressed = self.reader.topics[self.topic].type == topics.COMPRESSED
 
     @property
@@ -65,17 +71,18 @@ class BagFrames:
         if topic in self.reader.topics:
             yield from self.reader.messages([topic])
 
-    def frames(self) -> Iterator[Frame]:
+    def frames(self) -> Iterator[Frame | FrameError]:
         """The frames, decoded, in the order they were recorded.
 
-        Raises
-        ------
-        FrameError
-            For an encoding that is not supported or a picture that cannot be decoded.
+        In the place of a frame that cannot be used stands the reason: an encoding that is
+        not supported, a picture that cannot be decoded.
         """
         read = frame_from_compressed if self._compressed else frame_from_image
         for message in self.reader.messages([self.topic]):
-            yield read(self.reader.deserialize(message), self.where)
+            try:
+                yield read(self.reader.deserialize(message), self.where)
+            except FrameError as error:
+                yield error
 
     def truth(self, epoch_ns: int) -> dict[int, list[GroundTruth]]:
         """What the simulator knew, by tray; empty for a real recording."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-import shutil
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros import __version__
@@ -34,12 +34,16 @@ def _known(value: float) -> float | None:
 
 def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
     """The final estimate of every cycle, or its last where none is final."""
-    latest: dict[int, CorEstimate] = {}
+    latest: dict[tuple[int, int], CorEstimate] = {}
+    passes, last_stamp_ns = 0, None
     for one in cors:
-        before = latest.get(one.cycle)
+        # Time went back: cycles are counted from 1 again, and are others.
+        passes += last_stamp_ns is not None and one.stamp_ns < last_stamp_ns
+        last_stamp_ns = one.stamp_ns
+        before = latest.get((passes, one.cycle))
         if before is None or before.status is not CorStatus.FINAL:
-            latest[one.cycle] = one
-    return [latest[cycle] for cycle in sorted(latest)]
+            latest[passes, one.cycle] = one
+    return list(latest.values())
 
 
 def as_json(analysis: Analysis) -> dict[str, Any]:
@@ -61,7 +65,7 @@ def _tray_as_json(analysis: Analysis, results: TrayResults) -> dict[str, Any]:
     def seconds(stamp_ns: int) -> float:
         return (stamp_ns - analysis.epoch_ns) / NS
 
-    starts = {one.cycle: one.cycle_start_ns for one in results.speeds if one.cycle_start_ns}
+    starts = {one.stamp_ns: one.cycle_start_ns for one in results.speeds}
     return {
         'time': [seconds(one.stamp_ns) for one in results.speeds],
         'mean_projected_speed': [_known(one.mean_projected_speed) for one in results.speeds],
@@ -69,7 +73,7 @@ def _tray_as_json(analysis: Analysis, results: TrayResults) -> dict[str, Any]:
             _known(one.mean_projected_speed_error) for one in results.speeds
         ],
         'cycles': [
-            _cycle_as_json(one, seconds(starts[one.cycle]))
+            _cycle_as_json(one, seconds(starts[one.stamp_ns] or 0))
             for one in last_of_each_cycle(results.cors)
         ],
         'truth': _truth_as_json(analysis, results),
@@ -135,17 +139,18 @@ def write_results(
         raise RecordingError(
             str(folder), 'exists and holds no results of ours', 'pass another --output'
         )
-    fresh = folder.with_name(f'{folder.name}.part')
     try:
-        shutil.rmtree(fresh, ignore_errors=True)
-        fresh.mkdir(parents=True)
-        (fresh / _MARK).touch()
-        for number, results in analysis.trays.items():
-            _write_tables(analysis, results, fresh, number)
-        _write_bag(analysis, fresh / BAG_NAME, _provenance(source, settings))
-        if folder.exists():
-            shutil.rmtree(folder)
-        fresh.rename(folder)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=f'.{folder.name}.', dir=folder.parent) as scratch:
+            fresh = Path(scratch) / 'fresh'
+            fresh.mkdir()
+            (fresh / _MARK).touch()
+            for number, results in analysis.trays.items():
+                _write_tables(analysis, results, fresh, number)
+            _write_bag(analysis, fresh / BAG_NAME, _provenance(source, settings))
+            if folder.exists():
+                folder.rename(Path(scratch) / 'earlier')
+            fresh.rename(folder)
     except OSError as error:
         raise RecordingError(
             str(folder), f'cannot be written: {error.strerror}', 'pass a writable --output'

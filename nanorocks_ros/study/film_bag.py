@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 # Bags made from the same seed are alike, byte for byte: the clock starts at a fixed instant.
+_LONGEST = 86400.0
 START_NS = 1_000_000_000_000_000_000
 
 
@@ -63,8 +64,8 @@ def film_into_bag(
     RecordingError
         When the bag cannot be written.
     """
-    if not (math.isfinite(duration) and duration > 0.0):
-        raise ConfigurationError('--duration', f'{duration}', 'give a positive time in seconds')
+    if not (math.isfinite(duration) and 0.0 < duration <= _LONGEST):
+        raise ConfigurationError('--duration', f'{duration}', f'give up to {_LONGEST:g} s')
     if not 1 <= quality <= 100:
         raise ConfigurationError('--quality', f'{quality}', 'give a number from 1 to 100')
     tray = tray_by_number(load_trays(), settings.tray)
@@ -80,9 +81,10 @@ def film_into_bag(
         'nanorocks_ros': __version__,
         **{row.name: str(row.default) for row in rows(settings)},
     }
+    # Made before the bag, so that a tray that does not fit leaves nothing behind.
+    moments = film(settings, tray, frames, start_stamp_ns=START_NS)
     with BagWriter(path, table, metadata=provenance) as bag:
         bag.write(topics.EPOCH.absolute(), START_NS, time_message(START_NS))
-        moments = film(settings, tray, frames, start_stamp_ns=START_NS)
         for done, (frame, truth) in enumerate(moments, start=1):
             picture = compressed_image_message(
                 frame.stamp_ns,

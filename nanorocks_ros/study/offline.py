@@ -58,7 +58,9 @@ class Analysis:
     complete : bool
         Whether every frame was analysed.
     error : FrameError or None
-        Why the analysis ended early, if it did; what came before is kept.
+        Why the first of the frames that could not be used could not; the others were.
+    refused : int
+        Frames that could not be used.
     """
 
     epoch_ns: int
@@ -67,6 +69,7 @@ class Analysis:
     notices: list[str] = field(default_factory=list)
     complete: bool = True
     error: FrameError | None = None
+    refused: int = 0
 
     @property
     def frames(self) -> int:
@@ -122,7 +125,7 @@ def analyse(
     ConfigurationError
         When the settings cannot be used.
     FrameError
-        When not even the first frame can be used.
+        When no frame can be used.
     """
     bag = BagFrames(path, image_topic)
     epoch_ns = bag.epoch_ns()
@@ -135,15 +138,21 @@ def analyse(
         trays={n: TrayResults(truth=truth.get(n, [])) for n in settings.trays},
         complete=bag.reader.complete,
     )
-    try:
-        for number, frame in enumerate(bag.frames(), start=1):
+    for number, frame in enumerate(bag.frames(), start=1):
+        try:
+            if isinstance(frame, FrameError):
+                raise frame
             _push(result, pipeline, frame)
-            if progress is not None:
-                progress(number, bag.count)
-    except FrameError as error:
-        if not result.stamps_ns:
-            raise
-        result.error, result.complete = error, False
+        except FrameError as error:
+            result.refused += 1
+            result.error = result.error or error
+        if progress is not None:
+            progress(number, bag.count)
+    if result.error is not None and not result.stamps_ns:
+        raise result.error
+    if result.refused:
+        result.notices.append(f'{bag.where}: {result.refused} frames could not be used')
+        result.complete = False
     for final in pipeline.flush():
         result.trays[final.tray].cors.append(final)
     # Known only after reading: where a damaged bag ends.

@@ -153,7 +153,14 @@ def from_array(
     items: dict[str, Any] = {'tray': tray}
     for field, value in zip(fields, values, strict=True):
         name = _STAMPS.get(field.name, field.name)
-        items[name] = _value(field.name, float(value), epoch_ns)
+        try:
+            items[name] = _value(field.name, float(value), epoch_ns)
+        except (ValueError, OverflowError) as error:
+            raise FrameError(
+                where,
+                f'{field.name} is {value}',
+                'use the same release of nanorocks_ros on both sides',
+            ) from error
     return record_type(**items)
 
 

@@ -9,8 +9,6 @@ IMAGE = 'sensor_msgs/msg/Image'
 COMPRESSED = 'sensor_msgs/msg/CompressedImage'
 ARRAY = 'std_msgs/msg/Float32MultiArray'
 TIME = 'builtin_interfaces/msg/Time'
-CLOCK = 'rosgraph_msgs/msg/Clock'
-DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 
 NAMESPACE = '/nanorocks'
 """Where the graph lives unless it is moved; topics below are relative to it."""

@@ -76,6 +76,17 @@ def test_a_bad_change_of_a_parameter_is_rejected_with_the_reason(graph):
     assert graph.interrupt(process).code == 0
 
 
+def test_a_change_that_does_not_fit_the_other_parameters_is_rejected_and_the_node_lives(graph):
+    process = graph.start('preprocessor')
+    mix = set_parameter(graph, 'preprocessor', 'preprocess.gray_mix', [1.0, 1.0, 1.0])
+    assert not mix.successful
+    assert 'whose sum is at most 1' in mix.reason
+    trays = set_parameter(graph, 'preprocessor', 'trays', [1, 2])
+    assert not trays.successful
+    assert process.poll() is None
+    assert graph.interrupt(process).code == 0
+
+
 def test_a_camera_nobody_publishes_is_said_within_seconds(graph):
     process = graph.start('preprocessor')
     said = '/nanorocks/camera/image_raw: no publisher within 5 s'
@@ -128,8 +139,11 @@ class Camera:
         self._publisher.publish(image_message(stamp_ns, 'camera', pixels, encoding))
 
     def publish_until_seen(self, count):
-        self.publish()
-        self._graph.until(lambda: len(self.trays) >= count)
+        def seen():
+            self.publish()
+            return len(self.trays) >= count
+
+        self._graph.until(seen)
 
 
 @pytest.mark.parametrize(

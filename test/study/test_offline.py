@@ -279,7 +279,7 @@ def test_a_bag_cut_short_is_analysed_up_to_the_cut(capsys, tmp_path):
 @pytest.mark.parametrize(
     ('flags', 'message'),
     [
-        (('--trays', '9'), 'trays: 9.0 is outside [1, 8]'),
+        (('--trays', '9'), 'trays: 9 is outside [1, 8]'),
         (('--speed-interval', '-1'), 'speed.interval: -1 is outside'),
         (('--speed-interval', 'nan'), 'speed.interval'),
         (('--cooling-duration', '.nan'), 'cooling.duration: nan is not finite'),
@@ -298,3 +298,51 @@ def test_the_truth_covers_the_recording_in_order_of_time(analysis):
     assert math.isclose(
         analysis.seconds, (truth[-1].stamp_ns - truth[0].stamp_ns) / NS, abs_tol=1e-3
     )
+
+
+def test_one_picture_that_cannot_be_decoded_is_left_out_and_told(capsys, tmp_path):
+    path = tmp_path / 'bag'
+    name = topics.RAW_COMPRESSED.absolute()
+    source = open_bag(SAMPLE)
+    with BagWriter(path, {name: offered(topics.RAW_COMPRESSED)}, metadata={}) as bag:
+        for number, message in enumerate(source.messages([name])):
+            if number == 90:
+                break
+            content = source.deserialize(message)
+            if number == 40:
+                content.data = content.data[:200]
+            bag.write(name, message.log_time_ns, content)
+    assert run('analyse', path, '--json', '--no-output') == 1
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)['frames'] == 89
+    assert '1 frames could not be used' in printed.err
+
+
+def test_an_image_topic_that_holds_no_images_is_refused(capsys):
+    assert run('analyse', SAMPLE, '--no-output', '--image-topic', '/nanorocks/tray_1/truth') == 1
+    assert 'holds std_msgs/msg/Float32MultiArray, not images' in error_of(capsys)
+
+
+def test_cycles_of_a_second_pass_are_cycles_of_their_own(tmp_path):
+    path = tmp_path / 'twice'
+    name = topics.RAW_COMPRESSED.absolute()
+    source = open_bag(SAMPLE)
+    length = source.end_ns - source.start_ns + NS
+    with BagWriter(path, {name: offered(topics.RAW_COMPRESSED)}, metadata={}) as bag:
+        for again in range(2):
+            for message in source.messages([name]):
+                content = source.deserialize(message)
+                bag.write(name, message.log_time_ns + again * length, content)
+    cycles = as_json(analyse(path, PipelineSettings()))['trays']['1']['cycles']
+    assert [one['cycle'] for one in cycles] == [1, 1]
+    assert cycles[0]['restitution'] == cycles[1]['restitution']
+
+
+def test_nothing_but_our_own_results_is_ever_removed(analysis, tmp_path):
+    beside = tmp_path / 'out.part'
+    beside.mkdir()
+    (beside / 'thesis.txt').write_text('precious')
+    for _ in range(2):
+        write_results(analysis, tmp_path / 'out', SAMPLE, PipelineSettings())
+    assert (beside / 'thesis.txt').read_text() == 'precious'
+    assert sorted(one.name for one in tmp_path.iterdir()) == ['out', 'out.part']

@@ -123,3 +123,14 @@ def test_an_array_without_a_time_is_refused():
     values[0] = math.nan
     with pytest.raises(FrameError, match='time is nan'):
         from_array(SpeedEstimate, values, tray=1, epoch_ns=EPOCH, where='/speed')
+
+
+@pytest.mark.parametrize(
+    ('element', 'value'), [(1, math.nan), (1, math.inf), (6, 9.0), (6, math.nan)]
+)
+def test_an_element_that_means_nothing_is_refused(element, value):
+    values = to_array(RECORDS[0], EPOCH)
+    values[element] = value
+    name = layout(SpeedEstimate).fields[element].name
+    with pytest.raises(FrameError, match=f'/speed: {name} is '):
+        from_array(SpeedEstimate, values, tray=1, epoch_ns=EPOCH, where='/speed')
