@@ -164,9 +164,45 @@ class SimulationSettings:
     restitution: float = _setting(
         0.89, 'coefficient of restitution between beads', low=0.0, high=1.0
     )
+    restitution_width: float = _setting(
+        0.0,
+        'full width of the even distribution that the restitution of each collision is drawn from',
+        low=0.0,
+        high=1.0,
+    )
     wall_restitution: float = _setting(
         0.99, 'coefficient of restitution at the walls', low=0.0, high=1.0
     )
+    sticking_speed: float = _setting(
+        0.0, 'beads that meet more slowly stick together', 'm/s', low=0.0, high=1.0
+    )
+    wall_sticking_speed: float = _setting(
+        0.0, 'beads that meet a wall more slowly stay there', 'm/s', low=0.0, high=1.0
+    )
+    sticking_measure: str = _setting(
+        'normal',
+        'speed compared with the sticking speed: along the normal of the contact, or all of it',
+        choices=('normal', 'total'),
+    )
+    tangential_restitution: float = _setting(
+        -1.0,
+        'tangential restitution between beads; -1: smooth, 1: perfectly rough',
+        low=-1.0,
+        high=1.0,
+    )
+    wall_tangential_restitution: float = _setting(
+        -1.0, 'tangential restitution at the walls; -1: smooth', low=-1.0, high=1.0
+    )
+    speeds: str = _setting(
+        'uniform',
+        'speeds after a shaking event: even in [0, 2 mean], Maxwellian, or those of a tray whose '
+        'walls were really shaken, scaled to the mean',
+        choices=('uniform', 'maxwellian', 'shaken'),
+    )
+    shake_frequency: float = _setting(
+        5.0, 'speeds=shaken: frequency of the walls', '1/s', low=0.1, high=1000.0
+    )
+    shake_periods: int = _setting(20, 'speeds=shaken: periods of the walls', low=1, high=10000)
     mean_speed: float = _setting(
         0.007, 'mean 3-D speed after a shaking event', 'm/s', low=0.0, high=1.0
     )

@@ -1,8 +1,7 @@
-"""Many runs of one tray, from shaking to rest, without leaving compiled code."""
+"""Many runs of one tray, from shaking to rest."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,22 +9,23 @@ import numpy as np
 
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.simulation.engine import observables as columns
 from nanorocks_ros.simulation.engine.checks import check_room, check_times
-from nanorocks_ros.simulation.engine.gas import MOST_EVENTS
-from nanorocks_ros.simulation.engine.kernel import run_until
-from nanorocks_ros.simulation.engine.prediction import predict_all
-from nanorocks_ros.simulation.engine.state import COUNTS, DONE, PAIR, WALL, Rules, new_state
+from nanorocks_ros.simulation.engine.gas import MOST_FOR_SCAN, HardSphereGas
+from nanorocks_ros.simulation.engine.kernel import Output, run_until
+from nanorocks_ros.simulation.engine.rules import for_species
+from nanorocks_ros.simulation.engine.state import COUNTS, DONE, PAIR, WALL, new_state
 from nanorocks_ros.simulation.initial import (
-    MOST_TRIES,
     draw_diameters,
-    place,
+    drawn_velocities,
+    resting_beads,
     rules_of,
-    shaken_velocities,
     sphere_masses,
     stock,
 )
+from nanorocks_ros.simulation.placement import MOST_TRIES, place
 from nanorocks_ros.simulation.randomness import Purpose, key_for
-from nanorocks_ros.simulation.shaking import check_settings
+from nanorocks_ros.simulation.shaking import after_shaking, check_settings
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -34,13 +34,16 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.settings import SimulationSettings
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.simulation.engine.rules import Rules
+    from nanorocks_ros.simulation.initial import Stock
 
 _NO_ROOM = -1
+_MOST_EVENTS = 10_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoolingRuns:
-    """Mean speeds of a cooling gas, run by run.
+    """A cooling gas, run by run.
 
     Parameters
     ----------
@@ -48,12 +51,15 @@ class CoolingRuns:
         Since the shaking event.
     mean_speed, mean_projected_speed : ndarray (n_runs, n_times), [m/s]
         Over the beads.
+    bodies : ndarray of int64, (n_runs, n_times)
+        Beads that move together count once.
     pair_collisions, wall_collisions : ndarray of int64, (n_runs,)
     """
 
     times: NDArray[np.float64]
     mean_speed: NDArray[np.float64]
     mean_projected_speed: NDArray[np.float64]
+    bodies: NDArray[np.int64]
     pair_collisions: NDArray[np.int64]
     wall_collisions: NDArray[np.int64]
 
@@ -83,79 +89,119 @@ def cooling_runs(
     ConfigurationError
         For a setting outside its range.
     SimulationError
-        When the beads do not fit, or a run has too many events.
+        When the beads do not fit, or a run has events without end.
     """
     check_settings(settings)
-    drawn = stock(tray)
-    rules = rules_of(settings, tray).compiled()
-    check_room(0.5 * drawn.diameter_high, rules)
     last = float(np.max(times)) if np.size(times) else 0.0
     instants = check_times(0.0, last, times)
-    numbers = list(runs)
-    purposes = (Purpose.DIAMETERS, Purpose.POSITIONS, Purpose.VELOCITIES)
-    keys = np.array(
-        [[key_for(settings.seed, run, one) for one in purposes] for run in numbers],
-        dtype=np.uint64,
-    ).reshape(len(numbers), len(purposes))
-    speeds = np.empty((len(numbers), 2, instants.size))
-    counts = np.zeros((len(numbers), COUNTS), dtype=np.int64)
-    ranges = np.stack((drawn.diameter_low, drawn.diameter_high, drawn.density))
-    for k, run in enumerate(numbers):
-        status = _cool(rules, ranges, keys[k], settings.mean_speed, instants, speeds[k], counts[k])
-        _check_status(status, tray, run)
+    drawn = stock(tray)
+    small = drawn.density.size <= MOST_FOR_SCAN and settings.speeds != 'shaken'
+    rows = [
+        (_small_run if small else _large_run)(settings, tray, drawn, instants, run) for run in runs
+    ]
+    n_columns = columns.columns(int(drawn.species.max()) + 1)
+    found = np.array(rows).reshape(len(rows), instants.size + 1, n_columns)
+    counts = found[:, -1, columns.FIRST_COUNT : columns.FIRST_COUNT + COUNTS].astype(np.int64)
     return CoolingRuns(
         times=instants,
-        mean_speed=speeds[:, 0],
-        mean_projected_speed=speeds[:, 1],
+        mean_speed=found[:, :-1, columns.MEAN_SPEED],
+        mean_projected_speed=found[:, :-1, columns.MEAN_PROJECTED_SPEED],
+        bodies=found[:, :-1, columns.BODIES].astype(np.int64),
         pair_collisions=counts[:, PAIR],
         wall_collisions=counts[:, WALL],
     )
 
 
-def _check_status(status: int, tray: Tray, run: int) -> None:
-    where = f'tray {tray.number}, run {run}'
+def _large_run(
+    settings: SimulationSettings,
+    tray: Tray,
+    drawn: Stock,
+    instants: NDArray[np.float64],
+    run: int,
+) -> NDArray[np.float64]:
+    """Observations at the instants, and at the last one again, (n_times + 1, n_columns)."""
+    rules = rules_of(settings, tray, run)
+    beads = after_shaking(settings, rules, resting_beads(settings, tray, run), run, 0)
+    ends = instants[-1:] if instants.size else np.zeros(1)
+    gas = HardSphereGas(beads, rules)
+    rows: NDArray[np.float64] = gas.observe(np.concatenate((instants, ends)))
+    return rows
+
+
+def _small_run(
+    settings: SimulationSettings,
+    tray: Tray,
+    drawn: Stock,
+    instants: NDArray[np.float64],
+    run: int,
+) -> NDArray[np.float64]:
+    """The same without leaving compiled code."""
+    rules = rules_of(settings, tray, run).compiled()
+    n_species = int(drawn.species.max()) + 1
+    rules = rules._replace(restitution=for_species(rules.restitution, n_species))
+    check_room(0.5 * drawn.diameter_high, rules)
+    purposes = (Purpose.DIAMETERS, Purpose.POSITIONS, Purpose.VELOCITIES)
+    keys = np.array([key_for(settings.seed, run, one) for one in purposes])
+    ranges = np.stack((drawn.diameter_low, drawn.diameter_high, drawn.density))
+    rows = np.zeros((instants.size + 1, columns.columns(n_species)))
+    ends = instants[-1:] if instants.size else np.zeros(1)
+    status = _cool(
+        rules,
+        ranges,
+        drawn.species,
+        keys,
+        settings.mean_speed,
+        settings.speeds == 'maxwellian',
+        np.concatenate((instants, ends)),
+        rows,
+    )
     if status == _NO_ROOM:
-        raise SimulationError(where, 'found no room for all beads', 'give fewer or smaller beads')
+        raise SimulationError(
+            f'tray {tray.number}, run {run}',
+            'found no room for all beads',
+            'give fewer or smaller beads',
+        )
     if status != DONE:
         raise SimulationError(
-            where, f'more than {MOST_EVENTS} events', 'raise the restitution or shorten the run'
+            f'tray {tray.number}, run {run}',
+            f'more than {_MOST_EVENTS} events',
+            'raise the restitution or shorten the run',
         )
+    return rows
 
 
 @compiled
 def _cool(
     rules: Rules,
     ranges: NDArray[np.float64],
+    species: NDArray[np.int32],
     keys: NDArray[np.uint64],
     mean_speed: float,
+    maxwell: bool,
     times: NDArray[np.float64],
-    speeds: NDArray[np.float64],
-    counts: NDArray[np.int64],
+    rows: NDArray[np.float64],
 ) -> int:
-    """One run; writes mean speeds (2, n_times) and counts, and returns how it ended."""
+    """One run; writes observations (n_times, n_columns), and returns how it ended."""
     diameters = draw_diameters(ranges[0], ranges[1], keys[0])
     n = diameters.size
-    sides = np.array((rules.side_x, rules.side_y, rules.side_z))
+    sides = np.array((rules.sides[0], rules.sides[1], rules.sides[2]))
     radii = 0.5 * diameters
-    start, placed = place(radii, sides, keys[1], MOST_TRIES)
+    positions, placed = place(radii, sides, np.zeros(3, dtype=np.bool_), keys[1], MOST_TRIES)
     if placed < n:
         return _NO_ROOM
-    kicked = shaken_velocities(n, mean_speed, keys[2], 0)
-    state = new_state(start, kicked, radii, sphere_masses(diameters, ranges[2]))
-    predict_all(state, rules, 0.0)
-    positions = np.empty((times.size, n, 3))
-    velocities = np.empty((times.size, n, 3))
-    end = times[-1] if times.size else 0.0
-    status = run_until(state, rules, end, MOST_EVENTS, times, positions, velocities)
-    for k in range(times.size):
-        speeds[0, k] = 0.0
-        speeds[1, k] = 0.0
-        for i in range(n):
-            v = velocities[k, i]
-            in_plane = v[0] * v[0] + v[1] * v[1]
-            speeds[0, k] += math.sqrt(in_plane + v[2] * v[2])
-            speeds[1, k] += math.sqrt(in_plane)
-        speeds[0, k] /= n
-        speeds[1, k] /= n
-    counts[:] = state.counts
-    return status
+    masses = sphere_masses(diameters, ranges[2])
+    velocities = drawn_velocities(masses, mean_speed, maxwell, keys[2], 0)
+    state = new_state(positions, velocities, radii, masses, species, rules)
+    nothing = np.empty((0, 0, 3))
+    output = Output(
+        times[:0],
+        nothing,
+        nothing,
+        nothing,
+        np.empty((0, 0), dtype=np.int32),
+        times,
+        rows,
+        np.empty((0, 6)),
+        np.zeros(3, dtype=np.int64),
+    )
+    return run_until(state, rules, times[-1], _MOST_EVENTS, output)

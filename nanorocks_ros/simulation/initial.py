@@ -11,9 +11,15 @@ import numpy as np
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.simulation.engine.checks import check_room
-from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules
-from nanorocks_ros.simulation.ordering import rising
-from nanorocks_ros.simulation.randomness import Purpose, direction, hashed, key_for, uniform
+from nanorocks_ros.simulation.engine.gas import Beads
+from nanorocks_ros.simulation.engine.rules import (
+    CollisionRules,
+    UniformRestitution,
+    WallMotion,
+)
+from nanorocks_ros.simulation.placement import placed_at_random
+from nanorocks_ros.simulation.randomness import Purpose, key_for, uniform
+from nanorocks_ros.simulation.velocities import maxwellian, uniform_speeds
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,10 +27,10 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.settings import SimulationSettings
     from nanorocks_ros.experiment.trays import Tray
 
-# Places tried for one bead. Tray 8, the fullest (0.29), needs some hundred for its last ones.
-MOST_TRIES = 200_000
-
 _SPHERE = math.pi / 6.0
+_SMOOTH = -1.0
+# Largest speed of the walls of a tray that is really shaken, in mean speeds of the beads.
+_WALL_SPEED = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,12 +42,15 @@ class Stock:
     diameter_low, diameter_high : ndarray (n,), [m]
     density : ndarray (n,), [kg/m^3]
     materials : tuple of str
+    species : ndarray of int32, (n,)
+        Place of the species in the list of the tray.
     """
 
     diameter_low: NDArray[np.float64]
     diameter_high: NDArray[np.float64]
     density: NDArray[np.float64]
     materials: tuple[str, ...]
+    species: NDArray[np.int32]
 
 
 def stock(tray: Tray) -> Stock:
@@ -66,15 +75,49 @@ def stock(tray: Tray) -> Stock:
         diameter_high=np.repeat([one.diameter_high for one in tray.species], counts),
         density=np.repeat([one.density for one in tray.species], counts),
         materials=tuple(one.material for one in tray.species for _ in range(one.count)),
+        species=np.repeat(np.arange(len(counts), dtype=np.int32), counts),
     )
 
 
-def rules_of(settings: SimulationSettings, tray: Tray) -> CollisionRules:
-    """The box and the restitutions of a simulated tray."""
+def rules_of(settings: SimulationSettings, tray: Tray, run: int = 0) -> CollisionRules:
+    """The box of a simulated tray, and what collisions do in it.
+
+    Raises
+    ------
+    SimulationError
+        For a restitution that reaches beyond 0 or 1.
+    """
+    restitution: float | UniformRestitution = settings.restitution
+    if settings.restitution_width > 0.0:
+        restitution = UniformRestitution(
+            mean=settings.restitution, width=settings.restitution_width
+        )
+    tangential: tuple[float | None, float | None] = (
+        settings.tangential_restitution,
+        settings.wall_tangential_restitution,
+    )
+    if max(settings.tangential_restitution, settings.wall_tangential_restitution) <= _SMOOTH:
+        tangential = None, None
     return CollisionRules(
         box=tray.dimensions,
-        restitution=settings.restitution,
+        restitution=restitution,
         wall_restitution=settings.wall_restitution,
+        sticking_speed=settings.sticking_speed,
+        wall_sticking_speed=settings.wall_sticking_speed,
+        sticking_measure=settings.sticking_measure,
+        tangential_restitution=tangential[0],
+        wall_tangential_restitution=tangential[1],
+        seed=settings.seed,
+        run=run,
+    )
+
+
+def wall_motion(settings: SimulationSettings) -> WallMotion:
+    """How the walls of a tray move that is really shaken: to and fro along its diagonal."""
+    amplitude = _WALL_SPEED * settings.mean_speed / (2.0 * math.pi * settings.shake_frequency)
+    along = amplitude / math.sqrt(3.0)
+    return WallMotion.sinusoidal(
+        (along, along, along), settings.shake_frequency, settings.shake_periods
     )
 
 
@@ -99,19 +142,13 @@ def resting_beads(settings: SimulationSettings, tray: Tray, run: int = 0) -> Bea
     diameters = draw_diameters(drawn.diameter_low, drawn.diameter_high, sizes_key)
     check_room(0.5 * diameters, rules)
     places_key = key_for(settings.seed, run, Purpose.POSITIONS)
-    sides = np.array(tray.dimensions, dtype=np.float64)
-    positions, placed = place(0.5 * diameters, sides, places_key, MOST_TRIES)
-    if placed < diameters.size:
-        raise SimulationError(
-            f'tray {tray.number}',
-            f'found room for only {placed} of {diameters.size} beads',
-            'give fewer or smaller beads',
-        )
+    positions = placed_at_random(0.5 * diameters, tray.dimensions, key=places_key)
     return Beads(
         radii=0.5 * diameters,
         masses=sphere_masses(diameters, drawn.density),
         positions=positions,
         velocities=np.zeros((diameters.size, 3)),
+        species=drawn.species,
     )
 
 
@@ -138,93 +175,10 @@ def sphere_masses(
 
 
 @compiled
-def is_free(
-    positions: NDArray[np.float64], radii: NDArray[np.float64], order: NDArray[np.int64], last: int
-) -> bool:
-    """Whether the bead at place `last` of the order overlaps none of those after it."""
-    i = order[last]
-    for k in range(order.size - 1, last, -1):
-        j = order[k]
-        square = 0.0
-        for axis in range(3):
-            d = positions[j, axis] - positions[i, axis]
-            square += d * d
-        reach = radii[i] + radii[j]
-        if square < reach * reach:
-            return False
-    return True
-
-
-@compiled
-def place(
-    radii: NDArray[np.float64], sides: NDArray[np.float64], key: np.uint64, most_tries: int
-) -> tuple[NDArray[np.float64], int]:
-    """Put beads at random places in a box, the largest first, each clear of those before.
-
-    Parameters
-    ----------
-    radii : ndarray (n,), [m]
-    sides : ndarray (3,), [m]
-    key : uint64
-    most_tries : int
-        For one bead.
-
-    Returns
-    -------
-    positions : ndarray (n, 3), [m]
-    placed : int
-        Beads for which there was room; the rest have no valid position.
-    """
-    n = radii.size
-    order = rising(radii)
-    positions = np.zeros((n, 3))
-    counter = 0
-    for k in range(n - 1, -1, -1):
-        i = order[k]
-        tries = 0
-        while True:
-            if tries == most_tries:
-                return positions, n - 1 - k
-            tries += 1
-            for axis in range(3):
-                free = sides[axis] - 2.0 * radii[i]
-                positions[i, axis] = radii[i] + free * uniform(key, counter)
-                counter += 1
-            if is_free(positions, radii, order, k):
-                break
-    return positions, n
-
-
-@compiled
-def shaken_velocities(
-    n: int, mean_speed: float, key: np.uint64, shake: int
+def drawn_velocities(
+    masses: NDArray[np.float64], mean_speed: float, maxwell: bool, key: np.uint64, shake: int
 ) -> NDArray[np.float64]:
-    """Velocities after a shaking event: speeds even in [0, 2 mean), directions even.
-
-    Parameters
-    ----------
-    n : int
-    mean_speed : float, [m/s]
-        In space.
-    key : uint64
-    shake : int
-        Number of the shaking event; each gives others.
-
-    Returns
-    -------
-    ndarray (n, 3), [m/s]
-
-    References
-    ----------
-    [B19], section on the simulations: uniform about the measured mean, directions random.
-    """
-    velocities = np.empty((n, 3))
-    speeds_key = hashed(key, 2 * shake)
-    directions_key = hashed(key, 2 * shake + 1)
-    for i in range(n):
-        speed = 2.0 * mean_speed * uniform(speeds_key, i)
-        x, y, z = direction(hashed(directions_key, i))
-        velocities[i, 0] = speed * x
-        velocities[i, 1] = speed * y
-        velocities[i, 2] = speed * z
-    return velocities
+    """Velocities after a shaking event, (n, 3), [m/s]; walls give all masses the same speeds."""
+    if maxwell:
+        return maxwellian(masses, mean_speed, key, shake, False)
+    return uniform_speeds(masses.size, mean_speed, key, shake)

@@ -46,6 +46,7 @@ class Purpose(IntEnum):
     VELOCITIES = 3
     NOISE = 4
     TEXTURE = 5
+    RESTITUTION = 6
 
 
 def key_for(root_seed: int, run: int, purpose: Purpose) -> np.uint64:

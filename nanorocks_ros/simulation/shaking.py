@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import TYPE_CHECKING
 
@@ -12,8 +12,14 @@ import numpy as np
 from nanorocks_ros.errors import ConfigurationError, SimulationError
 from nanorocks_ros.experiment.settings import problem, rows
 from nanorocks_ros.records import GroundTruth
-from nanorocks_ros.simulation.engine.gas import EventCounts, HardSphereGas
-from nanorocks_ros.simulation.initial import resting_beads, rules_of, shaken_velocities, stock
+from nanorocks_ros.simulation.engine.gas import Beads, EventCounts, HardSphereGas
+from nanorocks_ros.simulation.initial import (
+    drawn_velocities,
+    resting_beads,
+    rules_of,
+    stock,
+    wall_motion,
+)
 from nanorocks_ros.simulation.randomness import Purpose, key_for
 
 if TYPE_CHECKING:
@@ -23,6 +29,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.settings import SimulationSettings
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.simulation.engine.rules import CollisionRules
 
 # A frame this much before a shaking event shows it: decimal times are not exact in binary.
 _SIMULTANEOUS = 1e-9
@@ -68,9 +75,10 @@ class ShakenTray:
         check_settings(settings)
         self._settings = settings
         self._tray = tray
-        self._key = key_for(settings.seed, run, Purpose.VELOCITIES)
         self.materials = stock(tray).materials
-        self._gas = HardSphereGas(resting_beads(settings, tray, run), rules_of(settings, tray))
+        self._run = run
+        self._rules = rules_of(settings, tray, run)
+        self._gas = HardSphereGas(resting_beads(settings, tray, run), self._rules)
         self._origin = 0.0
         self._cycle = 0
 
@@ -147,8 +155,10 @@ class ShakenTray:
     def _shake(self) -> None:
         instant = self._next_shake()
         self._gas.run_until(max(instant - self._origin, self._gas.now))
-        n = self._gas.radii.size
-        self._gas.kick(shaken_velocities(n, self._settings.mean_speed, self._key, self._cycle))
+        shaken = after_shaking(
+            self._settings, self._rules, self._gas.beads(), self._run, self._cycle
+        )
+        self._gas.set_going(shaken)
         self._origin = instant
         self._cycle += 1
 
@@ -160,11 +170,56 @@ class ShakenTray:
             cycle=self._cycle,
             mean_projected_speed=mean_projected_speed,
             mean_speed=mean_speed,
-            bodies=self._gas.radii.size,
+            bodies=np.unique(self._gas.bodies).size,
             restitution=self._settings.restitution,
             wall_restitution=self._settings.wall_restitution,
-            sticking_speed=0.0,
+            sticking_speed=self._settings.sticking_speed,
         )
+
+
+def after_shaking(
+    settings: SimulationSettings, rules: CollisionRules, beads: Beads, run: int, cycle: int
+) -> Beads:
+    """The beads of a tray at the end of a shaking event, all apart.
+
+    Parameters
+    ----------
+    settings : SimulationSettings
+    rules : CollisionRules
+    beads : Beads
+        Before it.
+    run, cycle : int, >= 0
+        Runs of a seed differ, and so do the shaking events of a run.
+
+    Returns
+    -------
+    Beads
+        Where they were, unless the walls are really shaken: then where that leaves them, with
+        the velocities it gives them times one factor, which makes the mean speed the wanted.
+        With constant restitution that is the gas of a tray shaken so much faster.
+
+    Raises
+    ------
+    SimulationError
+        When the walls bring a gas into a state that cannot be followed.
+    """
+    key = key_for(settings.seed, run, Purpose.VELOCITIES)
+    maxwell = settings.speeds == 'maxwellian'
+    velocities = drawn_velocities(beads.masses, settings.mean_speed, maxwell, key, cycle)
+    started = replace(beads, velocities=velocities, spins=None)
+    if settings.speeds != 'shaken' or settings.mean_speed == 0.0:
+        return started
+    motion = wall_motion(settings)
+    apart = replace(rules, sticking_speed=0.0, wall_sticking_speed=0.0, motion=motion)
+    gas = HardSphereGas(started, apart)
+    gas.run_until(motion.end)
+    shaken = gas.beads()
+    factor = settings.mean_speed / mean_speeds(shaken.velocities)[0]
+    return replace(
+        shaken,
+        velocities=factor * shaken.velocities,
+        spins=None if shaken.spins is None else factor * shaken.spins,
+    )
 
 
 def mean_speeds(velocities: NDArray[np.float64]) -> tuple[float, float]:

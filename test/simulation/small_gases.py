@@ -7,8 +7,9 @@ import numpy as np
 from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import Species, Tray
 from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas
-from nanorocks_ros.simulation.initial import resting_beads, shaken_velocities
+from nanorocks_ros.simulation.initial import resting_beads
 from nanorocks_ros.simulation.randomness import Purpose, key_for
+from nanorocks_ros.simulation.velocities import uniform_speeds
 
 BOX = (0.015, 0.015, 0.003)
 
@@ -42,7 +43,7 @@ def shaken(tray, *, seed=1, mean_speed=0.007, **rules):
     settings = SimulationSettings(seed=seed)
     beads = resting_beads(settings, tray)
     key = key_for(seed, 0, Purpose.VELOCITIES)
-    velocities = shaken_velocities(beads.radii.size, mean_speed, key, 0)
+    velocities = uniform_speeds(beads.radii.size, mean_speed, key, 0)
     moving = beads_of(beads.positions, velocities, beads.radii, beads.masses)
     return HardSphereGas(moving, CollisionRules(box=tray.dimensions, **rules))
 

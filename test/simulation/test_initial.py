@@ -12,8 +12,9 @@ from small_gases import acrylic, smallest_gap, tray_of
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.simulation.initial import resting_beads, shaken_velocities, stock
+from nanorocks_ros.simulation.initial import resting_beads, stock
 from nanorocks_ros.simulation.randomness import Purpose, key_for
+from nanorocks_ros.simulation.velocities import uniform_speeds
 
 SETTINGS = SimulationSettings()
 
@@ -43,13 +44,13 @@ def test_diameters_are_even_over_the_range_and_masses_those_of_spheres():
 
 def test_speeds_after_a_shake_are_even_from_zero_to_twice_the_mean():
     key = key_for(1, 0, Purpose.VELOCITIES)
-    velocities = shaken_velocities(20_000, 0.007, key, 0)
+    velocities = uniform_speeds(20_000, 0.007, key, 0)
     speeds = np.linalg.norm(velocities, axis=1)
     assert speeds.max() <= 0.014
     assert speeds.mean() == pytest.approx(0.007, abs=4 * 0.014 / math.sqrt(12 * 20_000))
     assert np.mean(speeds < 0.0035) == pytest.approx(0.25, abs=0.013)
     assert np.abs(velocities.mean(axis=0)).max() < 4 * 0.0081 / math.sqrt(3 * 20_000)
-    assert not np.array_equal(velocities, shaken_velocities(20_000, 0.007, key, 1))
+    assert not np.array_equal(velocities, uniform_speeds(20_000, 0.007, key, 1))
 
 
 def test_seeds_and_runs_give_different_beads_and_the_same_ones_again():
@@ -61,9 +62,14 @@ def test_seeds_and_runs_give_different_beads_and_the_same_ones_again():
 
 
 def test_a_tray_too_full_for_random_places_is_refused_in_time():
-    # 60 fill 0.37 of the tray, more than random places one after the other reach in a slit.
-    with pytest.raises(SimulationError, match=r'found room for only \d+ of 60 beads'):
-        resting_beads(SETTINGS, tray_of(acrylic(60)))
+    # 80 fill 0.50 of the tray, a slit half as wide again as a bead.
+    with pytest.raises(SimulationError, match=r'found room for only \d+ of 80 beads'):
+        resting_beads(SETTINGS, tray_of(acrylic(80)))
+
+
+def test_a_tray_too_full_for_one_place_after_the_other_is_filled_all_the_same():
+    beads = resting_beads(SETTINGS, tray_of(acrylic(60)))
+    assert smallest_gap(beads.positions, beads.radii) > 0.0
 
 
 def test_more_beads_than_the_tray_has_volume_are_refused():

@@ -2,72 +2,88 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine.checks import check_beads, check_rules, check_times
+from nanorocks_ros.simulation.engine import saved
+from nanorocks_ros.simulation.engine.checks import (
+    check_beads,
+    check_species,
+    check_spins,
+    check_times,
+    overlapping_pair,
+    refuse_overlap,
+)
+from nanorocks_ros.simulation.engine.course import Course, Recorder
 from nanorocks_ros.simulation.engine.kernel import run_until
-from nanorocks_ros.simulation.engine.prediction import predict_all
-from nanorocks_ros.simulation.engine.state import DONE, Rules, new_state, snapshot
+from nanorocks_ros.simulation.engine.rules import (
+    CONTACT_DURATION,
+    CollisionRules,
+    for_species,
+)
+from nanorocks_ros.simulation.engine.state import (
+    BODY,
+    COUNTER,
+    DONE,
+    ELASTIC_PAIR,
+    ELASTIC_WALL,
+    EPOCH,
+    FIX,
+    FLAGS,
+    LISTS_FULL,
+    LOG_FULL,
+    MERGE,
+    MISSED,
+    NOW,
+    ORIGINAL,
+    PAIR,
+    PREDICTED,
+    QUANTUM,
+    RENEWED,
+    SPECIES,
+    STALE,
+    WALL,
+    new_state,
+)
+from nanorocks_ros.simulation.engine.tuning import (
+    built,
+    in_space_order,
+    skin_for,
+    with_lists,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
-# Hertz contact of two 2 mm acrylic beads that meet at 10 mm/s lasts about this long.
-CONTACT_DURATION = 4e-5
+    from nanorocks_ros.simulation.engine.rules import Rules
+    from nanorocks_ros.simulation.engine.state import State
 
-MOST_EVENTS = 10_000_000
+__all__ = ['CONTACT_DURATION', 'Beads', 'CollisionRules', 'EventCounts', 'HardSphereGas', 'Kernel']
 
-_COUNT_NAMES = ('pair', 'wall', 'elastic_pair', 'elastic_wall', 'stale', 'missed')
+# From so many beads on lists are faster (`python -m benchmarks engine`).
+MOST_FOR_SCAN = 40
+
+# Events between two looks at the keyboard and the watchdog: some tenths of a second.
+_SLICE = 200_000
+# The gas is stuck when this many slices move time by less than this part of the time in which
+# beads cross the box some dozens of times.
+_STUCK_SLICES = 10
+_STUCK = 1e-9
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CollisionRules:
-    """The box, and what a collision leaves of the normal velocity.
+class Kernel(IntEnum):
+    """How the next event of a bead is found."""
 
-    Parameters
-    ----------
-    box : tuple of 3 floats, [m], > 0
-        Sides; a corner is the origin.
-    restitution, wall_restitution : float, 0 to 1
-        Between beads, and at the six walls.
-    contact_duration : float, [s], >= 0
-        A contact is elastic when the last one of the same pair (or of the same bead and
-        wall) was less than this ago; without it, inelastic collapse piles up events without
-        end.
-
-    Raises
-    ------
-    SimulationError
-        For a value that cannot be used.
-    """
-
-    box: tuple[float, float, float]
-    restitution: float = 1.0
-    wall_restitution: float = 1.0
-    contact_duration: float = CONTACT_DURATION
-
-    def __post_init__(self) -> None:
-        check_rules(self.compiled())
-
-    def compiled(self) -> Rules:
-        """The same for compiled code."""
-        if len(self.box) != 3:
-            raise SimulationError('box', f'{len(self.box)} sides', 'give three, in metres')
-        x, y, z = (float(side) for side in self.box)
-        return Rules(
-            x,
-            y,
-            z,
-            float(self.restitution),
-            float(self.wall_restitution),
-            float(self.contact_duration),
-        )
+    AUTOMATIC = 0
+    SCAN = 1
+    LISTS = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,12 +94,18 @@ class Beads:
     ----------
     radii, masses : ndarray (n,), [m], [kg], > 0
     positions, velocities : ndarray (n, 3), [m], [m/s]
+    spins : ndarray (n, 3) or None, [rad/s]
+        Angular velocities; None: no rotation.
+    species : ndarray of int, (n,), or None
+        From 0; None: all alike.
     """
 
     radii: NDArray[np.float64]
     masses: NDArray[np.float64]
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64]
+    spins: NDArray[np.float64] | None = None
+    species: NDArray[np.int32] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,20 +114,38 @@ class EventCounts:
 
     Parameters
     ----------
-    pair, wall : int
-        Collisions of two beads, and of a bead with a wall.
+    pair, wall, merge, fix : int
+        Collisions of two beads, and of a bead with a wall; bodies that merged, and that stuck
+        to a wall.
     elastic_pair, elastic_wall : int
-        Those among them made elastic by the contact duration.
-    stale, missed : int
-        Events taken but void: the partner had moved on, or a graze rounded to a miss.
+        Collisions made elastic by the contact duration.
+    stale, missed, renewed : int
+        Events taken but void: the partner had moved on, or a graze rounded to a miss; lists
+        renewed.
     """
 
     pair: int
     wall: int
+    merge: int
+    fix: int
     elastic_pair: int
     elastic_wall: int
     stale: int
     missed: int
+    renewed: int
+
+
+_PLACES = {
+    'pair': PAIR,
+    'wall': WALL,
+    'merge': MERGE,
+    'fix': FIX,
+    'elastic_pair': ELASTIC_PAIR,
+    'elastic_wall': ELASTIC_WALL,
+    'stale': STALE,
+    'missed': MISSED,
+    'renewed': RENEWED,
+}
 
 
 class HardSphereGas:
@@ -116,107 +156,337 @@ class HardSphereGas:
     beads : Beads
         At time 0; inside the box, not overlapping.
     rules : CollisionRules
+    kernel : Kernel
+        Both give the same gas; automatic takes the faster.
 
     Raises
     ------
     SimulationError
-        For beads that cannot be: NaN, no radius or mass, overlapping, larger than the box.
+        For beads that cannot be: NaN, no radius or mass, overlapping, larger than the box, of
+        an unknown species; or lists asked for in a periodic box too small for them.
     """
 
-    def __init__(self, beads: Beads, rules: CollisionRules) -> None:
+    _state: State
+    _rules: Rules
+    _known_species: int
+    _n_species: int
+
+    def __init__(
+        self, beads: Beads, rules: CollisionRules, kernel: Kernel = Kernel.AUTOMATIC
+    ) -> None:
         self._rules = rules.compiled()
-        checked = check_beads(
-            beads.radii, beads.masses, beads.positions, beads.velocities, self._rules
-        )
-        self._radii, self._masses, positions, velocities = checked
-        self._state = new_state(positions, velocities, self._radii, self._masses)
-        predict_all(self._state, self._rules, 0.0)
+        self._known_species = rules.species
+        self._set(beads, kernel)
+
+    @classmethod
+    def load(cls, path: Path) -> HardSphereGas:
+        """A gas as it was saved; it goes on bit by bit as it would have.
+
+        Raises
+        ------
+        SimulationError
+            For a file that is damaged, or not a saved gas.
+        """
+        gas = cls.__new__(cls)
+        gas._state, gas._rules, gas._n_species = saved.load(path)
+        gas._known_species = gas._n_species
+        return gas
+
+    def save(self, path: Path) -> None:
+        """Write the whole state to a file, which is replaced when it exists.
+
+        Raises
+        ------
+        SimulationError
+            When it cannot be written.
+        """
+        saved.save(path, self._state, self._rules, self._n_species)
+
+    @property
+    def now(self) -> float:
+        """How far the gas has been followed, [s]."""
+        return float(self._state.clock[EPOCH] + self._state.clock[NOW])
 
     @property
     def radii(self) -> NDArray[np.float64]:
         """Radius of each bead, (n,), [m]."""
-        return self._radii.copy()
+        return self._by_number(self._state.rows[:, 7])
 
     @property
-    def now(self) -> float:
-        """How far the gas has been followed since the start or the last kick, [s]."""
-        return float(self._state.clock[0])
+    def masses(self) -> NDArray[np.float64]:
+        """Mass of each bead, (n,), [kg]."""
+        return self._by_number(self._state.masses[:, 0])
+
+    @property
+    def bodies(self) -> NDArray[np.int32]:
+        """The smallest number of a bead in the body of each bead, (n,)."""
+        if not self._rules.sticky:
+            return np.arange(self._state.rows.shape[0], dtype=np.int32)
+        return self._by_number(self._state.bodies[:, BODY])
+
+    @property
+    def stuck(self) -> NDArray[np.bool_]:
+        """Whether each bead is stuck to a wall, by itself or in a body, (n,)."""
+        if not self._rules.sticky:
+            return np.zeros(self._state.rows.shape[0], dtype=np.bool_)
+        stuck: NDArray[np.bool_] = np.isinf(self._state.masses[self.bodies, 1])
+        return stuck
+
+    @property
+    def kernel(self) -> Kernel:
+        """The kernel at work."""
+        return Kernel.LISTS if self._state.references.shape[0] else Kernel.SCAN
 
     @property
     def counts(self) -> EventCounts:
         """Events so far."""
-        return EventCounts(**dict(zip(_COUNT_NAMES, self._state.counts.tolist(), strict=True)))
+        counts = self._state.counts.tolist()
+        return EventCounts(**{name: counts[place] for name, place in _PLACES.items()})
 
-    def run_until(
+    @property
+    def books(self) -> NDArray[np.float64]:
+        """Energy, momentum and angular momentum that left the beads, (18,), SI.
+
+        Energy lost in pair collisions, at walls (gained from moving walls: negative) and in
+        merges; normal momentum given to each of the six walls; momentum and angular momentum
+        about the origin given to walls and to what sticks to them; angular momentum taken by
+        aggregates, which cannot turn. Angular momentum is booked for rough and sticky beads.
+        """
+        return self._state.books.copy()
+
+    @property
+    def bytes_per_bead(self) -> float:
+        """Memory in use for each bead."""
+        return sum(array.nbytes for array in self._state) / self._state.rows.shape[0]
+
+    def _by_number(self, values: NDArray[Any]) -> NDArray[Any]:
+        ordered = np.empty_like(values)
+        ordered[self._state.links[:, ORIGINAL]] = values
+        return ordered
+
+    def follow(
         self,
         end: float,
         frame_times: Sequence[float] | NDArray[np.float64] = (),
-        most_events: int = MOST_EVENTS,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Follow the gas to a time.
+        observation_times: Sequence[float] | NDArray[np.float64] = (),
+        *,
+        log: bool = False,
+        most_events: int | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Course:
+        """Follow the gas to a time, and write down what is wanted on the way.
 
         Parameters
         ----------
         end : float, [s]
             Not before `now`.
-        frame_times : array_like (n_frames,), [s]
-            Rising, from `now` to `end`.
-        most_events : int
+        frame_times, observation_times : array_like, [s]
+            Rising, from `now` to `end`; an event at the very time of a frame belongs to it.
+        log : bool
+            Whether to keep every event.
+        most_events : int or None
             Events of any kind before giving up.
-
-        Returns
-        -------
-        positions, velocities : ndarray (n_frames, n, 3), [m], [m/s]
-            At the frame times; an event at the very time of a frame belongs to it.
+        progress : callable or None
+            Called with the time reached, a few times a second.
 
         Raises
         ------
         SimulationError
-            When times go backwards, or after too many events; the gas can then still be
-            followed further.
+            When times go backwards, after too many events, or when events follow one another
+            so fast that time stands still. The gas can then still be followed further.
         """
-        times = check_times(self.now, end, frame_times)
-        shape = (times.size, self._radii.size, 3)
-        positions, velocities = np.empty(shape), np.empty(shape)
-        status = run_until(
-            self._state, self._rules, float(end), int(most_events), times, positions, velocities
+        recorder = self._record(
+            end,
+            frame_times,
+            observation_times,
+            log=log,
+            most_events=most_events,
+            progress=progress,
         )
-        if status != DONE:
-            raise SimulationError(
-                'event-driven engine',
-                f'{most_events} events taken and only {self.now:.6g} s of {end:.6g} s reached',
-                'raise most_events, the contact duration or the restitution',
-            )
-        return positions, velocities
+        return recorder.course()
+
+    def _record(
+        self,
+        end: float,
+        frame_times: Sequence[float] | NDArray[np.float64],
+        observation_times: Sequence[float] | NDArray[np.float64],
+        *,
+        log: bool = False,
+        most_events: int | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Recorder:
+        now = self.now
+        frames = check_times(now, end, frame_times)
+        observed = check_times(now, end, observation_times, 'observation_times')
+        recorder = Recorder(self._state, self._rules, frames, observed, self._n_species, log)
+        left = most_events
+        slow = 0
+        while True:
+            part = _SLICE if left is None else min(_SLICE, left)
+            before = self.now
+            status = run_until(self._state, self._rules, float(end), part, recorder.output)
+            if status == DONE:
+                return recorder
+            if status == LISTS_FULL:
+                self._state = built(self._state, self._rules)
+                self._state.clock[PREDICTED] = 0.0
+                continue
+            if status == LOG_FULL:
+                recorder.make_room()
+                continue
+            if left is not None:
+                left -= part
+            least = _STUCK * self._state.clock[QUANTUM]
+            slow = slow + 1 if self.now - before < least else 0
+            if left == 0 or slow == _STUCK_SLICES:
+                taken = most_events if left == 0 else slow * _SLICE
+                raise SimulationError(
+                    'event-driven engine',
+                    f'{taken} events taken and only {self.now:.6g} s of {end:.6g} s reached',
+                    'raise most_events, the contact duration or the restitution',
+                )
+            if progress is not None:
+                progress(self.now)
+
+    def observe(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rows of sums over the beads at some times, as `observables` has them.
+
+        Parameters
+        ----------
+        times : ndarray (n_times,), [s]
+            At least one; the gas is followed to the last.
+
+        Returns
+        -------
+        ndarray (n_times, n_columns)
+
+        Raises
+        ------
+        SimulationError
+            As `follow`.
+        """
+        return self._record(float(times[-1]), (), times).output.observations
+
+    def run_until(
+        self,
+        end: float,
+        frame_times: Sequence[float] | NDArray[np.float64] = (),
+        most_events: int | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Follow the gas to a time; positions and velocities at the frame times.
+
+        Parameters
+        ----------
+        end : float, [s]
+        frame_times : array_like (n_frames,), [s]
+        most_events : int or None
+
+        Returns
+        -------
+        positions, velocities : ndarray (n_frames, n, 3), [m], [m/s]
+
+        Raises
+        ------
+        SimulationError
+            As `follow`.
+        """
+        course = self.follow(end, frame_times, most_events=most_events)
+        return course.positions, course.velocities
 
     def beads(self) -> Beads:
         """The beads as they are now."""
-        positions, velocities = np.empty((2, self._radii.size, 3))
-        snapshot(self._state, self.now, positions, velocities)
+        now = self.now
+        course = self.follow(now, [now])
         return Beads(
-            radii=self._radii.copy(),
-            masses=self._masses.copy(),
-            positions=positions,
-            velocities=velocities,
+            radii=self.radii,
+            masses=self.masses,
+            positions=course.positions[0],
+            velocities=course.velocities[0],
+            spins=course.spins[0] if course.spins is not None else None,
+            species=self._by_number(self._state.links[:, FLAGS] >> SPECIES),
         )
 
-    def kick(self, velocities: ArrayLike) -> None:
+    def set_going(self, beads: Beads) -> None:
+        """Go on with the same beads elsewhere or otherwise; time counts from 0 again.
+
+        Bodies come apart. Events are counted on, and the random restitutions go on.
+
+        Parameters
+        ----------
+        beads : Beads
+            As many as before.
+
+        Raises
+        ------
+        SimulationError
+            For another number of beads, or beads that cannot be.
+        """
+        before = self._state
+        n = before.rows.shape[0]
+        if np.size(beads.radii) != n:
+            raise SimulationError('beads', f'{np.size(beads.radii)} of them', f'give {n}')
+        changes = self._by_number(before.links[:, COUNTER])
+        self._set(beads, self.kernel)
+        self._state.links[:, COUNTER] = changes[self._state.links[:, ORIGINAL]]
+        self._state.counts[:] = before.counts
+        self._state.books[:] = before.books
+
+    def kick(self, velocities: NDArray[np.float64]) -> None:
         """Give every bead a new velocity where it is; time counts from 0 again.
 
         Parameters
         ----------
-        velocities : array_like (n, 3), [m/s]
+        velocities : ndarray (n, 3), [m/s]
 
         Raises
         ------
         SimulationError
             For velocities of another shape, or not finite.
         """
-        here = self.beads().positions
+        self.set_going(replace(self.beads(), velocities=velocities, spins=None))
+
+    def _set(self, beads: Beads, kernel: Kernel) -> None:
         checked = check_beads(
-            self._radii, self._masses, here, velocities, self._rules, overlap=False
+            beads.radii, beads.masses, beads.positions, beads.velocities, self._rules
         )
-        counts = self._state.counts
-        self._state = new_state(here, checked[3], self._radii, self._masses)
-        self._state.counts[:] = counts
-        predict_all(self._state, self._rules, 0.0)
+        n = checked[0].size
+        species = check_species(beads.species, n, self._known_species)
+        spins = check_spins(beads.spins, n, self._rules.rough)
+        self._n_species = max(int(species.max()) + 1, self._known_species)
+        self._rules = self._rules._replace(
+            restitution=for_species(self._rules.restitution, self._n_species)
+        )
+        self._state = _arranged(checked, species, spins, self._rules, kernel)
+        refuse_overlap(*overlapping_pair(self._state, self._rules))
+
+
+def _arranged(
+    checked: tuple[NDArray[np.float64], ...],
+    species: NDArray[np.int32],
+    spins: NDArray[np.float64],
+    rules: Rules,
+    kernel: Kernel,
+) -> State:
+    """The state for a kernel, beads in the order that suits it."""
+    radii, masses, positions, velocities = checked
+    skin = skin_for(radii, rules)
+    if kernel == Kernel.LISTS and not skin:
+        raise SimulationError(
+            'kernel', 'the periodic box is too small for lists', 'use the scan, or a larger box'
+        )
+    listed = kernel == Kernel.LISTS or (
+        kernel == Kernel.AUTOMATIC and radii.size > MOST_FOR_SCAN and skin > 0.0
+    )
+    order = np.arange(radii.size)
+    if listed:
+        order = in_space_order(positions, 2.0 * float(radii.max()) + skin)
+    state = new_state(
+        positions[order], velocities[order], radii[order], masses[order], species[order], rules
+    )
+    state.links[:, ORIGINAL] = order
+    if spins.shape[0]:
+        state.spins[:] = spins[order]
+    if rules.sticky:
+        state.masses[:, 1] = masses
+        state.bodies[:, BODY] = order
+    return with_lists(state, rules, skin) if listed else state

@@ -1,4 +1,4 @@
-"""When the next event of a bead happens, and with what: every other bead and wall is asked."""
+"""When the next event of a bead happens, and with what."""
 
 from __future__ import annotations
 
@@ -7,161 +7,139 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.physics.compiled import inlined
+from nanorocks_ros.simulation.engine.integers import unsigned, whole
+from nanorocks_ros.simulation.engine.pairs import speed_square, wait_for_contact
+from nanorocks_ros.simulation.engine.queue import schedule
 from nanorocks_ros.simulation.engine.state import (
-    NOTHING,
-    RADIUS,
+    COUNTER,
+    FLAGS,
+    HALF_SKIN,
+    LARGEST_RADIUS,
+    NEAR,
+    PARTNER,
+    PARTNER_COUNTER,
+    RENEW,
     TIME,
     VX,
     VY,
     VZ,
-    Rules,
     State,
     X,
     Y,
     Z,
 )
+from nanorocks_ros.simulation.engine.walls import next_wall
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from nanorocks_ros.simulation.engine.books import Vector
+    from nanorocks_ros.simulation.engine.rules import Rules
 
-# Squares of the approach, relative to the speeds, that is rounding; and of the gap, relative to
-# the distance, of beads that touch.
-_ROUNDING = 1e-26
-_TOUCHING = 1e-9
+_ALL = 63
 
 
-@compiled
-def speed_square(rows: NDArray[np.float64], i: int) -> float:
-    """Square of the speed of a bead, [m^2/s^2]."""
-    vx, vy, vz = rows[i, VX], rows[i, VY], rows[i, VZ]
-    return float(vx * vx + vy * vy + vz * vz)
-
-
-@compiled
-def time_to_plane(
-    position: float, velocity: float, radius: float, side: float
-) -> tuple[float, int]:
-    """Time until a bead meets one of the two walls of an axis, and which one (1: the far one).
-
-    A bead on or behind a wall that it moves towards meets it now; infinite when at rest.
-    """
-    if velocity > 0.0:
-        return max((side - radius - position) / velocity, 0.0), 1
-    if velocity < 0.0:
-        return max((radius - position) / velocity, 0.0), 0
-    return np.inf, 0
-
-
-@compiled
-def next_wall(state: State, rules: Rules, i: int, now: float) -> tuple[float, int]:
-    """Time and partner of the first wall event of a bead."""
+@inlined
+def place_at(state: State, i: int, now: float) -> Vector:
+    """Where a bead is at a time, [m]."""
     rows = state.rows
     since = now - rows[i, TIME]
+    return (
+        rows[i, X] + rows[i, VX] * since,
+        rows[i, Y] + rows[i, VY] * since,
+        rows[i, Z] + rows[i, VZ] * since,
+    )
+
+
+@inlined
+def set_pending(state: State, i: int, time: float, partner: int) -> None:
+    """Make an event the pending one of a bead."""
+    state.links[i, PARTNER] = partner
+    if partner >= 0:
+        state.links[i, PARTNER_COUNTER] = state.links[partner, COUNTER]
+    schedule(state.times, state.levels, i, time)
+
+
+@inlined
+def image_horizon(state: State, rules: Rules, i: int, now: float) -> float:
+    """Until when the nearest image of every other bead is the one that can be met first."""
     best = np.inf
-    partner = NOTHING
     for axis in range(3):
-        side = rules.side_x if axis == 0 else (rules.side_y if axis == 1 else rules.side_z)
-        velocity = rows[i, VX + axis]
-        position = rows[i, X + axis] + velocity * since
-        wait, far = time_to_plane(position, velocity, rows[i, RADIUS], side)
-        if now + wait < best:
-            best = now + wait
-            partner = -1 - (2 * axis + far)
-    return best, partner
+        speed = abs(state.rows[i, VX + axis])
+        if rules.periodic[axis] and speed > 0.0:
+            # Any two beads together move less than half a side, less where they touch.
+            free = 0.25 * (rules.sides[axis] - 2.0 * state.reach[LARGEST_RADIUS])
+            best = min(best, now + free / speed)
+    return best
 
 
-@compiled
-def time_to_contact(approach: float, speed_square: float, gap_square: float) -> float:
-    """Time until two beads touch, infinite when they never do.
-
-    Parameters
-    ----------
-    approach : float, [m^2/s]
-        Relative position times relative velocity; negative when they approach.
-    speed_square : float, [m^2/s^2]
-        Of the relative velocity.
-    gap_square : float, [m^2]
-        Square of the distance less square of the sum of the radii. Overlapping and
-        approaching beads touch now.
-    """
-    if approach >= 0.0:
-        return np.inf
-    if gap_square <= 0.0:
-        return 0.0
-    discriminant = approach * approach - speed_square * gap_square
-    if discriminant < 0.0:
-        return np.inf
-    # The other form of the root, (-b - sqrt)/a, loses all digits when they nearly touch.
-    return gap_square / (math.sqrt(discriminant) - approach)
-
-
-@compiled
-def is_rounding(
-    approach: float, distance_square: float, speed_square_1: float, speed_square_2: float
-) -> bool:
-    """Whether two beads approach so slowly that only rounding makes it differ from rest.
-
-    After a contact of restitution 0 the normal velocity is rounding alone; taken at its word,
-    such pairs collide again and again at one instant. What is ignored here adds up to an
-    overlap of 1e-13 of the path.
-
-    Parameters
-    ----------
-    approach : float, [m^2/s]
-        Relative position times relative velocity.
-    distance_square : float, [m^2]
-    speed_square_1, speed_square_2 : float, [m^2/s^2]
-        Of the two beads.
-    """
-    scale = _ROUNDING * distance_square * (speed_square_1 + speed_square_2)
-    return approach * approach <= scale
-
-
-@compiled
-def predict(state: State, rules: Rules, i: int, now: float) -> None:
-    """Find the earliest event of a bead from now on and make it pending.
+@inlined
+def predict_among_all(state: State, rules: Rules, i: int, now: float, folded: bool) -> None:
+    """Find the earliest event of a bead from now on, asking every other bead and wall.
 
     Walls come before beads and beads by index when times are equal.
     """
-    rows = state.rows
-    best, partner = next_wall(state, rules, i, now)
-    since = now - rows[i, TIME]
-    x = rows[i, X] + rows[i, VX] * since
-    y = rows[i, Y] + rows[i, VY] * since
-    z = rows[i, Z] + rows[i, VZ] * since
-    for j in range(rows.shape[0]):
-        if j == i:
-            continue
-        since = now - rows[j, TIME]
-        ux = rows[j, VX] - rows[i, VX]
-        uy = rows[j, VY] - rows[i, VY]
-        uz = rows[j, VZ] - rows[i, VZ]
-        dx = rows[j, X] + rows[j, VX] * since - x
-        dy = rows[j, Y] + rows[j, VY] * since - y
-        dz = rows[j, Z] + rows[j, VZ] * since - z
-        approach = dx * ux + dy * uy + dz * uz
-        if approach < 0.0:
-            reach = rows[i, RADIUS] + rows[j, RADIUS]
-            square = dx * dx + dy * dy + dz * dz
-            gap_square = square - reach * reach
-            if gap_square <= _TOUCHING * square:
-                own = speed_square(rows, i)
-                if is_rounding(approach, square, own, speed_square(rows, j)):
-                    continue
-            relative = ux * ux + uy * uy + uz * uz
-            when = now + time_to_contact(approach, relative, gap_square)
+    best, partner = next_wall(state, rules, i, now, _ALL)
+    if folded:
+        horizon = image_horizon(state, rules, i, now)
+        if horizon < best:
+            best = horizon
+            partner = RENEW
+    place = place_at(state, i, now)
+    for j in range(state.rows.shape[0]):
+        if j != i:
+            when = now + wait_for_contact(state, rules, i, place, j, now, folded)
             if when < best:
                 best = when
                 partner = j
-    state.event_time[i] = best
-    state.event_partner[i] = partner
-    if partner >= 0:
-        state.event_counter[i] = state.counter[partner]
+    set_pending(state, i, best, partner)
 
 
-@compiled
-def predict_all(state: State, rules: Rules, now: float) -> None:
-    """Find the earliest event of every bead from now on."""
-    for i in range(state.rows.shape[0]):
-        predict(state, rules, i, now)
+@inlined
+def predict_among_neighbours(state: State, rules: Rules, i: int, now: float) -> None:
+    """Find the earliest event of a bead from now on, asking its neighbours and near walls."""
+    place = place_at(state, i, now)
+    near = state.links[i, FLAGS] & NEAR
+    partner = RENEW
+    best = shell_exit(state, i, now, place)
+    if near:
+        wall_time, wall = next_wall(state, rules, i, now, near)
+        if wall_time < best:
+            best = wall_time
+            partner = wall
+    neighbours = state.neighbours
+    for k in range(1, neighbours[i, 0] + 1):
+        j = unsigned(neighbours[i, k])
+        when = now + wait_for_contact(state, rules, i, place, j, now, near != 0)
+        if when < best:
+            best = when
+            partner = whole(j)
+    set_pending(state, i, best, partner)
+
+
+@inlined
+def shell_exit(state: State, i: int, now: float, place: Vector) -> float:
+    """When a bead leaves the shell in which its list of neighbours holds good."""
+    rows = state.rows
+    a = speed_square(rows, i)
+    if a == 0.0:
+        return np.inf
+    qx = place[0] - state.references[i, 0]
+    qy = place[1] - state.references[i, 1]
+    qz = place[2] - state.references[i, 2]
+    b = qx * rows[i, VX] + qy * rows[i, VY] + qz * rows[i, VZ]
+    c = qx * qx + qy * qy + qz * qz - state.reach[HALF_SKIN] * state.reach[HALF_SKIN]
+    if c >= 0.0:
+        return now
+    root = math.sqrt(b * b - a * c)
+    return now + (-c / (b + root) if b > 0.0 else (root - b) / a)
+
+
+@inlined
+def predict(state: State, rules: Rules, i: int, now: float) -> None:
+    """Find the earliest event of a bead from now on and make it pending."""
+    if state.references.shape[0]:
+        predict_among_neighbours(state, rules, i, now)
+    elif rules.periodic[0] or rules.periodic[1] or rules.periodic[2]:
+        predict_among_all(state, rules, i, now, True)
+    else:
+        predict_among_all(state, rules, i, now, False)

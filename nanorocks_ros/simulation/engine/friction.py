@@ -1,0 +1,148 @@
+"""Rough spheres: the tangential part of a contact, which makes beads spin."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from nanorocks_ros.physics.compiled import inlined
+from nanorocks_ros.simulation.engine.bodies import mass_of, turns
+from nanorocks_ros.simulation.engine.books import INERTIA, Vector, cross
+from nanorocks_ros.simulation.engine.state import OWN, RADIUS, VX, State
+
+if TYPE_CHECKING:
+    from nanorocks_ros.simulation.engine.rules import Rules
+
+
+@inlined
+def softness(state: State, rules: Rules, i: int) -> float:
+    """Change of the surface velocity of a bead with a tangential impulse, [1/kg]."""
+    mass = mass_of(state, rules, i)
+    inverse = 0.0 if math.isinf(mass) else 1.0 / mass
+    if turns(state, rules, i):
+        inverse += 1.0 / (INERTIA * state.masses[i, OWN])
+    return inverse
+
+
+@inlined
+def surface_velocity(state: State, i: int, normal: Vector, side: float) -> Vector:
+    """Velocity of the point of a bead's surface at a contact, without the bead's own, [m/s].
+
+    Parameters
+    ----------
+    state : State
+    i : int
+    normal : tuple of 3 floats
+        From the first partner to the second.
+    side : float
+        1 for the first partner, -1 for the second.
+    """
+    arm = side * state.rows[i, RADIUS]
+    spin = state.spins[i, 0], state.spins[i, 1], state.spins[i, 2]
+    return cross(spin, (arm * normal[0], arm * normal[1], arm * normal[2]))
+
+
+@inlined
+def push(state: State, rules: Rules, i: int, impulse: Vector, normal: Vector, sign: float) -> None:
+    """Give a tangential impulse to a bead: velocity to its body, and spin if it can turn.
+
+    Parameters
+    ----------
+    state : State
+    rules : Rules
+    i : int
+    impulse : tuple of 3 floats, [kg m/s]
+        On the second partner.
+    normal : tuple of 3 floats
+        From the first partner to the second.
+    sign : float
+        -1 for the first partner, 1 for the second.
+    """
+    mass = mass_of(state, rules, i)
+    if not math.isinf(mass):
+        for axis in range(3):
+            state.rows[i, VX + axis] += sign * impulse[axis] / mass
+    if turns(state, rules, i):
+        turn = cross(normal, impulse)
+        per = 1.0 / (INERTIA * state.masses[i, OWN] * state.rows[i, RADIUS])
+        for axis in range(3):
+            state.spins[i, axis] -= per * turn[axis]
+
+
+@inlined
+def tangential(slip: Vector, normal: Vector) -> Vector:
+    """The part of a velocity across a normal."""
+    along = slip[0] * normal[0] + slip[1] * normal[1] + slip[2] * normal[2]
+    return (
+        slip[0] - along * normal[0],
+        slip[1] - along * normal[1],
+        slip[2] - along * normal[2],
+    )
+
+
+@inlined
+def rub_pair(
+    state: State, rules: Rules, i: int, j: int, normal: Vector, restitution: float
+) -> tuple[Vector, float]:
+    """Tangential part of a collision of two beads.
+
+    Returns
+    -------
+    impulse : tuple of 3 floats, [kg m/s]
+        On bead j.
+    loss : float, [J]
+    """
+    rows = state.rows
+    a = surface_velocity(state, i, normal, 1.0)
+    b = surface_velocity(state, j, normal, -1.0)
+    slip = tangential(
+        (
+            rows[j, VX] - rows[i, VX] + b[0] - a[0],
+            rows[j, VX + 1] - rows[i, VX + 1] + b[1] - a[1],
+            rows[j, VX + 2] - rows[i, VX + 2] + b[2] - a[2],
+        ),
+        normal,
+    )
+    mass = 1.0 / (softness(state, rules, i) + softness(state, rules, j))
+    per = -mass * (1.0 + restitution)
+    impulse = per * slip[0], per * slip[1], per * slip[2]
+    push(state, rules, i, impulse, normal, -1.0)
+    push(state, rules, j, impulse, normal, 1.0)
+    square = slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2]
+    return impulse, 0.5 * mass * (1.0 - restitution * restitution) * square
+
+
+@inlined
+def rub_wall(
+    state: State,
+    rules: Rules,
+    i: int,
+    normal: Vector,
+    wall_velocity: Vector,
+    restitution: float,
+) -> tuple[Vector, float]:
+    """Tangential part of a collision with a wall.
+
+    Returns
+    -------
+    impulse : tuple of 3 floats, [kg m/s]
+        On the wall.
+    loss : float, [J]
+        Where the wall is at rest.
+    """
+    rows = state.rows
+    a = surface_velocity(state, i, normal, 1.0)
+    slip = tangential(
+        (
+            wall_velocity[0] - rows[i, VX] - a[0],
+            wall_velocity[1] - rows[i, VX + 1] - a[1],
+            wall_velocity[2] - rows[i, VX + 2] - a[2],
+        ),
+        normal,
+    )
+    mass = 1.0 / softness(state, rules, i)
+    per = -mass * (1.0 + restitution)
+    impulse = per * slip[0], per * slip[1], per * slip[2]
+    push(state, rules, i, impulse, normal, -1.0)
+    square = slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2]
+    return impulse, 0.5 * mass * (1.0 - restitution * restitution) * square

@@ -1,0 +1,126 @@
+"""What can be read off a gas: frames of all beads, and sums over them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.physics.compiled import compiled, inlined
+from nanorocks_ros.simulation.engine.integers import whole
+from nanorocks_ros.simulation.engine.state import (
+    BODY,
+    BOOKS,
+    COUNTS,
+    FLAGS,
+    ORIGINAL,
+    SPECIES,
+    TIME,
+    VX,
+    VY,
+    VZ,
+    State,
+    X,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.simulation.engine.rules import Rules
+
+# Columns of a row of observations; then for each species how many beads it has and their mean
+# squares of velocity along x, y and z.
+MEAN_SPEED, MEAN_PROJECTED_SPEED, BODIES, FIRST_COUNT = range(4)
+FIRST_BOOK = FIRST_COUNT + COUNTS
+FIRST_SPECIES = FIRST_BOOK + BOOKS
+PER_SPECIES = 4
+
+
+@inlined
+def take_frame(
+    state: State,
+    rules: Rules,
+    time: float,
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    spins: NDArray[np.float64],
+    bodies: NDArray[np.int32],
+) -> None:
+    """Write down where the beads are at a time, x + v (t - t_i), and leave them untouched.
+
+    Parameters
+    ----------
+    state : State
+    rules : Rules
+    time : float, [s]
+        Since the epoch.
+    positions, velocities : ndarray (n, 3), [m], [m/s]
+        Written, by original number; positions continuous across periodic sides.
+    spins : ndarray (n, 3) or (0, 3), [rad/s]
+    bodies : ndarray of int32, (n,) or (0,)
+    """
+    rows = state.rows
+    for i in range(rows.shape[0]):
+        number = whole(state.links[i, ORIGINAL])
+        since = time - rows[i, TIME]
+        for axis in range(3):
+            at = rows[i, X + axis] + rows[i, VX + axis] * since
+            if state.images.shape[0]:
+                at += state.images[i, axis] * rules.sides[axis]
+            positions[number, axis] = at
+            velocities[number, axis] = rows[i, VX + axis]
+        if spins.shape[0]:
+            for axis in range(3):
+                spins[number, axis] = state.spins[i, axis]
+        if bodies.shape[0]:
+            bodies[number] = state.bodies[i, BODY]
+
+
+@inlined
+def observe(state: State, rules: Rules, row: NDArray[np.float64]) -> None:
+    """Write down sums over the beads, between two events.
+
+    Parameters
+    ----------
+    state : State
+    rules : Rules
+    row : ndarray (n_columns,)
+        Written; see the columns.
+    """
+    rows = state.rows
+    n = rows.shape[0]
+    for k in range(FIRST_SPECIES, row.size):
+        row[k] = 0.0
+    speed = 0.0
+    projected = 0.0
+    bodies = 0 if state.bodies.shape[0] else n
+    for i in range(n):
+        vx, vy, vz = rows[i, VX], rows[i, VY], rows[i, VZ]
+        in_plane = vx * vx + vy * vy
+        speed += math.sqrt(in_plane + vz * vz)
+        projected += math.sqrt(in_plane)
+        if state.bodies.shape[0]:
+            bodies += whole(state.bodies[i, BODY] == state.links[i, ORIGINAL])
+        first = FIRST_SPECIES + PER_SPECIES * whole(state.links[i, FLAGS] >> SPECIES)
+        row[first] += 1.0
+        row[first + 1] += vx * vx
+        row[first + 2] += vy * vy
+        row[first + 3] += vz * vz
+    row[MEAN_SPEED] = speed / n
+    row[MEAN_PROJECTED_SPEED] = projected / n
+    row[BODIES] = bodies
+    for k in range(COUNTS):
+        row[FIRST_COUNT + k] = state.counts[k]
+    for k in range(BOOKS):
+        row[FIRST_BOOK + k] = state.books[k]
+    for first in range(FIRST_SPECIES, row.size, PER_SPECIES):
+        if row[first] > 0.0:
+            for axis in range(1, PER_SPECIES):
+                row[first + axis] /= row[first]
+
+
+@compiled
+def columns(n_species: int) -> int:
+    """Columns of a row of observations."""
+    return FIRST_SPECIES + PER_SPECIES * n_species

@@ -1,0 +1,271 @@
+"""Velocities of a gas that was shaken, or that has come to equilibrium.
+
+Normal deviates come from Marsaglia's polar method with a logarithm of our own. The usual ones
+call `log` and `cos`, whose last bits differ from one mathematical library to the next; this
+one needs ``+ - * /`` and square roots, so that velocities are the same bits on every machine,
+and unlike a sum of uniform numbers it has the right tails.
+
+References
+----------
+Marsaglia, Bray 1964, A convenient method for generating normal variables, SIAM Rev. 6, 260.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.simulation.randomness import direction, hashed, uniform
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+# Deviation of each component of a Maxwellian gas of mean speed 1.
+_DEVIATION = math.sqrt(math.pi / 8.0)
+
+_LOG_2 = math.log(2.0)
+_SQRT_HALF = math.sqrt(0.5)
+# Terms of the series of the logarithm: the next one is below 3e-18 of the sum.
+_TERMS = 11
+
+
+def check_motion(masses: ArrayLike, mean_speed: float) -> NDArray[np.float64]:
+    """Masses as an array, refused when no velocities can be drawn for them.
+
+    Parameters
+    ----------
+    masses : array_like (n,), [kg], > 0
+    mean_speed : float, [m/s], >= 0
+
+    Raises
+    ------
+    SimulationError
+        Naming the value at fault.
+    """
+    try:
+        array = np.array(masses, dtype=np.float64, order='C')
+    except (TypeError, ValueError) as error:
+        raise SimulationError('masses', 'not an array of numbers', 'give masses in kg') from error
+    if array.ndim != 1 or array.size < 1:
+        raise SimulationError('masses', f'shape {array.shape}', 'give one for each bead')
+    wrong = np.flatnonzero(~(np.isfinite(array) & (array > 0.0)))
+    if wrong.size:
+        first = int(wrong[0])
+        raise SimulationError(
+            'masses', f'bead {first} has {float(array[first])!r}', 'give finite masses above 0'
+        )
+    if not (math.isfinite(mean_speed) and mean_speed >= 0.0):
+        raise SimulationError('mean_speed', f'{mean_speed!r}', 'give 0 or a finite speed in m/s')
+    return array
+
+
+@compiled
+def uniform_speeds(n: int, mean_speed: float, key: np.uint64, shake: int) -> NDArray[np.float64]:
+    """Velocities after a shaking event: speeds even in [0, 2 mean), directions even.
+
+    Parameters
+    ----------
+    n : int
+    mean_speed : float, [m/s]
+        In space.
+    key : uint64
+    shake : int
+        Number of the shaking event; each gives others.
+
+    Returns
+    -------
+    ndarray (n, 3), [m/s]
+
+    References
+    ----------
+    [B19], section on the simulations: uniform about the measured mean, directions random.
+    """
+    velocities = np.empty((n, 3))
+    speeds_key = hashed(key, 2 * shake)
+    directions_key = hashed(key, 2 * shake + 1)
+    for i in range(n):
+        speed = 2.0 * mean_speed * uniform(speeds_key, i)
+        x, y, z = direction(hashed(directions_key, i))
+        velocities[i, 0] = speed * x
+        velocities[i, 1] = speed * y
+        velocities[i, 2] = speed * z
+    return velocities
+
+
+@compiled
+def maxwellian(
+    masses: NDArray[np.float64], mean_speed: float, key: np.uint64, shake: int, equipartition: bool
+) -> NDArray[np.float64]:
+    """Velocities of a gas in equilibrium: each component of each bead is normal.
+
+    Parameters
+    ----------
+    masses : ndarray (n,), [kg]
+    mean_speed : float, [m/s]
+        Expected over all beads, in space; those drawn scatter about it.
+    key : uint64
+    shake : int
+        Number of the shaking event; each gives others.
+    equipartition : bool
+        Whether beads of all masses have the same mean kinetic energy, as in a gas of elastic
+        beads; or else the same mean square velocity, the granular temperature per unit mass,
+        as walls give it.
+
+    Returns
+    -------
+    ndarray (n, 3), [m/s]
+    """
+    n = masses.size
+    velocities = np.empty((n, 3))
+    deviates_key = hashed(key, 2 * shake)
+    mean = 0.0
+    for i in range(n):
+        mean += _lightness(masses[i], equipartition) / n
+    for i in range(n):
+        deviation = _DEVIATION * mean_speed * (_lightness(masses[i], equipartition) / mean)
+        own_key = hashed(deviates_key, i)
+        x, y, counter = normal_pair(own_key, 0)
+        z, _, _ = normal_pair(own_key, counter)
+        velocities[i, 0] = deviation * x
+        velocities[i, 1] = deviation * y
+        velocities[i, 2] = deviation * z
+    return velocities
+
+
+@compiled
+def _lightness(mass: float, equipartition: bool) -> float:
+    """What the speeds of a bead are in proportion to."""
+    return 1.0 / math.sqrt(mass) if equipartition else 1.0
+
+
+@compiled
+def normal_pair(key: np.uint64, counter: int) -> tuple[float, float, int]:
+    """Two random numbers of the normal law, and the counter after those they took."""
+    while True:
+        a = 2.0 * uniform(key, counter) - 1.0
+        b = 2.0 * uniform(key, counter + 1) - 1.0
+        counter += 2
+        square = a * a + b * b
+        if 0.0 < square < 1.0:
+            stretch = math.sqrt(-2.0 * logarithm(square) / square)
+            return a * stretch, b * stretch, counter
+
+
+@compiled
+def logarithm(x: float) -> float:
+    """Natural logarithm of a number in (0, 1), the same bits on every machine.
+
+    Halves are taken out until the rest m is near 1; then log m = 2 artanh z with
+    z = (m - 1)/(m + 1), whose series in z^2 < 0.03 is summed.
+    """
+    halves = 0
+    while x < _SQRT_HALF:
+        x *= 2.0
+        halves += 1
+    z = (x - 1.0) / (x + 1.0)
+    square = z * z
+    total = 0.0
+    for k in range(_TERMS - 1, -1, -1):
+        total = total * square + 1.0 / (2 * k + 1)
+    return 2.0 * z * total - halves * _LOG_2
+
+
+@compiled
+def without_drift(
+    velocities: NDArray[np.float64], masses: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Velocities as seen from the centre of mass.
+
+    Parameters
+    ----------
+    velocities : ndarray (n, 3), [m/s]
+    masses : ndarray (n,), [kg]
+
+    Returns
+    -------
+    ndarray (n, 3), [m/s]
+        Their total momentum is zero within rounding.
+    """
+    n = masses.size
+    seen = np.empty((n, 3))
+    for axis in range(3):
+        momentum = 0.0
+        mass = 0.0
+        for i in range(n):
+            momentum += masses[i] * velocities[i, axis]
+            mass += masses[i]
+        for i in range(n):
+            seen[i, axis] = velocities[i, axis] - momentum / mass
+    return seen
+
+
+@compiled
+def at_temperature(
+    velocities: NDArray[np.float64], granular_temperature: float
+) -> NDArray[np.float64]:
+    """Velocities times what gives them a granular temperature, within rounding.
+
+    Parameters
+    ----------
+    velocities : ndarray (n, 3), [m/s]
+    granular_temperature : float, [m^2/s^2]
+        Mean square velocity / 3, over all beads. (What `maxwellian` draws has, without
+        equipartition, pi/8 of the square of the mean speed.)
+
+    Returns
+    -------
+    ndarray (n, 3), [m/s]
+        A gas at rest stays at rest.
+    """
+    squares = 0.0
+    for i in range(velocities.shape[0]):
+        squares += _square(velocities, i)
+    if squares == 0.0:
+        return velocities.copy()
+    return _times(
+        velocities, math.sqrt(3.0 * velocities.shape[0] * granular_temperature / squares)
+    )
+
+
+@compiled
+def at_mean_speed(velocities: NDArray[np.float64], mean_speed: float) -> NDArray[np.float64]:
+    """Velocities times what gives them a mean speed, within rounding.
+
+    Parameters
+    ----------
+    velocities : ndarray (n, 3), [m/s]
+    mean_speed : float, [m/s]
+        In space, over all beads.
+
+    Returns
+    -------
+    ndarray (n, 3), [m/s]
+        A gas at rest stays at rest.
+    """
+    speeds = 0.0
+    for i in range(velocities.shape[0]):
+        speeds += math.sqrt(_square(velocities, i))
+    if speeds == 0.0:
+        return velocities.copy()
+    return _times(velocities, velocities.shape[0] * mean_speed / speeds)
+
+
+@compiled
+def _square(velocities: NDArray[np.float64], i: int) -> float:
+    """Square of the speed of a bead, [m^2/s^2]."""
+    x, y, z = velocities[i, 0], velocities[i, 1], velocities[i, 2]
+    return float(x * x + y * y + z * z)
+
+
+@compiled
+def _times(velocities: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
+    """Velocities times a number."""
+    scaled = np.empty(velocities.shape)
+    for i in range(velocities.shape[0]):
+        for axis in range(3):
+            scaled[i, axis] = factor * velocities[i, axis]
+    return scaled
