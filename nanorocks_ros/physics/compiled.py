@@ -6,12 +6,20 @@ and integers, this makes states and pictures bit-identical on every machine.
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numba
+from numba.core import event
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+LOGGER = logging.getLogger('nanorocks_ros')
+
+# The function that takes longest to compile.
+_SLOWEST = 'run_until'
+
 Function = TypeVar('Function', bound='Callable[..., Any]')
 
 
@@ -27,6 +35,25 @@ def kernel(function: Function) -> Function:
     they are not counted.
     """
     return _compiled(function, {'_nrt': False})
+
+
+class _Announcer(event.Listener):
+    """Tells the log once when the loop over events must be compiled, which takes its time."""
+
+    def __init__(self) -> None:
+        self._told = False
+
+    def on_start(self, event: event.Event) -> None:
+        name = event.data['dispatcher'].py_func.__name__
+        if name == _SLOWEST and not self._told:
+            self._told = True
+            LOGGER.info('compiling the simulation, once on this machine: about half a minute')
+
+    def on_end(self, event: event.Event) -> None:
+        pass
+
+
+event.register('numba:compile', _Announcer())  # type: ignore[no-untyped-call]
 
 
 def inlined(function: Function) -> Function:

@@ -17,50 +17,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.simulation.randomness import direction, hashed, uniform
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
 # Deviation of each component of a Maxwellian gas of mean speed 1.
 _DEVIATION = math.sqrt(math.pi / 8.0)
 
-_LOG_2 = math.log(2.0)
+_LOG_2 = 0.6931471805599453
 _SQRT_HALF = math.sqrt(0.5)
 # Terms of the series of the logarithm: the next one is below 3e-18 of the sum.
 _TERMS = 11
-
-
-def check_motion(masses: ArrayLike, mean_speed: float) -> NDArray[np.float64]:
-    """Masses as an array, refused when no velocities can be drawn for them.
-
-    Parameters
-    ----------
-    masses : array_like (n,), [kg], > 0
-    mean_speed : float, [m/s], >= 0
-
-    Raises
-    ------
-    SimulationError
-        Naming the value at fault.
-    """
-    try:
-        array = np.array(masses, dtype=np.float64, order='C')
-    except (TypeError, ValueError) as error:
-        raise SimulationError('masses', 'not an array of numbers', 'give masses in kg') from error
-    if array.ndim != 1 or array.size < 1:
-        raise SimulationError('masses', f'shape {array.shape}', 'give one for each bead')
-    wrong = np.flatnonzero(~(np.isfinite(array) & (array > 0.0)))
-    if wrong.size:
-        first = int(wrong[0])
-        raise SimulationError(
-            'masses', f'bead {first} has {float(array[first])!r}', 'give finite masses above 0'
-        )
-    if not (math.isfinite(mean_speed) and mean_speed >= 0.0):
-        raise SimulationError('mean_speed', f'{mean_speed!r}', 'give 0 or a finite speed in m/s')
-    return array
 
 
 @compiled
@@ -124,7 +93,8 @@ def maxwellian(
     deviates_key = hashed(key, 2 * shake)
     mean = 0.0
     for i in range(n):
-        mean += _lightness(masses[i], equipartition) / n
+        mean += _lightness(masses[i], equipartition)
+    mean /= n
     for i in range(n):
         deviation = _DEVIATION * mean_speed * (_lightness(masses[i], equipartition) / mean)
         own_key = hashed(deviates_key, i)
@@ -172,100 +142,3 @@ def logarithm(x: float) -> float:
     for k in range(_TERMS - 1, -1, -1):
         total = total * square + 1.0 / (2 * k + 1)
     return 2.0 * z * total - halves * _LOG_2
-
-
-@compiled
-def without_drift(
-    velocities: NDArray[np.float64], masses: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Velocities as seen from the centre of mass.
-
-    Parameters
-    ----------
-    velocities : ndarray (n, 3), [m/s]
-    masses : ndarray (n,), [kg]
-
-    Returns
-    -------
-    ndarray (n, 3), [m/s]
-        Their total momentum is zero within rounding.
-    """
-    n = masses.size
-    seen = np.empty((n, 3))
-    for axis in range(3):
-        momentum = 0.0
-        mass = 0.0
-        for i in range(n):
-            momentum += masses[i] * velocities[i, axis]
-            mass += masses[i]
-        for i in range(n):
-            seen[i, axis] = velocities[i, axis] - momentum / mass
-    return seen
-
-
-@compiled
-def at_temperature(
-    velocities: NDArray[np.float64], granular_temperature: float
-) -> NDArray[np.float64]:
-    """Velocities times what gives them a granular temperature, within rounding.
-
-    Parameters
-    ----------
-    velocities : ndarray (n, 3), [m/s]
-    granular_temperature : float, [m^2/s^2]
-        Mean square velocity / 3, over all beads. (What `maxwellian` draws has, without
-        equipartition, pi/8 of the square of the mean speed.)
-
-    Returns
-    -------
-    ndarray (n, 3), [m/s]
-        A gas at rest stays at rest.
-    """
-    squares = 0.0
-    for i in range(velocities.shape[0]):
-        squares += _square(velocities, i)
-    if squares == 0.0:
-        return velocities.copy()
-    return _times(
-        velocities, math.sqrt(3.0 * velocities.shape[0] * granular_temperature / squares)
-    )
-
-
-@compiled
-def at_mean_speed(velocities: NDArray[np.float64], mean_speed: float) -> NDArray[np.float64]:
-    """Velocities times what gives them a mean speed, within rounding.
-
-    Parameters
-    ----------
-    velocities : ndarray (n, 3), [m/s]
-    mean_speed : float, [m/s]
-        In space, over all beads.
-
-    Returns
-    -------
-    ndarray (n, 3), [m/s]
-        A gas at rest stays at rest.
-    """
-    speeds = 0.0
-    for i in range(velocities.shape[0]):
-        speeds += math.sqrt(_square(velocities, i))
-    if speeds == 0.0:
-        return velocities.copy()
-    return _times(velocities, velocities.shape[0] * mean_speed / speeds)
-
-
-@compiled
-def _square(velocities: NDArray[np.float64], i: int) -> float:
-    """Square of the speed of a bead, [m^2/s^2]."""
-    x, y, z = velocities[i, 0], velocities[i, 1], velocities[i, 2]
-    return float(x * x + y * y + z * z)
-
-
-@compiled
-def _times(velocities: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
-    """Velocities times a number."""
-    scaled = np.empty(velocities.shape)
-    for i in range(velocities.shape[0]):
-        for axis in range(3):
-            scaled[i, axis] = factor * velocities[i, axis]
-    return scaled

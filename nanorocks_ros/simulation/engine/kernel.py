@@ -96,12 +96,13 @@ def handle(state: State, rules: Rules, i: int, now: float) -> int:
     if partner == RENEW:
         if state.references.shape[0] and not renew(state, rules, i, now):
             return FULL
-    elif partner < 0:
-        return bounce_off_wall(state, rules, i, -1 - partner, now)
-    elif state.links[partner, COUNTER] != state.links[i, PARTNER_COUNTER]:
+    elif partner >= 0 and state.links[partner, COUNTER] != state.links[i, PARTNER_COUNTER]:
         state.counts[STALE] += 1
     else:
-        marked = collide_pair(state, rules, i, partner, now)
+        if partner < 0:
+            marked = bounce_off_wall(state, rules, i, -1 - partner, now)
+        else:
+            marked = collide_pair(state, rules, i, partner, now)
         if marked:
             return marked
         state.counts[MISSED] += 1

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 # Measured (`python -m benchmarks engine`): lists of about eight are the fastest, whatever the
 # density, and so are shells whose centre lies this far ahead of the bead.
 _WANTED = 8.0
-_SKINS = 0.3, 1.5
-_AHEAD = 0.7
+_SKINS = 0.3, 2.5
+AHEAD_OF_BEAD = 0.7
 # A little more than the reach, for the rounding of references.
 _CELL_SLACK = 1.004
 _FIRST_ROOM = 12
@@ -79,7 +79,7 @@ def with_lists(state: State, rules: Rules, skin: float) -> State:
     reach[HALF_SKIN] = 0.5 * skin
     reach[CELLS : CELLS + 3] = cells
     reach[PER_CELL : PER_CELL + 3] = cells / sides
-    reach[AHEAD] = _AHEAD
+    reach[AHEAD] = AHEAD_OF_BEAD
     state = state._replace(reach=reach, references=np.zeros((n, 4), dtype=np.float32))
     state = _with_room(state, int(cells.prod()), _FIRST_ROOM, _FIRST_CELL_ROOM)
     set_references(state, rules)

@@ -50,6 +50,10 @@ if TYPE_CHECKING:
 # A gap this small, of the radius, is a contact; and so many steps are enough to find any.
 _CLOSED = 1e-13
 _MOST_STEPS = 10_000
+# Some digits of time that cannot be divided further.
+_LEAST_STEP = 2e-15
+# Further from a moving wall than this, of the radius, a bead does not touch it.
+_APART = 1e-6
 
 
 @inlined
@@ -137,7 +141,7 @@ def time_to_moving_plane(
             # Out of reach of the wall wherever it is.
             if closing <= 0.0:
                 return np.inf
-            time += beyond / closing
+            time += max(beyond / closing, _LEAST_STEP * abs(time))
             continue
         moved, speed = displacement(rules, axis, time)
         gap = left + outward * moved
@@ -177,7 +181,7 @@ def next_look(rules: Rules, axis: int, time: float, gap: float, opening: float) 
     else:
         step = np.inf
     # Where the bead rides on the wall, time must still go on; the contact comes then.
-    step = max(step, 1e-15 * abs(time), 1e-9 * rules.contact_duration)
+    step = max(step, _LEAST_STEP * abs(time), 1e-9 * rules.contact_duration)
     return min(time + step, until)
 
 
@@ -256,7 +260,7 @@ def bounce_off_wall(state: State, rules: Rules, i: int, wall: int, now: float) -
     Returns
     -------
     int
-        Beads marked.
+        Beads marked; 0 when the bead is not there yet.
     """
     rows = state.rows
     advance(state, i, now)
@@ -266,6 +270,8 @@ def bounce_off_wall(state: State, rules: Rules, i: int, wall: int, now: float) -
     if rules.moving:
         moved, wall_speed = displacement(rules, axis, state.clock[EPOCH] + now)
     surface = moved + (rules.sides[axis] - radius if wall % 2 else radius)
+    if rules.moving and abs(rows[i, X + axis] - surface) > _APART * radius:
+        return 0
     shift(state, rules, i, axis, surface - rows[i, X + axis])
     rows[i, X + axis] = surface
     number = whole(state.links[i, ORIGINAL])
