@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import sys
 from typing import TYPE_CHECKING
@@ -20,7 +21,7 @@ EXIT_INTERRUPTED = 130
 
 def build_parser() -> argparse.ArgumentParser:
     """The parser of the whole command; heavy imports wait until a command runs."""
-    from nanorocks_ros.cli import analyse, simulate
+    from nanorocks_ros.cli import analyse, simulate, sweep
 
     parser = argparse.ArgumentParser(
         prog='nanorocks',
@@ -30,7 +31,18 @@ def build_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest='command', metavar='COMMAND', required=True)
     analyse.add_parser(commands)
     simulate.add_parser(commands)
+    sweep.add_parser(commands)
     return parser
+
+
+def _listen_to_the_core() -> None:
+    """Let people read what the core has to say while it works."""
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter('nanorocks: %(message)s'))
+    logger = logging.getLogger('nanorocks_ros')
+    logger.handlers = [handler]
+    logger.setLevel(logging.INFO)
+    logger.propagate = False
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -44,6 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     # Before numpy is loaded: no array here is worth a second thread.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+    _listen_to_the_core()
     try:
         options = build_parser().parse_args(arguments)
         code: int = options.run(options)
@@ -53,8 +66,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except NanorocksError as error:
         print(f'nanorocks: {error}', file=sys.stderr)
         return EXIT_INPUT
-    except KeyboardInterrupt:
-        print('nanorocks: interrupted; what was written until now can be read', file=sys.stderr)
+    except KeyboardInterrupt as interruption:
+        what = str(interruption) or 'what was written until now can be read'
+        print(f'nanorocks: interrupted; {what}', file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         # Whoever read our output has enough of it.

@@ -1,0 +1,106 @@
+"""Files a command is asked to write: looked at before the work, complete or absent after it."""
+
+from __future__ import annotations
+
+import os
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
+
+from nanorocks_ros.errors import ConfigurationError, RecordingError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+
+def check_outputs(
+    files: Mapping[str, Path], kinds: Mapping[str, tuple[str, ...]], *, force: bool = False
+) -> None:
+    """Refuse files that could not be written in the end, before hours of work.
+
+    Parameters
+    ----------
+    files : mapping of str to Path
+        By the flag that asked for them.
+    kinds : mapping of str to tuple of str
+        Endings that a flag accepts; a flag that is not listed names a new folder.
+    force : bool
+        Whether files (not folders) that exist may be replaced.
+
+    Raises
+    ------
+    ConfigurationError
+        For an ending that is not known, or two flags with the same file.
+    RecordingError
+        For a file that exists, or cannot be made where it should.
+    """
+    seen: dict[Path, str] = {}
+    for flag, path in files.items():
+        if flag in kinds and path.suffix not in kinds[flag]:
+            raise ConfigurationError(
+                flag, f'{path} ends in none of {", ".join(kinds[flag])}', 'name such a file'
+            )
+        place = path.resolve()
+        if place in seen:
+            raise ConfigurationError(
+                flag, f'names the file of {seen[place]}, {path}', 'name another'
+            )
+        seen[place] = flag
+    for flag, path in files.items():
+        _check_place(path, folder=flag not in kinds, force=force)
+
+
+def _check_place(path: Path, *, folder: bool, force: bool) -> None:
+    if os.path.lexists(path) and (folder or path.is_dir()):
+        raise RecordingError(str(path), 'exists already and is not overwritten', 'name another')
+    if os.path.lexists(path) and not force:
+        raise RecordingError(
+            str(path), 'exists already and is not overwritten', 'name another, or add --force'
+        )
+    if folder:
+        return
+    if not path.parent.is_dir():
+        raise RecordingError(
+            str(path), f'there is no folder {path.parent}', 'make it, or write elsewhere'
+        )
+    if not os.access(path.parent, os.W_OK):
+        raise RecordingError(
+            str(path), f'the folder {path.parent} cannot be written to', 'write elsewhere'
+        )
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give a place to write a file, which gets its name when all of it is there.
+
+    Parameters
+    ----------
+    path : Path
+        A file there is replaced.
+
+    Yields
+    ------
+    Path
+        Where to write; with the same ending. Gone afterwards, whatever happens.
+
+    Raises
+    ------
+    RecordingError
+        When the file cannot be written.
+    """
+    part = path.with_name(f'.{path.stem}.part{path.suffix}')
+    try:
+        try:
+            yield part
+            with part.open('rb+') as stream:
+                os.fsync(stream.fileno())
+            os.replace(part, path)
+        finally:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
+    except OSError as error:
+        raise RecordingError(
+            str(path),
+            f'cannot be written ({error.strerror or error})',
+            'make room, or write elsewhere',
+        ) from error

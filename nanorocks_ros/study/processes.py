@@ -1,0 +1,136 @@
+"""Tasks in processes of this machine, which end with the process that started them."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing, contextmanager
+from typing import TYPE_CHECKING, TypeVar
+
+from nanorocks_ros.errors import NanorocksError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Iterator, Mapping
+    from multiprocessing.connection import Connection
+
+Argument = TypeVar('Argument')
+Result = TypeVar('Result')
+
+# Pools in a row that end without finishing a single task.
+_MOST_FRUITLESS = 3
+# What a worker gets to hand over a result when it is told to end [s].
+_GRACE = 1.0
+
+
+def finished_in_processes(
+    function: Callable[[Argument], Result], tasks: Mapping[str, Argument], processes: int
+) -> Generator[tuple[str, Result], None, None]:
+    """Results as they come. What a killed worker had in hand is done again by a new one.
+
+    Parameters
+    ----------
+    function : callable
+    tasks : mapping of str to picklable objects
+    processes : int, > 0
+
+    Yields
+    ------
+    key, result
+
+    Raises
+    ------
+    NanorocksError
+        When the workers of three pools in a row end before any task does.
+    """
+    left = dict(tasks)
+    fruitless = 0
+    while left:
+        before = len(left)
+        try:
+            with closing(_one_pool(function, dict(left), processes)) as results:
+                for key, result in results:
+                    del left[key]
+                    yield key, result
+        except BrokenProcessPool as error:
+            fruitless = fruitless + 1 if len(left) == before else 0
+            if fruitless == _MOST_FRUITLESS:
+                raise NanorocksError(
+                    'workers',
+                    f'were killed {fruitless} times with nothing done, for lack of memory perhaps',
+                    'use fewer --workers, or a smaller task',
+                ) from error
+
+
+def _one_pool(
+    function: Callable[[Argument], Result], tasks: Mapping[str, Argument], processes: int
+) -> Generator[tuple[str, Result], None, None]:
+    # Not forked: a fork copies the locks of threads that numba or matplotlib may have started.
+    context = multiprocessing.get_context('spawn')
+    ending, lifeline = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(
+        processes, mp_context=context, initializer=_start, initargs=(ending,)
+    )
+    broken = None
+    try:
+        with _born_quiet():
+            keys = {pool.submit(_work, function, one): key for key, one in tasks.items()}
+        for future in as_completed(keys):
+            try:
+                result = future.result()
+            except BrokenProcessPool as error:
+                # Others may have finished before: hand these over first.
+                broken = error
+            else:
+                yield keys[future], result
+        if broken is not None:
+            raise broken
+    finally:
+        # Nobody waits for work that is not wanted any more.
+        lifeline.close()
+        pool.shutdown(wait=True, cancel_futures=True)
+        ending.close()
+
+
+@contextmanager
+def _born_quiet() -> Iterator[None]:
+    """Processes started here get one thread of BLAS, and no Ctrl-C while they start."""
+    earlier = os.environ.get('OPENBLAS_NUM_THREADS')
+    os.environ['OPENBLAS_NUM_THREADS'] = '1'
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        if earlier is None:
+            del os.environ['OPENBLAS_NUM_THREADS']
+        else:
+            os.environ['OPENBLAS_NUM_THREADS'] = earlier
+        # Last: a Ctrl-C that came meanwhile is raised here.
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+_working = threading.Lock()
+
+
+def _start(ending: Connection) -> None:
+    """In the worker: Ctrl-C is for the parent, which tells us by closing the pipe, or dying."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    threading.Thread(target=_end_with, args=(ending,), daemon=True).start()
+
+
+def _end_with(ending: Connection) -> None:
+    ending.poll(None)
+    # Cutting a result in two would leave the parent waiting for the other half.
+    if _working.acquire(blocking=False):
+        time.sleep(_GRACE)
+    os._exit(1)
+
+
+def _work(function: Callable[[Argument], Result], argument: Argument) -> Result:
+    with _working:
+        return function(argument)

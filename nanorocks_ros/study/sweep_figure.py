@@ -1,0 +1,125 @@
+"""The picture of a sweep over two settings: which points agree with a decay, and which do not."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.settings import SimulationSettings, rows
+from nanorocks_ros.study.curves import chi_square
+
+mpl.use('Agg')
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.study.curves import SpeedCurve
+    from nanorocks_ros.study.sweep_plan import Axis
+    from nanorocks_ros.study.sweep_result import Sweep
+
+_PICTURES = ('.png', '.pdf', '.svg')
+_MARK = '#ffffff'
+# Below this, two curves are alike; colours are not spent on noise.
+_ALIKE = 0.5
+
+
+def check_drawable(path: Path, axes: tuple[Axis, ...]) -> None:
+    """Refuse what is no picture, or a grid that is no map.
+
+    Raises
+    ------
+    ConfigurationError
+        Unless there are two axes with two numbers or more each, and the picture's name ends in
+        ``.png``, ``.pdf`` or ``.svg``.
+    """
+    if path.suffix not in _PICTURES:
+        raise ConfigurationError(
+            '--figure', f'{str(path)!r} is no picture', f'end it in {", ".join(_PICTURES)}'
+        )
+    numbers = [
+        axis
+        for axis in axes
+        if len(axis.values) > 1 and all(isinstance(one, int | float) for one in axis.values)
+    ]
+    if len(axes) != 2 or len(numbers) != 2:
+        shape = ' x '.join(str(len(axis.values)) for axis in axes) or 'a single point'
+        raise ConfigurationError(
+            '--figure', f'the grid is {shape}', 'vary two numbers, with two values or more each'
+        )
+
+
+def chi_square_figure(path: Path, sweep: Sweep, curve: SpeedCurve) -> None:
+    """Map of the deviation of a sweep over two settings from a decay, as a picture.
+
+    Parameters
+    ----------
+    path : Path
+    sweep : Sweep
+        Over two settings.
+    curve : SpeedCurve
+
+    Raises
+    ------
+    ConfigurationError
+        When the sweep is not over two settings, or cannot be compared with the curve, or the
+        name is no picture's.
+
+    References
+    ----------
+    After [B19] fig. 12.
+    """
+    check_drawable(path, sweep.axes)
+    values = chi_square(sweep, curve)
+    across, up = (np.array(axis.values, dtype=np.float64) for axis in sweep.axes)
+    order = np.ix_(np.argsort(across), np.argsort(up))
+    figure = Figure(figsize=(7.5, 6.0), layout='constrained')
+    axes = figure.subplots()
+    shown = np.maximum(values[order].T, _ALIKE)
+    mesh = axes.pcolormesh(
+        np.sort(across),
+        np.sort(up),
+        shown,
+        shading='nearest',
+        cmap='turbo',
+        norm=LogNorm(vmin=_ALIKE, vmax=max(float(shown.max()), 2.0)),
+    )
+    figure.colorbar(mesh, ax=axes, label=r'mean $\chi^2$ over the times', extend='min')
+    _mark(axes, sweep, values, curve)
+    figure.savefig(path, dpi=110)
+
+
+def _mark(axes: Axes, sweep: Sweep, values: NDArray[np.float64], curve: SpeedCurve) -> None:
+    first, second = sweep.axes
+    if curve.point is not None:
+        point, marker, label = curve.point, '*', 'reference'
+    else:
+        best = np.unravel_index(int(np.argmin(values)), values.shape)
+        point = first.values[int(best[0])], second.values[int(best[1])]
+        marker, label = 'o', f'best: {point[0]:g}, {point[1]:g}'
+    axes.plot(
+        *([float(one)] for one in point),
+        marker,
+        ms=14,
+        color=_MARK,
+        mec='black',
+        ls='none',
+        clip_on=False,
+        label=label,
+    )
+    axes.set_xlabel(_label(first))
+    axes.set_ylabel(_label(second))
+    axes.set_title(f'{sweep.runs} runs at each of {values.size} points')
+    axes.legend(loc='upper left')
+
+
+def _label(axis: Axis) -> str:
+    (row,) = (one for one in rows(SimulationSettings()) if one.name == axis.name)
+    return f'{row.doc} [{row.unit}]' if row.unit else row.doc
