@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError
@@ -18,16 +19,19 @@ from nanorocks_ros.recordings.messages import (
 from nanorocks_ros.recordings.writer import BagWriter
 from nanorocks_ros.records import GroundTruth
 from nanorocks_ros.simulation.film import film
+from nanorocks_ros.simulation.render import TrayCamera
 from nanorocks_ros.study.offline import Progress
 from nanorocks_ros.study.results_bag import offered
+from nanorocks_ros.study.simulated_plan import check_duration
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import layout, to_array
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from nanorocks_ros.experiment.trays import Tray
+
 # Bags made from the same seed are alike, byte for byte: the clock starts at a fixed instant.
-_LONGEST = 86400.0
 START_NS = 1_000_000_000_000_000_000
 
 
@@ -38,6 +42,7 @@ def film_into_bag(
     duration: float,
     quality: int,
     progress: Progress,
+    tray: Tray | None = None,
 ) -> dict[str, Any]:
     """Film a simulated tray into a new bag.
 
@@ -51,6 +56,8 @@ def film_into_bag(
         Of the JPEGs, 1 to 100.
     progress : callable
         Called with the frames done and the frames there will be.
+    tray : Tray, optional
+        By default the one that was flown under the number in the settings.
 
     Returns
     -------
@@ -64,11 +71,9 @@ def film_into_bag(
     RecordingError
         When the bag cannot be written.
     """
-    if not (math.isfinite(duration) and 0.0 < duration <= _LONGEST):
-        raise ConfigurationError('--duration', f'{duration}', f'give up to {_LONGEST:g} s')
-    if not 1 <= quality <= 100:
-        raise ConfigurationError('--quality', f'{quality}', 'give a number from 1 to 100')
-    tray = tray_by_number(load_trays(), settings.tray)
+    check_duration(duration)
+    check_quality(quality)
+    tray = tray or tray_by_number(load_trays(), settings.tray)
     frames = max(1, round(duration * settings.frame_rate))
     truth_topic = topics.TRUTH.absolute(settings.tray)
     table = {
@@ -97,3 +102,26 @@ def film_into_bag(
             bag.write(truth_topic, truth.stamp_ns, float_array_message(labels, values))
             progress(done, frames)
     return {'frames': frames, 'duration': duration, 'tray': settings.tray, 'seed': settings.seed}
+
+
+def check_quality(quality: int) -> None:
+    """Refuse a quality that JPEG does not know.
+
+    Raises
+    ------
+    ConfigurationError
+        Unless it is 1 to 100.
+    """
+    if not 1 <= quality <= 100:
+        raise ConfigurationError('--quality', f'{quality}', 'give a number from 1 to 100')
+
+
+def check_camera(settings: SimulationSettings, tray: Tray) -> None:
+    """Refuse a picture that the tray does not fit into.
+
+    Raises
+    ------
+    SimulationError
+        With the sizes of both.
+    """
+    TrayCamera(settings, tray, np.array([tray.diameter]), ('',))
