@@ -202,6 +202,6 @@ def _cool(
         times,
         rows,
         np.empty((0, 6)),
-        np.zeros(3, dtype=np.int64),
+        np.zeros(4, dtype=np.int64),
     )
     return run_until(state, rules, times[-1], _MOST_EVENTS, output)

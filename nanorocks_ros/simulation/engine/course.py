@@ -137,7 +137,7 @@ class Recorder:
             observation_times=observation_times,
             observations=np.empty((observation_times.size, columns.columns(n_species))),
             events=np.empty((_FIRST_ROOM if log else 0, 6)),
-            done=np.zeros(3, dtype=np.int64),
+            done=np.zeros(4, dtype=np.int64),
         )
 
     def make_room(self) -> None:

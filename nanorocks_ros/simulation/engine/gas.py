@@ -19,7 +19,7 @@ from nanorocks_ros.simulation.engine.checks import (
     refuse_overlap,
 )
 from nanorocks_ros.simulation.engine.course import Course, Recorder
-from nanorocks_ros.simulation.engine.kernel import run_until
+from nanorocks_ros.simulation.engine.kernel import TAKEN, run_until, snapshot
 from nanorocks_ros.simulation.engine.rules import (
     CONTACT_DURATION,
     CollisionRules,
@@ -319,11 +319,11 @@ class HardSphereGas:
         frames = check_times(now, end, frame_times)
         observed = check_times(now, end, observation_times, 'observation_times')
         recorder = Recorder(self._state, self._rules, frames, observed, self._n_species, log)
-        left = most_events
         slow = 0
         while True:
-            part = _SLICE if left is None else min(_SLICE, left)
             before = self.now
+            taken = int(recorder.output.done[TAKEN])
+            part = taken + _SLICE if most_events is None else min(taken + _SLICE, most_events)
             status = run_until(self._state, self._rules, float(end), part, recorder.output)
             if status == DONE:
                 return recorder
@@ -334,15 +334,12 @@ class HardSphereGas:
             if status == LOG_FULL:
                 recorder.make_room()
                 continue
-            if left is not None:
-                left -= part
             least = _STUCK * self._state.clock[QUANTUM]
             slow = slow + 1 if self.now - before < least else 0
-            if left == 0 or slow == _STUCK_SLICES:
-                taken = most_events if left == 0 else slow * _SLICE
+            if part == most_events or slow == _STUCK_SLICES:
                 raise SimulationError(
                     'event-driven engine',
-                    f'{taken} events taken and only {self.now:.6g} s of {end:.6g} s reached',
+                    f'{part} events taken and only {self.now:.6g} s of {end:.6g} s reached',
                     'raise most_events, the contact duration or the restitution',
                 )
             if progress is not None:
@@ -395,14 +392,16 @@ class HardSphereGas:
 
     def beads(self) -> Beads:
         """The beads as they are now."""
-        now = self.now
-        course = self.follow(now, [now])
+        n = self._state.rows.shape[0]
+        positions, velocities = np.empty((2, n, 3))
+        spins = np.empty((n if self._rules.rough else 0, 3))
+        snapshot(self._state, self._rules, positions, velocities, spins)
         return Beads(
             radii=self.radii,
             masses=self.masses,
-            positions=course.positions[0],
-            velocities=course.velocities[0],
-            spins=course.spins[0] if course.spins is not None else None,
+            positions=positions,
+            velocities=velocities,
+            spins=spins if self._rules.rough else None,
             species=self._by_number(self._state.links[:, FLAGS] >> SPECIES),
         )
 
@@ -452,12 +451,11 @@ class HardSphereGas:
         n = checked[0].size
         species = check_species(beads.species, n, self._known_species)
         spins = check_spins(beads.spins, n, self._rules.rough)
-        self._n_species = max(int(species.max()) + 1, self._known_species)
-        self._rules = self._rules._replace(
-            restitution=for_species(self._rules.restitution, self._n_species)
-        )
-        self._state = _arranged(checked, species, spins, self._rules, kernel)
-        refuse_overlap(*overlapping_pair(self._state, self._rules))
+        n_species = max(int(species.max()) + 1, self._known_species)
+        rules = self._rules._replace(restitution=for_species(self._rules.restitution, n_species))
+        state = _arranged(checked, species, spins, rules, kernel)
+        refuse_overlap(*overlapping_pair(state, rules))
+        self._state, self._rules, self._n_species = state, rules, n_species
 
 
 def _arranged(

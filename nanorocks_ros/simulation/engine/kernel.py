@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.rules import Rules
 
 # Places in Output.done.
-FRAMES, OBSERVATIONS, EVENTS = range(3)
+FRAMES, OBSERVATIONS, EVENTS, TAKEN = range(4)
 
 # Every bead is marked.
 ALL = -2
@@ -67,8 +67,8 @@ class Output(NamedTuple):
     events : ndarray (room, 6)
         Time [s], kind, bead, bead or wall, normal relative speed [m/s], impulse [kg m/s]; no
         room: not wanted.
-    done : ndarray of int64, (3,)
-        Frames, observations and events written.
+    done : ndarray of int64, (4,)
+        Frames, observations and events written; events taken, of whatever kind.
     """
 
     frame_times: NDArray[np.float64]
@@ -196,7 +196,7 @@ def run_until(state: State, rules: Rules, end: float, most_events: int, output: 
     rules : Rules
     end : float, [s]
     most_events : int
-        Events to take, of whatever kind, before giving up.
+        Events to have taken, of whatever kind, with this output before giving up.
     output : Output
         Times rising, none after `end`; changed.
 
@@ -208,7 +208,7 @@ def run_until(state: State, rules: Rules, end: float, most_events: int, output: 
     """
     times = state.times
     room = output.events.shape[0]
-    taken = 0
+    done = output.done
     marked = 0 if state.clock[PREDICTED] else ALL
     state.clock[PREDICTED] = 1.0
     while True:
@@ -219,13 +219,13 @@ def run_until(state: State, rules: Rules, end: float, most_events: int, output: 
         if not absolute <= end:
             break
         marked = 0
-        if taken == most_events:
+        if done[TAKEN] == most_events:
             return TOO_MANY_EVENTS
-        if room and output.done[EVENTS] == room:
+        if room and done[EVENTS] == room:
             return LOG_FULL
         if times[i] >= state.clock[QUANTUM]:
             count_time_anew(state)
-        taken += 1
+        done[TAKEN] += 1
         state.clock[NOW] = times[i]
         partner = whole(state.links[i, PARTNER])
         marked = handle(state, rules, i, times[i])
@@ -235,3 +235,26 @@ def run_until(state: State, rules: Rules, end: float, most_events: int, output: 
             write_event(state, i, partner, times[i], output)
     state.clock[NOW] = end - state.clock[EPOCH]
     return DONE
+
+
+@kernel
+def snapshot(
+    state: State,
+    rules: Rules,
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    spins: NDArray[np.float64],
+) -> None:
+    """Write down the beads as they are now, by original number.
+
+    Parameters
+    ----------
+    state : State
+    rules : Rules
+    positions, velocities : ndarray (n, 3), [m], [m/s]
+        Written.
+    spins : ndarray (n, 3) or (0, 3), [rad/s]
+        Written.
+    """
+    nothing = state.links[:0, 0]
+    take_frame(state, rules, state.clock[NOW], positions, velocities, spins, nothing)

@@ -66,8 +66,8 @@ def image_horizon(state: State, rules: Rules, i: int, now: float) -> float:
     for axis in range(3):
         speed = abs(state.rows[i, VX + axis])
         if rules.periodic[axis] and speed > 0.0:
-            # Any two beads together move less than half a side, less where they touch.
-            free = 0.25 * (rules.sides[axis] - 2.0 * state.reach[LARGEST_RADIUS])
+            # Two beads together move less than lies between the second image and a contact.
+            free = 0.25 * (rules.sides[axis] - 4.0 * state.reach[LARGEST_RADIUS])
             best = min(best, now + free / speed)
     return best
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,7 +21,7 @@ from nanorocks_ros.simulation.randomness import Purpose, key_for
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 # Hertz contact of two 2 mm acrylic beads that meet at 10 mm/s lasts about this long.
 CONTACT_DURATION = 4e-5
@@ -95,7 +96,14 @@ class WallMotion:
         periods: int,
         start: float = 0.0,
     ) -> WallMotion:
-        """Shaking to and fro for some periods, at a frequency in Hz."""
+        """Shaking to and fro for some periods, at a frequency in Hz.
+
+        Raises
+        ------
+        SimulationError
+            For a frequency that is not above 0.
+        """
+        _check_frequency(frequency)
         return cls(
             amplitude=amplitude,
             angular_frequency=2.0 * math.pi * frequency,
@@ -114,7 +122,13 @@ class WallMotion:
         """A blow that gives the tray a velocity [m/s]; it swings on its springs and comes to rest.
 
         The swing ends after a whole number of periods, once it has shrunk to a millionth.
+
+        Raises
+        ------
+        SimulationError
+            For a frequency that is not above 0.
         """
+        _check_frequency(frequency)
         omega = 2.0 * math.pi * frequency
         periods = math.ceil(math.log(1e6) / damping * frequency) if damping > 0.0 else math.inf
         x, y, z = velocity
@@ -294,7 +308,8 @@ class CollisionRules:
         none = np.zeros((1, 1))
         if isinstance(law, UniformRestitution):
             low, high = law.mean - 0.5 * law.width, law.mean + 0.5 * law.width
-            if not (law.width >= 0.0 and low >= 0.0 and (high <= 1.0 or self.allow_gain)):
+            highest = sys.float_info.max if self.allow_gain else 1.0
+            if not (law.width >= 0.0 and low >= 0.0 and high <= highest):
                 raise SimulationError(
                     'restitution',
                     f'{law!r} reaches from {low:.6g} to {high:.6g}',
@@ -303,7 +318,7 @@ class CollisionRules:
             return UNIFORM, none, float(law.mean), float(law.width)
         if isinstance(law, ViscoelasticRestitution):
             return VISCOELASTIC, none, *_viscoelastic_scale(law)
-        table = _numbers('restitution', np.atleast_2d(np.asarray(law)), self.allow_gain)
+        table = np.atleast_2d(_numbers('restitution', law, self.allow_gain))
         if table.ndim != 2 or table.shape[0] != table.shape[1] or np.any(table != table.T):
             raise SimulationError(
                 'restitution',
@@ -313,7 +328,7 @@ class CollisionRules:
         return CONSTANT, table, 0.0, 0.0
 
     def _walls(self) -> tuple[float, float, float, float, float, float]:
-        given = _numbers('wall_restitution', np.asarray(self.wall_restitution), self.allow_gain)
+        given = _numbers('wall_restitution', self.wall_restitution, self.allow_gain)
         if given.shape not in ((), (_WALLS,)):
             raise SimulationError(
                 'wall_restitution', f'shape {given.shape}', f'give one value or {_WALLS}'
@@ -352,9 +367,9 @@ def _flags(periodic: Sequence[bool]) -> tuple[bool, bool, bool]:
     return x, y, z
 
 
-def _numbers(name: str, values: NDArray[np.generic], allow_gain: bool) -> NDArray[np.float64]:
+def _numbers(name: str, values: ArrayLike, allow_gain: bool) -> NDArray[np.float64]:
     try:
-        numbers = values.astype(np.float64)
+        numbers = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise SimulationError(name, f'{values!r}', 'give numbers from 0 to 1') from error
     for value in numbers.ravel().tolist():
@@ -379,6 +394,11 @@ def _tangential(name: str, value: float | None) -> float:
     if not -1.0 <= value <= 1.0:
         raise SimulationError(name, f'{value!r} is outside [-1, 1]', 'give a value from -1 to 1')
     return float(value)
+
+
+def _check_frequency(frequency: float) -> None:
+    if not (math.isfinite(frequency) and frequency > 0.0):
+        raise SimulationError('motion', f'frequency {frequency!r}', 'give one above 0, in Hz')
 
 
 def _check_motion(motion: WallMotion) -> None:

@@ -63,12 +63,15 @@ def load(path: Path) -> tuple[State, Rules, int]:
         When it cannot be read, is damaged, or was written by another release.
     """
     try:
+        with zipfile.ZipFile(path):
+            # Not a single array, nor a pickle: an archive, as it must be.
+            pass
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
     except OSError as error:
         reason = error.strerror or 'is not a saved gas'
         raise SimulationError(str(path), reason, 'name a file that was saved') from error
-    except (ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
+    except (ValueError, EOFError, KeyError, NotImplementedError, zipfile.BadZipFile) as error:
         raise SimulationError(str(path), 'is damaged', 'use another saved state') from error
     digest = arrays.pop(_DIGEST, None)
     if digest is None or 'form' not in arrays:

@@ -51,7 +51,8 @@ def skin_for(radii: NDArray[np.float64], rules: Rules) -> float:
     largest = 2.0 * float(radii.max())
     for axis in range(3):
         if rules.periodic[axis]:
-            skin = min(skin, 0.98 * (0.5 * sides[axis] - largest))
+            # Neighbours, two shells apart at most, are then always the nearest images.
+            skin = min(skin, 0.49 * (0.5 * sides[axis] - largest))
     return skin if skin > 0.05 * diameter else 0.0
 
 

@@ -307,6 +307,8 @@ def pressed_on(state: State, rules: Rules, wall: int, now: float, after: float) 
     A bead that an accelerating wall presses on would meet it again and again at one instant.
     """
     time = state.clock[EPOCH] + now
+    if not rules.start <= time < rules.end:
+        return after
     least = 0.5 * largest_acceleration(rules, wall // 2, time) * rules.contact_duration
     if abs(after) >= least:
         return after

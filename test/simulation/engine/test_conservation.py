@@ -1,0 +1,116 @@
+"""The beads and the books together keep energy, momentum and angular momentum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from engine.gases import (
+    KERNELS,
+    NEVER,
+    RULES,
+    angular_momentum,
+    energy,
+    mixture,
+    momentum,
+    smallest_gap,
+)
+from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+
+BOX = (12.0, 11.0, 10.0)
+BEADS = 40
+TIMES = np.linspace(0.0, 40.0, 9)
+PRECISION = 1e-12
+
+MOMENTUM = slice(9, 12)
+TO_WALLS, TO_AGGREGATES = slice(12, 15), slice(15, 18)
+
+
+def gas_and_rules(name, kernel, seed=1):
+    rules = CollisionRules(box=BOX, **RULES[name])
+    return HardSphereGas(mixture(seed, BEADS, rules), rules, kernel), rules
+
+
+def states(gas):
+    """The gas at each time."""
+    for time in TIMES:
+        gas.run_until(time)
+        yield gas.beads()
+
+
+@pytest.mark.parametrize('kernel', KERNELS)
+@pytest.mark.parametrize('name', RULES)
+def test_energy_and_momentum_of_beads_and_books_are_kept(name, kernel):
+    gas, rules = gas_and_rules(name, kernel)
+    start = gas.beads()
+    had, moved = energy(start), momentum(start)
+    scale = np.sum(start.masses * np.linalg.norm(start.velocities, axis=1))
+    for beads in states(gas):
+        exchanged = max(had, np.abs(gas.books[:3]).sum())
+        assert abs(energy(beads) + gas.books[:3].sum() - had) <= PRECISION * exchanged
+        given = np.abs(gas.books[3:12]).max()
+        total = momentum(beads) + gas.books[MOMENTUM]
+        assert np.abs(total - moved).max() <= PRECISION * max(scale, given)
+    assert gas.counts.pair > 100
+    assert (gas.counts.wall > 100) == (not all(rules.periodic))
+    assert (gas.counts.merge > 0) == (rules.sticking_speed > 0)
+    assert (gas.counts.fix > 0) == (rules.wall_sticking_speed > 0)
+
+
+BOOKED = [
+    name
+    for name, rule in RULES.items()
+    if rule.get('periodic', NEVER) == NEVER
+    and ('sticking_speed' in rule or 'tangential_restitution' in rule)
+]
+
+
+@pytest.mark.parametrize('kernel', KERNELS)
+@pytest.mark.parametrize('name', BOOKED)
+def test_angular_momentum_of_rough_and_sticky_beads_and_books_is_kept(name, kernel):
+    gas, rules = gas_and_rules(name, kernel)
+    start = gas.beads()
+    turned = angular_momentum(start)
+    scale = np.sum(start.masses * np.linalg.norm(start.velocities, axis=1)) * max(BOX)
+    for beads in states(gas):
+        given = max(scale, np.abs(gas.books[3:]).max() * max(BOX))
+        total = angular_momentum(beads) + gas.books[TO_WALLS] + gas.books[TO_AGGREGATES]
+        assert np.abs(total - turned).max() <= PRECISION * given
+    assert np.abs(gas.books[TO_WALLS]).max() > 1.0
+    assert (np.abs(gas.books[TO_AGGREGATES]).max() > 0.1) == (rules.sticking_speed > 0)
+
+
+@pytest.mark.parametrize('kernel', KERNELS)
+@pytest.mark.parametrize('rough', [False, True])
+def test_energy_drifts_by_rounding_alone_over_tens_of_thousands_of_elastic_events(kernel, rough):
+    spinning = {'tangential_restitution': 1.0, 'wall_tangential_restitution': 1.0}
+    rules = CollisionRules(box=BOX, **(spinning if rough else {}))
+    gas = HardSphereGas(mixture(2, BEADS, rules), rules, kernel)
+    had = energy(gas.beads())
+    gas.run_until(600.0)
+    assert gas.counts.pair + gas.counts.wall > 15_000
+    assert abs(energy(gas.beads()) / had - 1.0) <= PRECISION
+    assert smallest_gap(gas.beads().positions, gas.radii, rules) > -1e-10
+
+
+@pytest.mark.parametrize('kernel', KERNELS)
+def test_momentum_given_to_walls_is_that_of_the_reversed_normal_velocities(kernel):
+    """Between elastic walls alone, one bead: each bounce gives 2 m |v|."""
+    rules = CollisionRules(box=BOX)
+    beads = mixture(3, 1, rules)
+    gas = HardSphereGas(beads, rules, kernel)
+    events = gas.follow(3000.0, log=True).events
+    for wall in range(6):
+        bounces = np.sum(events['partner'] == wall)
+        push = 2 * beads.masses[0] * abs(beads.velocities[0, wall // 2])
+        assert bounces > 5
+        assert gas.books[3 + wall] == pytest.approx(bounces * push, rel=PRECISION)
+
+
+@pytest.mark.parametrize('kernel', KERNELS)
+def test_a_shaken_tray_gains_what_its_walls_give(kernel):
+    gas, _ = gas_and_rules('shaken', kernel)
+    had = energy(gas.beads())
+    gas.run_until(5.0)
+    assert gas.books[1] < 0.0
+    assert energy(gas.beads()) > had

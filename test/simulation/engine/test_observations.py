@@ -1,0 +1,135 @@
+"""Running observables say the same as frames taken at the same instants, and as the events."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from engine.gases import BOX, KERNELS, RULES, energy, gas_of, mixture, near
+from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+
+END = 12.0
+TIMES = np.array([0.0, 0.4, 1.0, 1.0, 2.5, 5.5, 8.0, 11.9, END])
+
+
+def followed(name, kernel, n=14):
+    rules = CollisionRules(box=BOX, **RULES[name])
+    beads = mixture(3, n, rules)
+    gas = HardSphereGas(beads, rules, kernel)
+    return beads, gas, gas.follow(END, TIMES, TIMES, log=True)
+
+
+cases = pytest.mark.parametrize('kernel', KERNELS)
+
+
+@cases
+@pytest.mark.parametrize('name', RULES)
+def test_means_are_those_of_the_frames(name, kernel):
+    beads, _, course = followed(name, kernel)
+    seen = course.observations
+    v = course.velocities
+    np.testing.assert_array_equal(seen.times, TIMES)
+    np.testing.assert_allclose(seen.mean_speed, np.linalg.norm(v, axis=2).mean(axis=1), 1e-14)
+    projected = np.hypot(v[..., 0], v[..., 1]).mean(axis=1)
+    np.testing.assert_allclose(seen.mean_projected_speed, projected, 1e-14)
+    species = np.zeros(14, dtype=int) if beads.species is None else beads.species
+    assert seen.granular_temperature.shape == (TIMES.size, species.max() + 1, 3)
+    for kind in range(species.max() + 1):
+        squares = (v[:, species == kind] ** 2).mean(axis=1)
+        np.testing.assert_allclose(seen.granular_temperature[:, kind], squares, 1e-13)
+
+
+@cases
+@pytest.mark.parametrize('name', RULES)
+def test_counts_are_those_of_the_events_until_then(name, kernel):
+    _, gas, course = followed(name, kernel)
+    seen, events = course.observations, course.events
+    for kind, counts in (
+        ('pair', seen.pair_collisions),
+        ('wall', seen.wall_collisions),
+        ('merge', seen.merges),
+        ('fix', seen.fixings),
+    ):
+        times = events['time'][events['kind'] == kind]
+        np.testing.assert_array_equal(counts, np.searchsorted(times, TIMES, side='right'))
+    assert seen.pair_collisions[-1] == gas.counts.pair > 0
+    assert seen.wall_collisions[-1] == gas.counts.wall
+    bodies = [14] * TIMES.size
+    if course.bodies is not None:
+        bodies = [np.unique(frame).size for frame in course.bodies]
+    np.testing.assert_array_equal(seen.bodies, bodies)
+    assert seen.bodies[-1] == 14 - seen.merges[-1]
+
+
+@cases
+@pytest.mark.parametrize('name', RULES)
+def test_the_books_are_those_of_the_frames_and_events_until_then(name, kernel):
+    beads, gas, course = followed(name, kernel)
+    seen = course.observations
+    left = energy(beads, course.velocities, course.spins)
+    np.testing.assert_allclose(left + seen.energy_lost.sum(axis=1), left[0], 1e-12)
+    np.testing.assert_array_equal(seen.energy_lost[-1], gas.books[:3])
+    np.testing.assert_array_equal(seen.wall_impulse[-1], gas.books[3:9])
+    if name in {'rough', 'struck and rough', 'rough and sticking'}:
+        return  # the impulse of an event then has a tangential part
+    events = course.events
+    for wall in range(6):
+        hits = events[(events['kind'] == 'wall') & (events['partner'] == wall)]
+        if 'fix' not in events['kind']:
+            pushes = [hits['impulse'][hits['time'] <= time].sum() for time in TIMES]
+            np.testing.assert_allclose(seen.wall_impulse[:, wall], pushes, 1e-12, 1e-12)
+
+
+@cases
+def test_what_is_written_down_counts_on_when_a_gas_is_followed_further(kernel):
+    rules = CollisionRules(box=BOX, restitution=0.9)
+    beads = mixture(3, 14, rules)
+    whole = HardSphereGas(beads, rules, kernel).follow(END, (), TIMES).observations
+    gas = HardSphereGas(beads, rules, kernel)
+    parts = [gas.follow(end, (), [end]).observations for end in (1.0, 5.5, END)]
+    for field in ('mean_speed', 'pair_collisions', 'energy_lost', 'wall_impulse'):
+        found = np.concatenate([getattr(part, field) for part in parts])
+        np.testing.assert_array_equal(found, getattr(whole, field)[[3, 5, 8]])
+
+
+@cases
+def test_temperatures_of_species_without_beads_are_not_known(kernel):
+    gas = gas_of(
+        [(2, 5, 5), (8, 5, 5)],
+        [(1, 2, 3), (0.5, 0, 0)],
+        species=np.array([0, 2]),
+        restitution=np.full((4, 4), 0.5),
+        kernel=kernel,
+    )
+    temperature = gas.follow(0.1, (), [0.0]).observations.granular_temperature
+    assert temperature.shape == (1, 4, 3)
+    assert temperature[0, 0] == near([1, 4, 9])
+    assert temperature[0, 2] == near([0.25, 0, 0])
+    assert np.isnan(temperature[0, [1, 3]]).all()
+
+
+@cases
+def test_species_may_be_told_apart_though_they_bounce_alike(kernel):
+    gas = gas_of(
+        [(3, 5, 5), (7, 5, 5)],
+        [(1, 0, 0), (-1, 0, 0)],
+        species=np.array([2, 0]),
+        restitution=0.5,
+        kernel=kernel,
+    )
+    course = gas.follow(1.5, [1.5], [1.5])
+    assert course.velocities[0, :, 0] == near([-0.5, 0.5])
+    assert course.observations.granular_temperature.shape == (1, 3, 3)
+    assert gas.beads().species.tolist() == [2, 0]
+
+
+@cases
+def test_nothing_asked_for_is_an_empty_course(kernel):
+    rules = CollisionRules(box=BOX)
+    course = HardSphereGas(mixture(3, 5, rules), rules, kernel).follow(1.0)
+    assert course.positions.shape == course.velocities.shape == (0, 5, 3)
+    assert course.spins is None
+    assert course.bodies is None
+    assert course.observations.mean_speed.shape == (0,)
+    assert course.observations.wall_impulse.shape == (0, 6)
+    assert len(course.events) == 0

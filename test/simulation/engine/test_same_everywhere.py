@@ -1,0 +1,74 @@
+"""The same beads and rules have the same course, bit by bit, on every machine."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from engine.gases import ALWAYS, BOX, KERNELS, RULES, Beads, placed
+from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+
+# CRC-32 of places and velocities after 30 s. The rules are those that need no more than
+# + - * /, square roots and integers; sines and powers differ from machine to machine.
+GOLDEN = {
+    'inelastic': {'scan': (395183756, 4026217824), 'lists': (2139855582, 3907813359)},
+    'half periodic': {'scan': (1262311415, 1848979193), 'lists': (1678390301, 790753584)},
+    'species': {'scan': (2505272471, 3254736298), 'lists': (4255303355, 3111237540)},
+    'random': {'scan': (3344575901, 513728827), 'lists': (838228335, 1434260786)},
+    'sticking': {'scan': (970506315, 422705974), 'lists': (2448823502, 4278800618)},
+    'rough and sticking': {'scan': (84539865, 1852282705), 'lists': (2654559063, 255263914)},
+    'contact duration': {'scan': (541658232, 1961044516), 'lists': (1225011924, 1262128175)},
+}
+
+
+def beads_for(rules, n=20):
+    """With nothing but uniform numbers and products: these too are the same everywhere."""
+    random = np.random.default_rng(1)
+    radii = random.uniform(0.6, 1.0, n)
+    return Beads(
+        radii=radii,
+        masses=radii * radii * radii,
+        positions=placed(random, radii, rules.box, rules.periodic),
+        velocities=random.uniform(-1.0, 1.0, (n, 3)),
+        spins=random.uniform(-1.0, 1.0, (n, 3)) if rules.tangential_restitution else None,
+        species=np.arange(n) % 2 if np.ndim(rules.restitution) == 2 else None,
+    )
+
+
+def fingerprint(name, kernel):
+    box = tuple(1.5 * side for side in BOX)
+    rules = CollisionRules(box=box, **RULES[name])
+    course = HardSphereGas(beads_for(rules), rules, kernel).follow(30.0, [30.0])
+    return tuple(
+        zlib.crc32(np.ascontiguousarray(array).tobytes())
+        for array in (course.positions, course.velocities)
+    )
+
+
+@pytest.mark.parametrize('name', GOLDEN)
+def test_the_course_has_not_changed(name):
+    scan, lists = (fingerprint(name, kernel) for kernel in KERNELS)
+    assert {'scan': scan, 'lists': lists} == GOLDEN[name]
+
+
+@pytest.mark.parametrize('kernel', KERNELS)
+@pytest.mark.parametrize('name', RULES)
+def test_the_same_gas_twice_is_the_same(name, kernel):
+    assert fingerprint(name, kernel) == fingerprint(name, kernel)
+
+
+@pytest.mark.parametrize('kernel', KERNELS)
+def test_the_last_bit_of_one_place_changes_the_course(kernel):
+    """What is compared above is as sharp as can be."""
+    rules = CollisionRules(box=BOX, periodic=ALWAYS)
+    beads = beads_for(rules, 6)
+    moved = beads.positions.copy()
+    moved[0, 0] = np.nextafter(moved[0, 0], np.inf)
+    one, other = (
+        HardSphereGas(replace(beads, positions=positions), rules, kernel).follow(30.0, [30.0])
+        for positions in (beads.positions, moved)
+    )
+    assert not np.array_equal(one.positions, other.positions)

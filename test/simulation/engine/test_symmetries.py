@@ -1,0 +1,213 @@
+"""The engine has no favourite place, axis, direction, unit, frame of reference or way of time."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from engine.gases import ALWAYS, BOX, KERNELS, RULES, mixture, placed
+from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.rules import ViscoelasticRestitution
+
+pytestmark = pytest.mark.parametrize('kernel', KERNELS)
+
+BEADS = 10
+# As many events as leave rounding below this part, in a gas that multiplies it at each.
+EVENTS = 20
+CHAOS = 1e-6
+
+seeds = st.integers(0, 10**6)
+names = st.sampled_from(sorted(RULES))
+few = settings(deadline=None, max_examples=25, derandomize=True)
+
+
+def gas_and_course(beads, rules, kernel, end=None):
+    """Follow for as many events as are compared, or to a time; frames on the way."""
+    if end is None:
+        events = HardSphereGas(beads, rules, kernel).follow(40.0, log=True).events
+        end = events['time'][:EVENTS][-1]
+    times = np.linspace(0.0, end, 5)
+    # Not at the last event itself: rounding would put it before or after the frame.
+    course = HardSphereGas(beads, rules, kernel).follow(end, 0.999 * times, log=True)
+    return end, course
+
+
+def assert_alike(course, other, matrix=None, shift=0.0, spin_matrix=None):
+    """Whether one course is the other, turned and shifted."""
+    matrix = np.eye(3) if matrix is None else matrix
+    np.testing.assert_allclose(other.positions, course.positions @ matrix.T + shift, atol=CHAOS)
+    np.testing.assert_allclose(other.velocities, course.velocities @ matrix.T, atol=CHAOS)
+    if course.spins is not None:
+        matrix = matrix if spin_matrix is None else spin_matrix
+        np.testing.assert_allclose(other.spins, course.spins @ matrix.T, atol=CHAOS)
+    assert abs(len(other.events) - len(course.events)) <= 1
+    for field in ('time', 'normal_speed', 'impulse'):
+        n = min(len(other.events), len(course.events))
+        assert n >= EVENTS // 2
+        np.testing.assert_allclose(other.events[field][:n], course.events[field][:n], atol=CHAOS)
+
+
+def turned(beads, rules, matrix, shift):
+    """Beads and rules seen in axes that are renamed, or reversed."""
+    axes = np.abs(matrix).argmax(axis=1)
+    signs = matrix.sum(axis=1)
+    walls = np.broadcast_to(rules.wall_restitution, 6).reshape(3, 2)[axes]
+    walls = np.where(signs[:, np.newaxis] < 0, walls[:, ::-1], walls)
+    motion = rules.motion
+    if motion is not None:
+        motion = replace(motion, amplitude=tuple(matrix @ motion.amplitude))
+    rules = replace(
+        rules,
+        box=tuple(np.array(rules.box)[axes]),
+        periodic=tuple(np.array(rules.periodic)[axes].tolist()),
+        wall_restitution=tuple(walls.ravel()),
+        motion=motion,
+    )
+    beads = replace(
+        beads,
+        positions=beads.positions @ matrix.T + shift,
+        velocities=beads.velocities @ matrix.T,
+        # Spins are turned with space but not reversed with it.
+        spins=None if beads.spins is None else beads.spins @ matrix.T * np.linalg.det(matrix),
+    )
+    return beads, rules
+
+
+@few
+@given(name=names, seed=seeds, order=st.permutations(range(3)))
+def test_axes_may_have_other_names(kernel, name, seed, order):
+    rules = CollisionRules(box=BOX, **RULES[name])
+    beads = mixture(seed, BEADS, rules)
+    matrix = np.eye(3)[list(order)]
+    end, course = gas_and_course(beads, rules, kernel)
+    _, other = gas_and_course(*turned(beads, rules, matrix, 0.0), kernel, end)
+    assert_alike(course, other, matrix, spin_matrix=matrix * np.linalg.det(matrix))
+
+
+@few
+@given(name=names, seed=seeds, signs=st.tuples(*[st.sampled_from([1.0, -1.0])] * 3))
+def test_a_mirror_shows_the_mirrored_course(kernel, name, seed, signs):
+    rules = CollisionRules(box=BOX, **RULES[name])
+    beads = mixture(seed, BEADS, rules)
+    matrix = np.diag(signs)
+    shift = np.where(np.array(signs) < 0, BOX, 0.0)
+    end, course = gas_and_course(beads, rules, kernel)
+    _, other = gas_and_course(*turned(beads, rules, matrix, shift), kernel, end)
+    assert_alike(course, other, matrix, shift, matrix * np.linalg.det(matrix))
+
+
+PERIODIC = [name for name, rule in RULES.items() if 'motion' not in rule]
+
+
+@few
+@given(
+    name=st.sampled_from(PERIODIC),
+    seed=seeds,
+    shift=st.tuples(*[st.floats(-20.0, 20.0)] * 3),
+    boost=st.tuples(*[st.floats(-2.0, 2.0)] * 3),
+)
+def test_a_periodic_box_may_be_anywhere_and_in_motion(kernel, name, seed, shift, boost):
+    walls = {'wall_sticking_speed': 0.0, 'wall_tangential_restitution': None}
+    rules = CollisionRules(**{'box': BOX, **RULES[name], **walls, 'periodic': ALWAYS})
+    beads = mixture(seed, BEADS, rules)
+    moved = replace(
+        beads, positions=beads.positions + shift, velocities=beads.velocities + np.array(boost)
+    )
+    end, course = gas_and_course(beads, rules, kernel)
+    _, other = gas_and_course(moved, rules, kernel, end)
+    drift = np.array(shift) + np.multiply.outer(other.times, boost)
+    other = replace(
+        other,
+        positions=other.positions - drift[:, np.newaxis],
+        velocities=other.velocities - np.array(boost),
+    )
+    assert_alike(course, other)
+
+
+@few
+@given(seed=seeds, boxes=st.lists(st.tuples(*[st.integers(-3, 3)] * 3), min_size=10, max_size=10))
+def test_beads_may_start_in_any_image_of_a_periodic_box(kernel, seed, boxes):
+    rules = CollisionRules(box=BOX, periodic=ALWAYS, restitution=0.9)
+    beads = mixture(seed, BEADS, rules)
+    away = np.array(boxes) * np.array(BOX)
+    end, course = gas_and_course(beads, rules, kernel)
+    far = replace(beads, positions=beads.positions + away)
+    _, other = gas_and_course(far, rules, kernel, end)
+    assert_alike(course, other, shift=away)
+
+
+def scaled(beads, rules, length, time, mass):
+    """Beads and rules in other units."""
+    speed = length / time
+    law, motion = rules.restitution, rules.motion
+    if isinstance(law, ViscoelasticRestitution):
+        law = replace(law, at_speed=law.at_speed * speed)
+    if motion is not None:
+        motion = replace(
+            motion,
+            amplitude=tuple(np.array(motion.amplitude) * length),
+            angular_frequency=motion.angular_frequency / time,
+            damping=motion.damping / time,
+            start=motion.start * time,
+            end=motion.end * time,
+        )
+    rules = replace(
+        rules,
+        box=tuple(np.array(rules.box) * length),
+        restitution=law,
+        contact_duration=rules.contact_duration * time,
+        sticking_speed=rules.sticking_speed * speed,
+        wall_sticking_speed=rules.wall_sticking_speed * speed,
+        motion=motion,
+    )
+    beads = replace(
+        beads,
+        radii=beads.radii * length,
+        masses=beads.masses * mass,
+        positions=beads.positions * length,
+        velocities=beads.velocities * speed,
+        spins=None if beads.spins is None else beads.spins / time,
+    )
+    return beads, rules
+
+
+@pytest.mark.parametrize('name', RULES)
+def test_units_that_are_powers_of_two_change_no_bit(kernel, name):
+    """Millimetres, hours or tons: nothing in the engine is of any size by itself."""
+    rules = CollisionRules(box=BOX, **RULES[name])
+    beads = mixture(1, BEADS, rules)
+    times = np.linspace(0.0, 20.0, 11)
+    course = HardSphereGas(beads, rules, kernel).follow(20.0, times, log=True)
+    for length, time, mass in itertools.product(
+        (2.0**-10, 2.0**7), (2.0**-3, 2.0**8), (2.0**-20,)
+    ):
+        gas = HardSphereGas(*scaled(beads, rules, length, time, mass), kernel)
+        other = gas.follow(20.0 * time, times * time, log=True)
+        np.testing.assert_array_equal(other.positions, course.positions * length)
+        np.testing.assert_array_equal(other.velocities, course.velocities * (length / time))
+        np.testing.assert_array_equal(other.events['time'], course.events['time'] * time)
+        np.testing.assert_array_equal(other.events['kind'], course.events['kind'])
+
+
+@few
+@given(seed=seeds, periodic=st.tuples(*[st.booleans()] * 3))
+def test_an_elastic_gas_turned_round_goes_back_to_where_it_came_from(kernel, seed, periodic):
+    rules = CollisionRules(box=BOX, periodic=periodic)
+    random = np.random.default_rng(seed)
+    beads = mixture(seed, BEADS, rules)
+    beads = replace(beads, positions=placed(random, beads.radii, BOX, periodic))
+    end = HardSphereGas(beads, rules, kernel).follow(40.0, log=True).events['time'][EVENTS // 2]
+    gas = HardSphereGas(beads, rules, kernel)
+    gas.run_until(end)
+    gas.kick(-gas.beads().velocities)
+    assert gas.now == 0.0
+    gas.run_until(end)
+    back = gas.beads()
+    np.testing.assert_allclose(back.positions, beads.positions, atol=CHAOS)
+    np.testing.assert_allclose(back.velocities, -beads.velocities, atol=CHAOS)
+    assert gas.counts.pair + gas.counts.wall >= EVENTS
