@@ -35,16 +35,6 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _listen_to_the_core() -> None:
-    """Let people read what the core has to say while it works."""
-    handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter('nanorocks: %(message)s'))
-    logger = logging.getLogger('nanorocks_ros')
-    logger.handlers = [handler]
-    logger.setLevel(logging.INFO)
-    logger.propagate = False
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; the exit code.
 
@@ -56,7 +46,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     # Before numpy is loaded: no array here is worth a second thread.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-    _listen_to_the_core()
+    # What the core has to say while it works; of others, warnings only.
+    logging.basicConfig(format='nanorocks: %(message)s')
+    logging.getLogger('nanorocks_ros').setLevel(logging.INFO)
     try:
         options = build_parser().parse_args(arguments)
         code: int = options.run(options)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
@@ -61,6 +62,9 @@ def run(name):
     # Before numpy is loaded: no array here is worth a second thread, which would wait for the
     # first on a machine whose cores are all in use.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+    # What the core has to say while it works; of others, warnings only.
+    logging.basicConfig(format=f'{name}: %(message)s')
+    logging.getLogger('nanorocks_ros').setLevel(logging.INFO)
     _use_large_segments()
     import rclpy
     from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
