@@ -109,7 +109,7 @@ def test_a_bag_through_separate_nodes_gives_the_same_numbers_as_offline(graph):
     listening_to(graph, topics.GRAY, 2)
     listening_to(graph, topics.SPEED, 2)
     listening_to(graph, topics.RAW)
-    player = graph.start('bag_player', f'bag:={SAMPLE}', 'rate:=4.0', 'listeners:=1')
+    player = graph.start('bag_player', f'bag:={SAMPLE}', 'rate:=2.0', 'listeners:=1')
     finished = graph.wait(player)
     assert finished.code == 0, finished.output
     graph.until(lambda: arrays.finals())

@@ -62,6 +62,12 @@ RULES = {
         'wall_restitution': 0.3,
         'contact_duration': 0.3,
     },
+    'contact duration, rough': {
+        'restitution': 0.4,
+        'wall_restitution': 0.4,
+        'contact_duration': 0.5,
+        **ROUGH,
+    },
     'shaken': {
         'restitution': 0.9,
         'wall_restitution': 0.9,

@@ -125,6 +125,27 @@ def test_a_slow_bead_stays_at_a_wall_and_reflects_as_one_of_infinite_mass(kernel
     assert gas.books[9:12] == near([-0.5 - 9.0, 0, 0])
 
 
+@pytest.mark.parametrize(
+    ('kind', 'rules'),
+    [
+        ('fix', {'wall_sticking_speed': 0.51}),
+        ('wall', {'wall_sticking_speed': 0.49}),
+        ('wall', {'wall_sticking_speed': 0.51, 'sticking_measure': 'total'}),
+        ('wall', {'wall_sticking_speed': 1.29, 'sticking_measure': 'total'}),
+        ('fix', {'wall_sticking_speed': 1.31, 'sticking_measure': 'total'}),
+    ],
+)
+def test_slow_beads_stay_at_a_wall_by_the_speed_that_is_to_count(kernel, kind, rules):
+    """The speed is 1.3, along the normal 0.5."""
+    gas = gas_of([(3, 2, 5)], [(-0.5, 1.2, 0)], kernel=kernel, **rules)
+    course = gas.follow(5.0, [5.0], log=True)
+    assert what_happened(course) == [(kind, 0, 0)]
+    assert course.events['normal_speed'] == near([0.5])
+    assert course.events['impulse'] == near([1.3 if kind == 'fix' else 1.0])
+    expected = (0, 0, 0) if kind == 'fix' else (0.5, 1.2, 0)
+    assert course.velocities[0, 0] == near(expected)
+
+
 def test_what_sticks_to_a_bead_at_a_wall_is_stuck_too(kernel):
     gas = gas_of(
         [(3, 5, 5), (8, 5, 5), (13, 5, 5)],
