@@ -76,7 +76,7 @@ RULES = {
     'struck and rough': {
         'restitution': 0.9,
         'wall_restitution': 0.9,
-        'motion': WallMotion.impulsive((2.0, 0.0, 1.0), 0.8, damping=0.5, start=0.5),
+        'motion': WallMotion.impulsive((2.0, 0.0, 1.0), 0.8, damping=1.0, start=0.5),
         **ROUGH,
     },
 }

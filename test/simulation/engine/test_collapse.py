@@ -237,7 +237,7 @@ def test_too_many_events_end_in_an_error_after_which_the_gas_goes_on(kernel):
     straight, stopped = (HardSphereGas(beads, rules, kernel) for _ in range(2))
     expected = straight.follow(30.0, [30.0])
     with pytest.raises(SimulationError, match='100 events taken and only'):
-        stopped.follow(30.0, most_events=100)
+        stopped.run_until(30.0, most_events=100)
     assert all_taken(stopped.counts) == 100
     assert 0.0 < stopped.now < 30.0
     course = stopped.follow(30.0, [30.0])
