@@ -6,7 +6,6 @@ folder `Single` in NANOROCKS_EDMD, built here with gcc and its author's flags.
 
 from __future__ import annotations
 
-import bz2
 import os
 import re
 import shutil
@@ -100,20 +99,24 @@ def dynamo() -> Callable[[int], float] | None:
         crystal = ['-m', '0', '-d', str(DENSITY), '-C', str(cells), '-o', 'start.xml']
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run([make, *crystal], cwd=folder, check=True, capture_output=True)
-            work = WORK // 4
             part = ['--out-config-file', 'end.xml.bz2', '--out-data-file', 'data.xml.bz2']
             cpu_seconds([run, 'start.xml', '-c', str(8 * n), *part], Path(folder))
-            seconds = []
             # The difference leaves out reading, sorting and writing the configuration.
-            for events in (work // 10, work):
-                command = [run, 'end.xml.bz2', '-c', str(events), '--out-config-file', 'no.xml']
-                seconds.append(
-                    cpu_seconds([*command, '--out-data-file', 'data.xml.bz2'], Path(folder))
-                )
-            text = bz2.decompress(Path(folder, 'data.xml.bz2').read_bytes()).decode()
-            found = re.search(r'TwoParticleEvents val="(\d+)"|Events[^>]*?Count="(\d+)"', text)
-            if found is None:
-                raise SystemExit('benchmarks: DynamO wrote no number of events')
-        return 0.9 * work / (seconds[1] - seconds[0])
+            short, long = (
+                dynamo_run([run, 'end.xml.bz2', '-c', str(events)], Path(folder))
+                for events in (WORK // 40, WORK // 4)
+            )
+        return (long[0] - short[0]) / (long[1] - short[1])
 
     return rate
+
+
+def dynamo_run(command: list[str], folder: Path) -> tuple[int, float]:
+    """Collisions that DynamO says it has done, and its CPU time."""
+    seconds = cpu_seconds(
+        [*command, '--out-config-file', 'no.xml', '--out-data-file', 'data.xml'], folder
+    )
+    found = re.search(r'TwoParticleEvents="(\d+)"', Path(folder, 'data.xml').read_text())
+    if found is None:
+        raise SystemExit('benchmarks: DynamO wrote no number of collisions; use another release')
+    return int(found[1]), seconds

@@ -20,6 +20,7 @@ from nanorocks_ros.simulation.engine.checks import (
 )
 from nanorocks_ros.simulation.engine.course import Course, Recorder
 from nanorocks_ros.simulation.engine.kernel import TAKEN, run_until, snapshot
+from nanorocks_ros.simulation.engine.memory import in_large_pages
 from nanorocks_ros.simulation.engine.rules import (
     CONTACT_DURATION,
     CollisionRules,
@@ -188,7 +189,8 @@ class HardSphereGas:
             For a file that is damaged, or not a saved gas.
         """
         gas = cls.__new__(cls)
-        gas._state, gas._rules, gas._n_species = saved.load(path)
+        state, gas._rules, gas._n_species = saved.load(path)
+        gas._state = in_large_pages(state)
         gas._known_species = gas._n_species
         return gas
 

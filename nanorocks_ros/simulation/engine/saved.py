@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import zipfile
+import zlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -71,7 +72,7 @@ def load(path: Path) -> tuple[State, Rules, int]:
     except OSError as error:
         reason = error.strerror or 'is not a saved gas'
         raise SimulationError(str(path), reason, 'name a file that was saved') from error
-    except (ValueError, EOFError, KeyError, NotImplementedError, zipfile.BadZipFile) as error:
+    except (ValueError, EOFError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         raise SimulationError(str(path), 'is damaged', 'use another saved state') from error
     digest = arrays.pop(_DIGEST, None)
     if digest is None or 'form' not in arrays:

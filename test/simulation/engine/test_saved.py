@@ -180,6 +180,15 @@ def test_a_file_with_one_changed_bit_is_refused_or_the_same_gas(saved):
     assert refusals > 75
 
 
+@pytest.mark.parametrize(('place', 'value'), [(8, 1), (10, 8), (10, 12), (10, 14), (10, 99)])
+def test_an_archive_said_to_be_encrypted_or_packed_otherwise_is_refused(saved, place, value):
+    """In the directory of the archive: flags, and deflate, bzip2, LZMA, and a method unknown."""
+    changed = bytearray(saved.read_bytes())
+    changed[changed.index(b'PK\x01\x02') + place] = value
+    saved.write_bytes(changed)
+    refused(saved)
+
+
 def foreign(kind):
     """What else somebody may name."""
     buffer = io.BytesIO()
