@@ -70,12 +70,16 @@ class Tray:
     species : tuple of Species
     chalk : bool
         Whether the beads were breaded with chalk dust.
+    place : tuple of 2 floats or None, [m]
+        Corner of the cell nearest to the upper left one of the plate, along columns and rows of
+        the picture; None for a cell that lies on no plate.
     """
 
     number: int
     dimensions: tuple[float, float, float]
     species: tuple[Species, ...]
     chalk: bool
+    place: tuple[float, float] | None = None
 
     @property
     def count(self) -> int:
@@ -180,7 +184,7 @@ class _TrayFile:
         return key
 
     def _tray(self, number: int, node: yaml.Node, densities: Mapping[str, float]) -> Tray:
-        entry = self._mapping(node, {'dimensions_mm', 'species'}, {'chalk'})
+        entry = self._mapping(node, {'dimensions_mm', 'species'}, {'chalk', 'place_mm'})
         sides = self._numbers(entry['dimensions_mm'])
         if len(sides) != 3:
             raise self._error(
@@ -202,7 +206,16 @@ class _TrayFile:
             dimensions=(sides[0] * MILLIMETRE, sides[1] * MILLIMETRE, sides[2] * MILLIMETRE),
             species=species,
             chalk=self._flag(entry.get('chalk')),
+            place=self._place(entry.get('place_mm')),
         )
+
+    def _place(self, node: yaml.Node | None) -> tuple[float, float] | None:
+        if node is None:
+            return None
+        found = self._numbers(node)
+        if len(found) != 2:
+            raise self._error(node, f'{len(found)} numbers for a place', 'give column and row')
+        return found[0] * MILLIMETRE, found[1] * MILLIMETRE
 
     def _species(self, node: yaml.Node, densities: Mapping[str, float]) -> Species:
         entry = self._mapping(node, {'material', 'diameter_mm', 'count'}, {'mass_g'})

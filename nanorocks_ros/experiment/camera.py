@@ -1,0 +1,152 @@
+"""The camera: where a point of the rectified picture is in the picture that the lens makes.
+
+Points are in pixels from the upper left corner of the picture; the centre of the first pixel is
+at (0.5, 0.5). ROS and OpenCV count from that centre, see `Camera.matrix`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# Newton's iteration for the angle gains a factor of over 100 each time.
+_MOST_ITERATIONS = 20
+_EXACT = 1e-12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Camera:
+    """A camera with an equidistant (fisheye) lens, as in sensor_msgs/CameraInfo.
+
+    A point seen at the angle t from the axis appears at the distance f d(t) from the centre,
+    d(t) = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8); in the rectified picture at f tan(t).
+    (Kannala and Brandt 2006, IEEE PAMI 28, 1335.)
+
+    Parameters
+    ----------
+    width, height : int, [px]
+    focal : tuple of 2 floats, [px], > 0
+        Along columns and rows.
+    centre : tuple of 2 floats, [px]
+        Where the axis meets the picture.
+    distortion : tuple of 4 floats
+        k1 to k4.
+
+    Raises
+    ------
+    ConfigurationError
+        For numbers that no camera has: not finite, or a picture that folds over within itself.
+    """
+
+    width: int
+    height: int
+    focal: tuple[float, float]
+    centre: tuple[float, float]
+    distortion: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        numbers = (*self.focal, *self.centre, *self.distortion)
+        if not all(math.isfinite(value) for value in numbers) or min(self.focal) <= 0.0:
+            raise ConfigurationError(
+                'camera', f'numbers {numbers}', 'give finite ones, and positive focal lengths'
+            )
+        if self.width < 1 or self.height < 1:
+            raise ConfigurationError(
+                'camera', f'a picture of {self.width} x {self.height} px', 'give its size'
+            )
+        angles = np.linspace(0.0, self._widest_angle(), 200)
+        if (self._slope(angles) <= 0.0).any():
+            raise ConfigurationError(
+                'camera',
+                f'the distortion {self.distortion} folds the picture over',
+                'calibrate it again',
+            )
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """The matrix K of ROS and OpenCV, (3, 3): they count from the centre of a pixel."""
+        return np.array(
+            [
+                [self.focal[0], 0.0, self.centre[0] - 0.5],
+                [0.0, self.focal[1], self.centre[1] - 0.5],
+                [0.0, 0.0, 1.0],
+            ]
+        )
+
+    def distorted(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where points of the rectified picture are in the picture of the lens.
+
+        Parameters
+        ----------
+        points : ndarray (..., 2), [px]
+
+        Returns
+        -------
+        ndarray (..., 2), [px]
+        """
+        flat = (np.asarray(points, dtype=np.float64) - self.centre) / self.focal
+        radius = np.hypot(flat[..., 0], flat[..., 1])
+        angle = np.arctan(radius)
+        ratio = np.divide(
+            self._bent(angle), radius, where=radius > _EXACT, out=np.ones_like(radius)
+        )
+        return np.asarray(flat * ratio[..., np.newaxis] * self.focal + self.centre)
+
+    def rectified(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where points of the picture of the lens are in the rectified picture.
+
+        Parameters
+        ----------
+        points : ndarray (..., 2), [px]
+
+        Returns
+        -------
+        ndarray (..., 2), [px]
+            NaN where no straight ray leads.
+        """
+        bent = (np.asarray(points, dtype=np.float64) - self.centre) / self.focal
+        radius = np.hypot(bent[..., 0], bent[..., 1])
+        angle = np.minimum(radius, 0.5 * math.pi)
+        for _ in range(_MOST_ITERATIONS):
+            step = (self._bent(angle) - radius) / np.maximum(self._slope(angle), _EXACT)
+            angle = angle - step
+            if not (np.abs(step) > _EXACT).any():
+                break
+        lost = ~((angle >= 0.0) & (angle < 0.5 * math.pi))
+        ratio = np.divide(
+            np.tan(np.where(lost, 0.0, angle)),
+            radius,
+            where=radius > _EXACT,
+            out=np.ones_like(radius),
+        )
+        ratio[lost] = np.nan
+        return np.asarray(bent * ratio[..., np.newaxis] * self.focal + self.centre)
+
+    def _widest_angle(self) -> float:
+        """Angle of the corner of the rectified picture that is furthest from the axis."""
+        across = max(self.centre[0], self.width - self.centre[0]) / self.focal[0]
+        down = max(self.centre[1], self.height - self.centre[1]) / self.focal[1]
+        return math.atan(math.hypot(across, down))
+
+    def _bent(self, angle: NDArray[np.float64]) -> NDArray[np.float64]:
+        k1, k2, k3, k4 = self.distortion
+        square = angle * angle
+        return np.asarray(
+            angle * (1.0 + square * (k1 + square * (k2 + square * (k3 + square * k4))))
+        )
+
+    def _slope(self, angle: NDArray[np.float64]) -> NDArray[np.float64]:
+        k1, k2, k3, k4 = self.distortion
+        square = angle * angle
+        return np.asarray(
+            1.0
+            + square * (3.0 * k1 + square * (5.0 * k2 + square * (7.0 * k3 + square * 9.0 * k4)))
+        )
