@@ -22,6 +22,7 @@ class SpeedMethod(IntEnum):
 
     STRUCTURE_FUNCTION = 1
     BINARISED_AREA = 2
+    TRACKING = 3
 
 
 class CorStatus(IntEnum):
@@ -158,6 +159,12 @@ class SpeedEstimate:
     method : SpeedMethod
     cycle_start_ns : int or None
         The shaking event that opened the cycle; None before the first.
+    quality : Quality
+        What was wrong with the pictures since the last estimate.
+    first_species_speed, first_species_speed_error : float, [m/s]
+    second_species_speed, second_species_speed_error : float, [m/s]
+        Mean projected speed of the first two of `Tray.species`; unknown when they were not told
+        apart.
     """
 
     stamp_ns: int
@@ -168,6 +175,11 @@ class SpeedEstimate:
     mean_projected_speed_error: float
     window: float
     method: SpeedMethod
+    quality: Quality = Quality(0)
+    first_species_speed: float = UNKNOWN
+    first_species_speed_error: float = UNKNOWN
+    second_species_speed: float = UNKNOWN
+    second_species_speed_error: float = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

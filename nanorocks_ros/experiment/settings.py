@@ -126,6 +126,15 @@ class SpeedSettings:
     threshold: float = _setting(
         5.0, 'binarised_area: threshold in units of the noise', low=0.5, high=50.0
     )
+    area_factor: float = _setting(
+        1.0,
+        'binarised_area: factor that manual tracks call for (`nanorocks track --compare`)',
+        low=1e-3,
+        high=1e3,
+    )
+    area_offset: float = _setting(
+        0.0, 'binarised_area: what manual tracks call for to be added', 'm/s', low=-1.0, high=1.0
+    )
     shake_ratio: float = _setting(
         2.0,
         'a shaking event is a jump of the motion between two frames by this factor',

@@ -60,7 +60,7 @@ def _difference_counts(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> 
 def _power_of(counts: NDArray[np.float64]) -> float:
     power = float(counts @ _SQUARES / counts.sum())
     for _ in range(30):
-        kept = _SQUARES <= max(1.0, _CLIP**2 * power)
+        kept = max(1.0, _CLIP**2 * power) >= _SQUARES
         clipped = float((counts * kept) @ _SQUARES / (counts @ kept)) / _CLIPPED_VARIANCE
         if abs(clipped - power) <= 1e-6 * power:
             break
@@ -80,6 +80,24 @@ def noise_power(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> float:
     """
     counts = _difference_counts(np.ascontiguousarray(later), np.ascontiguousarray(earlier))
     return _power_of(counts.astype(np.float64))
+
+
+class NoiseMeter:
+    """Noise of the images of one tray."""
+
+    def __init__(self) -> None:
+        self._found: deque[float] = deque(maxlen=_NOISE_FRAMES)
+        self._last: NDArray[np.uint8] | None = None
+
+    def push(self, image: NDArray[np.uint8]) -> float:
+        """Mean squared difference per pixel of two images of a scene at rest."""
+        last, self._last = self._last, image
+        if last is None:
+            return 0.0
+        self._found.append(noise_power(image, last))
+        # Slow motion hides in the noise, and a frame stored twice has none: neither the mean
+        # nor the least will do.
+        return float(np.quantile(self._found, _NOISE_QUANTILE))
 
 
 class MotionMeter:

@@ -121,9 +121,7 @@ class TrayFollower:
         self._reference += (self._values - self._reference) / self._seen
         return found
 
-    def _registered(
-        self, image: NDArray[np.uint8], start: tuple[float, float]
-    ) -> Shift | None:
+    def _registered(self, image: NDArray[np.uint8], start: tuple[float, float]) -> Shift | None:
         found = np.empty(5)
         done = register(
             image,
@@ -155,9 +153,7 @@ class TrayFollower:
         self._seen = 1
         return self._registered(image, (0.0, 0.0))
 
-    def _edges(
-        self, image: NDArray[np.uint8]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _edges(self, image: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         region, margin = self._region, self._wall + 2
         rows, columns = region.height + 2 * margin, region.width + 2 * margin
         x = region.x - margin + 0.5 + np.arange(columns)

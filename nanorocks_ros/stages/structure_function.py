@@ -37,40 +37,30 @@ _KEYS_KEPT = 48
 
 
 @dataclass(frozen=True, slots=True)
-class Displacement:
-    """Mean path of the beads between two images.
+class Sample:
+    """Structure function at every lag, at one instant.
 
     Parameters
     ----------
-    stamp_ns, window_ns : int
-        Middle and length of the time between the two.
     cycle : int
-    cycle_start_ns : int or None
-    pixels, pixels_error : float, [px]
+    cycle_start_ns : int or None, [ns]
+    noise_power : float, [gray levels^2]
+    middles_ns, windows_ns : ndarray of int64, (n_lags,), [ns]
+        Middle and length of the time between the two images.
+    powers : ndarray (n_lags,), [gray levels^2]
+        Sums over the image, free of noise.
     """
 
-    stamp_ns: int
-    window_ns: int
-    cycle: int
-    cycle_start_ns: int | None
-    pixels: float
-    pixels_error: float
-
-
-@dataclass(frozen=True, slots=True)
-class _Sample:
-    """Structure function at every lag, at one instant."""
-
-    stamp_ns: int
     cycle: int
     cycle_start_ns: int | None
     noise_power: float
+    middles_ns: NDArray[np.int64]
     windows_ns: NDArray[np.int64]
     powers: NDArray[np.float64]
 
 
 class StructureFunction:
-    """Turns gray images into mean displacements; silent until it knows its beads.
+    """Turns images of one species into mean displacements, once it knows its beads.
 
     Parameters
     ----------
@@ -78,10 +68,17 @@ class StructureFunction:
     diameter_px : float, [px]
         Mean bead diameter.
     beads : int
+    centred : bool
+        Whether all pairs of images have one middle, so that species that differ in speed can
+        have lags of their own; otherwise all end with the last image, which is half the longest
+        lag earlier.
     """
 
-    def __init__(self, settings: SpeedSettings, diameter_px: float, beads: int) -> None:
+    def __init__(
+        self, settings: SpeedSettings, diameter_px: float, beads: int, centred: bool = False
+    ) -> None:
         self._settings = settings
+        self._centred = centred
         self._diameter_px = diameter_px
         self._lags = _ladder(settings.longest_lag_frames)
         self._images: deque[tuple[int, NDArray[np.uint8]]] = deque(
@@ -92,11 +89,9 @@ class StructureFunction:
         self._response = BeadResponse(diameter_px, beads)
         self._first_guess = BeadResponse(diameter_px, beads)
         self._beads = beads
-        self._held: list[_Sample] = []
         self._path_stamps: list[int] = []
         self._path: list[float] = []
         self._next_sample_ns: int | None = None
-        self._last_emitted_ns: int | None = None
 
     def shaken(self) -> None:
         """Forget the images from before a shaking event, all but the last."""
@@ -115,17 +110,26 @@ class StructureFunction:
         gray: NDArray[np.uint8],
         cycle: tuple[int, int | None],
         noise_power: float,
-    ) -> tuple[Displacement, ...]:
-        """Take the next image; `cycle` is the cycle and the stamp at which it started."""
+    ) -> Sample | None:
+        """Take the next image; a sample when one is due.
+
+        Parameters
+        ----------
+        stamp_ns : int, [ns]
+        gray : ndarray of uint8, (rows, columns)
+        cycle : tuple
+            The cycle, and the stamp at which it started.
+        noise_power : float, [gray levels^2]
+            Mean squared difference per pixel of a scene at rest.
+        """
         self._images.append((stamp_ns, gray))
         if self._next_sample_ns is None:
             self._next_sample_ns = stamp_ns
-        found: tuple[Displacement, ...] = ()
+        found = None
         if stamp_ns >= self._next_sample_ns and len(self._images) > 1:
             self._next_sample_ns += round(self._settings.interval * NS)
             self._next_sample_ns = max(self._next_sample_ns, stamp_ns + 1)
-            self._held.append(self._sample(stamp_ns, cycle, noise_power))
-            found = self._release()
+            found = self._sample(cycle, noise_power, self._centred)
         if not self._keys or stamp_ns - self._keys[-1][0] >= self._key_interval_ns:
             self._learn(stamp_ns, gray, noise_power)
             self._keep(stamp_ns, gray)
@@ -136,54 +140,54 @@ class StructureFunction:
         """Whether enough unrelated image pairs have been seen."""
         return self._response.pairs >= _PAIRS_NEEDED
 
-    def _sample(self, stamp_ns: int, cycle: tuple[int, int | None], noise_power: float) -> _Sample:
-        gray = self._images[-1][1]
-        usable = [lag for lag in self._lags if lag < len(self._images)]
-        earlier = [self._images[-1 - lag] for lag in usable]
-        powers = [difference_power(gray, one[1]) - noise_power * gray.size for one in earlier]
-        return _Sample(
-            stamp_ns=stamp_ns,
+    def _sample(
+        self, cycle: tuple[int, int | None], noise_power: float, centred: bool = False
+    ) -> Sample:
+        lags = [lag for lag in self._lags if lag < len(self._images)]
+        last = len(self._images) - 1
+        # The later of the two images: the last one, or so that all pairs have one middle.
+        ends = [last - (last - lag) // 2 if centred else last for lag in lags]
+        pairs = [
+            (self._images[end], self._images[end - lag])
+            for end, lag in zip(ends, lags, strict=True)
+        ]
+        quiet = noise_power * self._images[-1][1].size
+        return Sample(
             cycle=cycle[0],
             cycle_start_ns=cycle[1],
             noise_power=noise_power,
-            windows_ns=np.array([stamp_ns - one[0] for one in earlier]),
-            powers=np.array(powers),
+            middles_ns=np.array([(later[0] + earlier[0]) // 2 for later, earlier in pairs]),
+            windows_ns=np.array([later[0] - earlier[0] for later, earlier in pairs]),
+            powers=np.array(
+                [difference_power(later[1], earlier[1]) - quiet for later, earlier in pairs]
+            ),
         )
 
-    def _release(self) -> tuple[Displacement, ...]:
-        if not self.ready:
-            return ()
-        held, self._held = self._held, []
-        found = []
-        for sample in held:
-            one = self._displacement(sample)
-            if self._last_emitted_ns is None or one.stamp_ns > self._last_emitted_ns:
-                self._last_emitted_ns = one.stamp_ns
-                found.append(one)
-        return tuple(found)
+    def longest_lag(self, sample: Sample) -> int:
+        """Place of the longest lag over which the beads have not gone too far."""
+        return self._lag_below_plateau(sample, self._response)
 
-    def _chosen_lag(self, sample: _Sample, response: BeadResponse) -> int:
-        low_enough = sample.powers <= self._settings.saturation * response.plateau
-        # The lags before the first that is too long, so that a chance return is no choice.
-        return max(0, int(np.argmin(np.append(low_enough, False))) - 1)
+    def displacement(self, sample: Sample, lag: int) -> tuple[float, float]:
+        """Mean path of the beads over a lag, and its error, [px].
 
-    def _displacement(self, sample: _Sample) -> Displacement:
-        lag = self._chosen_lag(sample, self._response)
+        Parameters
+        ----------
+        sample : Sample
+        lag : int
+            Place in `sample.windows_ns`.
+        """
         power = sample.powers[lag : lag + 1]
         pixels = self._images[-1][1].size
-        window = int(sample.windows_ns[lag])
         away = float(self._response.displacement(power)[0])
         error = float(self._response.displacement_error(power, sample.noise_power, pixels)[0])
         loss = min(0.5, _DEFLECTION_LOSS * away / self._diameter_px)
         scatter = np.sqrt(_DEFLECTION_SCATTER * loss / self._beads) * away
-        return Displacement(
-            stamp_ns=sample.stamp_ns - window // 2,
-            window_ns=window,
-            cycle=sample.cycle,
-            cycle_start_ns=sample.cycle_start_ns,
-            pixels=away / (1.0 - loss),
-            pixels_error=float(np.hypot(error, scatter)),
-        )
+        return away / (1.0 - loss), float(np.hypot(error, scatter))
+
+    def _lag_below_plateau(self, sample: Sample, response: BeadResponse) -> int:
+        low_enough = sample.powers <= self._settings.saturation * response.plateau
+        # The lags before the first that is too long, so that a chance return is no choice.
+        return max(0, int(np.argmin(np.append(low_enough, False))) - 1)
 
     def _learn(self, stamp_ns: int, gray: NDArray[np.uint8], noise_power: float) -> None:
         if not self._keys or self._response.pairs >= _PAIRS_KEPT:
@@ -192,7 +196,7 @@ class StructureFunction:
             self._guess(gray, noise_power)
         self._extend_path(stamp_ns, noise_power)
         path_now = self._path[-1]
-        for key_stamp, key in reversed(self._keys):
+        for key_stamp, key in self._keys:
             path = path_now - float(np.interp(key_stamp, self._path_stamps, self._path))
             if path >= _UNRELATED_PATH * self._diameter_px:
                 self._response.add(gray, key, noise_power, path)
@@ -219,8 +223,8 @@ class StructureFunction:
         response = self._response if self.ready else self._first_guess
         # Without motion the guess is made of noise and would lead anywhere.
         if response.plateau > noise_power * self._images[-1][1].size:
-            sample = self._sample(stamp_ns, (0, None), noise_power)
-            lag = self._chosen_lag(sample, response)
+            sample = self._sample((0, None), noise_power)
+            lag = self._lag_below_plateau(sample, response)
             pixels = float(response.displacement(sample.powers[lag : lag + 1])[0])
             step = pixels * (stamp_ns - self._path_stamps[-1]) / float(sample.windows_ns[lag])
         self._path_stamps.append(stamp_ns)

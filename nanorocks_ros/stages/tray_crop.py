@@ -120,9 +120,7 @@ class TrayCrop:
             self.velocity_error = math.hypot(self.shift.error, last.error) * rate
         return self.shift
 
-    def crop(
-        self, image: NDArray[np.uint8]
-    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:
+    def crop(self, image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:
         """The gray mix and the colours of the tray at rest.
 
         Parameters
@@ -142,9 +140,7 @@ class TrayCrop:
         resample_color(image, self._nodes, shift, mix_weights(self._mix), color, gray)
         return gray, self._as_bgr(color)
 
-    def _cut(
-        self, image: NDArray[np.uint8]
-    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:
+    def _cut(self, image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:
         x, y, width, height = self.region
         part = np.ascontiguousarray(image[y : y + height, x : x + width])
         if image.shape[2] == 1:
