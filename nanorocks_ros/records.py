@@ -244,3 +244,47 @@ class Notice:
 
     stamp_ns: int
     text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tracks:
+    """The beads of one tray in one picture, each with a number that it keeps.
+
+    Parameters
+    ----------
+    stamp_ns : int
+    tray : int
+    ids : ndarray of int32, (n,)
+        Numbers of the tracks, rising; a bead lost for too long comes back under a new one.
+    species : ndarray of int32, (n,)
+        Index into the species of the tray.
+    positions : ndarray (n, 2), [m]
+        Of the centres, from the corner of the floor; along columns and rows.
+    position_errors : ndarray (n,), [m]
+        Standard error of a coordinate.
+    velocities : ndarray (n, 2), [m/s]
+        At the instant of the picture; NaN when unknown.
+    velocity_errors : ndarray (n,), [m/s]
+        Standard error of a component; NaN when unknown.
+    radii, radius_errors : ndarray (n,), [m]
+    seen : ndarray of bool, (n,)
+        False where the bead is hidden and its place is predicted.
+    expected : ndarray of int32, (species,)
+        Beads of each species that the tray should show.
+    """
+
+    stamp_ns: int
+    tray: int
+    ids: NDArray[np.int32]
+    species: NDArray[np.int32]
+    positions: NDArray[np.float64]
+    position_errors: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    velocity_errors: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    radius_errors: NDArray[np.float64]
+    seen: NDArray[np.bool_]
+    expected: NDArray[np.int32]
+
+    def __post_init__(self) -> None:
+        _freeze_arrays(self)

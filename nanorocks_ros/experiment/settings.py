@@ -113,6 +113,24 @@ class SpeedSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TrackingSettings:
+    """From colour crops to the beads and their tracks."""
+
+    least_area_seen: float = _setting(
+        0.3, 'share of its disc that a bead must show to be found', low=0.05, high=1.0
+    )
+    longest_gap: float = _setting(
+        1.0, 'a bead that is hidden for longer gets a new number', 's', low=0.0, high=60.0
+    )
+    fastest: float = _setting(
+        0.05, 'no bead is faster in the picture', 'm/s', low=1e-4, high=10.0
+    )
+    window: float = _setting(
+        1.0, 'longest flight from which a velocity is measured', 's', low=0.05, high=10.0
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterSettings:
     """From gray crops to the width of their autocorrelation."""
 
@@ -151,6 +169,7 @@ class PipelineSettings:
     trays_file: str = _setting('', 'YAML file of trays; empty: the trays that were flown')
     preprocess: PreprocessSettings = field(default_factory=PreprocessSettings)
     speed: SpeedSettings = field(default_factory=SpeedSettings)
+    tracking: TrackingSettings = field(default_factory=TrackingSettings)
     clusters: ClusterSettings = field(default_factory=ClusterSettings)
     cooling: CoolingSettings = field(default_factory=CoolingSettings)
 
