@@ -20,6 +20,8 @@ _RIM_PX = 1.0
 _FIT_KEEPS = 0.7
 # A pixel of floor under a disc outweighs so many of the species.
 _FLOOR_WEIGHT = 2
+# Of its radius, how far from where it should be a bead is taken for the expected one.
+_HINT_REACH = 0.6
 
 
 @compiled
@@ -95,6 +97,73 @@ def _explain(
 
 
 @compiled
+def _surplus_table(balance: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Sums of what is left to explain over all rectangles from the corner."""
+    table = np.zeros((balance.shape[0] + 1, balance.shape[1] + 1), dtype=np.int32)
+    for i in range(balance.shape[0]):
+        total = 0
+        for j in range(balance.shape[1]):
+            total += max(balance[i, j], 0)
+            table[i + 1, j + 1] = table[i, j + 1] + total
+    return table
+
+
+@compiled
+def _follow_hints(
+    shown: NDArray[np.uint8],
+    darkness: NDArray[np.uint8],
+    hue: NDArray[np.int16],
+    kind: int,
+    hue_sign: float,
+    step: int,
+    least_share: float,
+    covered: NDArray[np.uint8],
+    discs: NDArray[np.float64],
+    fits: NDArray[np.float64],
+    hints: NDArray[np.float64],
+    balance: NDArray[np.int32],
+) -> int:
+    """Find beads where they should be; see `cover`."""
+    fit = np.zeros(3)
+    found = 0
+    for k in range(min(hints.shape[0], discs.shape[0])):
+        discs[found] = hints[k, :3]
+        if _left_to_explain(shown, covered, kind, discs[found]) < least_share:
+            continue
+        fit_circle(darkness, hue, hue_sign, discs, found, found + 1, hints[k, 2:], fit)
+        dx, dy = discs[found, 0] - hints[k, 0], discs[found, 1] - hints[k, 1]
+        away = dx * dx + dy * dy > (_HINT_REACH * hints[k, 2]) ** 2
+        if away or _left_to_explain(shown, covered, kind, discs[found]) < least_share:
+            continue
+        fits[found, :3] = fit
+        area = np.pi * discs[found, 2] * discs[found, 2]
+        fits[found, 3] = _explain(shown, covered, kind, discs[found], step, balance) / area
+        found += 1
+    return found
+
+
+@compiled
+def _left_to_explain(
+    shown: NDArray[np.uint8], covered: NDArray[np.uint8], kind: int, disc: NDArray[np.float64]
+) -> float:
+    """Share of a disc that shows the species, unexplained, less the share that shows floor."""
+    radius = disc[2]
+    own = np.uint8(1 << kind)
+    total = 0
+    for i in range(max(int(disc[1] - radius), 0), min(int(disc[1] + radius) + 1, shown.shape[0])):
+        for j in range(
+            max(int(disc[0] - radius), 0), min(int(disc[0] + radius) + 1, shown.shape[1])
+        ):
+            dx, dy = j + 0.5 - disc[0], i + 0.5 - disc[1]
+            if dx * dx + dy * dy <= radius * radius:
+                if shown[i, j] == kind:
+                    total += 0 if covered[i, j] & own else 1
+                elif shown[i, j] == FLOOR:
+                    total -= 1
+    return total / (np.pi * radius * radius)
+
+
+@compiled
 def cover(
     shown: NDArray[np.uint8],
     darkness: NDArray[np.uint8],
@@ -109,6 +178,7 @@ def cover(
     covered: NDArray[np.uint8],
     discs: NDArray[np.float64],
     fits: NDArray[np.float64],
+    hints: NDArray[np.float64],
 ) -> int:
     """Cover the pixels of one species with discs.
 
@@ -135,6 +205,9 @@ def cover(
         Written: column, row, radius.
     fits : ndarray (most, 4)
         Written: see `fit_circle`, and the share of the disc that was seen.
+    hints : ndarray (k, 4), [px]
+        Where beads should be: column, row, radius and its standard deviation. These places are
+        tried first, in this order; only what they leave unexplained is searched.
 
     Returns
     -------
@@ -142,6 +215,9 @@ def cover(
         Beads found.
     """
     balance = _balance(shown, kind, step)
+    found = _follow_hints(
+        shown, darkness, hue, kind, hue_sign, step, least_share, covered, discs, fits, hints, balance
+    )
     rows, columns = balance.shape
     sizes = radii.size
     gains = np.zeros((sizes, rows, columns), dtype=np.int32)
@@ -151,15 +227,21 @@ def cover(
     sums = np.zeros((rows, columns + 1), dtype=np.int32)
     for i in range(rows):
         _sum_row(balance, sums, i)
+    table = _surplus_table(balance)
     for size in range(sizes):
         widths = _widths(radii[size] / step)
+        reach = int(radii[size] / step)
+        least = least_share * np.pi * radii[size] * radii[size]
         for i in range(rows):
+            above, below = max(i - reach, 0), min(i + reach + 1, rows)
             for j in range(columns):
-                if 2 * balance[i, j] > -full:
+                left, right = max(j - reach, 0), min(j + reach + 1, columns)
+                most_gain = table[below, right] - table[above, right]
+                most_gain -= table[below, left] - table[above, left]
+                if most_gain > least and 2 * balance[i, j] > -full:
                     gains[size, i, j] = _gain(sums, i, j, widths)
                     if gains[size, i, j] > tops[size, i]:
                         tops[size, i], places[size, i] = gains[size, i, j], j
-    found = 0
     fit = np.zeros(3)
     guess = np.zeros(3)
     while found < most:

@@ -13,6 +13,8 @@ from nanorocks_ros.stages.tracking.outline import refit
 from nanorocks_ros.stages.tracking.pixels import BLUE, GRAY, RED, look_at_pixels
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.settings import TrackingSettings
@@ -23,7 +25,7 @@ KINDS = {'acrylic': RED, 'copper': RED, 'glass': BLUE, 'JSC-1': GRAY}
 
 _HUE_SIGN = {RED: 1.0, BLUE: -1.0, GRAY: 0.0}
 # Sizes tried differ by this factor at most.
-_SIZE_STEP = 1.4
+_SIZE_STEP = 1.2
 # Squares in which places are tried, per radius of the smallest bead.
 _SQUARES_PER_RADIUS = 2.4
 # Smallest radius with which squares of two pixels lose nothing, [px].
@@ -87,13 +89,18 @@ class BeadDetector:
         self._turn = 0
         self._floor: NDArray[np.float32] | None = None
 
-    def detect(self, color: NDArray[np.uint8]) -> tuple[Detections, ...]:
+    def detect(
+        self, color: NDArray[np.uint8], hints: Sequence[NDArray[np.float64]] = ()
+    ) -> tuple[Detections, ...]:
         """The beads of each species, in the order of the species of the tray.
 
         Parameters
         ----------
         color : ndarray of uint8, (rows, columns, 3), bgr
+        hints : sequence of ndarrays (k, 4), [px]
+            For each species where beads should be: column, row, radius and its error.
         """
+        hints = hints or [np.empty((0, 4))] * len(self._searches)
         if self._floor is None or self._floor.shape != color.shape:
             self._start(color)
         floor = self._floor
@@ -102,7 +109,7 @@ class BeadDetector:
             color, self._levels, self._gray_known, self._darkness, self._hue, self._shown
         )
         self._covered[:] = 0
-        found = [self._cover(one) for one in self._searches]
+        found = [self._cover(*one) for one in zip(self._searches, hints, strict=True)]
         every = np.concatenate([discs for discs, _ in found])
         detections = []
         first = 0
@@ -150,7 +157,9 @@ class BeadDetector:
         self._shown = np.empty(shape, dtype=np.uint8)
         self._covered = np.zeros(shape, dtype=np.uint8)
 
-    def _cover(self, search: _Search) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _cover(
+        self, search: _Search, hints: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         discs = np.zeros((search.most, 3))
         fits = np.zeros((search.most, 4))
         count = cover(
@@ -167,6 +176,7 @@ class BeadDetector:
             self._covered,
             discs,
             fits,
+            hints,
         )
         return discs[:count], fits[:count]
 
@@ -175,7 +185,7 @@ def _search(species: Species, pixels_per_metre: float) -> _Search:
     low = 0.5 * species.diameter_low * pixels_per_metre
     high = 0.5 * species.diameter_high * pixels_per_metre
     sizes = max(1, int(np.ceil(np.log(high / low) / np.log(_SIZE_STEP))))
-    ends = np.linspace(low, high, 2 * sizes + 1)
+    ends = np.geomspace(low, high, 2 * sizes + 1)
     spread = max((high - low) / np.sqrt(12.0), _SIZE_SPREAD_PX)
     return _Search(
         kind=KINDS.get(species.material, GRAY),

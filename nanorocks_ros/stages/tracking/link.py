@@ -142,6 +142,7 @@ class Linker:
         self.hits = np.empty(0, dtype=np.int64)
         self.radii = np.empty(0)
         self.radius_weights = np.empty(0)
+        self._shares = np.empty(0)
         self._times = np.empty((0, KEPT))
         self._places = np.empty((0, KEPT, 2))
         self._errors = np.empty((0, KEPT))
@@ -198,6 +199,8 @@ class Linker:
         hit = chosen >= 0
         self._update_sizes(hit, chosen[hit], found)
         self.last[hit] = time
+        self._shares[hit] = found.area_seen[chosen[hit]]
+        self._shares[~hit] *= 0.5
         self.hits[hit] += 1
         self._learn_speed()
         self._drop(time, hit)
@@ -231,6 +234,16 @@ class Linker:
         places = np.where(outside, low + folded, places)
         spread = np.where(moving, lines[:, 6], _SLOWEST_PX_S**2)
         return places, lines[:, 5] + spread * after**2
+
+    def hints(self, time: float) -> NDArray[np.float64]:
+        """Where beads should be: column, row, radius and its error, (n, 4), [px].
+
+        Those of which most was seen come first: they lie on top.
+        """
+        places, _ = self.predicted(time)
+        sizes = np.maximum(self.radius_errors(), _SIZE_JITTER_PX)
+        order = np.argsort(-self._shares, kind='stable')
+        return np.column_stack([places, self.radii, sizes])[order]
 
     def velocities(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Velocity of each bead, (n, 2), and the error of a component, (n,), [px/s]."""
@@ -300,6 +313,7 @@ class Linker:
             hits,
             found.radii[new],
             1.0 / np.square(found.radius_errors[new]),
+            found.area_seen[new],
             times,
             places,
             errors,
@@ -316,6 +330,7 @@ _STATE = (
     'hits',
     'radii',
     'radius_weights',
+    '_shares',
     '_times',
     '_places',
     '_errors',

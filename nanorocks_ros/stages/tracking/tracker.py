@@ -58,7 +58,9 @@ class Tracker:
             self._linkers = [self._linker(n, image.gray.shape) for n in self._expected.tolist()]
         self._last_ns = image.stamp_ns
         time = (image.stamp_ns - self._first_ns) / _NS
-        for linker, found in zip(self._linkers, self._detector.detect(image.color), strict=True):
+        hints = [linker.hints(time) for linker in self._linkers]
+        detected = self._detector.detect(image.color, hints)
+        for linker, found in zip(self._linkers, detected, strict=True):
             self._next_number += linker.push(time, found, self._next_number)
         return (self._tracks(image.stamp_ns, time),)
 
