@@ -139,8 +139,11 @@ class _Painting:
     def finished(self, blur: float) -> tuple[Picture, Picture]:
         """The painting and where it is opaque, both blurred by so many of its pixels."""
         # What is around the plate takes its colour, so that its edge stays its own when blurred.
-        image = cv2.GaussianBlur(self._image, (0, 0), blur)
-        return image, cv2.GaussianBlur(self._opaque, (0, 0), blur)
+        image, opaque = (
+            np.asarray(cv2.GaussianBlur(one, (0, 0), blur), dtype=np.float32)
+            for one in (self._image, self._opaque)
+        )
+        return image, opaque
 
     def _bevel(
         self,
@@ -168,7 +171,8 @@ class _Painting:
         rows = slice(high, int(bottom + reach) + 2)
         x, y = self._columns[:, columns], self._rows[rows]
         depths = np.stack(np.broadcast_arrays(left - x, top - y, x - right, y - bottom))
-        return self._image[rows, columns], np.asarray(depths, dtype=np.float32)
+        image = np.asarray(self._image[rows, columns], dtype=np.float32)
+        return image, np.asarray(depths, dtype=np.float32)
 
     def _mill_marks(self, shape: tuple[int, int]) -> Picture:
         """Arcs of a cutter that went along the cell."""
