@@ -6,7 +6,7 @@ Estimates carry ``_error``, one standard error. NaN means "not known yet", never
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from enum import IntEnum
+from enum import IntEnum, IntFlag
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +36,20 @@ class CorRelation(IntEnum):
     """Which relation turned a decay into a restitution (constants of ``CorEstimate.msg``)."""
 
     PAPER = 1
+
+
+class Quality(IntFlag):
+    """What is wrong with the picture of a tray since the last one; 0 when nothing is."""
+
+    SATURATED = 1
+    LOW_CONTRAST = 2
+    FEW_BEADS = 4
+    GLARE = 8
+    STABILISATION_LOST = 16
+    GRAY_CAMERA = 32
+    FROZEN = 64
+    HALF_FRAME = 128
+    WRONG_SCALE = 256
 
 
 def _freeze_arrays(record: Any) -> None:
@@ -77,13 +91,40 @@ class TrayImage:
     stamp_ns : int
     tray : int
     gray : ndarray of uint8, (rows, columns)
+        Rectified, and moved back by the displacement of the tray.
     color : ndarray of uint8, (rows, columns, 3), bgr, or None for a gray camera
+    cycle : int or None
+        Shaking events so far; None when nobody has counted yet.
+    cycle_start_ns : int or None
+        The shaking event that opened the cycle; None before the first.
+    noise_power : float, [gray levels^2]
+        Mean squared difference per pixel of two images of a scene at rest; NaN when unknown.
+    displacement : tuple of 2 floats, [m]
+        Of the tray in the picture, along columns and rows, from where it was at first; NaN when
+        there is nothing to measure it by.
+    displacement_error : float, [m]
+        One standard error, of each component.
+    velocity : tuple of 2 floats, [m/s]
+        Of the tray, since the image before.
+    velocity_error : float, [m/s]
+    quality : Quality
+    glare : float, 0 to 1
+        Share of the picture that is hidden by reflections; NaN when unknown.
     """
 
     stamp_ns: int
     tray: int
     gray: NDArray[np.uint8]
     color: NDArray[np.uint8] | None = None
+    cycle: int | None = None
+    cycle_start_ns: int | None = None
+    noise_power: float = UNKNOWN
+    displacement: tuple[float, float] = (UNKNOWN, UNKNOWN)
+    displacement_error: float = UNKNOWN
+    velocity: tuple[float, float] = (UNKNOWN, UNKNOWN)
+    velocity_error: float = UNKNOWN
+    quality: Quality = Quality(0)
+    glare: float = UNKNOWN
 
     def __post_init__(self) -> None:
         _freeze_arrays(self)

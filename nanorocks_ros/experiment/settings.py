@@ -40,17 +40,42 @@ class PreprocessSettings:
 
     regions_px: tuple[int, ...] = _setting(
         (),
-        'x, y, width, height of each tray in the frame, in the order of `trays`; '
-        'empty: one tray, centred',
+        'x, y, width, height of each tray in the rectified frame, in the order of `trays`; '
+        'empty: as `layout` says',
         'px',
         low=0,
         whole=True,
+    )
+    layout: str = _setting(
+        'centred',
+        'where the trays are: one alone, centred, or all as they lie on the plate, centred',
+        choices=('centred', 'plate'),
+    )
+    calibration: str = _setting(
+        '',
+        'calibration file: lens, regions and scale in one, in place of `regions_px`, `layout`, '
+        '`pixels_per_metre` and camera_info; empty: none',
     )
     pixels_per_metre: float = _setting(
         13500.0, 'scale of the picture', 'px/m', low=100.0, high=1e6
     )
     gray_mix: tuple[float, ...] = _setting(
         (0.45, 0.45, 0.10), 'weights of blue, green and red in the gray mix', low=0.0, high=1.0
+    )
+    stabilise: bool = _setting(True, 'follow the motion of each tray, and take it out')
+    wall_width: float = _setting(
+        0.0015,
+        'width of the wall around a tray by which its motion is followed',
+        'm',
+        low=0.0001,
+        high=0.01,
+    )
+    shake_speed: float = _setting(
+        0.003,
+        'a tray that starts to move faster than this is being shaken',
+        'm/s',
+        low=0.0001,
+        high=10.0,
     )
     late_tolerance: float = _setting(
         1.0,

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import fft
 
 from nanorocks_ros.records import Autocorrelation, ClusterEstimate, TrayImage
-from nanorocks_ros.stages.shaking import NS, ShakeDetector
+from nanorocks_ros.stages.shaking import NS, CycleFollower
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -67,7 +67,7 @@ class ClusterAutocorrelator:
 
     def _restart(self) -> None:
         speed = self._settings.speed
-        self._shakes = ShakeDetector(speed.shake_ratio, speed.shortest_cycle)
+        self._shakes = CycleFollower(speed.shake_ratio, speed.shortest_cycle)
         self._last_stamp_ns: int | None = None
         self._next_ns: int | None = None
 
@@ -76,7 +76,7 @@ class ClusterAutocorrelator:
         if self._last_stamp_ns is not None and image.stamp_ns <= self._last_stamp_ns:
             self._restart()
         self._last_stamp_ns = image.stamp_ns
-        self._shakes.push(image.stamp_ns, image.gray)
+        self._shakes.push(image)
         if self._next_ns is not None and image.stamp_ns < self._next_ns:
             return ()
         self._next_ns = image.stamp_ns + round(self._settings.clusters.interval * NS)

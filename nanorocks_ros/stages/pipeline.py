@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from nanorocks_ros.experiment.calibration import calibrated
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.records import (
     Autocorrelation,
@@ -23,6 +24,7 @@ from nanorocks_ros.stages.speed import SpeedEstimator
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.experiment.view import View
 
 Result = (
     TrayImage
@@ -80,6 +82,8 @@ class Pipeline:
     settings : PipelineSettings
     camera : str
         What to call the source of the frames in an error.
+    view : View, optional
+        What camera_info says of the lens.
 
     Raises
     ------
@@ -87,9 +91,12 @@ class Pipeline:
         When the settings cannot be used.
     """
 
-    def __init__(self, settings: PipelineSettings, camera: str) -> None:
+    def __init__(
+        self, settings: PipelineSettings, camera: str, view: View | None = None
+    ) -> None:
+        settings = calibrated(settings)
         trays = trays_of(settings)
-        self.preprocessor = Preprocessor(settings, trays, camera)
+        self.preprocessor = Preprocessor(settings, trays, camera, view)
         self.trays = {number: TrayStages(settings, tray) for number, tray in trays.items()}
 
     def push(self, frame: Frame) -> tuple[Result, ...]:

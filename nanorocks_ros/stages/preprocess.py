@@ -1,14 +1,21 @@
-"""From the camera's frame to the gray crop of each tray, once per frame."""
+"""From the camera's frame to the straight, steady, gray crop of each tray, once per frame."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
-from nanorocks_ros.records import Frame, Notice, TrayImage
+from nanorocks_ros.experiment.calibration import calibrated, load_calibration
+from nanorocks_ros.experiment.plate import Region, regions_on_plate
+from nanorocks_ros.experiment.view import Straight, View
+from nanorocks_ros.records import Frame, Notice, Quality, TrayImage
+from nanorocks_ros.stages.frame_checks import FrameChecks
+from nanorocks_ros.stages.picture_checks import picture_quality
+from nanorocks_ros.stages.shaking import PlateMeter, ShakeCounter
+from nanorocks_ros.stages.tray_crop import TrayCrop
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,13 +24,14 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.stages.stabilise import Shift
 
 CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
 NS = 1_000_000_000
 
 
 class Preprocessor:
-    """Crops the trays out of each frame and mixes their gray images.
+    """Cuts the trays out of each frame: straight, at rest, with their gray mix.
 
     Parameters
     ----------
@@ -32,25 +40,48 @@ class Preprocessor:
         The trays of `settings.trays`.
     camera : str
         What to call the source of the frames in an error.
+    view : View, optional
+        What camera_info says of the lens. A calibration file in the settings goes before it;
+        without either, frames are taken as straight.
 
     Raises
     ------
     ConfigurationError
-        When the regions do not fit the trays.
+        When the regions do not fit the trays, or the calibration file cannot be used.
     """
 
-    def __init__(self, settings: PipelineSettings, trays: Mapping[int, Tray], camera: str) -> None:
-        self._settings = settings.preprocess
+    def __init__(
+        self,
+        settings: PipelineSettings,
+        trays: Mapping[int, Tray],
+        camera: str,
+        view: View | None = None,
+    ) -> None:
+        self._pipeline = calibrated(settings)
+        self._settings = self._pipeline.preprocess
+        if self._settings.calibration:
+            view = load_calibration(self._settings.calibration).view
         self._trays = tuple(trays[number] for number in settings.trays)
         self._camera = camera
+        self._view = view
         self._shape: tuple[int, ...] | None = None
         self._encoding = ''
-        self._regions: tuple[tuple[int, int, int, int], ...] = ()
+        self._regions: tuple[Region, ...] = ()
         self._last_stamp_ns: int | None = None
         self._check_regions()
 
+    @property
+    def straightened(self) -> bool:
+        """Whether anything is known of the lens."""
+        return self._view is not None
+
+    @property
+    def duplicates(self) -> int:
+        """Frames left out so far since they were the same as the one before."""
+        return 0 if self._shape is None else self._checks.duplicates
+
     def push(self, frame: Frame) -> tuple[TrayImage | Notice, ...]:
-        """The tray images of a frame; a notice alone when the frame came late.
+        """The tray images of a frame; notices alone when it cannot be used.
 
         Raises
         ------
@@ -58,33 +89,98 @@ class Preprocessor:
             For an encoding that is not supported or a size that changed.
         """
         self._check_frame(frame)
-        last = self._last_stamp_ns
+        last, self._last_stamp_ns = self._last_stamp_ns, frame.stamp_ns
+        notices: tuple[Notice, ...] = ()
         if last is not None and frame.stamp_ns <= last:
             late = (last - frame.stamp_ns) / NS
             if late < self._settings.late_tolerance:
+                self._last_stamp_ns = last
                 text = f'{self._camera}: a frame came {late:.3f} s late and was dropped'
                 return (Notice(stamp_ns=frame.stamp_ns, text=text),)
-            self._last_stamp_ns = frame.stamp_ns
             text = f'{self._camera}: time went back by {late:.3f} s; starting afresh'
-            notice = Notice(stamp_ns=frame.stamp_ns, text=text)
-            return (notice, *self._tray_images(frame))
-        self._last_stamp_ns = frame.stamp_ns
-        return self._tray_images(frame)
+            notices = (Notice(stamp_ns=frame.stamp_ns, text=text),)
+            self._start()
+        verdict = self._checks.push(frame)
+        if not verdict.usable:
+            return (*notices, *verdict.notices)
+        images = self._tray_images(frame, verdict.rows, verdict.quality)
+        return (*notices, *images, *verdict.notices)
 
-    def _tray_images(self, frame: Frame) -> tuple[TrayImage, ...]:
-        images = []
-        for tray, (x, y, width, height) in zip(self._trays, self._regions, strict=True):
-            crop = frame.image[y : y + height, x : x + width]
-            color = None if frame.encoding == 'mono8' else _as_bgr(crop, frame.encoding)
-            gray = np.ascontiguousarray(crop) if color is None else self._gray(color)
-            images.append(
-                TrayImage(stamp_ns=frame.stamp_ns, tray=tray.number, gray=gray, color=color)
+    def _start(self) -> None:
+        """Forget everything but where the trays are."""
+        speed = self._pipeline.speed
+        size = {'height': self._shape[0], 'width': self._shape[1]} if self._shape else {}
+        view = self._view or View(camera=Straight(**size))
+        self._checks = FrameChecks(self._camera)
+        self._counter = ShakeCounter(speed.shortest_cycle)
+        self._plate = PlateMeter(speed.shake_ratio, self._settings.shake_speed)
+        self._crops = tuple(
+            TrayCrop(
+                self._pipeline,
+                tray.number,
+                region,
+                view,
+                bent=self._view is not None,
+                encoding=self._encoding,
             )
-        return tuple(images)
+            for tray, region in zip(self._trays, self._regions, strict=True)
+        )
 
-    def _gray(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        mix = np.array([self._settings.gray_mix], dtype=np.float32)
-        return np.asarray(cv2.transform(color, mix), dtype=np.uint8).reshape(color.shape[:2])
+    def _tray_images(self, frame: Frame, rows: int, quality: Quality) -> tuple[TrayImage, ...]:
+        image = np.ascontiguousarray(frame.image).reshape(*frame.image.shape[:2], -1)
+        hint: Shift | None = None
+        pictures: list[tuple[TrayCrop, NDArray[np.uint8], NDArray[np.uint8] | None]] = []
+        jumps = []
+        for crop in self._crops:
+            if rows < image.shape[0] and crop.lowest_row > rows:
+                # The images before and after it are not compared: it is as if it were lost.
+                crop.pending |= Quality.HALF_FRAME
+                continue
+            hint = crop.follow(frame.stamp_ns, image, hint) or hint
+            gray, color = crop.crop(image)
+            jumps.append(crop.meter.push(gray))
+            pictures.append((crop, gray, color))
+        if pictures:
+            self._counter.push(frame.stamp_ns, jumps, self._plate.push(*self._plate_speed()))
+        return tuple(
+            self._tray_image(frame.stamp_ns, crop, gray, color, quality)
+            for crop, gray, color in pictures
+        )
+
+    def _plate_speed(self) -> tuple[float, float]:
+        """Speed of the plate and its error, [m/s]; NaN when no tray knows."""
+        known = [one for one in self._crops if math.isfinite(one.velocity_error)]
+        if not known:
+            return math.nan, math.nan
+        middle = np.median([one.velocity for one in known], axis=0)
+        error = float(np.median([one.velocity_error for one in known]))
+        return math.hypot(float(middle[0]), float(middle[1])), error
+
+    def _tray_image(
+        self,
+        stamp_ns: int,
+        crop: TrayCrop,
+        gray: NDArray[np.uint8],
+        color: NDArray[np.uint8] | None,
+        quality: Quality,
+    ) -> TrayImage:
+        own, glare = picture_quality(gray)
+        pending, crop.pending = crop.pending, Quality(0)
+        return TrayImage(
+            stamp_ns=stamp_ns,
+            tray=crop.tray,
+            gray=gray,
+            color=color,
+            cycle=self._counter.cycle,
+            cycle_start_ns=self._counter.cycle_start_ns,
+            noise_power=crop.meter.noise_power,
+            displacement=crop.displacement,
+            displacement_error=crop.displacement_error,
+            velocity=crop.velocity,
+            velocity_error=crop.velocity_error,
+            quality=quality | own | pending,
+            glare=glare,
+        )
 
     def _check_frame(self, frame: Frame) -> None:
         if frame.encoding not in CHANNELS:
@@ -94,8 +190,10 @@ class Preprocessor:
                 f'publish {", ".join(CHANNELS)}',
             )
         if self._shape is None:
+            self._check_lens(frame.image.shape)
             self._regions = self._regions_in(frame.image.shape)
             self._shape, self._encoding = frame.image.shape, frame.encoding
+            self._start()
         elif frame.encoding != self._encoding:
             raise FrameError(
                 self._camera,
@@ -120,11 +218,12 @@ class Preprocessor:
                 f'{len(regions)} numbers for {count} trays',
                 'give x, y, width, height for each tray',
             )
-        if not regions and count != 1:
+        if not regions and count != 1 and self._settings.layout == 'centred':
             raise ConfigurationError(
                 'preprocess.regions_px',
                 f'empty, with {count} trays',
-                'give x, y, width, height for each tray; only a single tray can be centred',
+                'give x, y, width, height for each tray, or layout: plate; only a single tray can be '
+                'centred',
             )
         if len(self._settings.gray_mix) != 3 or sum(self._settings.gray_mix) > 1.0 + 1e-9:
             raise ConfigurationError(
@@ -133,14 +232,29 @@ class Preprocessor:
                 'give three weights (blue, green, red) whose sum is at most 1',
             )
 
-    def _regions_in(self, shape: tuple[int, ...]) -> tuple[tuple[int, int, int, int], ...]:
+    def _check_lens(self, shape: tuple[int, ...]) -> None:
+        if self._view is None:
+            return
+        lens = self._view.camera
+        if (lens.height, lens.width) != shape[:2]:
+            raise FrameError(
+                self._camera,
+                f'the frame is {shape[1]}x{shape[0]} px, the calibration of the camera for '
+                f'{lens.width}x{lens.height} px',
+                'calibrate the camera at this size',
+            )
+
+    def _regions_in(self, shape: tuple[int, ...]) -> tuple[Region, ...]:
         height, width = shape[:2]
+        if self._settings.layout == 'plate' and not self._settings.regions_px:
+            scale = self._settings.pixels_per_metre
+            found = regions_on_plate(self._trays, (height, width), scale)
+            return tuple(found[tray.number] for tray in self._trays)
         flat = self._settings.regions_px or self._centred(width, height)
-        regions = tuple(
-            (flat[i], flat[i + 1], flat[i + 2], flat[i + 3]) for i in range(0, len(flat), 4)
-        )
+        regions = tuple(Region(*flat[i : i + 4]) for i in range(0, len(flat), 4))
         for tray, (x, y, w, h) in zip(self._trays, regions, strict=True):
-            if w < 8 or h < 8 or x < 0 or y < 0 or x + w > width or y + h > height:
+            inside = x >= 0 and y >= 0 and x + w <= width and y + h <= height
+            if w < 8 or h < 8 or not (inside or self._settings.calibration):
                 raise FrameError(
                     self._camera,
                     f'tray {tray.number} at x={x} y={y} of {w}x{h} px does not lie inside '
@@ -154,9 +268,3 @@ class Preprocessor:
         w = round(sides[0] * self._settings.pixels_per_metre)
         h = round(sides[1] * self._settings.pixels_per_metre)
         return ((width - w) // 2, (height - h) // 2, w, h)
-
-
-def _as_bgr(crop: NDArray[np.uint8], encoding: str) -> NDArray[np.uint8]:
-    if encoding == 'rgb8':
-        return np.ascontiguousarray(crop[:, :, ::-1])
-    return np.ascontiguousarray(crop)

@@ -10,7 +10,7 @@ import numpy as np
 from nanorocks_ros.physics.moving_area import mean_displacement
 from nanorocks_ros.records import MotionMask, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.stages.motion_mask import MotionMasker
-from nanorocks_ros.stages.shaking import NS, ShakeDetector
+from nanorocks_ros.stages.shaking import NS, CycleFollower
 from nanorocks_ros.stages.structure_function import Displacement, StructureFunction
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class SpeedEstimator:
         self._restart()
 
     def _restart(self) -> None:
-        self._shakes = ShakeDetector(self._settings.shake_ratio, self._settings.shortest_cycle)
+        self._shakes = CycleFollower(self._settings.shake_ratio, self._settings.shortest_cycle)
         self._masker = MotionMasker(self._settings)
         self._structure = StructureFunction(
             self._settings, self._tray.diameter * self._scale, self._tray.count
@@ -66,7 +66,7 @@ class SpeedEstimator:
         if self._last_stamp_ns is not None and image.stamp_ns <= self._last_stamp_ns:
             self._restart()
         self._last_stamp_ns = image.stamp_ns
-        shaken = self._shakes.push(image.stamp_ns, image.gray)
+        shaken = self._shakes.push(image)
         by_area = self._settings.method == 'binarised_area'
         if shaken:
             self._masker.clear()

@@ -1,0 +1,184 @@
+"""Whether a frame can be used: black, white, frozen, stored twice, or only half of it there."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.records import Notice, Quality
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.records import Frame
+
+NS = 1_000_000_000
+# Rows that are looked at, and pixels of them: a look at the whole frame costs as much as all else.
+_ROW_STEP = 16
+_COLUMN_STEP = 4
+_BLACK, _WHITE = 4.0, 251.0
+# A picture that stays the same for longer is not stored twice, it stands still.
+_FROZEN_NS = NS // 4
+_FROZEN_TOLD_NS = NS
+# Filled rows that count, as a share of the height, beyond those that frames usually end in.
+_HALF = 0.03
+_FEWEST_ROWS = 12
+_USUAL_FRAMES = 30
+_HISTORY = 5
+# Levels by which a filled row may differ from the next: JPEG leaves a little.
+_FILLED = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What is to be done with a frame.
+
+    Parameters
+    ----------
+    usable : bool
+    rows : int, [px]
+        Of the frame that can be used, from above.
+    quality : Quality
+        Flags for the images of all trays.
+    notices : tuple of Notice
+    """
+
+    usable: bool
+    rows: int
+    quality: Quality
+    notices: tuple[Notice, ...] = ()
+
+
+class FrameChecks:
+    """Looks at each frame before anything else does.
+
+    Parameters
+    ----------
+    camera : str
+        What to call the source of the frames.
+    """
+
+    def __init__(self, camera: str) -> None:
+        self._camera = camera
+        self._sample: NDArray[np.uint8] | None = None
+        self._image: NDArray[np.uint8] | None = None
+        self._changed_ns = 0
+        self._ends: deque[int] = deque(maxlen=_USUAL_FRAMES)
+        self._same: deque[int] = deque(maxlen=_USUAL_FRAMES)
+        self._blank = 0
+        self._told: set[str] = set()
+        self._frozen_told = False
+        self.duplicates = 0
+
+    def push(self, frame: Frame) -> Verdict:
+        """Judge the next frame; stamps rise."""
+        sample = frame.image[_ROW_STEP // 2 :: _ROW_STEP, ::_COLUMN_STEP]
+        height = frame.image.shape[0]
+        blank = self._blankness(sample)
+        if blank:
+            self._blank += 1
+            notices = (self._notice(frame, f'the picture is {blank}; left out until it returns'),)
+            return Verdict(False, height, Quality(0), notices if self._blank == 1 else ())
+        notices = self._light_again(frame)
+        if self._unchanged(frame, sample):
+            return self._stands_still(frame, notices)
+        rows = self._filled_from(frame)
+        self._sample, self._image = sample, frame.image
+        self._changed_ns, self._frozen_told = frame.stamp_ns, False
+        quality = Quality(0) if _has_colors(sample) else Quality.GRAY_CAMERA
+        if rows < height:
+            text = (
+                f'a frame breaks off at row {rows} of {height}; the trays below it are left out, '
+                'here and whenever it happens'
+            )
+            notices = (*notices, *self._once(frame, 'half', text))
+        return Verdict(True, rows, quality, notices)
+
+    def _notice(self, frame: Frame, text: str) -> Notice:
+        return Notice(stamp_ns=frame.stamp_ns, text=f'{self._camera}: {text}')
+
+    def _once(self, frame: Frame, key: str, text: str) -> tuple[Notice, ...]:
+        if key in self._told:
+            return ()
+        self._told.add(key)
+        return (self._notice(frame, text),)
+
+    def _blankness(self, sample: NDArray[np.uint8]) -> str:
+        level = float(sample.mean())
+        if level < _BLACK:
+            return f'black (mean level {level:.1f})'
+        return f'white (mean level {level:.1f})' if level > _WHITE else ''
+
+    def _light_again(self, frame: Frame) -> tuple[Notice, ...]:
+        count, self._blank = self._blank, 0
+        if not count:
+            return ()
+        return (self._notice(frame, f'the picture is back; {count} blank frames were left out'),)
+
+    def _unchanged(self, frame: Frame, sample: NDArray[np.uint8]) -> bool:
+        if self._image is None or self._sample is None:
+            return False
+        # The whole frame is compared only where its sample is the same.
+        return np.array_equal(sample, self._sample) and np.array_equal(frame.image, self._image)
+
+    def _stands_still(self, frame: Frame, notices: tuple[Notice, ...]) -> Verdict:
+        rows = frame.image.shape[0]
+        still_ns = frame.stamp_ns - self._changed_ns
+        if still_ns < _FROZEN_NS:
+            self.duplicates += 1
+            text = (
+                'a frame is the same as the one before it, to the last bit; such frames are left '
+                'out, here and whenever it happens'
+            )
+            notices = (*notices, *self._once(frame, 'duplicate', text))
+            return Verdict(False, rows, Quality(0), notices)
+        if still_ns >= _FROZEN_TOLD_NS and not self._frozen_told:
+            self._frozen_told = True
+            text = f'the picture has stood still for {still_ns / NS:.1f} s; check the camera'
+            notices = (*notices, self._notice(frame, text))
+        return Verdict(True, rows, Quality.FROZEN, notices)
+
+    def _filled_from(self, frame: Frame) -> int:
+        """The row from which on the frame holds nothing new, or its height."""
+        height = frame.image.shape[0]
+        filled = _filled_rows(frame.image)
+        same = 0 if self._image is None else _rows_the_same(frame.image, self._image)
+        cut = 0
+        for count, usual, history in ((filled, self._ends, 1), (same, self._same, _HISTORY)):
+            # A scene without noise may well end in rows that are alike, frame after frame.
+            more = count - float(np.median(usual)) if len(usual) >= history else 0.0
+            if more >= max(_FEWEST_ROWS, _HALF * height):
+                cut = max(cut, count)
+            usual.append(count)
+        return height - cut
+
+
+def _has_colors(sample: NDArray[np.uint8]) -> bool:
+    if sample.ndim == 2:
+        return False
+    first = sample[..., 0]
+    return not (np.array_equal(first, sample[..., 1]) and np.array_equal(first, sample[..., 2]))
+
+
+def _filled_rows(image: NDArray[np.uint8]) -> int:
+    """Rows at the lower end that are alike, as where a picture broke off; 0 when all are."""
+    few = image[:, ::_COLUMN_STEP]
+    last = few[-1].astype(np.int16)
+    count = 1
+    # In steps: a whole frame has nothing of the kind, and the second row says so.
+    while count < len(few) and np.abs(few[-1 - count] - last).max() <= _FILLED:
+        count += 1
+    return 0 if count == len(few) else count
+
+
+def _rows_the_same(image: NDArray[np.uint8], before: NDArray[np.uint8]) -> int:
+    """Rows at the lower end that are those of the frame before, to the last bit."""
+    if image.shape != before.shape:
+        return 0
+    count = 0
+    while count < len(image) and np.array_equal(image[-1 - count], before[-1 - count]):
+        count += 1
+    return count
