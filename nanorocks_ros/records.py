@@ -355,12 +355,14 @@ class Tracks:
         Numbers of the tracks, rising; a bead lost for too long comes back under a new one.
     species : ndarray of int32, (n,)
         Index into the species of the tray.
+    displacement : ndarray (2,), [m]
+        Of the tray in the picture, from where it was at first; 0 where nobody measured it.
     positions : ndarray (n, 2), [m]
-        Of the centres, from the corner of the floor; along columns and rows.
+        Of the centres, from the corner of the floor where it is now; along columns and rows.
     position_errors : ndarray (n,), [m]
         Standard error of a coordinate.
     velocities : ndarray (n, 2), [m/s]
-        At the instant of the picture; NaN when unknown.
+        Past the camera, not the swinging tray, at the instant of the picture; NaN when unknown.
     velocity_errors : ndarray (n,), [m/s]
         Standard error of a component; NaN when unknown.
     radii, radius_errors : ndarray (n,), [m]
@@ -374,6 +376,7 @@ class Tracks:
     tray: int
     ids: NDArray[np.int32]
     species: NDArray[np.int32]
+    displacement: NDArray[np.float64]
     positions: NDArray[np.float64]
     position_errors: NDArray[np.float64]
     velocities: NDArray[np.float64]

@@ -149,13 +149,17 @@ class Linker:
         self._counts = np.empty(0, dtype=np.int64)
         self._lines = np.empty((0, 9))
 
-    def push(self, time: float, found: Detections, first_number: int) -> int:
+    def push(
+        self, time: float, found: Detections, shift: NDArray[np.float64], first_number: int
+    ) -> int:
         """Take the beads of the next picture.
 
         Parameters
         ----------
         time : float, [s]
         found : Detections
+        shift : ndarray (2,), [px]
+            Where the corner of the tray is now.
         first_number : int
             Of the first new track.
 
@@ -164,7 +168,7 @@ class Linker:
         int
             New tracks.
         """
-        places, variances = self.predicted(time)
+        places, variances = self.predicted(time, shift)
         costs = np.empty((places.shape[0], found.radii.size))
         waits = time - self.last
         collided = max(self._speed, _SLOWEST_PX_S)
@@ -216,7 +220,9 @@ class Linker:
         """Which tracks are believed, (n,)."""
         return self.hits >= _CONFIRM
 
-    def predicted(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def predicted(
+        self, time: float, shift: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Where the beads should be, (n, 2), [px], and the variance of a coordinate, (n,).
 
         Beads that would have reached a wall come back from it.
@@ -226,8 +232,8 @@ class Linker:
         moving = np.isfinite(lines[:, 6])
         velocity = np.where(moving[:, None], lines[:, 3:5], 0.0)
         places = lines[:, 1:3] + velocity * after[:, None]
-        low = self.radii[:, None]
-        room = np.maximum(self._size - 2.0 * low, 1.0)
+        low = self.radii[:, None] + shift
+        room = np.maximum(self._size - 2.0 * self.radii[:, None], 1.0)
         folded = np.abs(np.mod(places - low + room, 2.0 * room) - room)
         # A bead may be a little beyond where its wall should be.
         outside = np.abs(places - low - 0.5 * room) > 0.5 * room + 1.0
@@ -235,15 +241,15 @@ class Linker:
         spread = np.where(moving, lines[:, 6], _SLOWEST_PX_S**2)
         return places, lines[:, 5] + spread * after**2
 
-    def hints(self, time: float) -> NDArray[np.float64]:
+    def hints(self, time: float, shift: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where beads should be: column, row, radius and its error, (n, 4), [px].
 
         Those of which most was seen come first: they lie on top.
         """
-        places, _ = self.predicted(time)
+        places, _ = self.predicted(time, shift)
         sizes = np.maximum(self.radius_errors(), _SIZE_JITTER_PX)
         order = np.argsort(-self._shares, kind='stable')
-        return np.column_stack([places, self.radii, sizes])[order]
+        return np.column_stack([places - shift, self.radii, sizes])[order]
 
     def velocities(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Velocity of each bead, (n, 2), and the error of a component, (n,), [px/s]."""

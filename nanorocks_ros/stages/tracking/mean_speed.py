@@ -179,7 +179,8 @@ def _shown(
         shown = shown & (tracks.position_errors <= _WORST * usual)
     return (
         tracks.ids[shown],
-        [tracks.positions[shown]],
+        # Past the camera: the tray may swing under the beads.
+        [tracks.positions[shown] + tracks.displacement],
         [np.square(tracks.position_errors[shown])],
     )
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from nanorocks_ros.stages.tracking.detect import BeadDetector
 from nanorocks_ros.stages.tracking.link import Linker
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
 
@@ -58,11 +61,15 @@ class Tracker:
             self._linkers = [self._linker(n, image.gray.shape) for n in self._expected.tolist()]
         self._last_ns = image.stamp_ns
         time = (image.stamp_ns - self._first_ns) / _NS
-        hints = [linker.hints(time) for linker in self._linkers]
+        # Beads fly straight past the camera, not past a tray that swings.
+        displacement = np.nan_to_num(np.array(image.displacement))
+        shift = displacement * self._scale
+        hints = [linker.hints(time, shift) for linker in self._linkers]
         detected = self._detector.detect(image.color, hints)
         for linker, found in zip(self._linkers, detected, strict=True):
-            self._next_number += linker.push(time, found, self._next_number)
-        return (self._tracks(image.stamp_ns, time),)
+            moved = replace(found, places=found.places + shift)
+            self._next_number += linker.push(time, moved, shift, self._next_number)
+        return (self._tracks(image.stamp_ns, time, displacement),)
 
     def _linker(self, expected: int, shape: tuple[int, ...]) -> Linker:
         return Linker(
@@ -73,8 +80,11 @@ class Tracker:
             self._settings.window,
         )
 
-    def _tracks(self, stamp_ns: int, time: float) -> Tracks:
-        parts = [_in_view(k, linker, time) for k, linker in enumerate(self._linkers)]
+    def _tracks(
+        self, stamp_ns: int, time: float, displacement: NDArray[np.float64]
+    ) -> Tracks:
+        shift = displacement * self._scale
+        parts = [_in_view(k, linker, time, shift) for k, linker in enumerate(self._linkers)]
         ids, species, places, errors, velocities, velocity_errors, radii, radius_errors, seen = (
             np.concatenate(column) for column in zip(*parts, strict=True)
         )
@@ -85,7 +95,8 @@ class Tracker:
             tray=self._tray.number,
             ids=ids[order],
             species=species[order],
-            positions=metre * places[order],
+            displacement=displacement,
+            positions=metre * places[order] - displacement,
             position_errors=metre * errors[order],
             velocities=metre * velocities[order],
             velocity_errors=metre * velocity_errors[order],
@@ -96,11 +107,13 @@ class Tracker:
         )
 
 
-def _in_view(species: int, linker: Linker, time: float) -> tuple[np.ndarray, ...]:
+def _in_view(
+    species: int, linker: Linker, time: float, shift: NDArray[np.float64]
+) -> tuple[NDArray[Any], ...]:
     """The columns of the record for one species, in pixels."""
     shown = linker.confirmed
     seen = linker.last == time
-    predicted, variances = linker.predicted(time)
+    predicted, variances = linker.predicted(time, shift)
     places, errors = linker.places()
     velocities, velocity_errors = linker.velocities()
     columns = (
