@@ -9,7 +9,7 @@ import numpy as np
 
 from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.stages.tracking.outline import fit_circle
-from nanorocks_ros.stages.tracking.pixels import FLOOR
+from nanorocks_ros.stages.tracking.pixels import FLOOR, GRAY
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,24 +18,32 @@ if TYPE_CHECKING:
 _RIM_PX = 1.0
 # Of the area for which a place was chosen, what the fitted disc must still explain.
 _FIT_KEEPS = 0.7
-# A pixel of floor under a disc outweighs so many of the species.
-_FLOOR_WEIGHT = 2
+# The outline of a coloured bead has lost its colour to the compression in a ring so wide, [px].
+_GRAY_RING_PX = 2.5
 # Of its radius, how far from where it should be a bead is taken for the expected one.
 _HINT_REACH = 0.6
 
 
 @compiled
-def _balance(shown: NDArray[np.uint8], kind: int, step: int) -> NDArray[np.int32]:
+def _balance(
+    shown: NDArray[np.uint8],
+    covered: NDArray[np.uint8],
+    kind: int,
+    step: int,
+    floor_weight: int,
+) -> NDArray[np.int32]:
     """Pixels of the species less pixels of the floor, in squares of `step` pixels a side."""
     rows = (shown.shape[0] + step - 1) // step
     columns = (shown.shape[1] + step - 1) // step
     found = np.zeros((rows, columns), dtype=np.int32)
+    own = np.uint8(1 << kind)
     for i in range(shown.shape[0]):
         for j in range(shown.shape[1]):
             if shown[i, j] == kind:
-                found[i // step, j // step] += 1
+                if not covered[i, j] & own:
+                    found[i // step, j // step] += 1
             elif shown[i, j] == FLOOR:
-                found[i // step, j // step] -= _FLOOR_WEIGHT
+                found[i // step, j // step] -= floor_weight
     return found
 
 
@@ -80,19 +88,23 @@ def _explain(
     """Take the pixels of a disc out of the balance; how many of them are the species'."""
     radius = disc[2] + _RIM_PX
     own = np.uint8(1 << kind)
+    ring = np.uint8(1 << GRAY) if kind != GRAY else np.uint8(0)
+    outer = disc[2] + (_GRAY_RING_PX if kind != GRAY else _RIM_PX)
+    inner = max(disc[2] - _GRAY_RING_PX, 0.0)
     taken = 0
-    for i in range(
-        max(int(disc[1] - radius), 0), min(int(disc[1] + radius) + 1, shown.shape[0])
-    ):
+    for i in range(max(int(disc[1] - outer), 0), min(int(disc[1] + outer) + 1, shown.shape[0])):
         for j in range(
-            max(int(disc[0] - radius), 0), min(int(disc[0] + radius) + 1, shown.shape[1])
+            max(int(disc[0] - outer), 0), min(int(disc[0] + outer) + 1, shown.shape[1])
         ):
             dx, dy = j + 0.5 - disc[0], i + 0.5 - disc[1]
-            if dx * dx + dy * dy <= radius * radius:
+            d2 = dx * dx + dy * dy
+            if d2 <= radius * radius:
                 if shown[i, j] == kind and not covered[i, j] & own:
                     balance[i // step, j // step] -= 1
                     taken += 1
                 covered[i, j] |= own
+            if inner * inner < d2 <= outer * outer:
+                covered[i, j] |= ring
     return taken
 
 
@@ -172,6 +184,7 @@ def cover(
     hue_sign: float,
     radii: NDArray[np.float64],
     expected: NDArray[np.float64],
+    floor_weight: int,
     step: int,
     most: int,
     least_share: float,
@@ -193,6 +206,8 @@ def cover(
         Sizes to try.
     expected : ndarray (2,), [px]
         Radius and its spread, see `fit_circle`.
+    floor_weight : int
+        Of a pixel of floor under a disc, against one of the species.
     step : int, [px]
         Squares in which places are tried.
     most : int
@@ -214,7 +229,7 @@ def cover(
     int
         Beads found.
     """
-    balance = _balance(shown, kind, step)
+    balance = _balance(shown, covered, kind, step, floor_weight)
     found = _follow_hints(
         shown, darkness, hue, kind, hue_sign, step, least_share, covered, discs, fits, hints, balance
     )

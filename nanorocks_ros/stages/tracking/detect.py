@@ -5,12 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 
 from nanorocks_ros.stages.tracking.cover import cover
 from nanorocks_ros.stages.tracking.floor import first_floor, renew_floor
 from nanorocks_ros.stages.tracking.outline import refit
-from nanorocks_ros.stages.tracking.pixels import BLUE, GRAY, RED, look_at_pixels
+from nanorocks_ros.stages.tracking.pixels import (
+    BLUE,
+    GRAY,
+    RED,
+    look_at_dusty_pixels,
+    look_at_pixels,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,6 +41,10 @@ _COARSE_FROM_PX = 3.0
 _SIZE_SPREAD_PX = 0.3
 # More beads than the tray should hold are looked for, so that a wrong number shows.
 _SURPLUS = 1.2
+# A pixel of floor under a disc outweighs so many of the species; not where chalk may hide them.
+_FLOOR_WEIGHT = 2
+# Patches of chalk are smoothed over so many pixels.
+_DUSTY_BLUR_PX = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,6 +97,7 @@ class BeadDetector:
         self._gray_known = any(one.kind == GRAY for one in self._searches)
         largest = max(one.diameter_high for one in tray.species)
         self._reach = max(3, round(largest * pixels_per_metre))
+        self._dusty = tray.chalk and not self._gray_known
         self._turn = 0
         self._floor: NDArray[np.float32] | None = None
 
@@ -108,8 +120,14 @@ class BeadDetector:
         look_at_pixels(
             color, self._levels, self._gray_known, self._darkness, self._hue, self._shown
         )
+        if self._dusty:
+            self._hue = cv2.blur(self._hue, (_DUSTY_BLUR_PX, _DUSTY_BLUR_PX))
+            look_at_dusty_pixels(self._hue, self._levels, self._darkness, self._shown)
         self._covered[:] = 0
-        found = [self._cover(*one) for one in zip(self._searches, hints, strict=True)]
+        found: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = [None] * len(hints)
+        # Gray ones last: the outline of a coloured bead looks gray.
+        for k in sorted(range(len(hints)), key=lambda k: self._searches[k].kind == GRAY):
+            found[k] = self._cover(self._searches[k], hints[k])
         every = np.concatenate([discs for discs, _ in found])
         detections = []
         first = 0
@@ -170,6 +188,7 @@ class BeadDetector:
             _HUE_SIGN[search.kind],
             search.radii,
             search.expected,
+            1 if self._dusty else _FLOOR_WEIGHT,
             search.step,
             search.most,
             self._least_share,

@@ -17,7 +17,7 @@ _ANGLES = 2.0 * np.pi * (np.arange(_RAYS) + 0.5) / _RAYS
 _COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
 
 # Of 255: what counts as floor beyond the outline, and the least step of an edge.
-_FLOOR_DARKNESS = 45.0
+_FLOOR_DARKNESS = 80.0
 _LEAST_STEP = 60.0
 # Gray levels of red minus blue across an edge between two species.
 _LEAST_HUE_STEP = 30.0

@@ -22,8 +22,10 @@ FLOOR, RED, BLUE, GRAY, UNKNOWN = range(5)
 
 # Darkness is kept in 255 steps from the floor to black.
 FULL = 255.0
-# Of the floor to black, where a pixel is no longer floor: half the darkness of a chalky bead.
+# Of the floor to black, where a pixel of a coloured bead begins; and where a gray one does,
+# which must not be taken for shadows that overlap.
 _DARK = 0.27
+_GRAY_DARK = 0.45
 # (red - blue) / (red + blue): copper and acrylic 0.5 to 0.7, glass -0.7, JSC-1 and floor 0.1;
 # half of that under chalk.
 _COLOURED = 0.2
@@ -80,4 +82,43 @@ def look_at_pixels(
             elif -warm > _COLOURED * (red + blue):
                 shown[i, j] = BLUE
             else:
-                shown[i, j] = GRAY if gray_known else UNKNOWN
+                shown[i, j] = GRAY if gray_known and down > _GRAY_DARK * level else UNKNOWN
+
+
+# Gray levels of red minus blue, averaged over some pixels, of a bead under chalk.
+_DUSTY_HUE = 16
+# So many steps of darkness for a level of red minus blue: a quarter of a clean bead's is full.
+_DUSTY_STEPS = 5
+
+
+@compiled
+def look_at_dusty_pixels(
+    hue: NDArray[np.int16],
+    floor: NDArray[np.uint8],
+    darkness: NDArray[np.uint8],
+    shown: NDArray[np.uint8],
+) -> None:
+    """The same for beads and floor under chalk, and glare: only the hue tells them apart.
+
+    Parameters
+    ----------
+    hue : ndarray of int16, (rows, columns), [gray levels]
+        Smoothed: patches of chalk on a bead have none.
+    floor : ndarray of uint8, (rows, columns, 3), bgr
+    darkness : ndarray of uint8, (rows, columns)
+        Written: how much hue there is, 255 for a bead.
+    shown : ndarray of uint8, (rows, columns)
+        Written: FLOOR, RED, BLUE or UNKNOWN.
+    """
+    for i in range(hue.shape[0]):
+        for j in range(hue.shape[1]):
+            warm = np.int32(hue[i, j])
+            darkness[i, j] = min(_DUSTY_STEPS * abs(warm), FULL)
+            if warm > _DUSTY_HUE:
+                shown[i, j] = RED
+            elif warm < -_DUSTY_HUE:
+                shown[i, j] = BLUE
+            elif min(floor[i, j, 0], floor[i, j, 1], floor[i, j, 2]) >= _SATURATED:
+                shown[i, j] = UNKNOWN
+            else:
+                shown[i, j] = FLOOR

@@ -64,10 +64,12 @@ class Tracker:
         # Beads fly straight past the camera, not past a tray that swings.
         displacement = np.nan_to_num(np.array(image.displacement))
         shift = displacement * self._scale
+        registration = float(np.nan_to_num(image.displacement_error)) * self._scale
         hints = [linker.hints(time, shift) for linker in self._linkers]
         detected = self._detector.detect(image.color, hints)
         for linker, found in zip(self._linkers, detected, strict=True):
-            moved = replace(found, places=found.places + shift)
+            errors = np.hypot(found.place_errors, registration)
+            moved = replace(found, places=found.places + shift, place_errors=errors)
             self._next_number += linker.push(time, moved, shift, self._next_number)
         return (self._tracks(image.stamp_ns, time, displacement),)
 
