@@ -141,7 +141,8 @@ class Preprocessor:
             jumps.append(crop.meter.push(gray))
             pictures.append((crop, gray, color))
         if pictures:
-            self._counter.push(frame.stamp_ns, jumps, self._plate.push(*self._plate_speed()))
+            plate = self._plate.push(frame.stamp_ns, *self._plate_speed())
+            self._counter.push(frame.stamp_ns, jumps, plate)
         return tuple(
             self._tray_image(frame.stamp_ns, crop, gray, color, quality)
             for crop, gray, color in pictures
