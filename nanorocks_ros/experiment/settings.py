@@ -339,18 +339,39 @@ class CompressionSettings:
 
     codec: str = _setting(
         'jpeg',
-        'jpeg: every picture by itself; h264: a stream as of the flight camera, decoded again '
-        '(needs PyAV)',
-        choices=('jpeg', 'h264'),
+        'jpeg: every picture by itself, as the quality makes it; jpeg_rate: so that the film has '
+        'the size asked for; h264: as a stream of that size, decoded again (needs PyAV)',
+        choices=('jpeg', 'jpeg_rate', 'h264'),
     )
-    quality: int = _setting(90, 'of the JPEGs', low=1, high=100)
     rate: float = _setting(
         96e6,
-        'size of a minute of film at 30 frames per second, the same for every frame at other '
-        'rates; 0: as the quality makes it (jpeg only)',
+        'jpeg_rate, h264: size of a minute at 30 frames per second; a frame at other rates is as '
+        'large',
         'bytes',
-        low=0.0,
+        low=1e5,
         high=1e10,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneFilmSettings:
+    """A film of the whole plate."""
+
+    scene: SceneSettings = field(default_factory=SceneSettings)
+    compression: CompressionSettings = field(default_factory=CompressionSettings)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilmSettings:
+    """What the simulator films."""
+
+    whole_scene: bool = _setting(
+        False, 'film the whole plate with the trays of `scene.trays`, not one tray alone'
+    )
+    effects: str = _setting(
+        'all',
+        'of the scene: all as strong as set, or none at all',
+        choices=('all', 'none'),
     )
 
 

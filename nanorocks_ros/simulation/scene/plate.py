@@ -67,7 +67,9 @@ def empty_scene(
     corner = np.array([left - margin, top - margin])
     painting = _Painting(geometry, margin, rng)
     for number, region in geometry.regions.items():
-        painting.cell(region, corner, chalk.get(number, 0.0))
+        # Of its own random numbers: dust in one cell changes nothing in another.
+        dice = np.random.default_rng([seed, number])
+        painting.cell(region, corner, chalk.get(number, 0.0), dice)
     painted, opaque = painting.finished(np.hypot(_PIXEL_BLUR, defocus) * _FINE)
     rows, columns = geometry.shape
     grid = np.mgrid[0:rows, 0:columns][::-1].transpose(1, 2, 0) + 0.5
@@ -99,7 +101,6 @@ class _Painting:
     """The plate in the rectified picture, finer than that."""
 
     def __init__(self, geometry: SceneGeometry, margin: int, rng: np.random.Generator) -> None:
-        self._rng = rng
         self._metre = geometry.scale * _FINE
         size = [round(side * geometry.scale + 2 * margin) * _FINE for side in PLATE]
         self._rows, self._columns = np.ogrid[0.5 : size[1], 0.5 : size[0]]
@@ -116,7 +117,13 @@ class _Painting:
         for across, down in _SCREWS:
             self._screw(edge + across * 1e-3 * self._metre, edge + down * 1e-3 * self._metre)
 
-    def cell(self, region: Region, corner: NDArray[np.float64], chalk: float) -> None:
+    def cell(
+        self,
+        region: Region,
+        corner: NDArray[np.float64],
+        chalk: float,
+        rng: np.random.Generator,
+    ) -> None:
         """Mill a cell into the plate: a chamfer around, a floor, the shadow of its walls."""
         left, top = (
             (place - c) * _FINE for place, c in zip((region.x, region.y), corner, strict=True)
@@ -127,20 +134,23 @@ class _Painting:
         rows = slice(round(top), round(bottom))
         columns = slice(round(left), round(right))
         shape = rows.stop - rows.start, columns.stop - columns.start
-        milled = 1.0 + 0.012 * streaks(shape, self._rng, 1.5, 1.5)
-        milled += 0.02 * streaks(shape, self._rng, 90.0, 60.0)
-        milled += 0.018 * self._mill_marks(shape)
+        milled = 1.0 + 0.012 * streaks(shape, rng, 1.5, 1.5)
+        milled += 0.02 * streaks(shape, rng, 90.0, 60.0)
+        milled += 0.018 * self._mill_marks(shape, rng)
         floor = (milled * self._wall_shadow(shape))[..., np.newaxis] * _FLOOR
         if chalk > 0.0:
-            floor = dusted_floor(floor, chalk, self._metre, self._rng)
-            self._dust_around(left, top, right, bottom, chalk)
+            floor = dusted_floor(floor, chalk, self._metre, rng)
+            self._dust_around(left, top, right, bottom, chalk, rng)
         self._image[rows, columns] = floor
 
     def finished(self, blur: float) -> tuple[Picture, Picture]:
         """The painting and where it is opaque, both blurred by so many of its pixels."""
         # What is around the plate takes its colour, so that its edge stays its own when blurred.
-        image = cv2.GaussianBlur(self._image, (0, 0), blur)
-        return image, cv2.GaussianBlur(self._opaque, (0, 0), blur)
+        image, opaque = (
+            np.asarray(cv2.GaussianBlur(one, (0, 0), blur), dtype=np.float32)
+            for one in (self._image, self._opaque)
+        )
+        return image, opaque
 
     def _bevel(
         self,
@@ -168,15 +178,16 @@ class _Painting:
         rows = slice(high, int(bottom + reach) + 2)
         x, y = self._columns[:, columns], self._rows[rows]
         depths = np.stack(np.broadcast_arrays(left - x, top - y, x - right, y - bottom))
-        return self._image[rows, columns], np.asarray(depths, dtype=np.float32)
+        image = np.asarray(self._image[rows, columns], dtype=np.float32)
+        return image, np.asarray(depths, dtype=np.float32)
 
-    def _mill_marks(self, shape: tuple[int, int]) -> Picture:
+    def _mill_marks(self, shape: tuple[int, int], rng: np.random.Generator) -> Picture:
         """Arcs of a cutter that went along the cell."""
         y, x = np.ogrid[0.5 : shape[0], 0.5 : shape[1]]
         spacing, radius = 0.0011 * self._metre, 0.006 * self._metre
         bow = np.sqrt(np.maximum(radius**2 - (y - 0.5 * shape[0]) ** 2, 0.0))
         marks = np.cos(2.0 * np.pi * (x - bow) / spacing)
-        return np.asarray(marks * (0.6 + 0.4 * streaks(shape, self._rng, 30, 30)), np.float32)
+        return np.asarray(marks * (0.6 + 0.4 * streaks(shape, rng, 30, 30)), np.float32)
 
     def _wall_shadow(self, shape: tuple[int, int]) -> Picture:
         """Light that reaches the floor past the walls: less at those near the lamp."""
@@ -188,13 +199,19 @@ class _Painting:
         return np.asarray(light, dtype=np.float32)
 
     def _dust_around(
-        self, left: float, top: float, right: float, bottom: float, chalk: float
+        self,
+        left: float,
+        top: float,
+        right: float,
+        bottom: float,
+        chalk: float,
+        rng: np.random.Generator,
     ) -> None:
         """Chalk on the walls and what was spilt beside the cell."""
         fall = 0.0006 * self._metre
         image, depths = self._around(left, top, right, bottom, 6.0 * fall)
         share = 0.45 * chalk * np.exp(-np.maximum(depths.max(axis=0), 0.0) / fall)
-        patches = 0.5 + 0.5 * streaks((share.shape[0], share.shape[1]), self._rng, 9.0, 9.0)
+        patches = 0.5 + 0.5 * streaks((share.shape[0], share.shape[1]), rng, 9.0, 9.0)
         share = np.clip(share * patches, 0.0, 0.8)[..., np.newaxis]
         image += share * (np.array([214.0, 217.0, 219.0], np.float32) - image)
 
