@@ -65,7 +65,7 @@ class PlateGuess:
 
 @dataclass(frozen=True, slots=True)
 class Edges:
-    """Places on the sides of the floors, where they are, and where they should be.
+    """Places along the edges of the trays, and where they are in the picture.
 
     Parameters
     ----------
@@ -80,7 +80,8 @@ class Edges:
     normals : ndarray, (n, 2)
         Unit vectors across the side, outwards, in the picture.
     wall_px : float, [px]
-        Width of the walls, whose outer edges were found; 0 where there is one edge only, NaN where nobody looked.
+        Width of the walls, whose outer edges were found; 0 where there is one edge only, NaN
+        where nobody looked.
     expected : int
         Places that were looked at.
     """
@@ -171,8 +172,8 @@ def guess_plate(
     if high < low:
         return None
     size = (gray.shape[1] // _REDUCED, gray.shape[0] // _REDUCED)
-    small = cv2.resize(gray, size, interpolation=cv2.INTER_AREA).astype(np.float32)
-    small = cv2.GaussianBlur(small, (0, 0), 1.2)
+    reduced = cv2.resize(gray, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+    small = np.asarray(cv2.GaussianBlur(reduced, (0, 0), 1.2), dtype=np.float32)
     slopes = [np.abs(cv2.Sobel(small, cv2.CV_32F, 1 - k, k)) for k in (0, 1)]
     usual = []
     for k, one in enumerate(slopes):
@@ -233,7 +234,7 @@ def find_edges(
         To each side of where the edge should be. Below 10 px the outer edges of the walls are
         told from the inner ones, and from what lies on the floor.
     """
-    smooth = cv2.GaussianBlur(gray, (0, 0), 0.8)
+    smooth = np.asarray(cv2.GaussianBlur(gray, (0, 0), 0.8), dtype=np.float32)
     looks = [_look(smooth, tray, to_picture, pixels_per_metre, reach) for tray in trays]
     wall, anchors = (math.nan, {}) if reach >= _NARROW else _walls(looks)
     parts = []
@@ -249,7 +250,9 @@ def find_edges(
         good &= (look.at < np.array(gray.shape[::-1]) - reach).all(axis=1)
         found = look.at + offsets[:, np.newaxis] * look.normals
         numbers = np.full(int(good.sum()), look.tray)
-        parts.append((numbers, look.sides[good], look.places[good], found[good], look.normals[good]))
+        parts.append(
+            (numbers, look.sides[good], look.places[good], found[good], look.normals[good])
+        )
     columns = [np.concatenate(one) for one in zip(*parts, strict=True)]
     expected = sum(len(look.sides) for look in looks)
     return Edges(columns[0], columns[1], columns[2], columns[3], columns[4], wall, expected)
@@ -327,9 +330,7 @@ def _peaks(
 def _pairs(
     peaks: list[tuple[float, float, float]],
 ) -> list[tuple[tuple[float, float, float], tuple[float, float, float]]]:
-    return [
-        (a, b) for a in peaks for b in peaks if b[0] - a[0] > _NARROWEST_WALL and a[2] != b[2]
-    ]
+    return [(a, b) for a in peaks for b in peaks if b[0] - a[0] > _NARROWEST_WALL and a[2] != b[2]]
 
 
 def _slopes(

@@ -223,8 +223,8 @@ class Preprocessor:
             raise ConfigurationError(
                 'preprocess.regions_px',
                 f'empty, with {count} trays',
-                'give x, y, width, height for each tray, or layout: plate; only a single tray can be '
-                'centred',
+                'give x, y, width, height for each tray, or layout: plate; only a single tray '
+                'can be centred',
             )
         if len(self._settings.gray_mix) != 3 or sum(self._settings.gray_mix) > 1.0 + 1e-9:
             raise ConfigurationError(

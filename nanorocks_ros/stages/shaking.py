@@ -56,13 +56,15 @@ def _difference_counts(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> 
         place = np.uint64(k)
         difference = np.int32(one[place]) - np.int32(other[place])
         counts[np.uint64(k & 1), np.uint64(abs(difference))] += 1
-    return counts[0] + counts[1]
+    total: NDArray[np.int64] = counts[0] + counts[1]
+    return total
 
 
 def _power_of(counts: NDArray[np.float64]) -> float:
     power = float(counts @ _SQUARES / counts.sum())
     for _ in range(30):
-        kept = _SQUARES <= max(1.0, _CLIP**2 * power)
+        bound = max(1.0, _CLIP**2 * power)
+        kept = np.less_equal(_SQUARES, bound)
         clipped = float((counts * kept) @ _SQUARES / (counts @ kept)) / _CLIPPED_VARIANCE
         if abs(clipped - power) <= 1e-6 * power:
             break

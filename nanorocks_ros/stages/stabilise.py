@@ -28,9 +28,9 @@ _FEWEST_POINTS = 60
 # Least slope that is no noise, [gray levels/px], and share of the steepest that is as good.
 _LEAST_SLOPE = 3.0
 _STEEP = 0.3
-# Of the floor next to its edge, [px]: the edge itself is blurred into it.
-_INSIDE = -2
-# Beyond the wall: what a displaced wall may still show.
+# Next to the floor, [px], what lies there is blurred into the wall.
+_BLUR = 2
+# How far off a tray that was lost is looked for, and one whose neighbour is known, [px].
 _REACH = 16
 _NARROW_REACH = 4
 # What differences may remain, as a share of the contrast, and the largest standard error, [px].
@@ -131,9 +131,8 @@ class TrayFollower:
         self._trust = 1.0 / (1.0 + (self._powers / (_SUSPECT * usual)) ** 2)
         return found
 
-    def _registered(
-        self, image: NDArray[np.uint8], start: tuple[float, float]
-    ) -> Shift | None:
+    def _registered(self, image: NDArray[np.uint8], start: tuple[float, float]) -> Shift | None:
+        assert self._places is not None
         found = np.empty(5)
         done = register(
             image,
@@ -167,9 +166,7 @@ class TrayFollower:
         self._seen = 1
         return self._registered(image, (0.0, 0.0))
 
-    def _edges(
-        self, image: NDArray[np.uint8]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _edges(self, image: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         region, margin = self._region, self._wall + 2
         rows, columns = region.height + 2 * margin, region.width + 2 * margin
         x = region.x - margin + 0.5 + np.arange(columns)

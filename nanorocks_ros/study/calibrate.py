@@ -129,7 +129,9 @@ def rectified_picture(image: NDArray[np.uint8], view: View) -> NDArray[np.uint8]
     nodes = nodes_of(Region(0, 0, width, height), view)
     gray = np.empty((height, width), dtype=np.uint8)
     color = np.empty((height, width, 3), dtype=np.uint8)
-    resample_color(np.ascontiguousarray(image), nodes, (0.0, 0.0), np.zeros(3, np.int64), color, gray)
+    resample_color(
+        np.ascontiguousarray(image), nodes, (0.0, 0.0), np.zeros(3, np.int64), color, gray
+    )
     return color
 
 

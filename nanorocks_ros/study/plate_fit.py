@@ -29,7 +29,14 @@ if TYPE_CHECKING:
     from nanorocks_ros.stages.find_trays import Edges
 
 # Places in the vector of unknowns.
-_BEND, _CENTRE, _K, _TURN, _SCALE, _PLACE = 0, slice(1, 3), slice(3, 5), slice(5, 8), 8, slice(9, 11)
+_BEND, _CENTRE, _K, _TURN, _SCALE, _PLACE = (
+    0,
+    slice(1, 3),
+    slice(3, 5),
+    slice(5, 8),
+    8,
+    slice(9, 11),
+)
 # Width of the wall as seen from above: the edge that is seen best may be its outer one.
 _WALL = 11
 _COMMON = 12
@@ -80,9 +87,7 @@ class PlateModel:
     guess : PlateGuess
     """
 
-    def __init__(
-        self, trays: Sequence[Tray], size: tuple[int, int], guess: PlateGuess
-    ) -> None:
+    def __init__(self, trays: Sequence[Tray], size: tuple[int, int], guess: PlateGuess) -> None:
         self.trays = trays
         self.size = size
         self._order = {one.number: k for k, one in enumerate(trays)}
@@ -228,7 +233,20 @@ def _calibration(model: PlateModel, residual: float) -> Calibration:
     middle = 0.5 * np.array([width, height]) - scale * away[:2]
     cx, cy = (float(one) - 0.5 for one in values[_CENTRE])
     k1, k2 = (float(one) for one in values[_K])
-    p = (new_focal, 0.0, middle[0] - 0.5, 0.0, 0.0, new_focal, middle[1] - 0.5, 0.0, 0.0, 0.0, 1.0, 0.0)
+    p = (
+        new_focal,
+        0.0,
+        middle[0] - 0.5,
+        0.0,
+        0.0,
+        new_focal,
+        middle[1] - 0.5,
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+        0.0,
+    )
     info = CameraInfo(
         width=width,
         height=height,
