@@ -52,6 +52,9 @@ class Quality(IntFlag):
     WRONG_SCALE = 256
 
 
+NOTHING_WRONG = Quality(0)
+
+
 def _freeze_arrays(record: Any) -> None:
     for field in fields(record):
         value = getattr(record, field.name)
@@ -123,7 +126,7 @@ class TrayImage:
     displacement_error: float = UNKNOWN
     velocity: tuple[float, float] = (UNKNOWN, UNKNOWN)
     velocity_error: float = UNKNOWN
-    quality: Quality = Quality(0)
+    quality: Quality = NOTHING_WRONG
     glare: float = UNKNOWN
 
     def __post_init__(self) -> None:

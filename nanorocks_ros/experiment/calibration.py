@@ -107,7 +107,9 @@ def view_of(info: CameraInfo, where: str) -> View:
         )
     if len(info.k) != 9 or len(info.r) != 9 or len(info.p) not in (0, 12):
         raise ConfigurationError(
-            where, f'{len(info.k)}, {len(info.r)}, {len(info.p)} numbers in k, r, p', 'give 9, 9, 12'
+            where,
+            f'{len(info.k)}, {len(info.r)}, {len(info.p)} numbers in k, r, p',
+            'give 9, 9, 12',
         )
     focal = (info.k[0], info.k[4])
     centre = (info.k[2] + 0.5, info.k[5] + 0.5)
@@ -181,7 +183,9 @@ class _File:
         where = self._where(top['camera_info'])
         (scale,) = self._numbers(top['pixels_per_metre'], 1)
         if scale <= 0.0:
-            raise self._error(top['pixels_per_metre'], f'a scale of {scale:g}', 'give px per metre')
+            raise self._error(
+                top['pixels_per_metre'], f'a scale of {scale:g}', 'give px per metre'
+            )
         residual = self._numbers(top['residual_px'], 1)[0] if 'residual_px' in top else math.nan
         return Calibration(
             view=view_of(info, where),
@@ -192,9 +196,7 @@ class _File:
         )
 
     def _info(self, node: yaml.Node) -> CameraInfo:
-        entry = self._entries(
-            node, {'width', 'height', 'distortion_model', 'd', 'k'}, {'r', 'p'}
-        )
+        entry = self._entries(node, {'width', 'height', 'distortion_model', 'd', 'k'}, {'r', 'p'})
         (width,) = self._numbers(entry['width'], 1)
         (height,) = self._numbers(entry['height'], 1)
         for name, value in (('width', width), ('height', height)):

@@ -64,15 +64,15 @@ class PreprocessSettings:
     )
     stabilise: bool = _setting(True, 'follow the motion of each tray, and take it out')
     wall_width: float = _setting(
-        0.0015,
+        0.002,
         'width of the wall around a tray by which its motion is followed',
         'm',
         low=0.0001,
         high=0.01,
     )
     shake_speed: float = _setting(
-        0.003,
-        'a tray that starts to move faster than this is being shaken',
+        0.001,
+        'a plate that starts to move faster than this is being shaken',
         'm/s',
         low=0.0001,
         high=10.0,

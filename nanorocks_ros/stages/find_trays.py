@@ -34,8 +34,15 @@ _CORNER = 0.08
 _ALONG = 3
 _STEP = 0.5
 # Least slope of an edge, in units of what noise gives.
-_CLEAR = 4.0
+_CLEAR = 2.0
 _LEAST_SLOPE = 1.5
+# Below this reach [px] all places of a side agree, and so near to one another.
+_NARROW = 10.0
+_NEAR = 2.5
+# Edges that count, as a share of the strongest, and widths of walls, [px].
+_AS_STRONG = 0.2
+_NARROWEST_WALL, _WIDEST_WALL = 2.5, 24.0
+_WALL_SPREAD = 0.8
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +65,7 @@ class PlateGuess:
 
 @dataclass(frozen=True, slots=True)
 class Edges:
-    """Places on the sides of the floors, where they are, and where they should be.
+    """Places along the edges of the trays, and where they are in the picture.
 
     Parameters
     ----------
@@ -72,6 +79,9 @@ class Edges:
         In the picture.
     normals : ndarray, (n, 2)
         Unit vectors across the side, outwards, in the picture.
+    wall_px : float, [px]
+        Width of the walls, whose outer edges were found; 0 where there is one edge only, NaN
+        where nobody looked.
     expected : int
         Places that were looked at.
     """
@@ -81,6 +91,7 @@ class Edges:
     places: NDArray[np.float64]
     found: NDArray[np.float64]
     normals: NDArray[np.float64]
+    wall_px: float
     expected: int
 
 
@@ -161,8 +172,8 @@ def guess_plate(
     if high < low:
         return None
     size = (gray.shape[1] // _REDUCED, gray.shape[0] // _REDUCED)
-    small = cv2.resize(gray, size, interpolation=cv2.INTER_AREA).astype(np.float32)
-    small = cv2.GaussianBlur(small, (0, 0), 1.2)
+    reduced = cv2.resize(gray, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+    small = np.asarray(cv2.GaussianBlur(reduced, (0, 0), 1.2), dtype=np.float32)
     slopes = [np.abs(cv2.Sobel(small, cv2.CV_32F, 1 - k, k)) for k in (0, 1)]
     usual = []
     for k, one in enumerate(slopes):
@@ -209,7 +220,7 @@ def find_edges(
     pixels_per_metre: float,
     reach: float,
 ) -> Edges:
-    """Look for the edges of the floors next to where they should be.
+    """Look for the edges of the trays next to where they should be.
 
     Parameters
     ----------
@@ -220,30 +231,112 @@ def find_edges(
     pixels_per_metre : float, [px/m]
         About.
     reach : float, [px]
-        To each side of where the edge should be.
+        To each side of where the edge should be. Below 10 px the outer edges of the walls are
+        told from the inner ones, and from what lies on the floor.
     """
+    smooth = np.asarray(cv2.GaussianBlur(gray, (0, 0), 0.8), dtype=np.float32)
+    looks = [_look(smooth, tray, to_picture, pixels_per_metre, reach) for tray in trays]
+    wall, anchors = (math.nan, {}) if reach >= _NARROW else _walls(looks)
     parts = []
-    expected = 0
-    smooth = cv2.GaussianBlur(gray, (0, 0), 0.8)
-    for tray in trays:
-        sides, places = _sides(tray, _SPACING_PX / pixels_per_metre)
-        expected += len(sides)
-        at = to_picture(places, tray.number)
-        # A thousandth of the floor outwards.
-        normals = to_picture(places + 1e-3 * _OUTWARD[sides], tray.number) - at
-        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-        offsets, good = _offsets(smooth, at, normals, reach)
-        found = at + offsets[:, np.newaxis] * normals
-        numbers = np.full(int(good.sum()), tray.number)
-        parts.append((numbers, sides[good], places[good], found[good], normals[good]))
+    for look in looks:
+        offsets, good = np.empty(len(look.at)), np.zeros(len(look.at), dtype=bool)
+        for side in range(4):
+            own = look.sides == side
+            anchor = anchors.get((look.tray, side))
+            if reach < _NARROW and anchor is None:
+                continue
+            offsets[own], good[own] = _offsets(look.across, look.slope[own], reach, anchor)
+        good &= (look.at > reach).all(axis=1)
+        good &= (look.at < np.array(gray.shape[::-1]) - reach).all(axis=1)
+        found = look.at + offsets[:, np.newaxis] * look.normals
+        numbers = np.full(int(good.sum()), look.tray)
+        parts.append(
+            (numbers, look.sides[good], look.places[good], found[good], look.normals[good])
+        )
     columns = [np.concatenate(one) for one in zip(*parts, strict=True)]
-    return Edges(columns[0], columns[1], columns[2], columns[3], columns[4], expected)
+    expected = sum(len(look.sides) for look in looks)
+    return Edges(columns[0], columns[1], columns[2], columns[3], columns[4], wall, expected)
 
 
-def _offsets(
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """Slopes across the sides of one tray."""
+
+    tray: int
+    sides: NDArray[np.int64]
+    places: NDArray[np.float64]
+    at: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    across: NDArray[np.float64]
+    slope: NDArray[np.float64]
+
+
+def _look(
+    gray: NDArray[np.float32], tray: Tray, to_picture: Mapping, scale: float, reach: float
+) -> _Look:
+    sides, places = _sides(tray, _SPACING_PX / scale)
+    at = to_picture(places, tray.number)
+    # A thousandth of the floor outwards.
+    normals = to_picture(places + 1e-3 * _OUTWARD[sides], tray.number) - at
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    across, slope = _slopes(gray, at, normals, max(reach, _WIDEST_WALL))
+    return _Look(tray.number, sides, places, at, normals, across, slope)
+
+
+def _walls(looks: Sequence[_Look]) -> tuple[float, dict[tuple[int, int], float]]:
+    """Width of the walls in the picture, and where the outer edge of each side is, [px].
+
+    A wall is darker or brighter than the floor and the plate, so it has two edges of opposite
+    slopes, and all walls are equally wide. Where most sides show one edge only there is no wall.
+    """
+    peaks = {
+        (look.tray, side): _peaks(look.across, np.median(look.slope[look.sides == side], axis=0))
+        for look in looks
+        for side in range(4)
+    }
+    pairs = {key: _pairs(found) for key, found in peaks.items()}
+    widths = np.array([b[0] - a[0] for found in pairs.values() for a, b in found])
+    width = 0.0
+    if widths.size:
+        support = (np.abs(widths[:, np.newaxis] - widths) < _WALL_SPREAD).sum(axis=1)
+        if support.max() >= 0.5 * len(peaks):
+            like = np.abs(widths - widths[support.argmax()]) < _WALL_SPREAD
+            width = float(np.median(widths[like]))
+    anchors = {}
+    for key, found in peaks.items():
+        if width > 0.0:
+            fitting = [one for one in pairs[key] if abs(one[1][0] - one[0][0] - width) < 1.5]
+            best = max(fitting, key=lambda one: min(one[0][1], one[1][1]), default=None)
+            if best is not None:
+                anchors[key] = best[1][0]
+        elif found:
+            anchors[key] = max(found, key=lambda one: one[1] / (1.0 + abs(one[0])))[0]
+    return width, anchors
+
+
+def _peaks(
+    across: NDArray[np.float64], slope: NDArray[np.float64]
+) -> list[tuple[float, float, float]]:
+    """Place, strength and sign of the edges across a side."""
+    strength = np.abs(slope)
+    top = (strength[1:-1] > strength[:-2]) & (strength[1:-1] >= strength[2:])
+    top &= strength[1:-1] >= max(_LEAST_SLOPE, _AS_STRONG * float(strength.max()))
+    return [
+        (float(across[k]), float(strength[k]), float(np.sign(slope[k])))
+        for k in np.flatnonzero(top) + 1
+    ]
+
+
+def _pairs(
+    peaks: list[tuple[float, float, float]],
+) -> list[tuple[tuple[float, float, float], tuple[float, float, float]]]:
+    return [(a, b) for a in peaks for b in peaks if b[0] - a[0] > _NARROWEST_WALL and a[2] != b[2]]
+
+
+def _slopes(
     gray: NDArray[np.float32], at: NDArray[np.float64], normals: NDArray[np.float64], reach: float
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """How far along each normal the steepest slope is, and whether it is an edge."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Slope of the levels along each normal, outwards, [gray levels/px]."""
     across = np.arange(-reach - 2.0, reach + 2.0 + 0.5 * _STEP, _STEP)
     along = np.arange(-_ALONG, _ALONG + 1.0)
     tangents = np.stack([-normals[:, 1], normals[:, 0]], axis=-1)
@@ -252,30 +345,33 @@ def _offsets(
         + across[:, np.newaxis, np.newaxis] * normals[:, np.newaxis, np.newaxis]
         + along[:, np.newaxis] * tangents[:, np.newaxis, np.newaxis]
     ).astype(np.float32) - np.float32(0.5)
-    shape = points.shape
-    flat = points.reshape(shape[0], -1, 2)
-    levels = cv2.remap(gray, flat[..., 0], flat[..., 1], cv2.INTER_CUBIC, None, cv2.BORDER_REPLICATE)
-    profile = levels.reshape(shape[:3]).mean(axis=2)
-    slope = np.gradient(profile, _STEP, axis=1)
-    # What is nearer to where it should be is more likely it.
-    likely = np.exp(-0.5 * (across / (0.7 * reach + 1.0)) ** 2)
-    sign = _polarity(slope * likely)
-    signed = np.maximum(sign * slope, 0.0) * likely
-    signed[:, np.abs(across) > reach] = 0.0
+    flat = points.reshape(len(at), -1, 2)
+    levels = cv2.remap(
+        gray, flat[..., 0], flat[..., 1], cv2.INTER_CUBIC, None, cv2.BORDER_REPLICATE
+    )
+    profile = levels.reshape(points.shape[:3]).mean(axis=2)
+    return across, np.gradient(profile, _STEP, axis=1)
+
+
+def _offsets(
+    across: NDArray[np.float64], slope: NDArray[np.float64], reach: float, anchor: float | None
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """How far along each normal of a side its edge is, and whether it is an edge."""
+    if anchor is None:
+        # What is nearer to where it should be is more likely it.
+        signed = np.abs(slope) * np.exp(-0.5 * (across / (0.7 * reach)) ** 2)
+        signed = signed * (np.abs(across) <= reach)
+    else:
+        middle = np.median(slope[:, int(np.abs(across - anchor).argmin())])
+        signed = np.sign(middle) * slope * (np.abs(across - anchor) <= _NEAR)
     best = np.clip(signed.argmax(axis=1), 1, across.size - 2)
-    rows = np.arange(len(at))
-    left, middle, right = (sign * slope[rows, best + k] for k in (-1, 0, 1))
-    bend = np.minimum(left - 2.0 * middle + right, -1e-9)
+    rows = np.arange(len(slope))
+    left, top, right = (np.abs(slope[rows, best + k]) for k in (-1, 0, 1))
+    bend = np.minimum(left - 2.0 * top + right, -1e-9)
     peak = np.clip(0.5 * (left - right) / bend, -1.0, 1.0)
     noise = np.median(np.abs(slope), axis=1)
-    good = middle > np.maximum(_LEAST_SLOPE, _CLEAR * noise)
-    inside = (at > reach).all(axis=1) & (at < np.array(gray.shape[::-1]) - reach).all(axis=1)
-    return across[best] + peak * _STEP, good & inside
-
-
-def _polarity(slope: NDArray[np.float64]) -> float:
-    """Whether the wall is brighter than the floor, or darker, at most places of a tray."""
-    return 1.0 if np.maximum(slope, 0.0).max(axis=1).sum() > -np.minimum(slope, 0.0).min(axis=1).sum() else -1.0
+    good = (signed[rows, best] > 0.0) & (top > np.maximum(_LEAST_SLOPE, _CLEAR * noise))
+    return across[best] + peak * _STEP, good
 
 
 def plate_places(trays: Sequence[Tray]) -> dict[int, NDArray[np.float64]]:

@@ -91,9 +91,7 @@ class Pipeline:
         When the settings cannot be used.
     """
 
-    def __init__(
-        self, settings: PipelineSettings, camera: str, view: View | None = None
-    ) -> None:
+    def __init__(self, settings: PipelineSettings, camera: str, view: View | None = None) -> None:
         settings = calibrated(settings)
         trays = trays_of(settings)
         self.preprocessor = Preprocessor(settings, trays, camera, view)

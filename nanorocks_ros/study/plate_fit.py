@@ -29,8 +29,18 @@ if TYPE_CHECKING:
     from nanorocks_ros.stages.find_trays import Edges
 
 # Places in the vector of unknowns.
-_BEND, _CENTRE, _K, _TURN, _SCALE, _PLACE = 0, slice(1, 3), slice(3, 5), slice(5, 8), 8, slice(9, 11)
-_COMMON = 11
+_BEND, _CENTRE, _K, _TURN, _SCALE, _PLACE = (
+    0,
+    slice(1, 3),
+    slice(3, 5),
+    slice(5, 8),
+    8,
+    slice(9, 11),
+)
+# Width of the wall as seen from above: the edge that is seen best may be its outer one.
+_WALL = 11
+_COMMON = 12
+_WALL_USUAL, _WALL_ERROR = 0.5e-3, 0.1e-3
 # How well things are known before: place and size of a floor [m], axis of the lens as a share of
 # the width, k1 and k2, and tilt of the plate.
 _TOLERANCE = 0.04e-3
@@ -39,8 +49,10 @@ _K_USUAL = 0.3
 _TILT_USUAL = math.radians(3.0)
 # Of one place on an edge, [px].
 _EDGE_ERROR = 0.15
+_NO_WALL = 0.01e-3
 _LONGEST_FOCAL = 20.0
-_REACHES = (24.0, 12.0, 6.0, 4.0, 4.0)
+_OUTWARDS = np.array([-1.0, -1.0, 2.0, 2.0])
+_REACHES = (24.0, 14.0, 9.0, 8.0, 6.0, 6.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +87,7 @@ class PlateModel:
     guess : PlateGuess
     """
 
-    def __init__(
-        self, trays: Sequence[Tray], size: tuple[int, int], guess: PlateGuess
-    ) -> None:
+    def __init__(self, trays: Sequence[Tray], size: tuple[int, int], guess: PlateGuess) -> None:
         self.trays = trays
         self.size = size
         self._order = {one.number: k for k, one in enumerate(trays)}
@@ -109,8 +119,8 @@ class PlateModel:
         return found
 
     def picture(self, places: NDArray[np.float64], number: int) -> NDArray[np.float64]:
-        """Where places on a floor, as shares of it, are in the picture, [px]."""
-        box = self.floor(number)
+        """Where places within the edge of a tray, as shares, are in the picture, [px]."""
+        box = self.floor(number) + self.values[_WALL] * _OUTWARDS
         return self._project(self.values, box[:2] + places * box[2:])
 
     def _project(
@@ -133,6 +143,7 @@ class PlateModel:
         """Distance of each edge from where it should be, [px]."""
         order = np.array([self._order[one] for one in edges.trays])
         boxes = self._boxes + values[_COMMON:].reshape(-1, 4) * _TOLERANCE
+        boxes = boxes + values[_WALL] * _OUTWARDS
         own = boxes[order]
         points = self._project(values, own[:, :2] + edges.places * own[:, 2:])
         return np.asarray(((edges.found - points) * edges.normals).sum(axis=1))
@@ -145,8 +156,13 @@ class PlateModel:
         scale = np.ones(self.values.size)
         scale[_CENTRE] = scale[_PLACE] = 10.0
         scale[_SCALE] = 0.01 * self.values[_SCALE]
+        scale[_WALL] = 1e-4
         scale[_TURN], scale[_K], scale[_BEND] = 0.01, 0.05, 0.05
         middle = 0.5 * np.array(self.size)
+        # Until the walls are told from the floors the fit has to find out how wide they are.
+        told = math.isfinite(edges.wall_px)
+        wall = edges.wall_px / float(self.values[_SCALE]) if told else 0.0
+        wall_error = _WALL_ERROR if told and wall > 0.0 else _NO_WALL if told else _WALL_USUAL
 
         def every(part: NDArray[np.float64]) -> NDArray[np.float64]:
             values = self.values.copy()
@@ -158,6 +174,7 @@ class PlateModel:
                 (values[_CENTRE] - middle) / (_CENTRE_SHARE * self.size[0]),
                 values[_K] / _K_USUAL,
                 values[_TURN][:2] / _TILT_USUAL,
+                (values[_WALL : _WALL + 1] - wall) / wall_error,
                 values[_COMMON:],
             ]
             return np.concatenate([bounded, *known])
@@ -216,7 +233,20 @@ def _calibration(model: PlateModel, residual: float) -> Calibration:
     middle = 0.5 * np.array([width, height]) - scale * away[:2]
     cx, cy = (float(one) - 0.5 for one in values[_CENTRE])
     k1, k2 = (float(one) for one in values[_K])
-    p = (new_focal, 0.0, middle[0] - 0.5, 0.0, 0.0, new_focal, middle[1] - 0.5, 0.0, 0.0, 0.0, 1.0, 0.0)
+    p = (
+        new_focal,
+        0.0,
+        middle[0] - 0.5,
+        0.0,
+        0.0,
+        new_focal,
+        middle[1] - 0.5,
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+        0.0,
+    )
     info = CameraInfo(
         width=width,
         height=height,
