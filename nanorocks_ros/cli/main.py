@@ -21,7 +21,7 @@ EXIT_INTERRUPTED = 130
 
 def build_parser() -> argparse.ArgumentParser:
     """The parser of the whole command; heavy imports wait until a command runs."""
-    from nanorocks_ros.cli import analyse, calibrate, simulate, sweep
+    from nanorocks_ros.cli import analyse, calibrate, simulate, sweep, track
 
     parser = argparse.ArgumentParser(
         prog='nanorocks',
@@ -33,6 +33,7 @@ def build_parser() -> argparse.ArgumentParser:
     calibrate.add_parser(commands)
     simulate.add_parser(commands)
     sweep.add_parser(commands)
+    track.add_parser(commands)
     return parser
 
 

@@ -76,6 +76,11 @@ class Preprocessor:
         return self._view is not None
 
     @property
+    def regions(self) -> dict[int, Region]:
+        """Where the trays are in the rectified frame, by number; empty before the first frame."""
+        return {tray.number: one for tray, one in zip(self._trays, self._regions, strict=False)}
+
+    @property
     def duplicates(self) -> int:
         """Frames left out so far since they were the same as the one before."""
         return 0 if self._shape is None else self._checks.duplicates
