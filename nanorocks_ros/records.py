@@ -53,6 +53,9 @@ class Quality(IntFlag):
     WRONG_SCALE = 256
 
 
+NOTHING_WRONG = Quality(0)
+
+
 def _freeze_arrays(record: Any) -> None:
     for field in fields(record):
         value = getattr(record, field.name)
@@ -124,7 +127,7 @@ class TrayImage:
     displacement_error: float = UNKNOWN
     velocity: tuple[float, float] = (UNKNOWN, UNKNOWN)
     velocity_error: float = UNKNOWN
-    quality: Quality = Quality(0)
+    quality: Quality = NOTHING_WRONG
     glare: float = UNKNOWN
 
     def __post_init__(self) -> None:
@@ -292,8 +295,111 @@ class GroundTruth:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class BeadsTruth:
+    """What the simulator knows of every bead of a tray in the frame it drew.
+
+    Relative to the floor of the tray, as somebody who registers the tray in every picture
+    finds them; the tray itself swings, while free beads fly straight past it.
+
+    Parameters
+    ----------
+    stamp_ns : int
+    tray, cycle : int
+    displacement : ndarray (2,), [m]
+        Of the tray from its place at rest, along columns and rows.
+    tray_velocity : ndarray (2,), [m/s]
+    positions : ndarray (n, 3), [m]
+        From the corner of the floor where it is now; z towards the camera.
+    velocities : ndarray (n, 3), [m/s]
+        Relative to the tray.
+    radii : ndarray (n,), [m]
+    species : ndarray of int32, (n,)
+        Place of the species in `Tray.species`.
+    bodies : ndarray of int32, (n,)
+        The smallest number of a bead in the body that each bead belongs to. A bead's number,
+        its identity, is its row.
+    """
+
+    stamp_ns: int
+    tray: int
+    cycle: int
+    displacement: NDArray[np.float64]
+    tray_velocity: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    species: NDArray[np.int32]
+    bodies: NDArray[np.int32]
+
+    def __post_init__(self) -> None:
+        _freeze_arrays(self)
+
+    @property
+    def ids(self) -> NDArray[np.int32]:
+        """Number of each bead, (n,)."""
+        return np.arange(len(self.radii), dtype=np.int32)
+
+    @property
+    def free_velocities(self) -> NDArray[np.float64]:
+        """Velocities past the camera, (n, 3), [m/s]: constant between collisions."""
+        return np.asarray(self.velocities + np.append(self.tray_velocity, 0.0))
+
+    @property
+    def projected_speeds(self) -> NDArray[np.float64]:
+        """Speeds in the image plane past the camera, (n,), [m/s]."""
+        return np.asarray(np.hypot(*self.free_velocities[:, :2].T))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Notice:
     """Something the user should hear about, which is not an error."""
 
     stamp_ns: int
     text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tracks:
+    """The beads of one tray in one picture, each with a number that it keeps.
+
+    Parameters
+    ----------
+    stamp_ns : int
+    tray : int
+    ids : ndarray of int32, (n,)
+        Numbers of the tracks, rising; a bead lost for too long comes back under a new one.
+    species : ndarray of int32, (n,)
+        Index into the species of the tray.
+    displacement : ndarray (2,), [m]
+        Of the tray in the picture, from where it was at first; 0 where nobody measured it.
+    positions : ndarray (n, 2), [m]
+        Of the centres, from the corner of the floor where it is now; along columns and rows.
+    position_errors : ndarray (n,), [m]
+        Standard error of a coordinate.
+    velocities : ndarray (n, 2), [m/s]
+        Past the camera, not the swinging tray, at the instant of the picture; NaN when unknown.
+    velocity_errors : ndarray (n,), [m/s]
+        Standard error of a component; NaN when unknown.
+    radii, radius_errors : ndarray (n,), [m]
+    seen : ndarray of bool, (n,)
+        False where the bead is hidden and its place is predicted.
+    expected : ndarray of int32, (species,)
+        Beads of each species that the tray should show.
+    """
+
+    stamp_ns: int
+    tray: int
+    ids: NDArray[np.int32]
+    species: NDArray[np.int32]
+    displacement: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    position_errors: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    velocity_errors: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    radius_errors: NDArray[np.float64]
+    seen: NDArray[np.bool_]
+    expected: NDArray[np.int32]
+
+    def __post_init__(self) -> None:
+        _freeze_arrays(self)

@@ -14,9 +14,11 @@ from nanorocks_ros.experiment.settings import SettingRow, rows, with_values
 SettingsType = TypeVar('SettingsType')
 
 
-def add_flags(parser: argparse.ArgumentParser, settings: Any, skip: set[str]) -> None:
+def add_flags(
+    parser: argparse.ArgumentParser, settings: Any, skip: set[str], title: str = 'settings'
+) -> None:
     """A flag for every setting: ``speed.method`` becomes ``--speed-method``."""
-    group = parser.add_argument_group('settings')
+    group = parser.add_argument_group(title)
     for row in rows(settings):
         if row.name in skip:
             continue

@@ -6,8 +6,9 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.progress import Progress
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.settings import SimulationSettings
+from nanorocks_ros.experiment.settings import SceneFilmSettings, SimulationSettings
 
 if TYPE_CHECKING:
     import argparse
@@ -23,6 +24,7 @@ The first run is the one that is filmed. Results are the same whatever the worke
 
   nanorocks simulate --tray 3 --runs 20 --picture tray_3.png
   nanorocks simulate --tray 1 --sticking-speed 0.002 --trajectory run.npz --video run.mp4
+  nanorocks simulate --scene --duration 30 --bag scene
   nanorocks simulate --trays-file mine.yaml --tray 2 --runs 100 --json
 """
 
@@ -42,6 +44,7 @@ def add_parser(commands: Any) -> None:
     _add_work(parser)
     _add_outputs(parser.add_argument_group('files to write, all optional'))
     add_flags(parser, SimulationSettings(), skip=set())
+    add_flags(parser, SceneFilmSettings(), skip=set(), title='settings of --scene')
     parser.set_defaults(run=run)
 
 
@@ -62,6 +65,12 @@ def _add_work(parser: argparse.ArgumentParser) -> None:
         type=int,
         help='evenly spaced times from 0 to --duration, in what is printed and in trajectories; '
         f'default: as many as at --frame-rate, but at most {_SAMPLES}',
+    )
+    parser.add_argument(
+        '--scene',
+        action='store_true',
+        help='film the whole plate with all its trays, through the lens of the flight camera, '
+        'into --bag, --video or --picture (one .png, at the end); see docs/scene.md',
     )
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
@@ -92,7 +101,8 @@ def _add_outputs(group: Any) -> None:
         '--effects',
         choices=('all', 'none'),
         default='all',
-        help='of the camera, in bag and video; none: no sensor noise; default all',
+        help='of the camera, in bag and video; none: no sensor noise, and with --scene nothing '
+        'but shaded beads on a clean plate at rest; default all',
     )
     group.add_argument(
         '--quality', type=int, default=90, help='of the JPEGs in the bag, 1 to 100; default 90'
@@ -102,6 +112,15 @@ def _add_outputs(group: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Simulate, write, film, print; the exit code."""
+    from nanorocks_ros.cli.simulate_scene import check_alone, film_the_scene
+
+    if options.scene:
+        return film_the_scene(options)
+    check_alone(options)
+    return _run_tray(options)
+
+
+def _run_tray(options: argparse.Namespace) -> int:
     from nanorocks_ros.study.simulated import simulate
     from nanorocks_ros.study.tasks import Workers
 
@@ -113,16 +132,16 @@ def run(options: argparse.Namespace) -> int:
     written: list[str] = []
     filmed: dict[str, Any] = {}
     try:
-        with _Progress('simulating') as bar:
+        with Progress('simulating') as bar:
             found = simulate(plan, workers, bar.part)
         for path in files.write(found):
             written.append(str(path))  # noqa: PERF401
         if files.video is not None:
-            with _Progress('filming the video') as bar:
+            with Progress('filming the video') as bar:
                 filmed.update(files.film_video(plan, bar.count))
             written.append(str(files.video))
         if files.bag is not None:
-            with _Progress('filming the bag') as bar:
+            with Progress('filming the bag') as bar:
                 filmed.update(files.film_bag(plan, bar.count))
             written.append(str(files.bag))
     except KeyboardInterrupt as interruption:
@@ -171,37 +190,6 @@ def _plan(options: argparse.Namespace, files: SimulatedFiles) -> SimulationPlan:
         picture=files.picture is not None,
         events=files.events is not None,
     )
-
-
-class _Progress:
-    """How much is done and the time left, on a terminal and when it takes more than a second."""
-
-    def __init__(self, what: str) -> None:
-        self._what = what
-
-    def __enter__(self) -> _Progress:
-        from tqdm import tqdm
-
-        self._bar = tqdm(
-            total=1.0,
-            desc=self._what,
-            delay=1.0,
-            leave=False,
-            disable=None,
-            bar_format='{desc}: {percentage:3.0f} %|{bar}| {elapsed}, {remaining} left',
-        )
-        return self
-
-    def part(self, done: float) -> None:
-        """So much of 1 is done."""
-        self._bar.update(done - self._bar.n)
-
-    def count(self, done: int, total: int) -> None:
-        """So many of all are done."""
-        self.part(done / total)
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()
 
 
 def _left(files: SimulatedFiles, written: list[str]) -> str:

@@ -64,15 +64,15 @@ class PreprocessSettings:
     )
     stabilise: bool = _setting(True, 'follow the motion of each tray, and take it out')
     wall_width: float = _setting(
-        0.0015,
+        0.002,
         'width of the wall around a tray by which its motion is followed',
         'm',
         low=0.0001,
         high=0.01,
     )
     shake_speed: float = _setting(
-        0.003,
-        'a tray that starts to move faster than this is being shaken',
+        0.001,
+        'a plate that starts to move faster than this is being shaken',
         'm/s',
         low=0.0001,
         high=10.0,
@@ -147,6 +147,24 @@ class SpeedSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TrackingSettings:
+    """From colour crops to the beads and their tracks."""
+
+    least_area_seen: float = _setting(
+        0.3, 'share of its disc that a bead must show to be found', low=0.05, high=1.0
+    )
+    longest_gap: float = _setting(
+        1.0, 'a bead that is hidden for longer gets a new number', 's', low=0.0, high=60.0
+    )
+    fastest: float = _setting(
+        0.05, 'no bead is faster in the picture', 'm/s', low=1e-4, high=10.0
+    )
+    window: float = _setting(
+        1.0, 'longest flight from which a velocity is measured', 's', low=0.05, high=10.0
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterSettings:
     """From gray crops to the width of their autocorrelation."""
 
@@ -185,6 +203,7 @@ class PipelineSettings:
     trays_file: str = _setting('', 'YAML file of trays; empty: the trays that were flown')
     preprocess: PreprocessSettings = field(default_factory=PreprocessSettings)
     speed: SpeedSettings = field(default_factory=SpeedSettings)
+    tracking: TrackingSettings = field(default_factory=TrackingSettings)
     clusters: ClusterSettings = field(default_factory=ClusterSettings)
     cooling: CoolingSettings = field(default_factory=CoolingSettings)
 
@@ -252,6 +271,135 @@ class SimulationSettings:
     )
     noise: float = _setting(
         2.0, 'standard deviation of the sensor noise', 'gray levels', low=0.0, high=64.0
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneSettings:
+    """The whole plate under the camera, and what camera and light do; a strength of 0 is off."""
+
+    trays: tuple[int, ...] = _setting(
+        (1, 2, 3, 4, 5, 6, 7, 8), 'trays with beads in them', low=1, high=8, whole=True
+    )
+    pixels_per_metre: float = _setting(
+        12500.0, 'scale in the middle of the lens', 'px/m', low=1000.0, high=1e5
+    )
+    fisheye: float = _setting(
+        0.6,
+        'angle from the axis at which the lens sees the middle of the left edge of the rectified '
+        'picture; 0: a straight lens',
+        'rad',
+        low=0.0,
+        high=1.2,
+    )
+    lens_distortion: tuple[float, ...] = _setting(
+        (-0.02, 0.004, 0.0, 0.0), 'k1 to k4 of the fisheye lens', low=-1.0, high=1.0
+    )
+    lens_offset_px: tuple[float, ...] = _setting(
+        (9.0, -6.0), 'column and row of the axis, from the middle', 'px', low=-500.0, high=500.0
+    )
+    defocus_px: float = _setting(
+        0.7, 'standard deviation of the blur of the lens', 'px', low=0.0, high=10.0
+    )
+    noise: float = _setting(
+        2.0, 'standard deviation of the sensor noise', 'gray levels', low=0.0, high=64.0
+    )
+    vignetting: float = _setting(
+        0.25, 'light lost from the middle of the picture to its left edge', low=0.0, high=0.9
+    )
+    gradient: float = _setting(
+        0.12,
+        'light gained from edge to edge, along columns and half of it along rows',
+        low=0.0,
+        high=1.0,
+    )
+    flicker: float = _setting(
+        0.015, 'amplitude of the bands of light that roll over the picture', low=0.0, high=0.5
+    )
+    flicker_period: float = _setting(
+        4.1, 'time in which a band comes round', 's', low=0.01, high=1000.0
+    )
+    shading: float = _setting(
+        1.0, 'shading of the beads; 0: discs of one even colour', low=0.0, high=1.0
+    )
+    highlights: float = _setting(1.0, 'mirror images of the lamp on the beads', low=0.0, high=2.0)
+    shadows: float = _setting(0.25, 'light that the beads keep from the floor', low=0.0, high=1.0)
+    chalk: float = _setting(
+        1.0, 'dust on beads, floor and walls of the trays that have chalk', low=0.0, high=2.0
+    )
+    glare: float = _setting(
+        1.0, 'reflections of the LEDs in the window over trays 2 and 4', low=0.0, high=5.0
+    )
+    ovality: float = _setting(
+        0.12,
+        'copper beads: spread of the axis ratio from 1, drawn for each; areas stay',
+        low=0.0,
+        high=0.4,
+    )
+    irregularity: float = _setting(
+        0.12, 'JSC-1 grains: spread of the outline; areas stay', low=0.0, high=0.3
+    )
+    turning: float = _setting(
+        1.0,
+        'spread of the angular speeds of beads and grains about the line of sight, after shaking',
+        'rad/s',
+        low=0.0,
+        high=100.0,
+    )
+    swing: float = _setting(
+        0.0002, 'first amplitude of the plate on its springs', 'm', low=0.0, high=0.002
+    )
+    swing_frequency: float = _setting(1.5, 'of the swing', '1/s', low=0.1, high=15.0)
+    swing_damping: float = _setting(
+        0.16, 'decay of its amplitude; 0.16: to 2 % in 25 s', '1/s', low=0.0, high=10.0
+    )
+    swing_direction: float = _setting(
+        0.6, 'angle from the columns to its direction in the picture', 'rad', low=-3.2, high=3.2
+    )
+    swing_knocks: bool = _setting(
+        True, 'whether the swinging walls pass on their motion to beads that hit them'
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CompressionSettings:
+    """How the pictures of a simulated film are compressed."""
+
+    codec: str = _setting(
+        'jpeg',
+        'jpeg: every picture by itself, as the quality makes it; jpeg_rate: so that the film has '
+        'the size asked for; h264: as a stream of that size, decoded again (needs PyAV)',
+        choices=('jpeg', 'jpeg_rate', 'h264'),
+    )
+    rate: float = _setting(
+        96e6,
+        'jpeg_rate, h264: size of a minute at 30 frames per second; a frame at other rates is as '
+        'large',
+        'bytes',
+        low=1e5,
+        high=1e10,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneFilmSettings:
+    """A film of the whole plate."""
+
+    scene: SceneSettings = field(default_factory=SceneSettings)
+    compression: CompressionSettings = field(default_factory=CompressionSettings)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilmSettings:
+    """What the simulator films."""
+
+    whole_scene: bool = _setting(
+        False, 'film the whole plate with the trays of `scene.trays`, not one tray alone'
+    )
+    effects: str = _setting(
+        'all',
+        'of the scene: all as strong as set, or none at all',
+        choices=('all', 'none'),
     )
 
 

@@ -1,9 +1,20 @@
-"""The camera topic, raw or compressed, as frames."""
+"""The camera topic, raw or compressed, as frames, and what is known of its lens."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+from sensor_msgs.msg import CameraInfo
+
+from nanorocks_ros.errors import FrameError
+from nanorocks_ros.nodes._shell import qos_of
 from nanorocks_ros.recordings.images import frame_from_compressed, frame_from_image
+from nanorocks_ros.recordings.lens import info_from_message, view_from_message
 from nanorocks_ros.wire import topics
+
+# Frames that are held back for a camera_info that somebody offers, but has not sent yet.
+_PATIENCE_FRAMES = 30
 
 
 class Camera:
@@ -15,15 +26,73 @@ class Camera:
     settings : CameraSettings
     take : callable
         Called with each Frame.
+    look : callable, optional
+        Called when the lens becomes known or changes; `view` is the new View. Without it the
+        lens is not asked for.
     """
 
-    def __init__(self, node, settings, take):
+    def __init__(self, node, settings, take, look=None):
         compressed = settings.transport == 'compressed'
         topic = topics.RAW_COMPRESSED if compressed else topics.RAW
         self._read = frame_from_compressed if compressed else frame_from_image
-        self._take = take
+        self._node, self._take, self._look = node, take, look
+        self._info = None
+        self._refusal = None
+        self._held = []
+        self._started = False
+        self.view = None
         self.topic = node.resolve_topic_name(topic.name)
+        self._info_topic = node.resolve_topic_name(topics.CAMERA_INFO.name)
+        if look is not None:
+            # Ours is latched; drivers send one with each frame and keep none.
+            for latched in (True, False):
+                node.create_subscription(
+                    CameraInfo,
+                    topics.CAMERA_INFO.name,
+                    self._lens,
+                    qos_of(replace(topics.CAMERA_INFO, latched=latched)),
+                    event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+                )
         node.listen(topic, self._message)
 
+    def _lens(self, message):
+        info = info_from_message(message)
+        if info == self._info:
+            return
+        self._info, self._refusal = info, None
+        try:
+            self.view = view_from_message(message, self._info_topic)
+        except FrameError as error:
+            # Frames that are not straight would give wrong numbers, so they are refused too.
+            self._refusal = error
+            self._node.refuse(error)
+            return
+        if self._started:
+            self._node.get_logger().info(f'{self._info_topic}: a new lens; starting afresh')
+        self._look()
+        self._release()
+
     def _message(self, message):
+        waiting = self._look is not None and self._info is None and not self._started
+        offered = waiting and self._node.count_publishers(self._info_topic) > 0
+        if offered and len(self._held) < _PATIENCE_FRAMES:
+            self._held.append(message)
+            return
+        if waiting:
+            self._node.get_logger().info(
+                f'{self._info_topic}: nothing known of the lens; the picture is taken as straight'
+            )
+        self._started = True
+        self._release()
+        self._hand_on(message)
+
+    def _release(self):
+        held, self._held = self._held, []
+        self._started = self._started or bool(held)
+        for message in held:
+            self._node.timed(self._hand_on, message)
+
+    def _hand_on(self, message):
+        if self._refusal is not None:
+            raise self._refusal
         self._take(self._read(message, self.topic))

@@ -8,10 +8,11 @@ from importlib import import_module
 import numpy as np
 from builtin_interfaces.msg import Time
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Float32MultiArray, MultiArrayDimension
 
 from nanorocks_ros.records import TrayImage
+from nanorocks_ros.wire.beads import beads_layout, beads_to_array
 from nanorocks_ros.wire.layouts import layout, to_array
 
 NS = 1_000_000_000
@@ -95,6 +96,34 @@ def array_message(record, epoch_ns):
     data = array('f')
     data.frombytes(values.tobytes())
     message.data = data
+    return message
+
+
+def beads_message(truth, epoch_ns):
+    """The truth about all beads of a tray as Float32MultiArray."""
+    message = Float32MultiArray()
+    message.layout.dim = [
+        MultiArrayDimension(label=label, size=size, stride=stride)
+        for label, size, stride in beads_layout().dimensions(len(truth.radii))
+    ]
+    data = array('f')
+    data.frombytes(beads_to_array(truth, epoch_ns).tobytes())
+    message.data = data
+    return message
+
+
+def lens_message(stamp_ns, frame_id, camera):
+    """A `Camera` as sensor_msgs/CameraInfo."""
+    message = CameraInfo()
+    message.header.stamp = time_message(stamp_ns)
+    message.header.frame_id = frame_id
+    message.width, message.height = camera.width, camera.height
+    message.distortion_model = 'equidistant'
+    message.d = [float(value) for value in camera.distortion]
+    matrix = camera.matrix
+    message.k = matrix.ravel().tolist()
+    message.r = np.eye(3).ravel().tolist()
+    message.p = np.hstack([matrix, np.zeros((3, 1))]).ravel().tolist()
     return message
 
 

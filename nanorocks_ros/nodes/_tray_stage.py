@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from nanorocks_ros.experiment.calibration import calibrated
 from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._node import NanorocksNode
@@ -36,6 +37,7 @@ class TrayStageNode(NanorocksNode):
             self.listen(topics.GRAY, lambda message, tray=tray: self._take(message, tray), tray)
 
     def _build(self, settings):
+        settings = calibrated(settings)
         return {number: self._make(settings, one) for number, one in trays_of(settings).items()}
 
     def _adopt(self, settings, stages):

@@ -27,11 +27,14 @@ class PipelineNode(NanorocksNode):
         self._epoch = Epoch(self, may_set=True, follow=self._source == 'topic')
         self._reader = None
         self._where = self._source
+        self._camera, self._view = None, None
         self._offer_everything()
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(st.PipelineSettings(), self._build, self._adopt)
         if self._source == 'topic':
-            self._name_source(Camera(self, camera, self._take).topic)
+            look = None if self._settings.preprocess.calibration else self._straighten
+            self._camera = Camera(self, camera, self._take, look)
+            self._name_source(self._camera.topic)
         elif self._source == 'simulator':
             self._play_simulated()
         else:
@@ -43,13 +46,17 @@ class PipelineNode(NanorocksNode):
             self.offer(RESULT_TOPICS, tray)
 
     def _build(self, settings):
-        return Pipeline(settings, self._where)
+        return Pipeline(settings, self._where, self._view)
 
     def _adopt(self, settings, pipeline):
         self._settings, self._pipeline = settings, pipeline
 
-    def _name_source(self, where):
-        self._where = where
+    def _straighten(self):
+        self._view = self._camera.view
+        self._pipeline = self._build(self._settings)
+
+    def _name_source(self, where, view=None):
+        self._where, self._view = where, view
         self._pipeline = self._build(self._settings)
 
     def _play_simulated(self):
@@ -64,7 +71,7 @@ class PipelineNode(NanorocksNode):
 
     def _play_recorded(self):
         bag = _sources.opened_bag(self._bag)
-        self._name_source(bag.where)
+        self._name_source(bag.where, bag.view())
         self._reader = bag.reader
         self._epoch.set(bag.epoch_ns())
         self._play(_sources.recorded_moments(bag, self._bag.loop), tuple)

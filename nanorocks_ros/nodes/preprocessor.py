@@ -1,4 +1,4 @@
-"""Node: camera frames in, rectified and gray tray images out."""
+"""Node: camera frames in, straight and steady tray images out."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ class PreprocessorNode(NanorocksNode):
     def __init__(self):
         super().__init__('preprocessor')
         self._settings = self.declare(PipelineSettings(), fixed=False)
-        self._camera = Camera(self, self.declare(CameraSettings()), self._take)
+        look = None if self._settings.preprocess.calibration else self._straighten
+        self._camera = Camera(self, self.declare(CameraSettings()), self._take, look)
         self._epoch = Epoch(self, may_set=True)
         for tray in self._settings.trays:
             self.offer((topics.GRAY, topics.RECTIFIED), tray)
@@ -25,7 +26,11 @@ class PreprocessorNode(NanorocksNode):
         self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
 
     def _build(self, settings):
-        return Preprocessor(settings, trays_of(settings), self._camera.topic)
+        camera = self._camera
+        return Preprocessor(settings, trays_of(settings), camera.topic, camera.view)
+
+    def _straighten(self):
+        self._stage = self._build(self._settings)
 
     def _adopt(self, settings, stage):
         self._settings, self._stage = settings, stage

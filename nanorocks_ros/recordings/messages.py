@@ -138,6 +138,29 @@ def float_array_message(
     )
 
 
+def dimensioned_array_message(
+    dimensions: Sequence[tuple[str, int, int]], values: ArrayLike
+) -> jazzy.std_msgs__msg__Float32MultiArray:
+    """std_msgs/Float32MultiArray with several dimensions.
+
+    Parameters
+    ----------
+    dimensions : sequence of (str, int, int)
+        Label, size and stride of each.
+    values : array of float, (n,)
+    """
+    return jazzy.std_msgs__msg__Float32MultiArray(
+        layout=jazzy.std_msgs__msg__MultiArrayLayout(
+            dim=[
+                jazzy.std_msgs__msg__MultiArrayDimension(label=label, size=size, stride=stride)
+                for label, size, stride in dimensions
+            ],
+            data_offset=0,
+        ),
+        data=np.asarray(values, dtype=np.float32),
+    )
+
+
 def camera_info_message(
     stamp_ns: int,
     frame_id: str,

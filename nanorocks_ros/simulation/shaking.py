@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.settings import SimulationSettings
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.simulation.engine.rules import CollisionRules
+    from nanorocks_ros.simulation.engine.rules import CollisionRules, WallMotion
 
 # A frame this much before a shaking event shows it: decimal times are not exact in binary.
 _SIMULTANEOUS = 1e-9
@@ -62,6 +62,8 @@ class ShakenTray:
     tray : Tray
     run : int, >= 0
         Runs of one seed differ.
+    swing : WallMotion, optional
+        How the walls move after each shaking event, and knock the beads; by default they rest.
 
     Raises
     ------
@@ -71,13 +73,20 @@ class ShakenTray:
         When the beads do not fit into the tray.
     """
 
-    def __init__(self, settings: SimulationSettings, tray: Tray, run: int = 0) -> None:
+    def __init__(
+        self,
+        settings: SimulationSettings,
+        tray: Tray,
+        run: int = 0,
+        swing: WallMotion | None = None,
+    ) -> None:
         check_settings(settings)
         self._settings = settings
         self._tray = tray
         self.materials = stock(tray).materials
         self._run = run
         self._rules = rules_of(settings, tray, run)
+        self._swing = swing
         self._gas = HardSphereGas(resting_beads(settings, tray, run), self._rules)
         self._origin = 0.0
         self._cycle = 0
@@ -91,6 +100,16 @@ class ShakenTray:
     def cycle(self) -> int:
         """Shaking events so far."""
         return self._cycle
+
+    @property
+    def bodies(self) -> NDArray[np.int32]:
+        """The smallest number of a bead in the body of each bead, (n,)."""
+        return self._gas.bodies
+
+    @property
+    def origin(self) -> float | None:
+        """Time of the last shaking event, [s]; None before the first."""
+        return self._origin if self._cycle else None
 
     @property
     def counts(self) -> EventCounts:
@@ -123,7 +142,7 @@ class ShakenTray:
             yield Moment(
                 positions=positions,
                 velocities=velocities,
-                truth=self._truth(stamp_ns, velocities),
+                truth=self.truth(stamp_ns, velocities),
             )
 
     def at(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -158,11 +177,17 @@ class ShakenTray:
         shaken = after_shaking(
             self._settings, self._rules, self._gas.beads(), self._run, self._cycle
         )
-        self._gas.set_going(shaken)
+        if self._swing is not None and self._cycle == 0:
+            # Until now nothing moved: a new gas, in walls that swing from its time 0 on.
+            moving = replace(self._rules, motion=self._swing)
+            self._gas = HardSphereGas(shaken, moving)
+        else:
+            self._gas.set_going(shaken)
         self._origin = instant
         self._cycle += 1
 
-    def _truth(self, stamp_ns: int, velocities: NDArray[np.float64]) -> GroundTruth:
+    def truth(self, stamp_ns: int, velocities: NDArray[np.float64]) -> GroundTruth:
+        """What is known of the present as a whole, given the velocities (n, 3), [m/s]."""
         mean_speed, mean_projected_speed = mean_speeds(velocities)
         return GroundTruth(
             stamp_ns=stamp_ns,

@@ -80,8 +80,9 @@ class FrameChecks:
         blank = self._blankness(sample)
         if blank:
             self._blank += 1
-            notices = (self._notice(frame, f'the picture is {blank}; left out until it returns'),)
-            return Verdict(False, height, Quality(0), notices if self._blank == 1 else ())
+            text = f'the picture is {blank}; left out until it returns'
+            told = (self._notice(frame, text),) if self._blank == 1 else ()
+            return Verdict(False, height, Quality(0), told)
         notices = self._light_again(frame)
         if self._unchanged(frame, sample):
             return self._stands_still(frame, notices)
@@ -153,7 +154,7 @@ class FrameChecks:
             if more >= max(_FEWEST_ROWS, _HALF * height):
                 cut = max(cut, count)
             usual.append(count)
-        return height - cut
+        return int(height - cut)
 
 
 def _has_colors(sample: NDArray[np.uint8]) -> bool:

@@ -76,6 +76,11 @@ class Preprocessor:
         return self._view is not None
 
     @property
+    def regions(self) -> dict[int, Region]:
+        """Where the trays are in the rectified frame, by number; empty before the first frame."""
+        return {tray.number: one for tray, one in zip(self._trays, self._regions, strict=False)}
+
+    @property
     def duplicates(self) -> int:
         """Frames left out so far since they were the same as the one before."""
         return 0 if self._shape is None else self._checks.duplicates
@@ -141,7 +146,8 @@ class Preprocessor:
             jumps.append(crop.meter.push(gray))
             pictures.append((crop, gray, color))
         if pictures:
-            self._counter.push(frame.stamp_ns, jumps, self._plate.push(*self._plate_speed()))
+            plate = self._plate.push(frame.stamp_ns, *self._plate_speed())
+            self._counter.push(frame.stamp_ns, jumps, plate)
         return tuple(
             self._tray_image(frame.stamp_ns, crop, gray, color, quality)
             for crop, gray, color in pictures
@@ -222,8 +228,8 @@ class Preprocessor:
             raise ConfigurationError(
                 'preprocess.regions_px',
                 f'empty, with {count} trays',
-                'give x, y, width, height for each tray, or layout: plate; only a single tray can be '
-                'centred',
+                'give x, y, width, height for each tray, or layout: plate; only a single tray '
+                'can be centred',
             )
         if len(self._settings.gray_mix) != 3 or sum(self._settings.gray_mix) > 1.0 + 1e-9:
             raise ConfigurationError(

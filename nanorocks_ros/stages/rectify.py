@@ -52,7 +52,12 @@ def _between(low: np.int32, high: np.int32, eighths: np.int32) -> np.int32:
 
 @compiled
 def _blend(
-    pixels: NDArray[np.uint8], here: np.uint64, right: np.uint64, below: np.uint64, x: int, y: int
+    pixels: NDArray[np.uint8],
+    here: np.uint64,
+    right: np.uint64,
+    below: np.uint64,
+    x: np.int32,
+    y: np.int32,
 ) -> np.int32:
     """Bilinear interpolation at the fractions x, y of 128, from a place in a flat picture."""
     w11 = np.int32(x * y)

@@ -123,6 +123,7 @@ def register(
     places: NDArray[np.float64],
     reference: NDArray[np.float64],
     slopes: NDArray[np.float64],
+    trust: NDArray[np.float64],
     start: tuple[float, float],
     found: NDArray[np.float64],
     values: NDArray[np.float64],
@@ -136,6 +137,8 @@ def register(
     reference : ndarray, (n,), [gray levels]
     slopes : ndarray, (n, 2), [gray levels/px]
         Gradient of the reference.
+    trust : ndarray, (n,), 0 to 1
+        Weight of each point.
     start : tuple of 2 floats, [px]
     found : ndarray, (5,)
         Written: displacement (2) [px], its standard error, and the spread of what differences
@@ -164,7 +167,7 @@ def register(
         step[:] = 0.0
         for k in range(n):
             far = abs(differences[k]) / (_BOUND * spread)
-            weight = 1.0 if far <= 1.0 else 1.0 / far
+            weight = trust[k] if far <= 1.0 else trust[k] / far
             row[0], row[1] = slopes[k, 0], slopes[k, 1]
             row[2], row[3] = reference[k] - middle, 1.0
             for i in range(UNKNOWNS):

@@ -34,6 +34,8 @@ _CLIP = 3.0
 _CLIPPED_VARIANCE = 0.9733
 # A uint8 difference of variance 2 sigma^2 is never known better than its rounding.
 _ROUNDING_POWER = 1.0 / 6.0
+# A plate that swings stands still twice in every period, and that is no rest.
+_SWING_NS = 5 * NS
 # A speed of the tray counts when it is known to be one.
 _SIGNIFICANT = 5.0
 _SQUARES = np.arange(256.0) ** 2
@@ -54,13 +56,15 @@ def _difference_counts(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> 
         place = np.uint64(k)
         difference = np.int32(one[place]) - np.int32(other[place])
         counts[np.uint64(k & 1), np.uint64(abs(difference))] += 1
-    return counts[0] + counts[1]
+    total: NDArray[np.int64] = counts[0] + counts[1]
+    return total
 
 
 def _power_of(counts: NDArray[np.float64]) -> float:
     power = float(counts @ _SQUARES / counts.sum())
     for _ in range(30):
-        kept = max(1.0, _CLIP**2 * power) >= _SQUARES
+        bound = max(1.0, _CLIP**2 * power)
+        kept = np.less_equal(_SQUARES, bound)
         clipped = float((counts * kept) @ _SQUARES / (counts @ kept)) / _CLIPPED_VARIANCE
         if abs(clipped - power) <= 1e-6 * power:
             break
@@ -156,14 +160,16 @@ class PlateMeter:
     def __init__(self, ratio: float, least_speed: float) -> None:
         self._ratio = ratio
         self._least = least_speed
-        self._recent: deque[float] = deque(maxlen=_MEMORY_FRAMES)
+        self._recent: deque[tuple[int, float]] = deque()
 
-    def push(self, speed: float, error: float) -> bool:
+    def push(self, stamp_ns: int, speed: float, error: float) -> bool:
         """Take the speed of the plate since the frame before, [m/s]; NaN when unknown."""
-        if not (np.isfinite(speed) and np.isfinite(error)):
+        if not (math.isfinite(speed) and math.isfinite(error)):
             return False
-        before = max(self._recent, default=None)
-        self._recent.append(speed)
+        while self._recent and stamp_ns - self._recent[0][0] > _SWING_NS:
+            self._recent.popleft()
+        before = max((one for _, one in self._recent), default=None)
+        self._recent.append((stamp_ns, speed))
         least = max(self._least, _SIGNIFICANT * error)
         return before is not None and speed > max(least, self._ratio * before)
 

@@ -28,14 +28,19 @@ _FEWEST_POINTS = 60
 # Least slope that is no noise, [gray levels/px], and share of the steepest that is as good.
 _LEAST_SLOPE = 3.0
 _STEEP = 0.3
-# Of the floor next to its edge, [px]: the edge itself is blurred into it.
-_INSIDE = 3
-# Beyond the wall: what a displaced wall may still show.
+# Next to the floor, [px], what lies there is blurred into the wall.
+_BLUR = 2
+# How far off a tray that was lost is looked for, and one whose neighbour is known, [px].
 _REACH = 16
 _NARROW_REACH = 4
 # What differences may remain, as a share of the contrast, and the largest standard error, [px].
 _MOST_SPREAD = 0.5
 _LARGEST_ERROR = 0.2
+# A point whose level changes so much more than usual in power is half trusted: something passes
+# in front of it, or light that does not move with the tray.
+_SUSPECT = 3.0
+# What interpolation between pixels does to an edge, [px]: measured on simulated swings.
+_INTERPOLATION = 0.02
 # Pictures averaged in the reference.
 _MEMORY = 64
 
@@ -78,6 +83,7 @@ class TrayFollower:
         self._mix = mix
         self._places: NDArray[np.float64] | None = None
         self._slopes = self._reference = self._values = np.empty(0)
+        self._trust = self._powers = np.empty(0)
         self._seen = 0
         self._last = Shift(0.0, 0.0, 0.0)
 
@@ -118,10 +124,15 @@ class TrayFollower:
         self._last = found
         # The average is sharper than any one picture is free of noise.
         self._seen = min(self._seen + 1, _MEMORY)
-        self._reference += (self._values - self._reference) / self._seen
+        difference = self._values - self._reference
+        self._reference += difference / self._seen
+        self._powers += (difference * difference - self._powers) / self._seen
+        usual = float(np.median(self._powers))
+        self._trust = 1.0 / (1.0 + (self._powers / (_SUSPECT * usual)) ** 2)
         return found
 
     def _registered(self, image: NDArray[np.uint8], start: tuple[float, float]) -> Shift | None:
+        assert self._places is not None
         found = np.empty(5)
         done = register(
             image,
@@ -129,6 +140,7 @@ class TrayFollower:
             self._places,
             self._reference,
             self._slopes,
+            self._trust,
             start,
             found,
             self._values,
@@ -138,7 +150,7 @@ class TrayFollower:
         x, y, error, spread, contrast = (float(one) for one in found)
         if spread > _MOST_SPREAD * contrast or error > _LARGEST_ERROR:
             return None
-        return Shift(x, y, error)
+        return Shift(x, y, math.hypot(error, _INTERPOLATION))
 
     def _begin(self, image: NDArray[np.uint8]) -> Shift | None:
         """Choose the points to follow; None when the walls have too few edges."""
@@ -147,6 +159,7 @@ class TrayFollower:
         self._slopes = slopes
         self._reference = np.empty(len(points))
         self._values = np.empty(len(points))
+        self._powers, self._trust = np.ones(len(points)), np.ones(len(points))
         if not len(points):
             return None
         sample(image, self._mix, self._places, (0.0, 0.0), self._reference)
@@ -166,7 +179,7 @@ class TrayFollower:
         slopes = np.stack(np.gradient(smooth)[::-1], axis=-1)
         usable = np.zeros((rows, columns), dtype=bool)
         usable[1:-1, 1:-1] = True
-        inner = margin + _INSIDE
+        inner = margin - _BLUR
         usable[inner : rows - inner, inner : columns - inner] = False
         height, width = image.shape[:2]
         usable &= (places[..., 0] >= 1.0) & (places[..., 0] <= width - 1.0)

@@ -65,6 +65,7 @@ class TrayCrop:
         self._scale = settings.preprocess.pixels_per_metre
         self._mix = settings.preprocess.gray_mix[:: -1 if encoding == 'rgb8' else 1]
         self._bgr_mix = np.array([settings.preprocess.gray_mix], dtype=np.float32)
+        self._weights = mix_weights(self._mix)
         self._encoding = encoding
         self._bent = bent
         self._nodes = nodes_of(region, view)
@@ -137,7 +138,7 @@ class TrayCrop:
             resample_gray(image[:, :, 0], self._nodes, shift, gray)
             return gray, None
         color = np.empty((*size, 3), dtype=np.uint8)
-        resample_color(image, self._nodes, shift, mix_weights(self._mix), color, gray)
+        resample_color(image, self._nodes, shift, self._weights, color, gray)
         return gray, self._as_bgr(color)
 
     def _cut(self, image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.recordings.images import frame_from_compressed, frame_from_image
+from nanorocks_ros.recordings.lens import view_from_message
 from nanorocks_ros.recordings.reader import BagMessage, BagReader, open_bag
 from nanorocks_ros.records import Frame, GroundTruth
 from nanorocks_ros.wire import topics
@@ -14,6 +15,8 @@ from nanorocks_ros.wire.layouts import NS, from_array
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+    from nanorocks_ros.experiment.view import View
 
 
 class BagFrames:
@@ -70,6 +73,28 @@ class BagFrames:
     def _first(self, topic: str) -> Iterator[BagMessage]:
         if topic in self.reader.topics:
             yield from self.reader.messages([topic])
+
+    def view(self) -> View | None:
+        """What the bag says of the lens; None when it says nothing.
+
+        Its camera_info is that of the graph, or the one beside the camera topic.
+
+        Raises
+        ------
+        RecordingError
+            When it cannot be used.
+        """
+        base = self.topic.removesuffix('/compressed').rpartition('/')[0]
+        for name in (f'{base}/camera_info', topics.CAMERA_INFO.absolute()):
+            for message in self._first(name):
+                where = f'{self.reader.path}: {name}'
+                if message.type != topics.CAMERA_INFO.type:
+                    raise RecordingError(where, f'holds {message.type}', 'record a CameraInfo')
+                try:
+                    return view_from_message(self.reader.deserialize(message), where)
+                except FrameError as error:
+                    raise RecordingError(error.where, error.what, error.do) from error
+        return None
 
     def frames(self) -> Iterator[Frame | FrameError]:
         """The frames, decoded, in the order they were recorded.

@@ -20,7 +20,7 @@ from nanorocks_ros.study.output_files import whole_file
 from nanorocks_ros.study.simulated_plan import check_duration
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -108,13 +108,33 @@ def film_into_video(
     """
     check_duration(duration)
     frames = max(1, round(duration * settings.frame_rate))
-    moments = film(settings, tray, frames)
+    images = (frame.image for frame, _ in film(settings, tray, frames))
+    images_into_video(path, settings, images, frames=frames, progress=progress)
+    return {'frames': frames, 'duration': duration}
+
+
+def images_into_video(
+    path: Path,
+    settings: SimulationSettings,
+    images: Iterable[Picture],
+    *,
+    frames: int,
+    progress: Progress,
+) -> None:
+    """Write pictures of the size and at the rate of the settings into a video.
+
+    Raises
+    ------
+    ConfigurationError
+        Where PyAV is needed and not installed.
+    RecordingError
+        When the video cannot be written.
+    """
     kind = _h264 if path.suffix == '.mp4' else _motion_jpeg
     with whole_file(path) as part, kind(part, settings) as write:
-        for done, (frame, _) in enumerate(moments, start=1):
-            write(frame.image)
+        for done, image in enumerate(images, start=1):
+            write(image)
             progress(done, frames)
-    return {'frames': frames, 'duration': duration}
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from nanorocks_ros.records import (
     GroundTruth,
     Notice,
     SpeedEstimate,
+    TrayImage,
 )
 from nanorocks_ros.stages.pipeline import Pipeline
 from nanorocks_ros.study.bag_frames import BagFrames
@@ -131,7 +132,8 @@ def analyse(
     epoch_ns = bag.epoch_ns()
     if epoch_ns is None:
         raise RecordingError(bag.where, 'holds no frame', 'pass another bag or --image-topic')
-    pipeline = Pipeline(settings, bag.where)
+    view = None if settings.preprocess.calibration else bag.view()
+    pipeline = Pipeline(settings, bag.where, view)
     truth = bag.truth(epoch_ns)
     result = Analysis(
         epoch_ns=epoch_ns,
@@ -148,8 +150,11 @@ def analyse(
             result.error = result.error or error
         if progress is not None:
             progress(number, bag.count)
-    if result.error is not None and not result.stamps_ns:
-        raise result.error
+    if not result.stamps_ns:
+        raise result.error or FrameError(
+            bag.where, 'no frame can be used: all are black, white or broken', 'record it again'
+        )
+    result.notices += _remarks(pipeline, bag.where)
     if result.refused:
         result.notices.append(f'{bag.where}: {result.refused} frames could not be used')
         result.complete = False
@@ -161,10 +166,22 @@ def analyse(
     return result
 
 
+def _remarks(pipeline: Pipeline, where: str) -> list[str]:
+    """What the user should know of the frames as a whole."""
+    stage = pipeline.preprocessor
+    remarks = []
+    if not stage.straightened:
+        remarks.append(
+            f'{where}: no camera_info and no calibration file; the picture is taken as straight'
+        )
+    if stage.duplicates:
+        remarks.append(f'{where}: {stage.duplicates} frames were stored twice and left out')
+    return remarks
+
+
 def _push(result: Analysis, pipeline: Pipeline, frame: Frame) -> None:
     records = pipeline.push(frame)
-    late = len(records) == 1 and isinstance(records[0], Notice)
-    if not late:
+    if any(isinstance(record, TrayImage) for record in records):
         result.stamps_ns.append(frame.stamp_ns)
     for record in records:
         if isinstance(record, Notice):

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from nanorocks_ros.experiment import settings as st
 from nanorocks_ros.records import ClusterEstimate, CorEstimate, GroundTruth, SpeedEstimate
 from nanorocks_ros.wire import topics
+from nanorocks_ros.wire.beads import beads_layout
 from nanorocks_ros.wire.layouts import layout
 
 if TYPE_CHECKING:
@@ -26,6 +27,17 @@ _GROUPS = (
         st.PipelineSettings(),
     ),
     ('`simulator`, and `pipeline` under `simulation.`', '', st.SimulationSettings()),
+    (
+        '`simulator` with `whole_scene`, under `scene.`, and `nanorocks simulate --scene`',
+        'On the command line `scene.noise` is `--scene-noise`.',
+        st.SceneSettings(),
+    ),
+    (
+        '`nanorocks simulate --scene`',
+        'On the command line `compression.rate` is `--compression-rate`.',
+        st.CompressionSettings(),
+    ),
+    ('`simulator`', '', st.FilmSettings()),
     ('`simulator`, `bag_player`, `pipeline`', '', st.PacingSettings()),
     ('`bag_player`, `pipeline`', '', st.BagSettings()),
     ('`preprocessor`, `pipeline`', '', st.CameraSettings()),
@@ -82,7 +94,26 @@ def topics_page() -> str:
         if one.constants:
             named = ', '.join(f'`{name}` = {value}' for name, value in one.constants.items())
             text += f'\nConstants: {named}.\n'
-    return text
+    return text + _beads_section()
+
+
+def _beads_section() -> str:
+    """The array whose length is that of the list of beads."""
+    one = beads_layout()
+    head, row = len(one.head), len(one.bead)
+    text = f'\n## BeadsTruth\n\n{one.doc}\n\n'
+    text += (
+        f'{head} elements (`layout.dim[0]`), then {row} for each bead (`dim[1]`: how many beads, '
+        '`dim[2]`: the names); a bead keeps its row, which is its identity.\n\n'
+    )
+    fields = [
+        *((str(index), field) for index, field in enumerate(one.head)),
+        *((f'{head + index} + {row} i', field) for index, field in enumerate(one.bead)),
+    ]
+    return text + _table(
+        ('element', 'field', 'unit', 'meaning'),
+        ((place, f'`{field.name}`', field.unit, field.doc) for place, field in fields),
+    )
 
 
 def parameters_page() -> str:

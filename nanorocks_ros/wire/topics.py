@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 IMAGE = 'sensor_msgs/msg/Image'
 COMPRESSED = 'sensor_msgs/msg/CompressedImage'
+INFO = 'sensor_msgs/msg/CameraInfo'
 ARRAY = 'std_msgs/msg/Float32MultiArray'
 TIME = 'builtin_interfaces/msg/Time'
 
@@ -72,6 +73,16 @@ COR = Topic(
     name='tray_{tray}/cor', type=ARRAY, depth=100, latched=True, doc='CorEstimate, live and final'
 )
 TRUTH = Topic(name='tray_{tray}/truth', type=ARRAY, depth=1000, doc='GroundTruth, simulator only')
+BEADS = Topic(
+    name='tray_{tray}/beads', type=ARRAY, depth=30, doc='BeadsTruth, simulator of the scene only'
+)
+CAMERA_INFO = Topic(
+    name='camera/camera_info',
+    type=INFO,
+    depth=1,
+    latched=True,
+    doc='the lens: equidistant, 4 coefficients',
+)
 EPOCH = Topic(name='epoch', type=TIME, depth=1, latched=True, doc='what `time` counts from')
 
 TOPICS = (
@@ -85,6 +96,8 @@ TOPICS = (
     AUTOCORRELATION,
     COR,
     TRUTH,
+    BEADS,
+    CAMERA_INFO,
     EPOCH,
 )
 

@@ -99,7 +99,7 @@ def test_a_frame_that_comes_a_little_late_is_dropped_and_that_is_said(late_ns):
     (notice,) = stage.push(frame(10 * NS - late_ns))
     assert isinstance(notice, Notice)
     assert 'late and was dropped' in notice.text
-    assert isinstance(stage.push(frame(10 * NS + 1))[0], TrayImage)
+    assert isinstance(stage.push(frame(10 * NS + 1, seed=1))[0], TrayImage)
 
 
 def test_time_that_goes_back_is_a_loop_and_that_is_said():

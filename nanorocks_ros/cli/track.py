@@ -1,0 +1,211 @@
+"""``nanorocks track BAG``: every bead of a recording, followed through it."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.experiment.settings import PipelineSettings
+
+if TYPE_CHECKING:
+    import argparse
+
+    from nanorocks_ros.study.track_comparison import TrackComparison
+    from nanorocks_ros.study.tracking import TrackedBag
+
+_MM = 1e3
+_PERCENT = 100.0
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    from nanorocks_ros.cli.flags import add_flags
+
+    parser = commands.add_parser('track', help='follow every bead through a bag')
+    parser.add_argument('bag', help='rosbag2 folder or .mcap file')
+    parser.add_argument('-o', '--output', help='table of the tracks to write, .csv or .parquet')
+    parser.add_argument('--picture', help='picture of the last frame with tracks to write, .png')
+    parser.add_argument(
+        '--compare',
+        metavar='FILE',
+        help='tracks made by hand: CSV (frame, id, x, y), TrackMate CSV or XML, NASA Spotlight',
+    )
+    parser.add_argument(
+        '--first-frame', type=int, default=0, help='number of the first frame in FILE; default 0'
+    )
+    parser.add_argument('--force', action='store_true', help='replace files that exist')
+    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    parser.add_argument('--image-topic', default='', help="the camera topic, if it isn't ours")
+    parser.add_argument('--parameters', help='ROS parameter file, as the nodes take it')
+    add_flags(parser, PipelineSettings(), skip=set())
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Track, print, write; the exit code."""
+    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.study.manual_tracks import read_manual_tracks
+    from nanorocks_ros.study.tracking import track_bag
+
+    settings = settings_from(options, PipelineSettings(), options.parameters)
+    _check_outputs(options)
+    manual = read_manual_tracks(options.compare) if options.compare else None
+    with Progress('tracking') as progress:
+        found = track_bag(
+            Path(options.bag), settings, image_topic=options.image_topic, progress=progress.count
+        )
+    for notice in found.notices:
+        print(f'nanorocks: {notice}', file=sys.stderr)
+    compared = {} if manual is None else _compared(found, manual, options.first_frame)
+    if options.json:
+        print(json.dumps(_as_json(found, compared), allow_nan=False))
+    else:
+        _print(found, compared)
+    _write(options, found)
+    return 0
+
+
+def _check_outputs(options: argparse.Namespace) -> None:
+    from nanorocks_ros.study.output_files import check_outputs
+    from nanorocks_ros.study.parquet import check_parquet
+    from nanorocks_ros.study.tracks_files import TABLES
+
+    named = {'--output': options.output, '--picture': options.picture}
+    files = {flag: Path(name) for flag, name in named.items() if name}
+    check_outputs(files, {'--output': TABLES, '--picture': ('.png',)}, force=options.force)
+    if options.output:
+        check_parquet(Path(options.output))
+
+
+def _write(options: argparse.Namespace, found: TrackedBag) -> None:
+    from nanorocks_ros.study.overlay import overlay, write_overlay
+    from nanorocks_ros.study.tracks_files import write_tracks
+
+    if options.output:
+        write_tracks(Path(options.output), found)
+        print(f'nanorocks: tracks in {options.output}', file=sys.stderr)
+    if options.picture:
+        pictures = [
+            overlay(image, found.tracks[number], found.pixels_per_metre)
+            for number, image in sorted(found.pictures.items())
+        ]
+        write_overlay(Path(options.picture), pictures)
+        print(f'nanorocks: picture in {options.picture}', file=sys.stderr)
+
+
+def _compared(found: TrackedBag, manual: Any, first_frame: int) -> dict[int, TrackComparison]:
+    """The comparison for each tray in which the file has places."""
+    from nanorocks_ros.errors import RecordingError
+    from nanorocks_ros.study.track_comparison import compare_tracks, manual_reference
+
+    results = {}
+    for number, tray in found.trays.items():
+        reference = manual_reference(
+            manual,
+            found.tracks[number],
+            found.numbers[number],
+            region=found.regions[number],
+            pixels_per_metre=found.pixels_per_metre,
+            view=found.view,
+            first_frame=first_frame,
+        )
+        if reference:
+            reach = 0.5 * min(one.diameter_low for one in tray.species)
+            results[number] = compare_tracks(found.tracks[number], reference, reach=reach)
+    if not results:
+        raise RecordingError(
+            'the tracks made by hand',
+            'lie in no tray and frame of the recording',
+            'give places in pixels of its frames, and --first-frame',
+        )
+    return results
+
+
+def _counts(found: TrackedBag, number: int) -> list[dict[str, Any]]:
+    """What was seen of each species of a tray, on average over the frames."""
+    rows = []
+    for index, species in enumerate(found.trays[number].species):
+        tracks = found.tracks[number]
+        seen = sum(int((one.seen & (one.species == index)).sum()) for one in tracks)
+        followed = sum(int((one.species == index).sum()) for one in tracks)
+        numbers = {int(one) for record in tracks for one in record.ids[record.species == index]}
+        rows.append(
+            {
+                'material': species.material,
+                'expected': species.count,
+                'seen': seen / max(len(tracks), 1),
+                'followed': followed / max(len(tracks), 1),
+                'tracks': len(numbers),
+            }
+        )
+    return rows
+
+
+def _as_json(found: TrackedBag, compared: dict[int, TrackComparison]) -> dict[str, Any]:
+    return {
+        'frames': found.frames,
+        'trays': {
+            str(number): {
+                'frames': len(found.tracks[number]),
+                'species': _counts(found, number),
+                'comparison': _comparison_as_json(compared.get(number)),
+            }
+            for number in found.trays
+        },
+    }
+
+
+def _comparison_as_json(found: TrackComparison | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    values: dict[str, Any] = {
+        name: getattr(found, name)
+        for name in (
+            'beads',
+            'places',
+            'found',
+            'links',
+            'links_correct',
+            'switches',
+            'switches_per_minute',
+            'rms_distance',
+            'speed_ratio',
+        )
+    }
+    values['offset'] = list(found.offset)
+    known = {
+        name: None if isinstance(one, float) and math.isnan(one) else one
+        for name, one in values.items()
+    }
+    if math.isnan(found.offset[0]):
+        known['offset'] = None
+    return known
+
+
+def _print(found: TrackedBag, compared: dict[int, TrackComparison]) -> None:
+    print(f'{found.frames} frames')
+    for number in found.trays:
+        print(f'tray {number}: {len(found.tracks[number])} frames tracked')
+        for row in _counts(found, number):
+            share = _PERCENT * row['seen'] / row['expected']
+            print(
+                f'  {row["material"]}: {row["seen"]:.1f} of {row["expected"]} seen ({share:.0f} %), '
+                f'{row["followed"]:.1f} followed, {row["tracks"]} tracks'
+            )
+        if number in compared:
+            _print_comparison(compared[number])
+
+
+def _print_comparison(one: TrackComparison) -> None:
+    print(
+        f'  by hand: {one.beads} beads, {_PERCENT * one.found:.1f} % of {one.places} places found, '
+        f'rms distance {_MM * one.rms_distance:.3f} mm'
+    )
+    print(
+        f'  {one.links_correct} of {one.links} links agree, {one.switches} identity switches, '
+        f'speed over theirs {one.speed_ratio:.3f}'
+    )

@@ -1,0 +1,88 @@
+"""The empty plate where its springs have taken it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.simulation.scene.passes import BLOCK, shift_blocks
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.simulation.scene.geometry import SceneGeometry
+
+# Around the plate the shift falls to nothing within so many squares.
+_FADE = 2
+
+
+class MovingPlate:
+    """A canvas that holds the empty scene, and is drawn anew only where it must be.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+    still : ndarray of uint16, (rows, columns, 3)
+        The scene with the plate in its place.
+    """
+
+    def __init__(self, geometry: SceneGeometry, still: NDArray[np.uint16]) -> None:
+        self._still, self._scale = still, geometry.scale
+        self._canvas = still.copy()
+        self._moved = False
+        x, y, width, height = geometry.bounds(*geometry.plate)
+        rows, columns = geometry.shape
+        reach = _FADE * BLOCK
+        self._left, self._top = max(x - reach, BLOCK), max(y - reach, BLOCK)
+        # The last square needs the pixels after it.
+        right = min(x + width + reach, columns - BLOCK)
+        bottom = min(y + height + reach, rows - BLOCK)
+        across = max((right - self._left) // BLOCK, 0)
+        down = max((bottom - self._top) // BLOCK, 0)
+        self._lens = self._local_shifts(geometry, down, across)
+        self._touched = [
+            geometry.bounds(r.x - 40, r.y - 40, r.x + r.width + 40, r.y + r.height + 40)
+            for r in geometry.regions.values()
+        ]
+
+    def moved_to(self, displacement: tuple[float, float]) -> NDArray[np.uint16]:
+        """The canvas with the plate that far from its place [m]; to be drawn on.
+
+        Raises
+        ------
+        SimulationError
+            When that is further than it can be drawn.
+        """
+        shift = np.array(displacement) * self._scale
+        if not (np.abs(shift) < BLOCK - 1).all():
+            raise SimulationError(
+                'plate',
+                f'displaced by {np.abs(shift).max():.3g} px',
+                f'give less than {BLOCK - 1} px: a weaker swing, or fewer pixels_per_metre',
+            )
+        if shift.any():
+            shift_blocks(self._canvas, self._still, self._lens @ shift, self._left, self._top)
+            self._moved = True
+        elif self._moved:
+            self._canvas[:] = self._still
+            self._moved = False
+        else:
+            for x, y, width, height in self._touched:
+                part = slice(y, y + height), slice(x, x + width)
+                self._canvas[part] = self._still[part]
+        return self._canvas
+
+    def _local_shifts(
+        self, geometry: SceneGeometry, down: int, across: int
+    ) -> NDArray[np.float64]:
+        """What a shift of one pixel of the rectified picture makes of each square."""
+        middle = BLOCK * (np.mgrid[0:down, 0:across][::-1].transpose(1, 2, 0) + 0.5)
+        points = geometry.camera.rectified(middle + np.array([self._left, self._top]))
+        lens = geometry.local_scales(points.reshape(-1, 2)).reshape(down, across, 2, 2)
+        left, top, right, bottom = geometry.plate
+        x, y = points[..., 0], points[..., 1]
+        outside = np.stack([left - x, top - y, x - right, y - bottom]).max(axis=0)
+        share = np.clip(1.0 - (outside - 0.75 * BLOCK) / (_FADE * BLOCK), 0.0, 1.0)
+        return np.asarray(lens * share[..., np.newaxis, np.newaxis])

@@ -1,0 +1,167 @@
+"""Passes over the pixels of a frame: the shifted plate, added glare, light, noise, gray levels."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.simulation.randomness import hashed, nearly_normal
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+BLOCK = 16
+"""Side of the squares that are shifted as one, [px]."""
+
+# Light and noise are whole numbers: parts of 2^13, and of 2^19 gray levels.
+_LIGHT_BITS = 13
+_LEVEL_BITS = 6 + _LIGHT_BITS
+ONE = 1 << _LIGHT_BITS
+_HALF = 1 << (_LEVEL_BITS - 1)
+
+# Places at which a row may start in the strip of noise.
+_STRIP_PLACES = 1 << 16
+
+
+@compiled
+def shift_blocks(
+    picture: NDArray[np.uint16],
+    still: NDArray[np.uint16],
+    shifts: NDArray[np.float64],
+    left: int,
+    top: int,
+) -> None:
+    """Copy squares of a still picture from places between its pixels (bilinear).
+
+    Parameters
+    ----------
+    picture : ndarray of uint16, (rows, columns, 3)
+        Written, in the squares only.
+    still : ndarray of uint16, (rows, columns, 3)
+    shifts : ndarray (m, n, 2), [px]
+        How far, along columns and rows, what is seen in each square has moved.
+    left, top : int, [px]
+        Corner of the first square. All must lie so far inside that no source is outside.
+    """
+    for a in range(shifts.shape[0]):
+        for b in range(shifts.shape[1]):
+            column, row = -shifts[a, b, 0], -shifts[a, b, 1]
+            i, j = math.floor(row), math.floor(column)
+            down = np.uint32((row - i) * 64.0 + 0.5)
+            across = np.uint32((column - j) * 64.0 + 0.5)
+            first = left + BLOCK * b
+            for line in range(top + BLOCK * a, top + BLOCK * (a + 1)):
+                _blend(
+                    picture[line, first : first + BLOCK],
+                    still[line + i, first + j : first + j + BLOCK + 1],
+                    still[line + i + 1, first + j : first + j + BLOCK + 1],
+                    across,
+                    down,
+                )
+
+
+@compiled
+def _blend(
+    target: NDArray[np.uint16],
+    upper: NDArray[np.uint16],
+    lower: NDArray[np.uint16],
+    across: np.uint32,
+    down: np.uint32,
+) -> None:
+    """Pixels between four, at parts of 64 of the way."""
+    one = np.uint32(64)
+    w00, w01 = (one - down) * (one - across), (one - down) * across
+    w10, w11 = down * (one - across), down * across
+    for k in range(BLOCK):
+        for channel in range(3):
+            value = (
+                w00 * np.uint32(upper[k, channel])
+                + w01 * np.uint32(upper[k + 1, channel])
+                + w10 * np.uint32(lower[k, channel])
+                + w11 * np.uint32(lower[k + 1, channel])
+            )
+            target[k, channel] = np.uint16((value + np.uint32(2048)) >> np.uint32(12))
+
+
+@compiled
+def add_light(picture: NDArray[np.uint16], glare: NDArray[np.uint16]) -> None:
+    """Add one picture to another of the same shape; what is brighter than white stays white."""
+    for i in range(picture.shape[0]):
+        for j in range(picture.shape[1]):
+            for channel in range(3):
+                value = np.uint32(picture[i, j, channel]) + np.uint32(glare[i, j, channel])
+                picture[i, j, channel] = np.uint16(min(value, np.uint32(65535)))
+
+
+@compiled
+def noise_strip(columns: int, noise: float, key: np.uint64) -> NDArray[np.int32]:
+    """Sensor noise for rows to start in at any place, [gray levels / 2^19].
+
+    Parameters
+    ----------
+    columns : int
+        Pixels of a row.
+    noise : float, [gray levels]
+        Standard deviation.
+    key : uint64
+
+    Returns
+    -------
+    ndarray of int32, (3 columns + 65535,)
+    """
+    strip = np.empty(3 * columns + _STRIP_PLACES - 1, dtype=np.int32)
+    for i in range(strip.size):
+        strip[i] = np.int32(noise * nearly_normal(key, i) * (1 << _LEVEL_BITS))
+    return strip
+
+
+@compiled
+def expose(
+    canvas: NDArray[np.uint16],
+    across: NDArray[np.uint32],
+    down: NDArray[np.uint32],
+    strip: NDArray[np.int32],
+    key: np.uint64,
+    picture: NDArray[np.uint8],
+) -> None:
+    """Turn a canvas into gray levels under uneven light, with noise.
+
+    Parameters
+    ----------
+    canvas : ndarray of uint16, (rows, 3 columns), [1/64 gray levels]
+    across : ndarray of uint32, (3 columns,)
+        Light along a row, in parts of 2^13.
+    down : ndarray of uint32, (rows,)
+        The same along a column; their product stays below 3 times 2^26.
+    strip : ndarray of int32
+        See `noise_strip`.
+    key : uint64
+        Of the frame.
+    picture : ndarray of uint8, (rows, 3 columns)
+        Written.
+    """
+    columns = canvas.shape[1]
+    light = np.empty(columns, dtype=np.uint32)
+    places = np.uint64(strip.size - columns + 1)
+    for i in range(canvas.shape[0]):
+        for j in range(columns):
+            light[j] = (across[j] * down[i]) >> np.uint32(_LIGHT_BITS)
+        start = np.int64(hashed(key, i) % places)
+        _expose_row(canvas[i], light, strip[start : start + columns], picture[i])
+
+
+@compiled
+def _expose_row(
+    canvas: NDArray[np.uint16],
+    light: NDArray[np.uint32],
+    noise: NDArray[np.int32],
+    picture: NDArray[np.uint8],
+) -> None:
+    for j in range(canvas.size):
+        # At most 2^16 times 3 * 2^13, and noise of 300 levels: below 2^31.
+        value = np.int32(np.uint32(canvas[j]) * light[j]) + noise[j] + np.int32(_HALF)
+        value = value >> np.int32(_LEVEL_BITS)
+        picture[j] = np.uint8(min(max(value, np.int32(0)), np.int32(255)))

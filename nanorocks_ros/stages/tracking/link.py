@@ -1,0 +1,345 @@
+"""Tracks of one species: which bead of this picture is which of the last."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.stages.tracking.assignment import assign
+from nanorocks_ros.stages.tracking.flight import KEPT, extend_flight
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.stages.tracking.detect import Detections
+
+# Shares of the beads that collide, or are shaken, between two pictures.
+_COLLIDING, _SHAKEN = 0.15, 0.002
+# Of the size of one bead from picture to picture, beyond what its errors say, [px].
+_SIZE_JITTER_PX = 0.3
+_LARGEST_SIZE_COST = 6.0
+# Pictures in a row that a new bead must be seen in.
+_CONFIRM = 3
+# Slowest change of velocity in a collision that is reckoned with, [px/s].
+_SLOWEST_PX_S = 6.0
+# Share of a new mean speed taken over in each picture.
+_SPEED_SHARE = 0.1
+# The size of a bead is measured with an error that pictures share, [px].
+_SIZE_FLOOR_PX = 0.03
+
+
+@compiled
+def _costs(
+    predicted: NDArray[np.float64],
+    variances: NDArray[np.float64],
+    waits: NDArray[np.float64],
+    sizes: NDArray[np.float64],
+    places: NDArray[np.float64],
+    errors: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    collided: float,
+    fastest: float,
+    costs: NDArray[np.float64],
+) -> None:
+    """Minus the logarithm of the likelihood of every pair; infinite out of reach.
+
+    Parameters
+    ----------
+    predicted, variances : ndarrays (n, 2), (n,), [px], [px^2]
+    waits : ndarray (n,), [s]
+        Since each track was seen.
+    sizes, radii : ndarrays (n,), (m,), [px]
+    places, errors : ndarrays (m, 2), (m,), [px]
+    collided : float, [px/s]
+        Usual change of a component of the velocity in a collision.
+    fastest : float, [px/s]
+    costs : ndarray (n, m)
+        Written.
+    """
+    for i in range(predicted.shape[0]):
+        reach = fastest * waits[i]
+        for j in range(places.shape[0]):
+            costs[i, j] = np.inf
+            dx = places[j, 0] - predicted[i, 0]
+            dy = places[j, 1] - predicted[i, 1]
+            d2 = dx * dx + dy * dy
+            free = variances[i] + errors[j] * errors[j]
+            hit = free + (collided * waits[i]) ** 2
+            shaken = free + (0.4 * reach) ** 2
+            if d2 > 16.0 * hit and d2 > reach * reach:
+                continue
+            likelihood = (1.0 - _COLLIDING) / free * math.exp(-0.5 * d2 / free)
+            likelihood += _COLLIDING / hit * math.exp(-0.5 * d2 / hit)
+            likelihood += _SHAKEN / shaken * math.exp(-0.5 * d2 / shaken)
+            off = radii[j] - sizes[i]
+            size = 0.5 * off * off / (_SIZE_JITTER_PX * _SIZE_JITTER_PX)
+            costs[i, j] = min(size, _LARGEST_SIZE_COST) - math.log(likelihood)
+
+
+@compiled
+def _extend_all(
+    chosen: NDArray[np.int64],
+    times: NDArray[np.float64],
+    places: NDArray[np.float64],
+    errors: NDArray[np.float64],
+    counts: NDArray[np.int64],
+    lines: NDArray[np.float64],
+    time: float,
+    found: NDArray[np.float64],
+    found_errors: NDArray[np.float64],
+    window: float,
+) -> None:
+    for i in range(chosen.size):
+        j = chosen[i]
+        if j >= 0:
+            counts[i] = extend_flight(
+                times[i],
+                places[i],
+                errors[i],
+                counts[i],
+                lines[i],
+                time,
+                found[j, 0],
+                found[j, 1],
+                found_errors[j],
+                window,
+            )
+
+
+class Linker:
+    """Keeps the tracks of one species; lengths in pixels, times in seconds.
+
+    Parameters
+    ----------
+    expected : int
+        Beads there are.
+    size : tuple of 2 floats, [px]
+        Columns and rows of the tray.
+    fastest : float, [px/s]
+    longest_gap, window : float, [s]
+    """
+
+    def __init__(
+        self,
+        expected: int,
+        size: tuple[float, float],
+        fastest: float,
+        longest_gap: float,
+        window: float,
+    ) -> None:
+        self._expected = expected
+        self._size = np.array(size)
+        self._fastest = fastest
+        self._longest_gap = longest_gap
+        self._window = window
+        self._speed = 0.0
+        self._started = False
+        self.numbers = np.empty(0, dtype=np.int32)
+        self.last = np.empty(0)
+        self.hits = np.empty(0, dtype=np.int64)
+        self.radii = np.empty(0)
+        self.radius_weights = np.empty(0)
+        self._shares = np.empty(0)
+        self._times = np.empty((0, KEPT))
+        self._places = np.empty((0, KEPT, 2))
+        self._errors = np.empty((0, KEPT))
+        self._counts = np.empty(0, dtype=np.int64)
+        self._lines = np.empty((0, 9))
+
+    def push(
+        self, time: float, found: Detections, shift: NDArray[np.float64], first_number: int
+    ) -> int:
+        """Take the beads of the next picture.
+
+        Parameters
+        ----------
+        time : float, [s]
+        found : Detections
+        shift : ndarray (2,), [px]
+            Where the corner of the tray is now.
+        first_number : int
+            Of the first new track.
+
+        Returns
+        -------
+        int
+            New tracks.
+        """
+        places, variances = self.predicted(time, shift)
+        costs = np.empty((places.shape[0], found.radii.size))
+        waits = time - self.last
+        collided = max(self._speed, _SLOWEST_PX_S)
+        _costs(
+            places,
+            variances,
+            waits,
+            self.radii,
+            found.places,
+            found.place_errors,
+            found.radii,
+            collided,
+            self._fastest,
+            costs,
+        )
+        finite = costs[np.isfinite(costs)]
+        # Any pair within reach is better than none.
+        alone = float(finite.max()) + 1.0 if finite.size else 0.0
+        chosen = assign(costs, alone)
+        _extend_all(
+            chosen,
+            self._times,
+            self._places,
+            self._errors,
+            self._counts,
+            self._lines,
+            time,
+            found.places,
+            found.place_errors,
+            self._window,
+        )
+        hit = chosen >= 0
+        self._update_sizes(hit, chosen[hit], found)
+        self.last[hit] = time
+        self._shares[hit] = found.area_seen[chosen[hit]]
+        self._shares[~hit] *= 0.5
+        self.hits[hit] += 1
+        self._learn_speed()
+        self._drop(time, hit)
+        left = np.ones(found.radii.size, dtype=bool)
+        left[chosen[hit]] = False
+        new = np.flatnonzero(left)
+        self._add(time, found, new, first_number)
+        self._started = True
+        return int(new.size)
+
+    @property
+    def confirmed(self) -> NDArray[np.bool_]:
+        """Which tracks are believed, (n,)."""
+        return self.hits >= _CONFIRM
+
+    def predicted(
+        self, time: float, shift: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Where the beads should be, (n, 2), [px], and the variance of a coordinate, (n,).
+
+        Beads that would have reached a wall come back from it.
+        """
+        lines = self._lines
+        after = time - lines[:, 0]
+        moving = np.isfinite(lines[:, 6])
+        velocity = np.where(moving[:, None], lines[:, 3:5], 0.0)
+        places = lines[:, 1:3] + velocity * after[:, None]
+        low = self.radii[:, None] + shift
+        room = np.maximum(self._size - 2.0 * self.radii[:, None], 1.0)
+        folded = np.abs(np.mod(places - low + room, 2.0 * room) - room)
+        # A bead may be a little beyond where its wall should be.
+        outside = np.abs(places - low - 0.5 * room) > 0.5 * room + 1.0
+        places = np.where(outside, low + folded, places)
+        spread = np.where(moving, lines[:, 6], _SLOWEST_PX_S**2)
+        return places, lines[:, 5] + spread * after**2
+
+    def hints(self, time: float, shift: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where beads should be: column, row, radius and its error, (n, 4), [px].
+
+        Those of which most was seen come first: they lie on top.
+        """
+        places, _ = self.predicted(time, shift)
+        sizes = np.maximum(self.radius_errors(), _SIZE_JITTER_PX)
+        order = np.argsort(-self._shares, kind='stable')
+        return np.column_stack([places - shift, self.radii, sizes])[order]
+
+    def velocities(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Velocity of each bead, (n, 2), and the error of a component, (n,), [px/s]."""
+        known = np.isfinite(self._lines[:, 6])
+        velocity = np.where(known[:, None], self._lines[:, 3:5], np.nan)
+        return velocity, np.sqrt(np.where(known, self._lines[:, 6], np.nan))
+
+    def places(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Last place of each bead, (n, 2), and the error of a coordinate, (n,), [px]."""
+        return self._places[:, 0], self._errors[:, 0]
+
+    def radius_errors(self) -> NDArray[np.float64]:
+        """Standard errors of the radii, (n,), [px]."""
+        return np.sqrt(1.0 / self.radius_weights + _SIZE_FLOOR_PX**2)
+
+    def _update_sizes(
+        self, hit: NDArray[np.bool_], chosen: NDArray[np.int64], found: Detections
+    ) -> None:
+        weights = 1.0 / np.square(found.radius_errors[chosen])
+        total = self.radius_weights[hit] + weights
+        step = (found.radii[chosen] - self.radii[hit]) * weights / total
+        self.radii[hit] += step
+        self.radius_weights[hit] = total
+
+    def _learn_speed(self) -> None:
+        """A usual component of a velocity: half of the beads are faster."""
+        known = (self._counts >= 2) & self.confirmed
+        if known.any():
+            velocities = self._lines[known, 3:5]
+            usual = math.sqrt(float(np.mean(np.square(velocities))))
+            share = 1.0 if usual > self._speed else _SPEED_SHARE
+            self._speed += share * (usual - self._speed)
+
+    def _drop(self, time: float, hit: NDArray[np.bool_]) -> None:
+        waits = time - self.last
+        keep = hit | (self.confirmed & (waits <= self._longest_gap))
+        surplus = int(np.count_nonzero(keep & self.confirmed)) - self._expected
+        if surplus > 0:
+            # There are no more beads than that: those lost for longest came back as others.
+            lost = np.flatnonzero(keep & ~hit)
+            keep[lost[np.argsort(-waits[lost], kind='stable')[:surplus]]] = False
+        if not keep.all():
+            for name in _STATE:
+                setattr(self, name, getattr(self, name)[keep])
+
+    def _add(
+        self, time: float, found: Detections, new: NDArray[np.int64], first_number: int
+    ) -> None:
+        n = new.size
+        if n == 0:
+            return
+        times = np.zeros((n, KEPT))
+        times[:, 0] = time
+        places = np.zeros((n, KEPT, 2))
+        places[:, 0] = found.places[new]
+        errors = np.zeros((n, KEPT))
+        errors[:, 0] = found.place_errors[new]
+        lines = np.zeros((n, 9))
+        lines[:, 0] = time
+        lines[:, 1:3] = found.places[new]
+        lines[:, 5] = np.square(found.place_errors[new])
+        lines[:, 6] = np.inf
+        hits = np.full(n, 1 if self._started else _CONFIRM)
+        added = (
+            np.arange(first_number, first_number + n, dtype=np.int32),
+            np.full(n, time),
+            hits,
+            found.radii[new],
+            1.0 / np.square(found.radius_errors[new]),
+            found.area_seen[new],
+            times,
+            places,
+            errors,
+            np.ones(n, dtype=np.int64),
+            lines,
+        )
+        for name, values in zip(_STATE, added, strict=True):
+            setattr(self, name, np.concatenate([getattr(self, name), values]))
+
+
+_STATE = (
+    'numbers',
+    'last',
+    'hits',
+    'radii',
+    'radius_weights',
+    '_shares',
+    '_times',
+    '_places',
+    '_errors',
+    '_counts',
+    '_lines',
+)

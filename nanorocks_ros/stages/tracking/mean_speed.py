@@ -1,0 +1,187 @@
+"""Mean projected speed of the beads from their tracks.
+
+The distance between two places of a bead is longer than its way by the jitter of the places,
+and shorter where it collided in between. So it is taken over a time in which beads move well
+beyond the jitter; what the jitter adds is subtracted in squares; and from the same beads over
+twice the time follows how much collisions shorten it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.records import Tracks
+
+_NS = 1e9
+# Least distance wanted, in units of the error of a coordinate: the jitter then adds 2 % to the
+# mean square.
+_LEAST_ERRORS = 14.0
+# Fewer beads than this say nothing of a mean.
+_FEWEST = 3
+# Times the usual error of a place, with which a bead is still used.
+_WORST = 5.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeanSpeed:
+    """Mean projected speed of some beads.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Middle of the window.
+    mean_projected_speed, mean_projected_speed_error : float, [m/s]
+        The error is that of the measurement of these beads; not how they, as a sample, scatter.
+        NaN when unknown.
+    window : float, [s]
+    beads : int
+        Beads followed through the window.
+    """
+
+    stamp_ns: int
+    mean_projected_speed: float
+    mean_projected_speed_error: float
+    window: float
+    beads: int
+
+
+def mean_speed(
+    tracks: Sequence[Tracks], *, least_distance: float, species: int | None = None
+) -> MeanSpeed | None:
+    """Mean projected speed over the end of a series of tracks.
+
+    Parameters
+    ----------
+    tracks : sequence of Tracks
+        Of one tray and in order, up to the present; the longer the series, the slower the beads
+        that can be measured.
+    least_distance : float, [m]
+        Beads should come so far in half of the window, where the series is long enough.
+    species : int or None
+        Index of the species; all when None.
+
+    Returns
+    -------
+    MeanSpeed or None
+        None while there are fewer than three pictures or beads.
+    """
+    last = len(tracks) - 1
+    lag, distances = 0, None
+    for tried in _lags(last // 2):
+        found = _distances(tracks[last], tracks[last - tried], tracks[last - 2 * tried], species)
+        if found is None:
+            break
+        lag, distances = tried, found
+        if distances.far_enough(least_distance):
+            break
+    if distances is None:
+        return None
+    first, middle, end = (tracks[last - k * lag].stamp_ns for k in (2, 1, 0))
+    window = (end - first) / _NS
+    value, error = distances.speed((end - middle) / _NS, (middle - first) / _NS)
+    return MeanSpeed(
+        stamp_ns=(first + end) // 2,
+        mean_projected_speed=value,
+        mean_projected_speed_error=error,
+        window=window,
+        beads=distances.both.size,
+    )
+
+
+def _lags(longest: int) -> list[int]:
+    """Lags in pictures that grow by a quarter each."""
+    lags = [1] if longest >= 1 else []
+    while lags and lags[-1] < longest:
+        lags.append(min(longest, max(lags[-1] + 1, lags[-1] * 5 // 4)))
+    return lags
+
+
+@dataclass(frozen=True, slots=True)
+class _Distances:
+    """Of each bead: in the later half of the window, in the earlier, in both."""
+
+    later: NDArray[np.float64]
+    earlier: NDArray[np.float64]
+    both: NDArray[np.float64]
+    variances: NDArray[np.float64]
+
+    def far_enough(self, least: float) -> bool:
+        square = float(np.mean(np.square(self.later) + np.square(self.earlier))) / 2.0
+        jitter = float(self.variances.mean())
+        return square >= max(least * least, _LEAST_ERRORS**2 * jitter)
+
+    def speed(self, later_time: float, earlier_time: float) -> tuple[float, float]:
+        half = 0.5 * (
+            _mean_distance(self.later, self.variances) / later_time
+            + _mean_distance(self.earlier, self.variances) / earlier_time
+        )
+        whole = _mean_distance(self.both, self.variances) / (later_time + earlier_time)
+        # Collisions shorten the distance in proportion to the time, to first order.
+        shortened = max(half - whole, 0.0)
+        jitter = math.sqrt(2.0 * float(self.variances.mean()) / self.both.size)
+        per_time = 2.0 / (later_time + earlier_time)
+        bead = np.hypot(self.later - self.earlier, 1e-3 * self.later) * per_time
+        scatter = 0.5 * float(np.sqrt(np.mean(np.square(bead)))) / math.sqrt(self.both.size)
+        error = math.hypot(jitter * per_time, 0.5 * shortened, 0.8 * scatter)
+        return max(half + shortened, 0.0), error
+
+
+def _mean_distance(distances: NDArray[np.float64], variances: NDArray[np.float64]) -> float:
+    """Mean distance without the jitter of its ends, for places that scatter as Gaussians.
+
+    Exact for a Maxwellian gas, where the jitter widens a Gaussian by another.
+    """
+    square = float(np.mean(np.square(distances)))
+    left = square - 4.0 * float(variances.mean())
+    if left <= 0.0:
+        return 0.0
+    return float(distances.mean()) * math.sqrt(left / square)
+
+
+def _distances(later: Tracks, middle: Tracks, earlier: Tracks, species: int | None) -> _Distances | None:
+    ids, places, variances = _shown(later, species)
+    for one in (middle, earlier):
+        other_ids, other_places, other_variances = _shown(one, species)
+        ids, here, there = np.intersect1d(
+            ids, other_ids, assume_unique=True, return_indices=True
+        )
+        places = [*(known[here] for known in places), other_places[0][there]]
+        variances = [*(known[here] for known in variances), other_variances[0][there]]
+    if ids.size < _FEWEST:
+        return None
+    end, half, start = places
+    return _Distances(
+        later=np.hypot(*(end - half).T),
+        earlier=np.hypot(*(half - start).T),
+        both=np.hypot(*(end - start).T),
+        variances=np.mean(variances, axis=0),
+    )
+
+
+def _shown(
+    tracks: Tracks, species: int | None
+) -> tuple[NDArray[np.int32], list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """Numbers, places and variances of a coordinate of the beads that are seen."""
+    shown = tracks.seen if species is None else tracks.seen & (tracks.species == species)
+    if shown.any():
+        # A bead half hidden is placed badly; who is hidden does not depend on the speed.
+        usual = float(np.median(tracks.position_errors[shown]))
+        shown = shown & (tracks.position_errors <= _WORST * usual)
+    return (
+        tracks.ids[shown],
+        # Past the camera: the tray may swing under the beads.
+        [tracks.positions[shown] + tracks.displacement],
+        [np.square(tracks.position_errors[shown])],
+    )
+
+

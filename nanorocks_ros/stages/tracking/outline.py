@@ -1,0 +1,251 @@
+"""The outline of a bead with sub-pixel accuracy: edges along rays, and a circle through them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.physics.compiled import compiled
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_RAYS = 32
+_ANGLES = 2.0 * np.pi * (np.arange(_RAYS) + 0.5) / _RAYS
+_COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
+
+# Of 255: what counts as floor beyond the outline, and the least step of an edge.
+_FLOOR_DARKNESS = 80.0
+_LEAST_STEP = 60.0
+# Gray levels of red minus blue across an edge between two species.
+_LEAST_HUE_STEP = 30.0
+_ROUNDS = 3
+# No value of a picture.
+_OUT = -10000.0
+# A step that needs no further one, [px].
+_SETTLED_PX = 0.02
+# An edge off the circle by so many pixels counts half.
+_HALF_WEIGHT_PX = 0.35
+# Neighbouring rays see the same pixels; what a scatter of nothing would still hide, [px].
+_CORRELATED = 1.6
+_LEAST_SCATTER_PX = 0.06
+# How far a circle without edges may be from where it was guessed, [px].
+_GUESS_PX = 1.5
+# An edge nearer to another bead is no edge against the floor, [px].
+_NEAR_PX = 5.0
+# Share of an outline that does.
+_ENOUGH = 0.35
+
+
+@compiled
+def _at(picture: NDArray[np.uint8], x: float, y: float) -> float:
+    """Value between pixels, whose centres are at halves."""
+    column, row = x - 0.5, y - 0.5
+    j, i = math.floor(column), math.floor(row)
+    if i < 0 or j < 0 or i + 1 >= picture.shape[0] or j + 1 >= picture.shape[1]:
+        return _OUT
+    u, v = column - j, row - i
+    upper = picture[i, j] * (1.0 - u) + picture[i, j + 1] * u
+    lower = picture[i + 1, j] * (1.0 - u) + picture[i + 1, j + 1] * u
+    return upper * (1.0 - v) + lower * v
+
+
+@compiled
+def _edge(
+    picture: NDArray[np.uint8],
+    disc: NDArray[np.float64],
+    ray: int,
+    sign: float,
+    least: float,
+    most_outside: float,
+) -> float:
+    """Distance of an edge from the circle along a ray, [px]; NaN where there is none."""
+    reach = 3 if disc[2] >= 6.0 else 2
+    c, s = _COSINES[ray], _SINES[ray]
+    outside = 0.0
+    for t in range(reach - 1, reach + 1):
+        value = _at(picture, disc[0] + (disc[2] + t) * c, disc[1] + (disc[2] + t) * s)
+        outside += 0.5 * sign * value
+        if value == _OUT or sign * value > 2.0 * most_outside:
+            return np.nan
+    if outside > most_outside:
+        return np.nan
+    inside = 0.0
+    for t in range(reach - 1, reach + 1):
+        inside += 0.5 * sign * _at(
+            picture, disc[0] + (disc[2] - t) * c, disc[1] + (disc[2] - t) * s
+        )
+    step = inside - outside
+    if step < least:
+        return np.nan
+    # The outermost samples are 1 and 0 by the choice of the levels.
+    total = 1.0 - (reach + 0.5)
+    for t in range(1 - reach, reach):
+        value = _at(picture, disc[0] + (disc[2] + t) * c, disc[1] + (disc[2] + t) * s)
+        total += min(max((sign * value - outside) / step, 0.0), 1.0)
+    return total
+
+
+@compiled
+def _inverse(m: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """Inverse of a symmetric, positive 3 x 3 matrix."""
+    out[0, 0] = m[1, 1] * m[2, 2] - m[1, 2] * m[1, 2]
+    out[0, 1] = m[0, 2] * m[1, 2] - m[0, 1] * m[2, 2]
+    out[0, 2] = m[0, 1] * m[1, 2] - m[0, 2] * m[1, 1]
+    out[1, 1] = m[0, 0] * m[2, 2] - m[0, 2] * m[0, 2]
+    out[1, 2] = m[0, 1] * m[0, 2] - m[0, 0] * m[1, 2]
+    out[2, 2] = m[0, 0] * m[1, 1] - m[0, 1] * m[0, 1]
+    determinant = m[0, 0] * out[0, 0] + m[0, 1] * out[0, 1] + m[0, 2] * out[0, 2]
+    for a in range(3):
+        for b in range(a, 3):
+            out[a, b] /= determinant
+            out[b, a] = out[a, b]
+
+
+@compiled
+def _hidden(discs: NDArray[np.float64], own: int, count: int, ray: int) -> bool:
+    """Whether the edge on this ray lies on or beside another bead."""
+    x = discs[own, 0] + discs[own, 2] * _COSINES[ray]
+    y = discs[own, 1] + discs[own, 2] * _SINES[ray]
+    for k in range(count):
+        if k != own:
+            near = discs[k, 2] + 0.5 * _NEAR_PX
+            dx, dy = discs[k, 0] - x, discs[k, 1] - y
+            if dx * dx + dy * dy < near * near:
+                return True
+    return False
+
+
+@compiled
+def fit_circle(
+    darkness: NDArray[np.uint8],
+    hue: NDArray[np.int16],
+    hue_sign: float,
+    discs: NDArray[np.float64],
+    own: int,
+    count: int,
+    expected: NDArray[np.float64],
+    fit: NDArray[np.float64],
+) -> None:
+    """Fit a circle to the outline of one bead among others.
+
+    Parameters
+    ----------
+    darkness : ndarray of uint8, (rows, columns)
+    hue : ndarray of int16, (rows, columns)
+    hue_sign : float
+        1 for a red, -1 for a blue, 0 for a gray bead.
+    discs : ndarray (n, 3), [px]
+        Column, row and radius of the beads known so far; that of number `own` is replaced.
+    own, count : int
+        `count` of the discs are filled in.
+    expected : ndarray (2,), [px]
+        Radius and its standard deviation.
+    fit : ndarray (3,)
+        Written: error of a coordinate and of the radius [px], share of the outline seen.
+    """
+    start_x, start_y = discs[own, 0], discs[own, 1]
+    covariance = np.zeros((3, 3))
+    normal = np.zeros((3, 3))
+    right = np.zeros(3)
+    edges = np.empty(_RAYS)
+    row = np.ones(3)
+    seen, scatter2 = 0, 0.0
+    for turn in range(_ROUNDS):
+        seen = 0
+        total = 0.0
+        normal[:] = 0.0
+        right[:] = 0.0
+        for k in range(_RAYS):
+            if _hidden(discs, own, count, k):
+                continue
+            edge = _edge(darkness, discs[own], k, 1.0, _LEAST_STEP, _FLOOR_DARKNESS)
+            if edge != edge and hue_sign != 0.0:
+                edge = _edge(hue, discs[own], k, hue_sign, _LEAST_HUE_STEP, 20.0)
+            if edge != edge:
+                continue
+            off = edge / _HALF_WEIGHT_PX
+            weight = 1.0 / (1.0 + off * off) if turn > 0 else 1.0
+            seen += 1
+            total += weight * edge * edge
+            row[0], row[1] = _COSINES[k], _SINES[k]
+            for a in range(3):
+                right[a] += weight * row[a] * edge
+                for b in range(a, 3):
+                    normal[a, b] += weight * row[a] * row[b]
+        scatter2 = total / max(seen - 3, 1)
+        prior = max(scatter2, _LEAST_SCATTER_PX * _LEAST_SCATTER_PX)
+        # What is known of the size and of the place, as further edges of the same scatter.
+        size_weight = prior / (expected[1] * expected[1])
+        place_weight = prior / (_GUESS_PX * _GUESS_PX)
+        normal[0, 0] += place_weight
+        normal[1, 1] += place_weight
+        normal[2, 2] += size_weight
+        right[0] += place_weight * (start_x - discs[own, 0])
+        right[1] += place_weight * (start_y - discs[own, 1])
+        right[2] += size_weight * (expected[0] - discs[own, 2])
+        _inverse(normal, covariance)
+        largest = 0.0
+        for a in range(3):
+            step = 0.0
+            for b in range(3):
+                step += covariance[a, b] * right[b]
+            largest = max(largest, abs(step))
+            discs[own, a] += min(max(step, -2.0), 2.0)
+        discs[own, 2] = max(discs[own, 2], 1.5)
+        if turn > 0 and largest < _SETTLED_PX:
+            break
+    spread = _CORRELATED * (scatter2 + _LEAST_SCATTER_PX * _LEAST_SCATTER_PX)
+    fit[0] = math.sqrt(0.5 * spread * (covariance[0, 0] + covariance[1, 1]))
+    fit[1] = math.sqrt(spread * covariance[2, 2])
+    fit[2] = seen / _RAYS
+
+
+@compiled
+def _has_neighbour(discs: NDArray[np.float64], own: int) -> bool:
+    for k in range(discs.shape[0]):
+        if k != own:
+            reach = discs[k, 2] + discs[own, 2] + _NEAR_PX
+            dx, dy = discs[k, 0] - discs[own, 0], discs[k, 1] - discs[own, 1]
+            if dx * dx + dy * dy < reach * reach:
+                return True
+    return False
+
+
+@compiled
+def refit(
+    darkness: NDArray[np.uint8],
+    hue: NDArray[np.int16],
+    hue_sign: float,
+    discs: NDArray[np.float64],
+    first: int,
+    count: int,
+    expected: NDArray[np.float64],
+    fits: NDArray[np.float64],
+) -> None:
+    """Fit the circles of one species again, now that all their neighbours are known.
+
+    Parameters
+    ----------
+    darkness, hue, hue_sign, expected
+        See `fit_circle`.
+    discs : ndarray (n, 3), [px]
+        Of all species; `count` of them from `first` on are replaced.
+    fits : ndarray (count, 4)
+        First three columns written, see `fit_circle`.
+    """
+    fit = np.zeros(3)
+    alone = discs[first : first + count].copy()
+    for k in range(count):
+        if not _has_neighbour(discs, first + k):
+            continue
+        before = discs[first + k].copy()
+        fit_circle(darkness, hue, hue_sign, discs, first + k, discs.shape[0], expected, fit)
+        if fit[2] < _ENOUGH and hue_sign != 0.0:
+            # Edges against the other species show in the colour.
+            alone[k] = before
+            fit_circle(darkness, hue, hue_sign, alone, k, count, expected, fit)
+            discs[first + k] = alone[k]
+        fits[k, :3] = fit

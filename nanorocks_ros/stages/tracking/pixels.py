@@ -1,0 +1,124 @@
+"""What each pixel of a tray shows: how dark it is, how red or blue, and so what lies there.
+
+A bead of any species is darker than the gray floor in at least one colour: acrylic in blue,
+glass in red, copper in blue, JSC-1 in all three. The darkness in the darkest channel is nearly
+flat over the disc of a bead, whatever its shading, so that half of it marks the outline. Which
+species it is follows from red minus blue over their sum, which shading does not change.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.physics.compiled import compiled
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+FLOOR, RED, BLUE, GRAY, UNKNOWN = range(5)
+"""What a pixel shows; UNKNOWN is a highlight, a glare, or what fits no species of the tray."""
+
+# Darkness is kept in 255 steps from the floor to black.
+FULL = 255.0
+# Of the floor to black, where a pixel of a coloured bead begins; and where a gray one does,
+# which must not be taken for shadows that overlap.
+_DARK = 0.27
+_GRAY_DARK = 0.45
+# (red - blue) / (red + blue): copper and acrylic 0.5 to 0.7, glass -0.7, JSC-1 and floor 0.1;
+# half of that under chalk.
+_COLOURED = 0.2
+# Gray levels above the floor, in every channel, of a highlight.
+_BRIGHTER = 25
+# A floor as bright as this hides what lies on it.
+_SATURATED = 248
+
+
+@compiled
+def look_at_pixels(
+    color: NDArray[np.uint8],
+    floor: NDArray[np.uint8],
+    gray_known: bool,
+    darkness: NDArray[np.uint8],
+    hue: NDArray[np.int16],
+    shown: NDArray[np.uint8],
+) -> None:
+    """Compare a picture with the empty floor, pixel by pixel.
+
+    Parameters
+    ----------
+    color, floor : ndarray of uint8, (rows, columns, 3), bgr
+    gray_known : bool
+        Whether the tray has a gray species: dark gray is UNKNOWN otherwise.
+    darkness : ndarray of uint8, (rows, columns)
+        Written: 0 for the floor or brighter, 255 for black.
+    hue : ndarray of int16, (rows, columns), [gray levels]
+        Written: red minus blue, less that of the floor.
+    shown : ndarray of uint8, (rows, columns)
+        Written: FLOOR to UNKNOWN.
+    """
+    for i in range(color.shape[0]):
+        for j in range(color.shape[1]):
+            # Signed: differences of uint8 would wrap around.
+            blue = np.int32(color[i, j, 0])
+            green = np.int32(color[i, j, 1])
+            red = np.int32(color[i, j, 2])
+            floor_b = np.int32(floor[i, j, 0])
+            floor_g = np.int32(floor[i, j, 1])
+            floor_r = np.int32(floor[i, j, 2])
+            down = max(floor_b - blue, floor_g - green, floor_r - red)
+            up = min(blue - floor_b, green - floor_g, red - floor_r)
+            level = max(floor_b, floor_g, floor_r, 1)
+            warm = (red - blue) - (floor_r - floor_b)
+            darkness[i, j] = min(max(FULL * down, 0.0) / level, FULL)
+            hue[i, j] = warm
+            if min(floor_b, floor_g, floor_r) >= _SATURATED or up > _BRIGHTER:
+                shown[i, j] = UNKNOWN
+            elif down <= _DARK * level:
+                shown[i, j] = FLOOR
+            elif warm > _COLOURED * (red + blue):
+                shown[i, j] = RED
+            elif -warm > _COLOURED * (red + blue):
+                shown[i, j] = BLUE
+            else:
+                shown[i, j] = GRAY if gray_known and down > _GRAY_DARK * level else UNKNOWN
+
+
+# Gray levels of red minus blue, averaged over some pixels, of a bead under chalk.
+_DUSTY_HUE = 16
+# So many steps of darkness for a level of red minus blue: a quarter of a clean bead's is full.
+_DUSTY_STEPS = 5
+
+
+@compiled
+def look_at_dusty_pixels(
+    hue: NDArray[np.int16],
+    floor: NDArray[np.uint8],
+    darkness: NDArray[np.uint8],
+    shown: NDArray[np.uint8],
+) -> None:
+    """The same for beads and floor under chalk, and glare: only the hue tells them apart.
+
+    Parameters
+    ----------
+    hue : ndarray of int16, (rows, columns), [gray levels]
+        Smoothed: patches of chalk on a bead have none.
+    floor : ndarray of uint8, (rows, columns, 3), bgr
+    darkness : ndarray of uint8, (rows, columns)
+        Written: how much hue there is, 255 for a bead.
+    shown : ndarray of uint8, (rows, columns)
+        Written: FLOOR, RED, BLUE or UNKNOWN.
+    """
+    for i in range(hue.shape[0]):
+        for j in range(hue.shape[1]):
+            warm = np.int32(hue[i, j])
+            darkness[i, j] = min(_DUSTY_STEPS * abs(warm), FULL)
+            if warm > _DUSTY_HUE:
+                shown[i, j] = RED
+            elif warm < -_DUSTY_HUE:
+                shown[i, j] = BLUE
+            elif min(floor[i, j, 0], floor[i, j, 1], floor[i, j, 2]) >= _SATURATED:
+                shown[i, j] = UNKNOWN
+            else:
+                shown[i, j] = FLOOR

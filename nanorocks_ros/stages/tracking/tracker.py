@@ -1,0 +1,132 @@
+"""From the colour crops of a tray to its beads, each with a number that it keeps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.records import TrayImage, Tracks
+from nanorocks_ros.stages.tracking.detect import BeadDetector
+from nanorocks_ros.stages.tracking.link import Linker
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.settings import PipelineSettings
+    from nanorocks_ros.experiment.trays import Tray
+
+_NS = 1e9
+
+
+class Tracker:
+    """Follows the beads of one tray.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    tray : Tray
+    """
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self._settings = settings.tracking
+        self._scale = settings.preprocess.pixels_per_metre
+        self._tray = tray
+        self._expected = np.array([one.count for one in tray.species], dtype=np.int32)
+        self._restart()
+
+    def _restart(self) -> None:
+        self._detector = BeadDetector(self._settings, self._tray, self._scale)
+        self._linkers: list[Linker] = []
+        self._first_ns = 0
+        self._last_ns: int | None = None
+        self._next_number = 0
+
+    def push(self, image: TrayImage) -> tuple[Tracks, ...]:
+        """The beads of the next image of the tray.
+
+        Returns
+        -------
+        tuple of Tracks
+            One; none for a gray image, in which species cannot be told apart. A stamp that
+            goes back starts all afresh.
+        """
+        if image.color is None:
+            return ()
+        if self._last_ns is not None and image.stamp_ns <= self._last_ns:
+            self._restart()
+        if not self._linkers:
+            self._first_ns = image.stamp_ns
+            self._linkers = [self._linker(n, image.gray.shape) for n in self._expected.tolist()]
+        self._last_ns = image.stamp_ns
+        time = (image.stamp_ns - self._first_ns) / _NS
+        # Beads fly straight past the camera, not past a tray that swings.
+        displacement = np.nan_to_num(np.array(image.displacement))
+        shift = displacement * self._scale
+        registration = float(np.nan_to_num(image.displacement_error)) * self._scale
+        hints = [linker.hints(time, shift) for linker in self._linkers]
+        detected = self._detector.detect(image.color, hints)
+        for linker, found in zip(self._linkers, detected, strict=True):
+            errors = np.hypot(found.place_errors, registration)
+            moved = replace(found, places=found.places + shift, place_errors=errors)
+            self._next_number += linker.push(time, moved, shift, self._next_number)
+        return (self._tracks(image.stamp_ns, time, displacement),)
+
+    def _linker(self, expected: int, shape: tuple[int, ...]) -> Linker:
+        return Linker(
+            expected,
+            (float(shape[1]), float(shape[0])),
+            self._settings.fastest * self._scale,
+            self._settings.longest_gap,
+            self._settings.window,
+        )
+
+    def _tracks(
+        self, stamp_ns: int, time: float, displacement: NDArray[np.float64]
+    ) -> Tracks:
+        shift = displacement * self._scale
+        parts = [_in_view(k, linker, time, shift) for k, linker in enumerate(self._linkers)]
+        ids, species, places, errors, velocities, velocity_errors, radii, radius_errors, seen = (
+            np.concatenate(column) for column in zip(*parts, strict=True)
+        )
+        order = np.argsort(ids, kind='stable')
+        metre = 1.0 / self._scale
+        return Tracks(
+            stamp_ns=stamp_ns,
+            tray=self._tray.number,
+            ids=ids[order],
+            species=species[order],
+            displacement=displacement,
+            positions=metre * places[order] - displacement,
+            position_errors=metre * errors[order],
+            velocities=metre * velocities[order],
+            velocity_errors=metre * velocity_errors[order],
+            radii=metre * radii[order],
+            radius_errors=metre * radius_errors[order],
+            seen=seen[order],
+            expected=self._expected,
+        )
+
+
+def _in_view(
+    species: int, linker: Linker, time: float, shift: NDArray[np.float64]
+) -> tuple[NDArray[Any], ...]:
+    """The columns of the record for one species, in pixels."""
+    shown = linker.confirmed
+    seen = linker.last == time
+    predicted, variances = linker.predicted(time, shift)
+    places, errors = linker.places()
+    velocities, velocity_errors = linker.velocities()
+    columns = (
+        linker.numbers,
+        np.full(shown.size, species, dtype=np.int32),
+        np.where(seen[:, None], places, predicted),
+        np.where(seen, errors, np.sqrt(variances)),
+        velocities,
+        velocity_errors,
+        linker.radii,
+        linker.radius_errors(),
+        seen,
+    )
+    return tuple(column[shown] for column in columns)
