@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.records import Notice, Quality
 
 if TYPE_CHECKING:
@@ -75,7 +76,8 @@ class FrameChecks:
 
     def push(self, frame: Frame) -> Verdict:
         """Judge the next frame; stamps rise."""
-        sample = frame.image[_ROW_STEP // 2 :: _ROW_STEP, ::_COLUMN_STEP]
+        rows = frame.image[_ROW_STEP // 2 :: _ROW_STEP, ::_COLUMN_STEP]
+        sample = np.ascontiguousarray(rows)
         height = frame.image.shape[0]
         blank = self._blankness(sample)
         if blank:
@@ -89,7 +91,8 @@ class FrameChecks:
         rows = self._filled_from(frame)
         self._sample, self._image = sample, frame.image
         self._changed_ns, self._frozen_told = frame.stamp_ns, False
-        quality = Quality(0) if _has_colors(sample) else Quality.GRAY_CAMERA
+        colored = sample.ndim == 3 and _has_colors(sample)
+        quality = Quality(0) if colored else Quality.GRAY_CAMERA
         if rows < height:
             text = (
                 f'a frame breaks off at row {rows} of {height}; the trays below it are left out, '
@@ -157,11 +160,13 @@ class FrameChecks:
         return int(height - cut)
 
 
+@compiled
 def _has_colors(sample: NDArray[np.uint8]) -> bool:
-    if sample.ndim == 2:
-        return False
-    first = sample[..., 0]
-    return not (np.array_equal(first, sample[..., 1]) and np.array_equal(first, sample[..., 2]))
+    for i in range(sample.shape[0]):
+        for j in range(sample.shape[1]):
+            if sample[i, j, 0] != sample[i, j, 1] or sample[i, j, 0] != sample[i, j, 2]:
+                return True
+    return False
 
 
 def _filled_rows(image: NDArray[np.uint8]) -> int:

@@ -24,24 +24,38 @@ _TAIL = 0.01
 
 
 @compiled
-def _survey(gray: NDArray[np.uint8], counts: NDArray[np.int64]) -> int:
-    """Count the levels of every other row, and the pixels of all blocks at full scale."""
+def _survey(gray: NDArray[np.uint8]) -> tuple[int, float, float]:
+    """Contrast, share of the pixels at full scale, and share that glare hides.
+
+    Levels are those of every other row; glare is in blocks that are at full scale all over.
+    """
+    counts = np.zeros(256, dtype=np.int64)
     rows, columns = gray.shape
     for i in range(0, rows, 2):
         for j in range(columns):
-            counts[gray[i, j]] += 1
+            counts[np.uint64(gray[i, j])] += 1
+    pixels = ((rows + 1) // 2) * columns
+    full = counts[_FULL:].sum() / pixels
+    below, low, high = 0, -1, 255
+    for level in range(256):
+        below += counts[level]
+        if low < 0 and below >= _TAIL * pixels:
+            low = level
+        if below >= (1.0 - _TAIL) * pixels:
+            high = level
+            break
     hidden = 0
     for i in range(0, rows - _BLOCK + 1, _BLOCK):
         for j in range(0, columns - _BLOCK + 1, _BLOCK):
             if gray[i + _BLOCK // 2, j + _BLOCK // 2] < _FULL:
                 continue
-            full = True
+            covered = True
             for a in range(i, i + _BLOCK):
                 for b in range(j, j + _BLOCK):
-                    full = full and gray[a, b] >= _FULL
-            if full:
+                    covered = covered and gray[a, b] >= _FULL
+            if covered:
                 hidden += _BLOCK * _BLOCK
-    return hidden
+    return high - low, full, hidden / gray.size
 
 
 def picture_quality(gray: NDArray[np.uint8]) -> tuple[Quality, float]:
@@ -51,15 +65,12 @@ def picture_quality(gray: NDArray[np.uint8]) -> tuple[Quality, float]:
     ----------
     gray : ndarray of uint8, (rows, columns)
     """
-    counts = np.zeros(256, dtype=np.int64)
-    glare = _survey(gray, counts) / gray.size
-    cumulative = np.cumsum(counts) / max(1, int(counts.sum()))
-    low, high = np.searchsorted(cumulative, (_TAIL, 1.0 - _TAIL))
+    contrast, full, glare = _survey(gray)
     quality = Quality(0)
-    if high - low < _FLAT:
+    if contrast < _FLAT:
         quality |= Quality.LOW_CONTRAST
-    if 1.0 - cumulative[_FULL - 1] > _SATURATED:
+    if full > _SATURATED:
         quality |= Quality.SATURATED
     if glare > _GLARE:
         quality |= Quality.GLARE
-    return quality, glare
+    return quality, float(glare)

@@ -175,8 +175,10 @@ class TrayFollower:
         places = places_of(grid, self._view)
         gray = np.empty(rows * columns)
         sample(image, self._mix, places.reshape(-1, 6), (0.0, 0.0), gray)
+        # Chosen where they are no noise, but followed by how steep they are.
         smooth = cv2.GaussianBlur(gray.reshape(rows, columns), (3, 3), 0.0)
-        slopes = np.stack(np.gradient(smooth)[::-1], axis=-1)
+        steepness = np.stack(np.gradient(smooth)[::-1], axis=-1)
+        slopes = np.stack(np.gradient(gray.reshape(rows, columns))[::-1], axis=-1)
         usable = np.zeros((rows, columns), dtype=bool)
         usable[1:-1, 1:-1] = True
         inner = margin - _BLUR
@@ -184,7 +186,7 @@ class TrayFollower:
         height, width = image.shape[:2]
         usable &= (places[..., 0] >= 1.0) & (places[..., 0] <= width - 1.0)
         usable &= (places[..., 1] >= 1.0) & (places[..., 1] <= height - 1.0)
-        chosen = [_steepest(np.abs(slopes[..., axis]), usable) for axis in (0, 1)]
+        chosen = [_steepest(np.abs(steepness[..., axis]), usable) for axis in (0, 1)]
         if min(len(one) for one in chosen) < _FEWEST_POINTS:
             return np.empty((0, 2)), np.empty((0, 2))
         both = np.unique(np.concatenate(chosen))
