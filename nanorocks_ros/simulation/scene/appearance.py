@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -53,6 +53,26 @@ class Appearance:
     rates: NDArray[np.float64]
     dust: NDArray[np.float64]
     species: NDArray[np.int32]
+
+    @staticmethod
+    def joined(parts: list[Appearance]) -> Appearance:
+        """Those of several trays, one after the other."""
+        first = parts or [_NOTHING]
+        names = [field.name for field in fields(Appearance)]
+        return Appearance(
+            **{name: np.concatenate([getattr(one, name) for one in first]) for name in names}
+        )
+
+
+_NOTHING = Appearance(
+    looks=np.empty((0, 9)),
+    kinds=np.empty(0, dtype=np.int64),
+    stretch=np.empty(0),
+    angles=np.empty(0),
+    rates=np.empty(0),
+    dust=np.empty(0),
+    species=np.empty(0, dtype=np.int32),
+)
 
 
 def appearance_of(tray: Tray, scene: SceneSettings, rng: np.random.Generator) -> Appearance:

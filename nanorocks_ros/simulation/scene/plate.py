@@ -59,7 +59,7 @@ def empty_scene(
 
     Returns
     -------
-    ndarray of uint16, (rows, columns, 3), bgr, [1/64 gray levels]
+    ndarray of uint16, (3, rows, columns), bgr, [1/64 gray levels]
     """
     rng = np.random.default_rng(seed)
     left, top, _, _ = geometry.plate
@@ -80,7 +80,8 @@ def empty_scene(
     )
     around = _housing(geometry.shape, rng)
     scene = around + share[..., np.newaxis] * (seen - around)
-    return np.asarray(np.clip(scene, 0.0, 255.0) * LEVEL + 0.5, dtype=np.uint16)
+    levels = np.asarray(np.clip(scene, 0.0, 255.0) * LEVEL + 0.5, dtype=np.uint16)
+    return np.ascontiguousarray(levels.transpose(2, 0, 1))
 
 
 def streaks(
