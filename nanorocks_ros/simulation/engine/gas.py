@@ -69,7 +69,7 @@ if TYPE_CHECKING:
 __all__ = ['CONTACT_DURATION', 'Beads', 'CollisionRules', 'EventCounts', 'HardSphereGas', 'Kernel']
 
 # From so many beads on lists are faster (`python -m benchmarks engine`).
-MOST_FOR_SCAN = 40
+MOST_FOR_SCAN = 32
 
 # Events between two looks at the keyboard and the watchdog: some tenths of a second.
 _SLICE = 200_000

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 # density, and so are shells whose centre lies this far ahead of the bead.
 _WANTED = 6.0
 _SKINS = 0.3, 2.5
-AHEAD_OF_BEAD = 0.7
+AHEAD_OF_BEAD = 0.85
 # A little more than the reach, for the rounding of references.
 _CELL_SLACK = 1.004
 _FIRST_ROOM = 12

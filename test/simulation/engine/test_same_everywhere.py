@@ -14,13 +14,13 @@ from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
 # CRC-32 of places and velocities after 30 s. The rules are those that need no more than
 # + - * /, square roots and integers; sines and powers differ from machine to machine.
 GOLDEN = {
-    'inelastic': {'scan': (395183756, 4026217824), 'lists': (2086302937, 3282324102)},
-    'half periodic': {'scan': (1262311415, 1848979193), 'lists': (1678390301, 790753584)},
-    'species': {'scan': (2505272471, 3254736298), 'lists': (803537858, 1654220815)},
-    'random': {'scan': (3344575901, 513728827), 'lists': (1358702777, 846111466)},
-    'sticking': {'scan': (970506315, 422705974), 'lists': (2033098339, 2123703449)},
-    'rough and sticking': {'scan': (84539865, 1852282705), 'lists': (2691355325, 2108565022)},
-    'contact duration': {'scan': (541658232, 1961044516), 'lists': (1593687059, 1806678900)},
+    'inelastic': {'scan': (395183756, 4026217824), 'lists': (4232614788, 1052747800)},
+    'half periodic': {'scan': (1262311415, 1848979193), 'lists': (1808342153, 2565538268)},
+    'species': {'scan': (2505272471, 3254736298), 'lists': (1270870054, 4144898922)},
+    'random': {'scan': (3344575901, 513728827), 'lists': (1335779389, 2812309651)},
+    'sticking': {'scan': (970506315, 422705974), 'lists': (3439820232, 3729057012)},
+    'rough and sticking': {'scan': (84539865, 1852282705), 'lists': (979821484, 3226169597)},
+    'contact duration': {'scan': (541658232, 1961044516), 'lists': (1752359490, 2134086689)},
 }
 
 
