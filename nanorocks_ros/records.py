@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
 UNKNOWN = float('nan')
@@ -183,6 +185,15 @@ class SpeedEstimate:
     first_species_speed_error: float = UNKNOWN
     second_species_speed: float = UNKNOWN
     second_species_speed_error: float = UNKNOWN
+
+    @staticmethod
+    def by_species(speeds: Iterable[tuple[float, float]]) -> dict[str, float]:
+        """The fields for the speeds of the species and their errors, [m/s]; two at most."""
+        found = {}
+        for name, (speed, error) in zip(('first', 'second'), speeds, strict=False):
+            found[f'{name}_species_speed'] = speed
+            found[f'{name}_species_speed_error'] = error
+        return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -91,9 +91,10 @@ class SpeedSettings:
     """From gray crops to the mean projected speed."""
 
     method: str = _setting(
-        'structure_function',
-        'how the speed is measured',
-        choices=('structure_function', 'binarised_area'),
+        'auto',
+        'how the speed is measured; auto: by tracking where nearly all beads can be followed, by '
+        'the structure function elsewhere',
+        choices=('auto', 'tracking', 'structure_function', 'binarised_area'),
     )
     interval: float = _setting(0.1, 'time between two estimates', 's', low=0.0, high=10.0)
     longest_lag_frames: int = _setting(
@@ -156,9 +157,7 @@ class TrackingSettings:
     longest_gap: float = _setting(
         1.0, 'a bead that is hidden for longer gets a new number', 's', low=0.0, high=60.0
     )
-    fastest: float = _setting(
-        0.05, 'no bead is faster in the picture', 'm/s', low=1e-4, high=10.0
-    )
+    fastest: float = _setting(0.05, 'no bead is faster in the picture', 'm/s', low=1e-4, high=10.0)
     window: float = _setting(
         1.0, 'longest flight from which a velocity is measured', 's', low=0.05, high=10.0
     )

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.records import MotionMask, SpeedEstimate, TrayImage
+from nanorocks_ros.records import MotionMask, SpeedEstimate, Tracks, TrayImage
 from nanorocks_ros.stages.shaking import CycleFollower
 from nanorocks_ros.stages.speed_by_area import AreaSpeed
 from nanorocks_ros.stages.speed_by_structure import StructureSpeed
+from nanorocks_ros.stages.speed_by_tracks import TrackSpeed
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.settings import PipelineSettings
@@ -30,12 +31,15 @@ class SpeedEstimator:
     ----------
     emit_mask : bool
         Also emit a :class:`MotionMask` per image; off by default since few look at it.
+    emit_tracks : bool
+        Also emit the :class:`Tracks` of each image, where they are made.
     """
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings
         self._tray = tray
         self.emit_mask = False
+        self.emit_tracks = False
         self._restart()
 
     def _restart(self) -> None:
@@ -44,14 +48,16 @@ class SpeedEstimator:
         self._area = AreaSpeed(self._settings, self._tray)
         self._area.emit_speed = speed.method == 'binarised_area'
         self._structure = StructureSpeed(self._settings, self._tray)
+        self._tracks = TrackSpeed(self._settings, self._tray)
+        self._last_emitted_ns: int | None = None
         self._last_stamp_ns: int | None = None
 
-    def push(self, image: TrayImage) -> tuple[SpeedEstimate | MotionMask, ...]:
+    def push(self, image: TrayImage) -> tuple[SpeedEstimate | MotionMask | Tracks, ...]:
         """Take the next image of the tray.
 
         Returns
         -------
-        tuple of SpeedEstimate or MotionMask
+        tuple of SpeedEstimate, MotionMask or Tracks
             Empty while a window is filling. A stamp that goes back starts all afresh.
         """
         if self._last_stamp_ns is not None and image.stamp_ns <= self._last_stamp_ns:
@@ -59,7 +65,28 @@ class SpeedEstimator:
         self._last_stamp_ns = image.stamp_ns
         shaken = self._shakes.push(image)
         self._area.emit_mask = self.emit_mask
-        found = self._area.push(image, self._shakes, shaken)
-        if self._settings.speed.method == 'structure_function':
-            found += self._structure.push(image, self._shakes, shaken)
-        return found
+        found: list[SpeedEstimate | MotionMask | Tracks] = []
+        found += self._area.push(image, self._shakes, shaken)
+        method = self._settings.speed.method
+        if method in ('auto', 'tracking') or self.emit_tracks:
+            for record in self._tracks.push(image, self._shakes, shaken):
+                wanted = self.emit_tracks
+                if isinstance(record, SpeedEstimate):
+                    wanted = method == 'tracking' or (method == 'auto' and self._tracks.reliable)
+                if wanted:
+                    found.append(record)
+        if method in ('auto', 'structure_function'):
+            speeds = self._structure.push(image, self._shakes, shaken)
+            if method == 'structure_function' or not self._tracks.reliable:
+                found += speeds
+        return tuple(one for one in found if self._in_order(one))
+
+    def _in_order(self, record: SpeedEstimate | MotionMask | Tracks) -> bool:
+        """Whether a speed is later than the one before it, which another method may have given."""
+        if not isinstance(record, SpeedEstimate):
+            return True
+        last = self._last_emitted_ns
+        if last is not None and record.stamp_ns <= last:
+            return False
+        self._last_emitted_ns = record.stamp_ns
+        return True

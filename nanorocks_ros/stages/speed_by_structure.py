@@ -11,8 +11,6 @@ from nanorocks_ros.stages.shaking import NS, CycleFollower, NoiseMeter
 from nanorocks_ros.stages.species_images import SpeciesImages
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Species, Tray
 
@@ -69,7 +67,7 @@ class StructureSpeed:
         """Decide whether species are told apart; False until the picture shows it."""
         tray = self._tray
         told_apart = image.color is not None and self._images.possible
-        if told_apart and not self._images.learn(image.color):
+        if told_apart and image.color is not None and not self._images.learn(image.color):
             return False
         if told_apart or len(tray.species) == 1:
             diameters = [one.diameter * self._scale for one in tray.species]
@@ -95,18 +93,8 @@ class StructureSpeed:
             window=motion.window_ns / NS,
             method=SpeedMethod.STRUCTURE_FUNCTION,
             quality=self._flags,
-            **by_species([(speed / scale, error / scale) for speed, error in known]),
+            **SpeedEstimate.by_species([(speed / scale, error / scale) for speed, error in known]),
         )
-
-
-def by_species(speeds: Sequence[tuple[float, float]]) -> dict[str, float]:
-    """The fields of a SpeedEstimate for the speeds of its species and their errors."""
-    names = ('first', 'second')
-    found = {}
-    for name, (speed, error) in zip(names, speeds, strict=False):
-        found[f'{name}_species_speed'] = speed
-        found[f'{name}_species_speed_error'] = error
-    return found
 
 
 def size_factor(species: Species) -> tuple[float, float]:

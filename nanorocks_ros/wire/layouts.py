@@ -32,7 +32,12 @@ NS = 1_000_000_000
 ArrayRecord = SpeedEstimate | ClusterEstimate | CorEstimate | GroundTruth
 RecordType = TypeVar('RecordType', SpeedEstimate, ClusterEstimate, CorEstimate, GroundTruth)
 
-_ENUMERATIONS = {'method': SpeedMethod, 'quality': Quality, 'status': CorStatus, 'relation': CorRelation}
+_ENUMERATIONS = {
+    'method': SpeedMethod,
+    'quality': Quality,
+    'status': CorStatus,
+    'relation': CorRelation,
+}
 _COUNTS = frozenset({'cycle', 'samples', 'bodies'})
 # Fields of the array that a record keeps as an integer stamp.
 _STAMPS = {'time': 'stamp_ns', 'cycle_start': 'cycle_start_ns'}

@@ -231,7 +231,18 @@ def cover(
     """
     balance = _balance(shown, covered, kind, step, floor_weight)
     found = _follow_hints(
-        shown, darkness, hue, kind, hue_sign, step, least_share, covered, discs, fits, hints, balance
+        shown,
+        darkness,
+        hue,
+        kind,
+        hue_sign,
+        step,
+        least_share,
+        covered,
+        discs,
+        fits,
+        hints,
+        balance,
     )
     rows, columns = balance.shape
     sizes = radii.size

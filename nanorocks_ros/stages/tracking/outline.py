@@ -74,8 +74,8 @@ def _edge(
         return np.nan
     inside = 0.0
     for t in range(reach - 1, reach + 1):
-        inside += 0.5 * sign * _at(
-            picture, disc[0] + (disc[2] - t) * c, disc[1] + (disc[2] - t) * s
+        inside += (
+            0.5 * sign * _at(picture, disc[0] + (disc[2] - t) * c, disc[1] + (disc[2] - t) * s)
         )
     step = inside - outside
     if step < least:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.records import TrayImage, Tracks
+from nanorocks_ros.records import Tracks, TrayImage
 from nanorocks_ros.stages.tracking.detect import BeadDetector
 from nanorocks_ros.stages.tracking.link import Linker
 
@@ -82,9 +82,7 @@ class Tracker:
             self._settings.window,
         )
 
-    def _tracks(
-        self, stamp_ns: int, time: float, displacement: NDArray[np.float64]
-    ) -> Tracks:
+    def _tracks(self, stamp_ns: int, time: float, displacement: NDArray[np.float64]) -> Tracks:
         shift = displacement * self._scale
         parts = [_in_view(k, linker, time, shift) for k, linker in enumerate(self._linkers)]
         ids, species, places, errors, velocities, velocity_errors, radii, radius_errors, seen = (

@@ -1,0 +1,115 @@
+"""Mean projected speed from the tracks of the beads, where most of them are tracked."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.records import UNKNOWN, Quality, SpeedEstimate, SpeedMethod, Tracks, TrayImage
+from nanorocks_ros.stages.shaking import NS, CycleFollower
+from nanorocks_ros.stages.tracking.mean_speed import mean_speed
+from nanorocks_ros.stages.tracking.tracker import Tracker
+
+if TYPE_CHECKING:
+    from nanorocks_ros.experiment.settings import PipelineSettings
+    from nanorocks_ros.experiment.trays import Tray
+
+# A bead should come so many pixels in half of the window: jitter is far less.
+_LEAST_PATH_PX = 1.5
+# Tracks are looked back upon for so long; slower beads rest.
+_LOOK_BACK_NS = 4 * NS
+# Share of the beads that must be followed, of each species, to begin and to go on.
+_ENOUGH, _STILL_ENOUGH = 0.85, 0.7
+# Time over which that share is averaged.
+_MEMORY_FRAMES = 30
+
+
+class TrackSpeed:
+    """Measures the speed by tracking every bead that can be seen.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    tray : Tray
+
+    Attributes
+    ----------
+    reliable : bool
+        Whether nearly all beads of every species are being followed.
+    """
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self._interval_ns = round(settings.speed.interval * NS)
+        self._least_distance = _LEAST_PATH_PX / settings.preprocess.pixels_per_metre
+        self._tray = tray
+        self._counts = np.array([one.count for one in tray.species])
+        self._tracker = Tracker(settings, tray)
+        self._recent: deque[Tracks] = deque()
+        self._shares: deque[np.ndarray] = deque(maxlen=_MEMORY_FRAMES)
+        self._next_ns: int | None = None
+        self._flags = Quality(0)
+        self._last_ns: int | None = None
+        self.reliable = False
+
+    def push(
+        self, image: TrayImage, shakes: CycleFollower, shaken: bool
+    ) -> tuple[SpeedEstimate | Tracks, ...]:
+        """Take the next image: the tracks, and a speed when one is due."""
+        found: list[SpeedEstimate | Tracks] = []
+        if shaken:
+            self._recent.clear()
+            self._next_ns = None
+        self._flags |= image.quality
+        for tracks in self._tracker.push(image):
+            found.append(tracks)
+            self._recent.append(tracks)
+            while tracks.stamp_ns - self._recent[0].stamp_ns > _LOOK_BACK_NS:
+                self._recent.popleft()
+            self._judge(tracks)
+            if self._next_ns is None or tracks.stamp_ns >= self._next_ns:
+                self._next_ns = tracks.stamp_ns + self._interval_ns
+                found += self._speeds(shakes)
+        return tuple(found)
+
+    def _judge(self, tracks: Tracks) -> None:
+        seen = np.bincount(tracks.species[tracks.seen], minlength=self._counts.size)
+        self._shares.append(seen / self._counts)
+        least = float(np.mean(self._shares, axis=0).min())
+        full = len(self._shares) == _MEMORY_FRAMES
+        self.reliable = full and least >= (_STILL_ENOUGH if self.reliable else _ENOUGH)
+        if least < _STILL_ENOUGH:
+            self._flags |= Quality.FEW_BEADS
+
+    def _speeds(self, shakes: CycleFollower) -> list[SpeedEstimate]:
+        series = list(self._recent)
+        mean = mean_speed(series, least_distance=self._least_distance)
+        if mean is None or not np.isfinite(mean.mean_projected_speed):
+            return []
+        if self._last_ns is not None and mean.stamp_ns <= self._last_ns:
+            return []
+        self._last_ns = mean.stamp_ns
+        species = []
+        for number in range(self._counts.size):
+            one = mean_speed(series, least_distance=self._least_distance, species=number)
+            species.append(
+                (one.mean_projected_speed, one.mean_projected_speed_error)
+                if one
+                else (UNKNOWN, UNKNOWN)
+            )
+        flags, self._flags = self._flags, Quality(0)
+        return [
+            SpeedEstimate(
+                stamp_ns=mean.stamp_ns,
+                tray=self._tray.number,
+                cycle=shakes.cycle,
+                cycle_start_ns=shakes.cycle_start_ns,
+                mean_projected_speed=mean.mean_projected_speed,
+                mean_projected_speed_error=mean.mean_projected_speed_error,
+                window=mean.window,
+                method=SpeedMethod.TRACKING,
+                quality=flags,
+                **SpeedEstimate.by_species(species),
+            )
+        ]
