@@ -87,6 +87,7 @@ class MeanMotions:
         images: Sequence[NDArray[np.uint8]],
         cycle: tuple[int, int | None],
         noise_powers: Sequence[float],
+        shift_px: tuple[float, float] = (0.0, 0.0),
     ) -> tuple[MeanMotion, ...]:
         """Take the next image of each species.
 
@@ -98,6 +99,8 @@ class MeanMotions:
             The cycle, and the stamp at which it started.
         noise_powers : sequence of float, [gray levels^2]
             Mean squared difference per pixel of a scene at rest, for each.
+        shift_px : tuple of 2 floats, [px]
+            By which the tray had left its place when the images were moved back.
 
         Returns
         -------
@@ -107,7 +110,7 @@ class MeanMotions:
         samples = tuple(
             sample
             for part, image, noise in zip(self._parts, images, noise_powers, strict=True)
-            if (sample := part.push(stamp_ns, image, cycle, noise)) is not None
+            if (sample := part.push(stamp_ns, image, cycle, noise, shift_px)) is not None
         )
         if len(samples) != len(self._parts):
             return ()

@@ -143,7 +143,7 @@ class Preprocessor:
                 continue
             hint = crop.follow(frame.stamp_ns, image, hint) or hint
             gray, color = crop.crop(image)
-            jumps.append(crop.meter.push(gray))
+            jumps.append(crop.meter.push(frame.stamp_ns, gray))
             pictures.append((crop, gray, color))
         if pictures:
             plate = self._plate.push(frame.stamp_ns, *self._plate_speed())

@@ -168,12 +168,15 @@ class MotionMeter:
         self._recent: deque[float] = deque(maxlen=_MEMORY_FRAMES)
         self._noise = _Quantile(_NOISE_QUANTILE, _NOISE_FRAMES)
         self._last: NDArray[np.uint8] | None = None
+        self._last_ns = 0
+        self._steps_ns: deque[int] = deque(maxlen=_MEMORY_FRAMES)
         self.noise_power = 0.0
 
-    def push(self, gray: NDArray[np.uint8]) -> bool:
+    def push(self, stamp_ns: int, gray: NDArray[np.uint8]) -> bool:
         """Take the next image; True when the motion jumped since the one before."""
         gray = np.ascontiguousarray(gray)
         last, self._last = self._last, gray
+        step_ns, self._last_ns = stamp_ns - self._last_ns, stamp_ns
         if last is None:
             return False
         counts = _difference_counts(gray, last)
@@ -181,7 +184,11 @@ class MotionMeter:
         # nor the least will do.
         self.noise_power = self._noise.push(_power_of(counts))
         quiet = self.noise_power * gray.size
-        motion = _total_power(counts) - quiet
+        # Over a frame that was lost beads move twice as far, and the power is four times as much
+        # at most.
+        self._steps_ns.append(step_ns)
+        usual_ns = sorted(self._steps_ns)[len(self._steps_ns) // 2]
+        motion = (_total_power(counts) - quiet) * min(1.0, usual_ns / step_ns) ** 2
         # 15 frames rather than all: the gas may have been shaken harder long ago.
         before = max(self._recent, default=None)
         self._recent.append(motion)
@@ -282,7 +289,7 @@ class CycleFollower:
         before, first = self.cycle, self._first
         self._first = False
         if image.cycle is None or math.isnan(image.noise_power):
-            jump = self._meter.push(image.gray)
+            jump = self._meter.push(image.stamp_ns, image.gray)
             self._counter.push(image.stamp_ns, (jump,))
             self.noise_power = self._meter.noise_power
             self.cycle, self.cycle_start_ns = self._counter.cycle, self._counter.cycle_start_ns

@@ -49,6 +49,7 @@ class SpeedEstimator:
         self._area.emit_speed = speed.method == 'binarised_area'
         self._structure = StructureSpeed(self._settings, self._tray)
         self._tracks = TrackSpeed(self._settings, self._tray)
+        self._held: list[SpeedEstimate] = []
         self._last_emitted_ns: int | None = None
         self._last_stamp_ns: int | None = None
 
@@ -69,17 +70,27 @@ class SpeedEstimator:
         found += self._area.push(image, self._shakes, shaken)
         method = self._settings.speed.method
         if method in ('auto', 'tracking') or self.emit_tracks:
-            for record in self._tracks.push(image, self._shakes, shaken):
-                wanted = self.emit_tracks
-                if isinstance(record, SpeedEstimate):
-                    wanted = method == 'tracking' or (method == 'auto' and self._tracks.reliable)
-                if wanted:
-                    found.append(record)
+            records = self._tracks.push(image, self._shakes, shaken)
+            found += [one for one in records if isinstance(one, Tracks) and self.emit_tracks]
+            found += self._by_tracks([one for one in records if isinstance(one, SpeedEstimate)])
         if method in ('auto', 'structure_function'):
             speeds = self._structure.push(image, self._shakes, shaken)
-            if method == 'structure_function' or not self._tracks.reliable:
+            if method == 'structure_function' or (
+                self._tracks.judged and not self._tracks.reliable
+            ):
                 found += speeds
         return tuple(one for one in found if self._in_order(one))
+
+    def _by_tracks(self, speeds: list[SpeedEstimate]) -> list[SpeedEstimate]:
+        """Those to be given out: kept until it is known whether tracks can be relied upon."""
+        method = self._settings.speed.method
+        if method != 'auto':
+            return speeds if method == 'tracking' else []
+        self._held += speeds
+        if not self._tracks.judged:
+            return []
+        held, self._held = self._held, []
+        return held if self._tracks.reliable else []
 
     def _in_order(self, record: SpeedEstimate | MotionMask | Tracks) -> bool:
         """Whether a speed is later than the one before it, which another method may have given."""

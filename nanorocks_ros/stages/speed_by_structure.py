@@ -50,13 +50,19 @@ class StructureSpeed:
             self._motions.shaken()
         self._flags |= image.quality
         cycle = (shakes.cycle, shakes.cycle_start_ns)
+        across, down = (
+            0.0 if math.isnan(one) else self._scale * one for one in image.displacement
+        )
+        shift = (across, down)
         if self._noise:
             assert image.color is not None
             images = self._images.of(image.color)
             noise = [meter.push(one) for meter, one in zip(self._noise, images, strict=True)]
-            found = self._motions.push(image.stamp_ns, images, cycle, noise)
+            found = self._motions.push(image.stamp_ns, images, cycle, noise, shift)
         else:
-            found = self._motions.push(image.stamp_ns, (image.gray,), cycle, (shakes.noise_power,))
+            found = self._motions.push(
+                image.stamp_ns, (image.gray,), cycle, (shakes.noise_power,), shift
+            )
         if not found:
             return ()
         estimates = tuple(self._estimate(one) for one in found)

@@ -38,6 +38,8 @@ class TrackSpeed:
     ----------
     reliable : bool
         Whether nearly all beads of every species are being followed.
+    judged : bool
+        Whether enough images were seen to tell.
     """
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
@@ -52,6 +54,7 @@ class TrackSpeed:
         self._flags = Quality(0)
         self._last_ns: int | None = None
         self.reliable = False
+        self.judged = False
 
     def push(
         self, image: TrayImage, shakes: CycleFollower, shaken: bool
@@ -62,6 +65,9 @@ class TrackSpeed:
             self._recent.clear()
             self._next_ns = None
         self._flags |= image.quality
+        if image.color is None:
+            # Nothing can be tracked, and that is known at once.
+            self.judged, self.reliable = True, False
         for tracks in self._tracker.push(image):
             found.append(tracks)
             self._recent.append(tracks)
@@ -77,8 +83,8 @@ class TrackSpeed:
         seen = np.bincount(tracks.species[tracks.seen], minlength=self._counts.size)
         self._shares.append(seen / self._counts)
         least = float(np.mean(self._shares, axis=0).min())
-        full = len(self._shares) == _MEMORY_FRAMES
-        self.reliable = full and least >= (_STILL_ENOUGH if self.reliable else _ENOUGH)
+        self.judged = len(self._shares) == _MEMORY_FRAMES
+        self.reliable = self.judged and least >= (_STILL_ENOUGH if self.reliable else _ENOUGH)
         if least < _STILL_ENOUGH:
             self._flags |= Quality.FEW_BEADS
 

@@ -47,6 +47,8 @@ class Sample:
     noise_power : float, [gray levels^2]
     middles_ns, windows_ns : ndarray of int64, (n_lags,), [ns]
         Middle and length of the time between the two images.
+    shifts_px : ndarray (n_lags,), [px]
+        How far the tray moved between them.
     powers : ndarray (n_lags,), [gray levels^2]
         Sums over the image, free of noise.
     """
@@ -56,6 +58,7 @@ class Sample:
     noise_power: float
     middles_ns: NDArray[np.int64]
     windows_ns: NDArray[np.int64]
+    shifts_px: NDArray[np.float64]
     powers: NDArray[np.float64]
 
 
@@ -84,6 +87,7 @@ class StructureFunction:
         self._images: deque[tuple[int, NDArray[np.uint8]]] = deque(
             maxlen=settings.longest_lag_frames + 1
         )
+        self._shifts: deque[tuple[float, float]] = deque(maxlen=settings.longest_lag_frames + 1)
         self._keys: list[tuple[int, NDArray[np.uint8]]] = []
         self._key_interval_ns = _KEY_INTERVAL_NS
         self._response = BeadResponse(diameter_px, beads)
@@ -95,9 +99,11 @@ class StructureFunction:
 
     def shaken(self) -> None:
         """Forget the images from before a shaking event, all but the last."""
-        last = self._images[-1]
+        last, shift = self._images[-1], self._shifts[-1]
         self._images.clear()
         self._images.append(last)
+        self._shifts.clear()
+        self._shifts.append(shift)
         self._keys.clear()
         self._key_interval_ns = _KEY_INTERVAL_NS
         self._path_stamps.clear()
@@ -110,6 +116,7 @@ class StructureFunction:
         gray: NDArray[np.uint8],
         cycle: tuple[int, int | None],
         noise_power: float,
+        shift_px: tuple[float, float] = (0.0, 0.0),
     ) -> Sample | None:
         """Take the next image; a sample when one is due.
 
@@ -121,8 +128,11 @@ class StructureFunction:
             The cycle, and the stamp at which it started.
         noise_power : float, [gray levels^2]
             Mean squared difference per pixel of a scene at rest.
+        shift_px : tuple of 2 floats, [px]
+            By which the tray had left its place when the image was moved back.
         """
         self._images.append((stamp_ns, gray))
+        self._shifts.append(shift_px)
         if self._next_sample_ns is None:
             self._next_sample_ns = stamp_ns
         found = None
@@ -152,12 +162,19 @@ class StructureFunction:
             for end, lag in zip(ends, lags, strict=True)
         ]
         quiet = noise_power * self._images[-1][1].size
+        shifts = np.array(
+            [
+                (self._shifts[end], self._shifts[end - lag])
+                for end, lag in zip(ends, lags, strict=True)
+            ]
+        ).reshape(-1, 2, 2)
         return Sample(
             cycle=cycle[0],
             cycle_start_ns=cycle[1],
             noise_power=noise_power,
             middles_ns=np.array([(later[0] + earlier[0]) // 2 for later, earlier in pairs]),
             windows_ns=np.array([later[0] - earlier[0] for later, earlier in pairs]),
+            shifts_px=np.hypot(*(shifts[:, 0] - shifts[:, 1]).T),
             powers=np.array(
                 [difference_power(later[1], earlier[1]) - quiet for later, earlier in pairs]
             ),
@@ -180,6 +197,12 @@ class StructureFunction:
         pixels = self._images[-1][1].size
         away = float(self._response.displacement(power)[0])
         error = float(self._response.displacement_error(power, sample.noise_power, pixels)[0])
+        # Beads fly past the camera, and the images follow the tray: the mean of distances that
+        # are Rayleigh distributed grows like this when all are shifted.
+        square = away**2 - 0.25 * np.pi * float(sample.shifts_px[lag]) ** 2
+        if square > 0.0:
+            error *= away / np.sqrt(square)
+        away = float(np.sqrt(max(square, 0.0)))
         loss = min(0.5, _DEFLECTION_LOSS * away / self._diameter_px)
         scatter = np.sqrt(_DEFLECTION_SCATTER * loss / self._beads) * away
         return away / (1.0 - loss), float(np.hypot(error, scatter))

@@ -3,20 +3,32 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.records import MotionMask, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.records import (
+    Frame,
+    MotionMask,
+    Quality,
+    SpeedEstimate,
+    SpeedMethod,
+    TrayImage,
+)
 from nanorocks_ros.simulation.film import film
+from nanorocks_ros.simulation.render import TrayCamera
+from nanorocks_ros.simulation.shaking import ShakenTray
 from nanorocks_ros.stages.pipeline import trays_of
 from nanorocks_ros.stages.preprocess import Preprocessor
 from nanorocks_ros.stages.speed import SpeedEstimator
 
 NS = 1e9
 TRAY = load_trays()[1]
+SCALE = PipelineSettings().preprocess.pixels_per_metre
 
 
 def filmed(seconds, **values):
@@ -37,8 +49,9 @@ def run():
     return filmed(12.0, seed=5)
 
 
-def pushed(images, **values):
-    estimator = SpeedEstimator(with_values(PipelineSettings(), values, 'test'), TRAY)
+def pushed(images, method='structure_function', **values):
+    settings = with_values(PipelineSettings(), {'speed.method': method, **values}, 'test')
+    estimator = SpeedEstimator(settings, TRAY)
     return [one for image in images for one in estimator.push(image)]
 
 
@@ -55,18 +68,20 @@ def ratios(estimates, truth):
     return np.array(found)
 
 
+@pytest.mark.parametrize('method', ['auto', 'tracking', 'structure_function'])
 @pytest.mark.parametrize('mean_speed', [0.0025, 0.007])
-def test_the_default_is_within_ten_per_cent_of_the_truth_and_knows_its_error(mean_speed):
+def test_it_is_within_ten_per_cent_of_the_truth_and_knows_its_error(mean_speed, method):
     images, truth = filmed(14.0, seed=2, mean_speed=mean_speed)
-    speed, error, true = ratios(pushed(images), truth).T
+    speed, error, true = ratios(pushed(images, method), truth).T
     assert speed.size > 100
     assert (speed / true).mean() == pytest.approx(1.0, abs=0.03)
     assert np.quantile(np.abs(speed / true - 1.0), 0.95) < 0.1
     assert 0.5 < ((speed - true) / error).std() < 1.5
 
 
-def test_beads_at_rest_have_no_speed(run):
-    at_rest = [one for one in pushed(run[0]) if one.cycle == 0]
+@pytest.mark.parametrize('method', ['auto', 'tracking', 'structure_function'])
+def test_beads_at_rest_have_no_speed(run, method):
+    at_rest = [one for one in pushed(run[0], method) if one.cycle == 0]
     assert len(at_rest) >= 3
     assert all(one.mean_projected_speed < 2e-4 for one in at_rest)
     assert all(one.cycle_start_ns is None for one in at_rest)
@@ -87,8 +102,9 @@ def test_every_shaking_event_is_counted_once():
     assert cycles == sorted(cycles)
 
 
-def test_estimates_come_in_order_of_time(run):
-    stamps = [one.stamp_ns for one in pushed(run[0])]
+@pytest.mark.parametrize('method', ['auto', 'tracking', 'structure_function', 'binarised_area'])
+def test_estimates_come_in_order_of_time(run, method):
+    stamps = [one.stamp_ns for one in pushed(run[0], method)]
     assert all(before < after for before, after in itertools.pairwise(stamps))
 
 
@@ -132,11 +148,12 @@ def test_half_the_time_between_frames_is_twice_the_speed(run):
     assert np.median(double / single) == pytest.approx(2.0, rel=0.03)
 
 
-def test_frames_that_are_missing_do_not_change_the_speed(run):
+@pytest.mark.parametrize('method', ['tracking', 'structure_function'])
+def test_frames_that_are_missing_do_not_change_the_speed(run, method):
     images, truth = run
     rng = np.random.default_rng(3)
     kept = [one for one in images if rng.random() > 0.2]
-    speed, _, true = ratios(pushed(kept), truth).T
+    speed, _, true = ratios(pushed(kept, method), truth).T
     assert (speed / true).mean() == pytest.approx(1.0, abs=0.05)
 
 
@@ -151,11 +168,10 @@ def test_time_that_goes_back_starts_all_afresh(run):
 def test_the_papers_recipe_can_be_had_in_all_its_readings(run, averaging, geometry):
     images, truth = run
     values = {
-        'speed.method': 'binarised_area',
         'speed.averaging': averaging,
         'speed.geometry': geometry,
     }
-    found = pushed(images, **values)
+    found = pushed(images, 'binarised_area', **values)
     assert {one.method for one in found} == {SpeedMethod.BINARISED_AREA}
     speed, _, true = ratios(found, truth).T
     known = np.isfinite(speed)
@@ -164,7 +180,7 @@ def test_the_papers_recipe_can_be_had_in_all_its_readings(run, averaging, geomet
 
 
 def test_one_frame_as_the_time_step_is_ten_times_too_fast(run):
-    recipe = {'speed.method': 'binarised_area', 'speed.geometry': 'taylor'}
+    recipe = {'method': 'binarised_area', 'speed.geometry': 'taylor'}
     compared = pushed(run[0], **recipe)
     printed = pushed(run[0], **recipe, **{'speed.time_step': 'one_frame'})
     assert len(compared) == len(printed)
@@ -177,7 +193,7 @@ def test_one_frame_as_the_time_step_is_ten_times_too_fast(run):
 
 
 def test_the_exact_geometry_reads_more_than_its_taylor_form(run):
-    recipe = {'speed.method': 'binarised_area', 'speed.averaging': 'none'}
+    recipe = {'method': 'binarised_area', 'speed.averaging': 'none'}
     exact = pushed(run[0], **recipe)
     taylor = pushed(run[0], **recipe, **{'speed.geometry': 'taylor'})
     pairs = [
@@ -218,3 +234,86 @@ def test_frozen_frames_after_motion_are_slow_and_no_shake(run):
     found = [one for one in pushed([*images, *frozen]) if isinstance(one, SpeedEstimate)]
     assert {one.cycle for one in found} == {0, 1}
     assert found[-1].mean_projected_speed < 1e-4
+
+
+def test_tracks_are_relied_upon_where_nearly_all_beads_are_followed(run):
+    found = pushed(run[0], 'auto')
+    assert {one.method for one in found} == {SpeedMethod.TRACKING}
+    assert not any(one.quality & Quality.FEW_BEADS for one in found)
+
+
+def test_without_colour_the_structure_function_steps_in(run):
+    gray = [TrayImage(stamp_ns=one.stamp_ns, tray=1, gray=one.gray) for one in run[0]]
+    assert pushed(gray, 'auto') == pushed(gray, 'structure_function') != []
+
+
+def test_a_lost_frame_is_no_shaking_event(run):
+    images, _ = run
+    for lost in range(60, 300, 20):
+        kept = [one for k, one in enumerate(images) if k != lost]
+        assert max(one.cycle for one in pushed(kept)) == 1
+
+
+def test_the_motion_of_a_swinging_tray_is_taken_off():
+    """Images that follow the tray: beads seem to swing, and do not."""
+    images, truth = filmed(12.0, mean_speed=0.002)
+    away = 3.0
+    swung = []
+    for k, one in enumerate(images):
+        shift = away * np.sin(2.0 * np.pi * 1.5 * k / 30.0)
+        matrix = np.float32([[1.0, 0.0, -shift], [0.0, 1.0, 0.0]])
+        moved = cv2.warpAffine(
+            one.gray, matrix, one.gray.shape[::-1], borderMode=cv2.BORDER_REPLICATE
+        )
+        swung.append(
+            TrayImage(
+                stamp_ns=one.stamp_ns,
+                tray=1,
+                gray=moved,
+                cycle=int(k > 15),
+                cycle_start_ns=images[15].stamp_ns if k > 15 else None,
+                noise_power=one.noise_power,
+                displacement=(shift / SCALE, 0.0),
+            )
+        )
+    blind = [replace(one, displacement=(0.0, 0.0)) for one in swung]
+    found, wrong = (ratios(pushed(some), truth).T for some in (swung, blind))
+    assert (wrong[0] / wrong[2]).mean() > 1.3
+    assert (found[0] / found[2]).mean() == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize('method', ['tracking', 'structure_function'])
+@pytest.mark.parametrize(('number', 'tolerance'), [(3, 0.05), (5, 0.1)])
+def test_species_are_told_apart(number, tolerance, method):
+    """Light beads are the faster ones, and both are right."""
+    tray = load_trays()[number]
+    settings = SimulationSettings(
+        width_px=480, height_px=160, restitution=1.0, wall_restitution=1.0, first_shake=0.5,
+        mean_speed=0.003, seed=number,
+    )  # fmt: skip
+    stages = with_values(PipelineSettings(), {'trays': (number,), 'speed.method': method}, 'test')
+    crop = Preprocessor(stages, trays_of(stages), 'test')
+    shaken = ShakenTray(settings, tray)
+    camera = TrayCamera(settings, tray, shaken.radii, shaken.materials)
+    estimator = SpeedEstimator(stages, tray)
+    first = np.array(shaken.materials) == tray.species[0].material
+    found, truth = [], []
+    for k, moment in enumerate(shaken.moments(300)):
+        frame = Frame(
+            stamp_ns=moment.truth.stamp_ns,
+            encoding='bgr8',
+            image=camera.picture(moment.positions, k),
+        )
+        for image in crop.push(frame):
+            found += estimator.push(image)
+        speeds = np.hypot(*moment.velocities[:, :2].T)
+        truth.append((moment.truth.stamp_ns, speeds[first].mean(), speeds[~first].mean()))
+    stamps, *true = np.array(truth).T
+    moving = [one for one in found if one.cycle == 1 and one.stamp_ns > 1e9]
+    assert len(moving) > 50
+    for values, expected in (
+        ([one.first_species_speed for one in moving], true[0]),
+        ([one.second_species_speed for one in moving], true[1]),
+    ):
+        ratio = np.array(values) / np.interp([one.stamp_ns for one in moving], stamps, expected)
+        assert ratio.mean() == pytest.approx(1.0, abs=tolerance)
