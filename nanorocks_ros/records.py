@@ -135,6 +135,76 @@ class TrayImage:
     def __post_init__(self) -> None:
         _freeze_arrays(self)
 
+    def state(self) -> TrayState:
+        """What is known of the image besides its pixels."""
+        return TrayState(
+            stamp_ns=self.stamp_ns,
+            tray=self.tray,
+            cycle=self.cycle or 0,
+            cycle_start_ns=self.cycle_start_ns,
+            noise_power=self.noise_power,
+            displacement_x=self.displacement[0],
+            displacement_y=self.displacement[1],
+            displacement_error=self.displacement_error,
+            velocity_x=self.velocity[0],
+            velocity_y=self.velocity[1],
+            velocity_error=self.velocity_error,
+            quality=self.quality,
+            glare=self.glare,
+            color=int(self.color is not None),
+        )
+
+    @classmethod
+    def of_state(
+        cls,
+        state: TrayState,
+        stamp_ns: int,
+        gray: NDArray[np.uint8],
+        color: NDArray[np.uint8] | None,
+    ) -> TrayImage:
+        """The image again, from its state and its pixels; the stamp is that of the pixels."""
+        return cls(
+            stamp_ns=stamp_ns,
+            tray=state.tray,
+            gray=gray,
+            color=color,
+            cycle=state.cycle,
+            cycle_start_ns=state.cycle_start_ns,
+            noise_power=state.noise_power,
+            displacement=(state.displacement_x, state.displacement_y),
+            displacement_error=state.displacement_error,
+            velocity=(state.velocity_x, state.velocity_y),
+            velocity_error=state.velocity_error,
+            quality=state.quality,
+            glare=state.glare,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrayState:
+    """What is known of a tray image besides its pixels; see :class:`TrayImage`.
+
+    Parameters
+    ----------
+    color : int
+        1 when there is a colour image too, 0 for a gray camera.
+    """
+
+    stamp_ns: int
+    tray: int
+    cycle: int
+    cycle_start_ns: int | None
+    noise_power: float
+    displacement_x: float
+    displacement_y: float
+    displacement_error: float
+    velocity_x: float
+    velocity_y: float
+    velocity_error: float
+    quality: Quality
+    glare: float
+    color: int
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionMask:

@@ -134,7 +134,7 @@ class SpeedSettings:
         high=1e3,
     )
     area_offset: float = _setting(
-        0.0, 'binarised_area: what manual tracks call for to be added', 'm/s', low=-1.0, high=1.0
+        0.0, 'binarised_area: what manual tracks call for to be added', 'm/s', low=-0.1, high=0.1
     )
     shake_ratio: float = _setting(
         2.0,

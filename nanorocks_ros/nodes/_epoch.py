@@ -58,7 +58,8 @@ class Epoch:
         if self.ns is None:
             # Nothing is lost while discovery takes its time; some seconds of frames at most.
             self._held = [*self._held[-59:], (work, message)]
-            self._held_stamps.append(stamp_ns)
+            if stamp_ns is not None:
+                self._held_stamps.append(stamp_ns)
         else:
             work(message)
 

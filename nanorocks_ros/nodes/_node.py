@@ -46,7 +46,11 @@ _IMAGES = {
     MotionMask: ((topics.MOTION, 'mask'),),
     Autocorrelation: ((topics.AUTOCORRELATION, 'values'),),
 }
-RESULT_TOPICS = (*_ARRAYS.values(), *(topic for both in _IMAGES.values() for topic, _ in both))
+RESULT_TOPICS = (
+    *_ARRAYS.values(),
+    topics.STATE,
+    *(topic for both in _IMAGES.values() for topic, _ in both),
+)
 _OVERRIDABLE = QoSOverridingOptions(
     policy_kinds=(
         QoSPolicyKind.HISTORY,
@@ -200,6 +204,8 @@ class NanorocksNode(Node):
             message = array_message(record, epoch_ns)
             self.send(_ARRAYS[type(record)], message, record.tray)
         else:
+            if isinstance(record, TrayImage):
+                self.send(topics.STATE, array_message(record.state(), epoch_ns), record.tray)
             for topic, field in _IMAGES[type(record)]:
                 pixels = getattr(record, field)
                 if pixels is not None and self.wanted(topic, record.tray):

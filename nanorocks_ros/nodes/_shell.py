@@ -11,7 +11,6 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Float32MultiArray, MultiArrayDimension
 
-from nanorocks_ros.records import TrayImage
 from nanorocks_ros.wire.beads import beads_layout, beads_to_array
 from nanorocks_ros.wire.layouts import layout, to_array
 
@@ -125,8 +124,3 @@ def lens_message(stamp_ns, frame_id, camera):
     message.r = np.eye(3).ravel().tolist()
     message.p = np.hstack([matrix, np.zeros((3, 1))]).ravel().tolist()
     return message
-
-
-def tray_image(frame, tray):
-    """A frame from a tray's gray image topic as the record that the stages take."""
-    return TrayImage(stamp_ns=frame.stamp_ns, tray=tray, gray=frame.image)

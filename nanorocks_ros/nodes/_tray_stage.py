@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+
 from nanorocks_ros.experiment.calibration import calibrated
 from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.nodes._epoch import Epoch
+from nanorocks_ros.nodes._join import TrayJoiner
 from nanorocks_ros.nodes._node import NanorocksNode
-from nanorocks_ros.nodes._shell import tray_image
 from nanorocks_ros.recordings.images import frame_from_image
+from nanorocks_ros.records import TrayImage, TrayState
 from nanorocks_ros.stages.pipeline import trays_of
 from nanorocks_ros.wire import topics
+from nanorocks_ros.wire.layouts import from_array
 
 
 class TrayStageNode(NanorocksNode):
@@ -23,18 +28,26 @@ class TrayStageNode(NanorocksNode):
         Makes the stage from the settings and a Tray.
     outputs : tuple of Topic
         What it publishes, offered at once: a late offer would lose the first messages.
+    in_color : bool
+        Whether the stage looks at colours.
     """
 
-    def __init__(self, name, stage, outputs):
+    def __init__(self, name, stage, outputs, in_color=False):
         super().__init__(name)
+        inputs = {topics.GRAY: self._take_gray, topics.STATE: self._take_state}
+        if in_color:
+            inputs[topics.RECTIFIED] = self._take_color
+        self._in_color = in_color
         self._make = stage
         self._settings = self.declare(PipelineSettings(), fixed=False)
         self._epoch = Epoch(self, may_set=False)
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
+        self._joiners = {tray: TrayJoiner(tray) for tray in self._settings.trays}
         for tray in self._settings.trays:
             self.offer(outputs, tray)
-            self.listen(topics.GRAY, lambda message, tray=tray: self._take(message, tray), tray)
+            for topic, take in inputs.items():
+                self.listen(topic, partial(take, tray), tray, required=topic == topics.GRAY)
 
     def _build(self, settings):
         settings = calibrated(settings)
@@ -43,9 +56,34 @@ class TrayStageNode(NanorocksNode):
     def _adopt(self, settings, stages):
         self._settings, self._stages = settings, stages
 
-    def _take(self, message, tray):
+    def _take_gray(self, tray, message):
         frame = frame_from_image(message, self.resolve_topic_name(topics.GRAY.of(tray)))
-        self._epoch.when_known(frame.stamp_ns, self._push, tray_image(frame, tray))
+        if self.count_publishers(topics.STATE.of(tray)) == 0:
+            # Somebody's own crops, of which nothing more is known.
+            image = TrayImage(stamp_ns=frame.stamp_ns, tray=tray, gray=frame.image)
+            self._epoch.when_known(frame.stamp_ns, self._push, image)
+            return
+        self._push_all(frame.stamp_ns, self._joiners[tray].gray(frame))
+
+    def _take_color(self, tray, message):
+        frame = frame_from_image(message, self.resolve_topic_name(topics.RECTIFIED.of(tray)))
+        self._push_all(frame.stamp_ns, self._joiners[tray].color(frame))
+
+    def _take_state(self, tray, message):
+        self._epoch.when_known(None, partial(self._join_state, tray), message)
+
+    def _join_state(self, tray, message):
+        where = self.resolve_topic_name(topics.STATE.of(tray))
+        state = from_array(
+            TrayState, message.data, tray=tray, epoch_ns=self._epoch.ns, where=where
+        )
+        if not self._in_color:
+            state = replace(state, color=0)
+        self._push_all(state.stamp_ns, self._joiners[tray].state(state, self._epoch.ns))
+
+    def _push_all(self, stamp_ns, images):
+        for image in images:
+            self._epoch.when_known(stamp_ns, self._push, image)
 
     def _push(self, image):
         stage = self._stages[image.tray]

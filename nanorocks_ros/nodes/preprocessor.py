@@ -21,7 +21,7 @@ class PreprocessorNode(NanorocksNode):
         self._camera = Camera(self, self.declare(CameraSettings()), self._take, look)
         self._epoch = Epoch(self, may_set=True)
         for tray in self._settings.trays:
-            self.offer((topics.GRAY, topics.RECTIFIED), tray)
+            self.offer((topics.STATE, topics.GRAY, topics.RECTIFIED), tray)
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
 

@@ -1,4 +1,4 @@
-"""Node: gray tray images in, mean projected speeds and motion masks out."""
+"""Node: tray images in, mean projected speeds and motion masks out."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ class SpeedEstimatorNode(TrayStageNode):
     """Measures the mean projected speed of each tray."""
 
     def __init__(self):
-        super().__init__('speed_estimator', SpeedEstimator, (topics.SPEED, topics.MOTION))
+        outputs = (topics.SPEED, topics.MOTION)
+        super().__init__('speed_estimator', SpeedEstimator, outputs, in_color=True)
 
     def prepare(self, stage, tray):
         """Masks are made only while somebody looks."""

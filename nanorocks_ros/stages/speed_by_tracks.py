@@ -22,7 +22,7 @@ _LEAST_PATH_PX = 1.5
 _LOOK_BACK_NS = 4 * NS
 # Share of the beads that must be followed, of each species, to begin and to go on.
 _ENOUGH, _STILL_ENOUGH = 0.85, 0.7
-# Time over which that share is averaged.
+# Pictures over which the median of that share is taken.
 _MEMORY_FRAMES = 30
 
 
@@ -82,7 +82,8 @@ class TrackSpeed:
     def _judge(self, tracks: Tracks) -> None:
         seen = np.bincount(tracks.species[tracks.seen], minlength=self._counts.size)
         self._shares.append(seen / self._counts)
-        least = float(np.mean(self._shares, axis=0).min())
+        # A track is believed after some pictures only: the first ones show none.
+        least = float(np.median(self._shares, axis=0).min())
         self.judged = len(self._shares) == _MEMORY_FRAMES
         self.reliable = self.judged and least >= (_STILL_ENOUGH if self.reliable else _ENOUGH)
         if least < _STILL_ENOUGH:

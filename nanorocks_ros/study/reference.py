@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.experiment import settings as st
-from nanorocks_ros.records import ClusterEstimate, CorEstimate, GroundTruth, SpeedEstimate
+from nanorocks_ros.records import ClusterEstimate, CorEstimate, GroundTruth, SpeedEstimate, TrayState
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.beads import beads_layout
 from nanorocks_ros.wire.layouts import layout
@@ -81,7 +81,7 @@ def topics_page() -> str:
         '`time` counts from. Read from `msg_defs/nanorocks_msgs/msg/`, which also builds as an '
         'interface package.\n'
     )
-    for record in (SpeedEstimate, ClusterEstimate, CorEstimate, GroundTruth):
+    for record in (SpeedEstimate, ClusterEstimate, CorEstimate, GroundTruth, TrayState):
         one = layout(record)
         text += f'\n## {one.name}\n\n{one.doc}\n\n'
         text += _table(

@@ -21,6 +21,7 @@ from nanorocks_ros.records import (
     Quality,
     SpeedEstimate,
     SpeedMethod,
+    TrayState,
 )
 
 if TYPE_CHECKING:
@@ -29,8 +30,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 NS = 1_000_000_000
-ArrayRecord = SpeedEstimate | ClusterEstimate | CorEstimate | GroundTruth
-RecordType = TypeVar('RecordType', SpeedEstimate, ClusterEstimate, CorEstimate, GroundTruth)
+ArrayRecord = SpeedEstimate | ClusterEstimate | CorEstimate | GroundTruth | TrayState
+RecordType = TypeVar(
+    'RecordType', SpeedEstimate, ClusterEstimate, CorEstimate, GroundTruth, TrayState
+)
 
 _ENUMERATIONS = {
     'method': SpeedMethod,
@@ -38,7 +41,7 @@ _ENUMERATIONS = {
     'status': CorStatus,
     'relation': CorRelation,
 }
-_COUNTS = frozenset({'cycle', 'samples', 'bodies'})
+_COUNTS = frozenset({'cycle', 'samples', 'bodies', 'color'})
 # Fields of the array that a record keeps as an integer stamp.
 _STAMPS = {'time': 'stamp_ns', 'cycle_start': 'cycle_start_ns'}
 _FIELD = re.compile(r'^float32\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
@@ -102,7 +105,7 @@ def to_array(record: ArrayRecord, epoch_ns: int) -> NDArray[np.float32]:
 
     Parameters
     ----------
-    record : SpeedEstimate, ClusterEstimate, CorEstimate or GroundTruth
+    record : SpeedEstimate, ClusterEstimate, CorEstimate, GroundTruth or TrayState
     epoch_ns : int, [ns]
         What `time` counts from.
 

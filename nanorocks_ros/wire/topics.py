@@ -53,10 +53,16 @@ RAW_COMPRESSED = Topic(
     name='camera/image_raw/compressed', type=COMPRESSED, depth=10, doc='the camera, JPEG or PNG'
 )
 RECTIFIED = Topic(
-    name='tray_{tray}/image_rect_color', type=IMAGE, depth=10, doc='crop of the tray, bgr8'
+    name='tray_{tray}/image_rect_color', type=IMAGE, depth=30, doc='crop of the tray, bgr8'
 )
 GRAY = Topic(
     name='tray_{tray}/image_gray', type=IMAGE, depth=30, doc='gray mix of the crop, mono8'
+)
+STATE = Topic(
+    name='tray_{tray}/state',
+    type=ARRAY,
+    depth=100,
+    doc='TrayState: cycle, displacement, quality of the images of the same stamp',
 )
 MOTION = Topic(
     name='tray_{tray}/motion', type=IMAGE, depth=10, doc='motion mask, mono8: 255 where it moves'
@@ -90,6 +96,7 @@ TOPICS = (
     RAW_COMPRESSED,
     RECTIFIED,
     GRAY,
+    STATE,
     MOTION,
     SPEED,
     CLUSTER,

@@ -61,7 +61,7 @@ def test_every_problem_is_listed_at_once():
         st.with_values(st.PipelineSettings(), values, 'mine.yaml')
     text = str(caught.value)
     assert text.startswith('mine.yaml: ')
-    assert "'guess' is none of structure_function, binarised_area" in text
+    assert "'guess' is none of auto, tracking, structure_function, binarised_area" in text
     assert '2.0 is outside [0.5, 0.999]' in text
     assert "no setting 'sped.interval'" in text
 

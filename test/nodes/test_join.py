@@ -1,0 +1,91 @@
+"""A tray image put together again from its parts, in whatever order they come."""
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from nanorocks_ros.nodes._join import TrayJoiner
+from nanorocks_ros.records import Frame, Quality, TrayImage, TrayState
+from nanorocks_ros.wire.layouts import from_array, to_array
+
+EPOCH = 1_700_000_000_000_000_000
+STEP = 33_333_333
+
+
+def image_of(number, *, color=True):
+    gray = np.full((4, 6), number, dtype=np.uint8)
+    return TrayImage(
+        stamp_ns=EPOCH + 1000 * 10**9 + number * STEP,
+        tray=3,
+        gray=gray,
+        color=np.dstack([gray] * 3) if color else None,
+        cycle=2,
+        cycle_start_ns=EPOCH + 990 * 10**9,
+        noise_power=8.0,
+        displacement=(1e-4, -2e-4),
+        displacement_error=1e-6,
+        velocity=(1e-3, 0.0),
+        velocity_error=1e-5,
+        quality=Quality.GLARE,
+        glare=0.25,
+    )
+
+
+def pushed(joiner, image, part):
+    """What comes out when one part of an image, as it travels, goes in."""
+    if part == 'state':
+        values = to_array(image.state(), EPOCH)
+        state = from_array(TrayState, values, tray=3, epoch_ns=EPOCH, where='test')
+        return joiner.state(state, EPOCH)
+    pixels = getattr(image, part)
+    encoding = 'mono8' if part == 'gray' else 'bgr8'
+    return getattr(joiner, part)(Frame(stamp_ns=image.stamp_ns, encoding=encoding, image=pixels))
+
+
+def assert_alike(found, expected):
+    assert (found.stamp_ns, found.tray, found.cycle) == (expected.stamp_ns, 3, 2)
+    assert found.quality == expected.quality
+    np.testing.assert_array_equal(found.gray, expected.gray)
+    assert (found.color is None) == (expected.color is None)
+    assert found.displacement == pytest.approx(expected.displacement, rel=1e-6)
+    assert found.velocity == pytest.approx(expected.velocity, rel=1e-6)
+    # An array of float32 knows a time of 1000 s to 0.1 ms.
+    assert abs(found.cycle_start_ns - expected.cycle_start_ns) < 100_000
+
+
+@pytest.mark.parametrize('order', list(permutations(['state', 'gray', 'color'])))
+def test_the_parts_may_come_in_any_order(order):
+    joiner = TrayJoiner(3)
+    for number in range(5):
+        image = image_of(number)
+        found = [one for part in order for one in pushed(joiner, image, part)]
+        assert len(found) == 1
+        assert_alike(found[0], image)
+
+
+def test_a_gray_camera_is_not_waited_for():
+    joiner = TrayJoiner(3)
+    image = image_of(1, color=False)
+    assert pushed(joiner, image, 'gray') == []
+    assert_alike(pushed(joiner, image, 'state')[0], image)
+
+
+@pytest.mark.parametrize('lost', ['state', 'gray', 'color'])
+def test_an_image_of_which_a_part_is_lost_is_left_out_and_the_next_one_comes(lost):
+    joiner = TrayJoiner(3)
+    found = []
+    for number in range(6):
+        for part in ('state', 'color', 'gray'):
+            if not (number == 2 and part == lost):
+                found += pushed(joiner, image_of(number), part)
+    assert [int(one.gray[0, 0]) for one in found] == [0, 1, 3, 4, 5]
+
+
+def test_states_far_ahead_of_their_pixels_find_them():
+    joiner = TrayJoiner(3)
+    images = [image_of(number) for number in range(20)]
+    assert [one for image in images for one in pushed(joiner, image, 'state')] == []
+    assert [one for image in images for one in pushed(joiner, image, 'color')] == []
+    found = [one for image in images for one in pushed(joiner, image, 'gray')]
+    assert [one.stamp_ns for one in found] == [one.stamp_ns for one in images]
