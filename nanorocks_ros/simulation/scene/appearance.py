@@ -155,8 +155,23 @@ def grain_shapes(irregularity: float, rng: np.random.Generator) -> NDArray[np.fl
     return shapes
 
 
-def outline_moments(lobes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Root of the area in discs of radius 1, (n,), and centroid, (n, 2), of outlines (n, 6)."""
+def outline_moments(
+    lobes: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """What the outlines of grains of mean radius 1 come to.
+
+    Parameters
+    ----------
+    lobes : ndarray (n, 6)
+
+    Returns
+    -------
+    size : ndarray (n,)
+        Radius of the disc of the same area.
+    centroid : ndarray (n, 2)
+    furthest : ndarray (n,)
+        Largest distance from the origin.
+    """
     angle = np.linspace(0.0, 2.0 * math.pi, 360, endpoint=False)
     waves = np.stack([f(k * angle) for k in (2, 3, 4) for f in (np.cos, np.sin)])
     radius = 1.0 + lobes @ waves
@@ -164,4 +179,4 @@ def outline_moments(lobes: NDArray[np.float64]) -> tuple[NDArray[np.float64], ND
     unit = np.stack([np.cos(angle), np.sin(angle)])
     # Of a sector, the centroid lies at two thirds of the radius.
     centroid = (2.0 / 3.0) * np.mean(radius[:, np.newaxis] ** 3 * unit, axis=2) / area[:, None]
-    return np.sqrt(area), centroid
+    return np.sqrt(area), centroid, radius.max(axis=1)

@@ -38,6 +38,9 @@ COLUMN, ROW, HALF_WIDTH, HALF_HEIGHT, RADIUS, MATRIX, COSINE, SINE, DUST = (
 )
 PLACE = 12
 
+# Columns of the spot of a shadow, after those that it shares with a place.
+_BLUR, _FLOOR = 5, 6
+
 # Columns of a look, as the fields of materials.Look.
 # Its first three are blue, green and red.
 _AMBIENT, _DIFFUSE, _DARKENING, _GLOW, _SHEEN, _HIGHLIGHT = range(3, 9)
@@ -53,9 +56,13 @@ _CHALK = np.array([226.0, 229.0, 231.0])
 _DUST_SQUARES = 12.0
 
 
-# Rows of the buffer in which a row of a body is worked out.
-_SHARE, _WHITE, _ONE, _LIT, _ACROSS_DUST, _DOWN_DUST, _HIDDEN = range(7)
-BUFFERS = 7
+# Rows of the buffer in which the pixels of a body are worked out, all in one long loop: loops
+# over the short rows of a body would not run in lanes.
+_X, _Y, _SHARE, _LEVELS, _LIT, _ACROSS_DUST, _DOWN_DUST = 0, 1, 2, 3, 6, 7, 8
+BUFFERS = 9
+# Rows are filled up to a multiple of this, so that they are drawn in lanes too.
+_LANES = 8
+_EIGHT = np.uint64(_LANES)
 
 
 @inlined
@@ -75,6 +82,65 @@ def span(size: int, middle: float, reach: float) -> tuple[int, int]:
     return first, min(math.floor(middle + reach) + 1, size)
 
 
+@kernel
+def lay_out(out: NDArray[np.float64], rows: int, columns: int, across: float, down: float) -> int:
+    """Fill in the places of the pixels of a rectangle; how many there are.
+
+    Parameters
+    ----------
+    out : ndarray (2 or more, n)
+        Written: column and row from the centre of the body, [px].
+    rows, columns : int
+        The latter a multiple of 8.
+    across, down : float, [px]
+        Of the first pixel.
+    """
+    k = np.uint64(0)
+    for i in range(rows):
+        for m in range(columns // _LANES):
+            for j in range(_EIGHT):
+                out[_X, k + j] = across + (_LANES * m + np.int64(j))
+                out[_Y, k + j] = down + i
+            k += _EIGHT
+    return int(k)
+
+
+@inlined
+def box(
+    canvas: NDArray[np.uint16], place: NDArray[np.float64], width: float
+) -> tuple[int, int, int, int]:
+    """First column and row of the rectangle that a body is drawn in, its columns and rows."""
+    top, bottom = span(canvas.shape[1], place[ROW], place[HALF_HEIGHT] + 0.5 * width)
+    left, right = span(canvas.shape[2], place[COLUMN], place[HALF_WIDTH] + 0.5 * width)
+    columns = max(right - left + _LANES - 1, 0) // _LANES * _LANES
+    # Where the canvas ends, it begins so much earlier.
+    left = max(min(left, canvas.shape[2] - columns), 0)
+    return left, top, min(columns, canvas.shape[2] // _LANES * _LANES), max(bottom - top, 0)
+
+
+@kernel
+def compose(
+    canvas: NDArray[np.uint16],
+    out: NDArray[np.float64],
+    left: int,
+    top: int,
+    columns: int,
+    rows: int,
+) -> None:
+    """Let the shares and levels of a buffer cover a rectangle of a canvas."""
+    for channel in range(3):
+        k = np.uint64(0)
+        for i in range(top, top + rows):
+            for m in range(columns // _LANES):
+                first = np.uint64(left + _LANES * m)
+                for j in range(_EIGHT):
+                    before = np.float64(canvas[channel, i, first + j])
+                    share, level = out[_SHARE, k + j], out[_LEVELS + channel, k + j]
+                    value = before + share * (level - before) + 0.5
+                    canvas[channel, i, first + j] = np.uint16(np.int32(value))
+                k += _EIGHT
+
+
 @inlined
 def facet(
     best: float,
@@ -91,38 +157,37 @@ def facet(
 
 
 @kernel
-def grain_row(
+def grain_pixels(
     out: NDArray[np.float64],
     n: int,
     place: NDArray[np.float64],
     shape: NDArray[np.float64],
+    look: NDArray[np.float64],
     levels: NDArray[np.float64],
-    across: float,
-    down: float,
     width: float,
 ) -> None:
-    """Shares and light of a row of a grain, without branches so that it runs in lanes.
+    """Shares and light of the pixels of a grain, without branches so that it runs in lanes.
 
     Parameters
     ----------
-    out : ndarray (7, n or more)
-        Written: share of each pixel, light.
+    out : ndarray (9, n or more)
+        Written: share of each pixel, levels.
     place : ndarray (12,)
         With the turn of the grain in its matrix.
     shape : ndarray (SHAPE,)
+    look : ndarray (9,)
     levels : ndarray (FACETS,)
         Light of each facet.
-    across, down : float, [px]
-        From the centre of the grain to that of the first pixel.
     width : float, [px]
     """
     xx, xy, yx, yy = place[MATRIX], place[MATRIX + 1], place[MATRIX + 2], place[MATRIX + 3]
     radius = place[RADIUS]
     a2, b2, a3, b3, a4, b4 = shape[0], shape[1], shape[2], shape[3], shape[4], shape[5]
+    blue, green, red = look[0], look[1], look[2]
     l0, l1, l2, l3, l4 = levels[0], levels[1], levels[2], levels[3], levels[4]
     for j in range(n):
-        dx = across + j
-        x, y = xx * dx + xy * down, yx * dx + yy * down
+        dx, dy = out[_X, j], out[_Y, j]
+        x, y = xx * dx + xy * dy, yx * dx + yy * dy
         distance = math.sqrt(x * x + y * y) + 1e-9
         scale = 1.0 / distance
         c1, s1 = x * scale, y * scale
@@ -139,16 +204,9 @@ def grain_row(
         best, light = facet(best, light, point, shape, 3, l3)
         best, light = facet(best, light, point, shape, 4, l4)
         out[_SHARE, j] = covered((distance - edge) * radius, width)
-        out[_WHITE, j] = light
-
-
-@kernel
-def colour_grain(line: NDArray[np.uint16], buffer: NDArray[np.float64], colour: float) -> None:
-    """Draw a row of a grain, as `grain_row` left it, in one channel."""
-    for j in range(line.size):
-        before = np.float64(line[j])
-        value = before + buffer[_SHARE, j] * (colour * buffer[_WHITE, j] - before)
-        line[j] = np.uint16(np.int32(value + 0.5))
+        out[_LEVELS, j] = blue * light
+        out[_LEVELS + 1, j] = green * light
+        out[_LEVELS + 2, j] = red * light
 
 
 @kernel
@@ -163,7 +221,6 @@ def draw_grain(
     levels: NDArray[np.float64],
 ) -> None:
     """Draw a grain with facets; see `draw_bodies`."""
-    column, row = place[COLUMN], place[ROW]
     cosine, sine = place[COSINE], place[SINE]
     for k in range(PLACE):
         turned[k] = place[k]
@@ -177,48 +234,41 @@ def draw_grain(
         down = shape[n] * sine + shape[n + 1] * cosine
         lambert = max(right * _LAMP_X + down * _LAMP_Y + shape[n + 2] * _LAMP_Z, 0.0)
         levels[k] = LEVEL * (look[_AMBIENT] + look[_DIFFUSE] * lambert) * shape[n + 3]
-    top, bottom = span(canvas.shape[1], row, place[HALF_HEIGHT] + 0.5 * width)
-    left, end = span(canvas.shape[2], column, place[HALF_WIDTH] + 0.5 * width)
-    for i in range(top, bottom):
-        grain_row(
-            buffer, end - left, turned, shape, levels, left + 0.5 - column, i + 0.5 - row, width
-        )
-        for channel in range(3):
-            colour_grain(canvas[channel, i, left:end], buffer, look[channel])
+    left, top, columns, rows = box(canvas, place, width)
+    n = lay_out(buffer, rows, columns, left + 0.5 - place[COLUMN], top + 0.5 - place[ROW])
+    grain_pixels(buffer, n, turned, shape, look, levels, width)
+    compose(canvas, buffer, left, top, columns, rows)
 
 
 @kernel
-def bead_row(
+def bead_pixels(
     out: NDArray[np.float64],
     n: int,
     place: NDArray[np.float64],
     look: NDArray[np.float64],
-    across: float,
-    down: float,
     width: float,
 ) -> None:
-    """Shares and light of a row of a bead, without branches so that it runs in lanes.
+    """Shares and light of the pixels of a bead, without branches so that it runs in lanes.
 
     The light is that of `drawing.shade`.
 
     Parameters
     ----------
-    out : ndarray (7, n or more)
-        Written: share of each pixel, white light, light in the colour of the bead, how it is
-        lit, and the place on the bead, which has turned.
+    out : ndarray (9, n or more)
+        Written: share of each pixel, levels, how it is lit, and the place on the bead, which
+        has turned.
     place : ndarray (12,)
     look : ndarray (9,)
-    across, down : float, [px]
-        From the centre of the bead to that of the first pixel.
     width : float, [px]
     """
     xx, xy, yx, yy = place[MATRIX], place[MATRIX + 1], place[MATRIX + 2], place[MATRIX + 3]
     radius, cosine, sine = place[RADIUS], place[COSINE], place[SINE]
     ambient, diffuse, darkening = look[_AMBIENT], look[_DIFFUSE], look[_DARKENING]
-    glow, sheen, highlight = look[_GLOW], look[_SHEEN], look[_HIGHLIGHT]
+    glow, sheen, highlight = look[_GLOW], look[_SHEEN], LEVEL * look[_HIGHLIGHT]
+    blue, green, red = LEVEL * look[0], LEVEL * look[1], LEVEL * look[2]
     for j in range(n):
-        dx = across + j
-        x, y = xx * dx + xy * down, yx * dx + yy * down
+        dx, dy = out[_X, j], out[_Y, j]
+        x, y = xx * dx + xy * dy, yx * dx + yy * dy
         distance = math.sqrt(x * x + y * y)
         inward = 1.0 / max(distance, 1.0)
         x, y = x * inward, y * inward
@@ -234,24 +284,29 @@ def bead_row(
         away = max(-lamp / _LAMP_ACROSS, 0.0)
         light = (ambient + diffuse * lambert) * (1.0 - darkening * (1.0 - z) * (1.0 - z))
         out[_SHARE, j] = covered((distance - 1.0) * radius, width)
-        out[_WHITE, j] = highlight * narrow
-        out[_ONE, j] = light + glow * away * away * z + sheen * broad
+        light += glow * away * away * z + sheen * broad
+        out[_LEVELS, j] = blue * light + highlight * narrow
+        out[_LEVELS + 1, j] = green * light + highlight * narrow
+        out[_LEVELS + 2, j] = red * light + highlight * narrow
         out[_LIT, j] = 0.5 + 0.5 * lambert
         out[_ACROSS_DUST, j] = x * cosine + y * sine
         out[_DOWN_DUST, j] = y * cosine - x * sine
 
 
 @kernel
-def colour_bead(
-    line: NDArray[np.uint16], buffer: NDArray[np.float64], colour: float, chalk: float
+def put_dust(
+    out: NDArray[np.float64], n: int, dust: NDArray[np.float32], start: int, cover: float
 ) -> None:
-    """Draw a row of a bead, as `bead_row` left it, in one channel."""
-    for j in range(line.size):
-        level = colour * buffer[_ONE, j] + buffer[_WHITE, j]
-        level += buffer[_HIDDEN, j] * (chalk * buffer[_LIT, j] - level)
-        before = np.float64(line[j])
-        value = before + buffer[_SHARE, j] * (LEVEL * level - before)
-        line[j] = np.uint16(np.int32(value + 0.5))
+    """Hide the pixels that `bead_pixels` left under dust."""
+    size = dust.shape[0]
+    for j in range(n):
+        y = int((out[_DOWN_DUST, j] + 1.0) * _DUST_SQUARES) + start
+        x = int((out[_ACROSS_DUST, j] + 1.0) * _DUST_SQUARES) + start // size
+        hidden = min(cover * dust[y % size, x % size], 1.0)
+        for channel in range(3):
+            level = out[_LEVELS + channel, j]
+            chalk = LEVEL * _CHALK[channel] * out[_LIT, j]
+            out[_LEVELS + channel, j] = level + hidden * (chalk - level)
 
 
 @kernel
@@ -265,21 +320,12 @@ def draw_bead(
     buffer: NDArray[np.float64],
 ) -> None:
     """Draw a shaded sphere, or oval, under its dust; see `draw_bodies`."""
-    column, row, cover = place[COLUMN], place[ROW], place[DUST]
-    top, bottom = span(canvas.shape[1], row, place[HALF_HEIGHT] + 0.5 * width)
-    left, end = span(canvas.shape[2], column, place[HALF_WIDTH] + 0.5 * width)
-    size = dust.shape[0]
-    for j in range(end - left):
-        buffer[_HIDDEN, j] = 0.0
-    for i in range(top, bottom):
-        bead_row(buffer, end - left, place, look, left + 0.5 - column, i + 0.5 - row, width)
-        if cover > 0.0:
-            for j in range(end - left):
-                y = int((buffer[_DOWN_DUST, j] + 1.0) * _DUST_SQUARES) + start
-                x = int((buffer[_ACROSS_DUST, j] + 1.0) * _DUST_SQUARES) + start // size
-                buffer[_HIDDEN, j] = min(cover * dust[y % size, x % size], 1.0)
-        for channel in range(3):
-            colour_bead(canvas[channel, i, left:end], buffer, look[channel], _CHALK[channel])
+    left, top, columns, rows = box(canvas, place, width)
+    n = lay_out(buffer, rows, columns, left + 0.5 - place[COLUMN], top + 0.5 - place[ROW])
+    bead_pixels(buffer, n, place, look, width)
+    if place[DUST] > 0.0:
+        put_dust(buffer, n, dust, start, place[DUST])
+    compose(canvas, buffer, left, top, columns, rows)
 
 
 @compiled
@@ -316,10 +362,12 @@ def draw_bodies(
     width : float, [px]
         Of the outlines.
     """
-    widest = 0.0
+    most = 0.0
     for k in range(order.size):
-        widest = max(widest, places[k, HALF_WIDTH])
-    buffer = np.empty((BUFFERS, int(2.0 * widest + width) + 3))
+        sides = places[k, HALF_WIDTH : HALF_HEIGHT + 1]
+        across, down = 2.0 * sides[0] + width + 2.0 + _LANES, 2.0 * sides[1] + width + 2.0
+        most = max(most, across * down)
+    buffer = np.empty((BUFFERS, int(most) + _LANES))
     turned, levels = np.empty(PLACE), np.empty(FACETS)
     for k in range(order.size):
         i = order[k]
@@ -331,36 +379,46 @@ def draw_bodies(
 
 
 @kernel
-def shadow_row(
-    kept: NDArray[np.uint32],
-    n: int,
-    spot: NDArray[np.float64],
-    across: float,
-    down: float,
-    strength: float,
+def shadow_pixels(
+    out: NDArray[np.float64], n: int, spot: NDArray[np.float64], strength: float
 ) -> None:
-    """Parts of 2^16 of the light that a shadow leaves in a row of pixels, (n or more,)."""
-    radius, width = spot[2], spot[3]
+    """Share of the light that a shadow leaves of the pixels laid out in a buffer."""
+    radius, width = spot[RADIUS], spot[_BLUR]
+    left, right = spot[_FLOOR] - spot[COLUMN], spot[_FLOOR + 1] - spot[COLUMN]
+    top, bottom = spot[_FLOOR + 2] - spot[ROW], spot[_FLOOR + 3] - spot[ROW]
     for j in range(n):
-        dx = across + j
-        share = covered(math.sqrt(dx * dx + down * down) - radius, width)
-        kept[j] = np.uint32(np.int32(65536.0 * (1.0 - strength * share) - 0.5))
+        x, y = out[_X, j], out[_Y, j]
+        share = strength * covered(math.sqrt(x * x + y * y) - radius, width)
+        on_floor = (x > left) & (x < right) & (y > top) & (y < bottom)
+        out[_SHARE, j] = 1.0 - share if on_floor else 1.0
 
 
 @kernel
-def darken(line: NDArray[np.uint16], kept: NDArray[np.uint32]) -> None:
-    """Leave so many parts of 2^16 of the light in a row of pixels."""
-    for j in range(line.size):
-        line[j] = np.uint16((np.uint32(line[j]) * kept[j]) >> np.uint32(16))
+def darken(
+    canvas: NDArray[np.uint16],
+    out: NDArray[np.float64],
+    left: int,
+    top: int,
+    columns: int,
+    rows: int,
+) -> None:
+    """Leave a rectangle of a canvas the light that `shadow_pixels` found."""
+    for channel in range(3):
+        k = np.uint64(0)
+        for i in range(top, top + rows):
+            for m in range(columns // _LANES):
+                first = np.uint64(left + _LANES * m)
+                for j in range(_EIGHT):
+                    light = np.float64(canvas[channel, i, first + j]) * out[_SHARE, k + j]
+                    canvas[channel, i, first + j] = np.uint16(np.int32(light + 0.5))
+                k += _EIGHT
 
 
-@kernel
+@compiled
 def draw_shadows(
     canvas: NDArray[np.uint16],
     spots: NDArray[np.float64],
-    bounds: NDArray[np.int64],
     strength: float,
-    kept: NDArray[np.uint32],
 ) -> None:
     """Darken the floor where bodies keep the light away.
 
@@ -368,22 +426,20 @@ def draw_shadows(
     ----------
     canvas : ndarray of uint16, (3, rows, columns)
         Changed.
-    spots : ndarray (n, 4), [px]
-        Column and row of a shadow, its radius, and the width of its outline.
-    bounds : ndarray of int64, (n, 4), [px]
-        First and last column and row (not included) that it can fall on: of the floor.
+    spots : ndarray (n, 10), [px]
+        Column and row of a shadow, its radius three times, the width of its outline; first and
+        last column and row of the floor that it can fall on.
     strength : float
         Share of the light that the deepest shadow takes.
-    kept : ndarray of uint32, (columns,)
-        To work in.
     """
+    most = 0.0
     for k in range(spots.shape[0]):
-        spot = spots[k]
-        reach = spot[2] + 0.5 * spot[3]
-        top, bottom = span(bounds[k, 3], spot[1], reach)
-        left, right = span(bounds[k, 1], spot[0], reach)
-        left = max(left, bounds[k, 0])
-        for i in range(max(top, bounds[k, 2]), bottom):
-            shadow_row(kept, right - left, spot, left + 0.5 - spot[0], i + 0.5 - spot[1], strength)
-            for channel in range(3):
-                darken(canvas[channel, i, left:right], kept)
+        side = 2.0 * spots[k, HALF_WIDTH] + spots[k, _BLUR] + 2.0
+        most = max(most, side * (side + _LANES))
+    buffer = np.empty((BUFFERS, int(most) + _LANES))
+    for k in range(spots.shape[0]):
+        spot, width = spots[k], spots[k, _BLUR]
+        left, top, columns, rows = box(canvas, spot, width)
+        n = lay_out(buffer, rows, columns, left + 0.5 - spot[COLUMN], top + 0.5 - spot[ROW])
+        shadow_pixels(buffer, n, spot, strength)
+        darken(canvas, buffer, left, top, columns, rows)

@@ -112,7 +112,7 @@ class SceneCamera:
             For positions of another shape, or not finite.
         """
         canvas = self._plate.moved_to(motion.displacement)
-        self._painter.paint(canvas, positions, motion, turned)
+        self._painter.paint(canvas, positions, motion.displacement, turned)
         if self._glare is not None:
             x, y, _, _ = self._glare.region
             add_light(canvas, self._glare.light, x, y)
