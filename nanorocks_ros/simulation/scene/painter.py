@@ -32,7 +32,7 @@ _SHARP, _STEP_DEVIATION = 1.6, 0.2236
 
 # Towards the side away from the lamp, in heights: where the shadow of a bead falls.
 _CAST = np.array([0.45, 0.60])
-_SHADOW_BLUR, _WIDEST_BLUR = 0.5, 0.8
+_SHADOW_BLUR, _WIDEST_BLUR = 0.5, 1.3
 
 
 class BeadPainter:
