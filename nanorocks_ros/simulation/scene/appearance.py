@@ -10,7 +10,8 @@ import numpy as np
 
 from nanorocks_ros.simulation.initial import stock
 from nanorocks_ros.simulation.materials import looks_of
-from nanorocks_ros.simulation.scene.bodies import FACETS, GRAIN, LOBES, SHAPE, SPHERE
+from nanorocks_ros.simulation.scene.bodies import GRAIN, SPHERE
+from nanorocks_ros.simulation.scene.grains import FACETS, LOBES, SHAPE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -129,7 +130,7 @@ def turned_since(time: float, events: list[float]) -> float:
 
 
 def grain_shapes(irregularity: float, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Outlines and facets of grains, see `bodies.SHAPE`; every outline has the area of a disc.
+    """Outlines and facets of grains, see `grains.SHAPE`; every outline has the area of a disc.
 
     Parameters
     ----------

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.simulation.randomness import Purpose, hashed, key_for
-from nanorocks_ros.simulation.scene.bodies import LEVEL
 from nanorocks_ros.simulation.scene.geometry import SceneGeometry
 from nanorocks_ros.simulation.scene.glare import led_glare
+from nanorocks_ros.simulation.scene.lanes import LEVEL
 from nanorocks_ros.simulation.scene.light import Illumination
 from nanorocks_ros.simulation.scene.moving_plate import MovingPlate
 from nanorocks_ros.simulation.scene.painter import BeadPainter

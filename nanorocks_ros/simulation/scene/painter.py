@@ -15,8 +15,11 @@ from nanorocks_ros.simulation.scene.appearance import (
     grain_shapes,
     outline_moments,
 )
-from nanorocks_ros.simulation.scene.bodies import GRAIN, LOBES, PLACE, draw_bodies, draw_shadows
+from nanorocks_ros.simulation.scene.bodies import GRAIN, draw_bodies
 from nanorocks_ros.simulation.scene.chalk import dust_pattern
+from nanorocks_ros.simulation.scene.grains import LOBES
+from nanorocks_ros.simulation.scene.lanes import PLACE, short
+from nanorocks_ros.simulation.scene.shadows import draw_shadows
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,7 +35,7 @@ _SHARP, _STEP_DEVIATION = 1.6, 0.2236
 
 # Towards the side away from the lamp, in heights: where the shadow of a bead falls.
 _CAST = np.array([0.45, 0.60])
-_SHADOW_BLUR, _WIDEST_BLUR = 0.5, 1.3
+_SHADOW_BLUR, _WIDEST_BLUR = 0.5, 0.9
 
 
 class BeadPainter:
@@ -67,15 +70,17 @@ class BeadPainter:
         self._geometry, self._shadows = geometry, scene.shadows
         rng = np.random.default_rng(seed)
         self._dust = dust_pattern(rng)
-        self._shapes = grain_shapes(scene.irregularity, rng)
+        shapes = grain_shapes(scene.irregularity, rng)
+        self._shapes = shapes.astype(np.float32)
         self._counts = {number: len(one) for number, one in radii.items()}
         looks = [
             appearance_of(trays[number], scene, np.random.default_rng([seed, number]))
             for number in radii
         ]
         self._look = Appearance.joined(looks)
+        self._looks = self._look.looks.astype(np.float32)
         count = sum(self._counts.values())
-        size, centroid, furthest = outline_moments(self._shapes[:, :LOBES])
+        size, centroid, furthest = outline_moments(shapes[:, :LOBES])
         which = np.arange(count) % len(self._shapes)
         grain = self._look.kinds == GRAIN
         # An outline has the area of the grain, and its centroid where the grain is.
@@ -113,12 +118,12 @@ class BeadPainter:
         draw_bodies(
             canvas,
             self._order(places[:, 2]),
-            self._rows(seen, lens, turned),
-            look.looks,
+            self._rows(seen, lens, turned).astype(np.float32),
+            self._looks,
             look.kinds,
             self._shapes,
             self._dust,
-            self._width,
+            short(self._width),
         )
 
     def _checked(self, positions: Mapping[int, NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -189,7 +194,7 @@ class BeadPainter:
         spots[:, 5] = np.minimum(blur, _WIDEST_BLUR * spots[:, 4])
         across, down = np.array(displacement) * geometry.scale
         spots[:, 6:] = self._floors + np.array([across, across, down, down])
-        draw_shadows(canvas, spots, self._shadows)
+        draw_shadows(canvas, spots.astype(np.float32), short(self._shadows))
 
 
 def _floor(geometry: SceneGeometry, tray: int) -> tuple[int, int, int, int]:
