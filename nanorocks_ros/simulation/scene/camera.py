@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 
 from nanorocks_ros.simulation.randomness import Purpose, hashed, key_for
@@ -66,7 +65,6 @@ class SceneCamera:
         self._glare = led_glare(self.geometry, scene.glare) if scene.glare > 0.0 else None
         self._light = Illumination(scene, self.geometry.shape)
         self._strip = noise_strip(simulation.width_px, scene.noise, self._noise_key)
-        self._planes = np.empty((3, *self.geometry.shape), dtype=np.uint8)
         self._painter = BeadPainter(self.geometry, scene, trays, radii, seed)
 
     @property
@@ -116,12 +114,14 @@ class SceneCamera:
         if self._glare is not None:
             x, y, _, _ = self._glare.region
             add_light(canvas, self._glare.light, x, y)
+        rows, columns = self.geometry.shape
+        picture = np.empty((rows, columns, 3), dtype=np.uint8)
         expose(
             canvas,
             self._light.across,
             self._light.down(time),
             self._strip,
             np.uint64(hashed(self._noise_key, number)),
-            self._planes,
+            picture.reshape(rows, 3 * columns),
         )
-        return np.asarray(cv2.merge(list(self._planes)), dtype=np.uint8)
+        return picture

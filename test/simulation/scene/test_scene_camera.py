@@ -246,7 +246,7 @@ def test_copper_beads_are_ovals_of_the_area_of_their_spheres():
     for seed in range(4):
         simulation = replace(SIMULATION, seed=seed)
         camera = camera_with_one(5, scene, simulation, material='copper')
-        empty = SceneCamera(simulation, scene, TRAYS, {}).picture({}, 0).astype(float)
+        empty = empty_camera(scene, simulation).picture({}, 0).astype(float)
         change = camera.picture({5: place}, 0, turned=0.7).astype(float) - empty
         weight = np.abs(change[:, :, 0])
         weight[weight < 3.0] = 0.0
@@ -267,7 +267,7 @@ def test_grains_are_dark_and_of_irregular_outline():
         simulation = replace(SIMULATION, seed=seed)
         scene = replace(PLAIN, irregularity=0.15)
         camera = camera_with_one(8, scene, simulation, material='JSC-1', diameter=0.002)
-        empty = SceneCamera(simulation, scene, TRAYS, {}).picture({}, 0).astype(float)
+        empty = empty_camera(scene, simulation).picture({}, 0).astype(float)
         picture = camera.picture({8: place}, 0).astype(float)
         change = (empty - picture)[:, :, 1]
         column, row = camera.geometry.rectified(8, place)[0]
