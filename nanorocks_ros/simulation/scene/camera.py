@@ -61,20 +61,21 @@ class SceneCamera:
         self._noise_key = key_for(simulation.seed, 0, Purpose.NOISE)
         chalk = {number: scene.chalk for number, tray in trays.items() if tray.chalk}
         still = empty_scene(self.geometry, defocus=scene.defocus_px, chalk=chalk, seed=seed)
-        self._plate = MovingPlate(self.geometry, still)
         self._glare = led_glare(self.geometry, scene.glare) if scene.glare > 0.0 else None
+        glaring = [] if self._glare is None else [self._glare.region]
+        self._plate = MovingPlate(self.geometry, still, glaring)
         self._light = Illumination(scene, self.geometry.shape)
         self._strip = noise_strip(simulation.width_px, scene.noise, self._noise_key)
         self._painter = BeadPainter(self.geometry, scene, trays, radii, seed)
 
     @property
     def glare(self) -> NDArray[np.float64] | None:
-        """Levels that the LEDs add to the picture, (rows, columns), or None."""
+        """Gray levels that the LEDs add to green, (rows, columns), before the light; or None."""
         if self._glare is None:
             return None
         levels = np.zeros(self.geometry.shape)
         x, y, width, height = self._glare.region
-        levels[y : y + height, x : x + width] = self._glare.light.mean(axis=0) / LEVEL
+        levels[y : y + height, x : x + width] = self._glare.light[1] / LEVEL
         return levels
 
     def picture(
