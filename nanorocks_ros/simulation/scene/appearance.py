@@ -10,7 +10,8 @@ import numpy as np
 
 from nanorocks_ros.simulation.initial import stock
 from nanorocks_ros.simulation.materials import looks_of
-from nanorocks_ros.simulation.scene.bodies import FACETS, GRAIN, LOBES, SHAPE, SPHERE
+from nanorocks_ros.simulation.scene.bodies import GRAIN, SPHERE
+from nanorocks_ros.simulation.scene.grains import FACETS, LOBES, SHAPE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -43,7 +44,6 @@ class Appearance:
         Orientation at first, and how fast it turns right after shaking.
     dust : ndarray (n,)
         Share of it on the bead, 0 to 2.
-    species : ndarray of int32, (n,)
     """
 
     looks: NDArray[np.float64]
@@ -52,7 +52,6 @@ class Appearance:
     angles: NDArray[np.float64]
     rates: NDArray[np.float64]
     dust: NDArray[np.float64]
-    species: NDArray[np.int32]
 
     @staticmethod
     def joined(parts: list[Appearance]) -> Appearance:
@@ -71,7 +70,6 @@ _NOTHING = Appearance(
     angles=np.empty(0),
     rates=np.empty(0),
     dust=np.empty(0),
-    species=np.empty(0, dtype=np.int32),
 )
 
 
@@ -97,7 +95,6 @@ def appearance_of(tray: Tray, scene: SceneSettings, rng: np.random.Generator) ->
         angles=angles,
         rates=rates,
         dust=dust * (scene.chalk if tray.chalk else 0.0),
-        species=drawn.species,
     )
 
 
@@ -129,7 +126,7 @@ def turned_since(time: float, events: list[float]) -> float:
 
 
 def grain_shapes(irregularity: float, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Outlines and facets of grains, see `bodies.SHAPE`; every outline has the area of a disc.
+    """Outlines and facets of grains, see `grains.SHAPE`; every outline has the area of a disc.
 
     Parameters
     ----------
@@ -155,8 +152,23 @@ def grain_shapes(irregularity: float, rng: np.random.Generator) -> NDArray[np.fl
     return shapes
 
 
-def outline_moments(lobes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Root of the area in discs of radius 1, (n,), and centroid, (n, 2), of outlines (n, 6)."""
+def outline_moments(
+    lobes: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """What the outlines of grains of mean radius 1 come to.
+
+    Parameters
+    ----------
+    lobes : ndarray (n, 6)
+
+    Returns
+    -------
+    size : ndarray (n,)
+        Radius of the disc of the same area.
+    centroid : ndarray (n, 2)
+    furthest : ndarray (n,)
+        Largest distance from the origin.
+    """
     angle = np.linspace(0.0, 2.0 * math.pi, 360, endpoint=False)
     waves = np.stack([f(k * angle) for k in (2, 3, 4) for f in (np.cos, np.sin)])
     radius = 1.0 + lobes @ waves
@@ -164,4 +176,4 @@ def outline_moments(lobes: NDArray[np.float64]) -> tuple[NDArray[np.float64], ND
     unit = np.stack([np.cos(angle), np.sin(angle)])
     # Of a sector, the centroid lies at two thirds of the radius.
     centroid = (2.0 / 3.0) * np.mean(radius[:, np.newaxis] ** 3 * unit, axis=2) / area[:, None]
-    return np.sqrt(area), centroid
+    return np.sqrt(area), centroid, radius.max(axis=1)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.simulation.scene.bodies import LEVEL
+from nanorocks_ros.simulation.scene.lanes import LEVEL
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,8 +15,11 @@ from nanorocks_ros.simulation.scene.appearance import (
     grain_shapes,
     outline_moments,
 )
-from nanorocks_ros.simulation.scene.bodies import GRAIN, LOBES, PLACE, draw_bodies, draw_shadows
+from nanorocks_ros.simulation.scene.bodies import GRAIN, draw_bodies
 from nanorocks_ros.simulation.scene.chalk import dust_pattern
+from nanorocks_ros.simulation.scene.grains import LOBES
+from nanorocks_ros.simulation.scene.lanes import PLACE, short
+from nanorocks_ros.simulation.scene.shadows import draw_shadows
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,14 +29,13 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.settings import SceneSettings
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.simulation.scene.geometry import SceneGeometry
-    from nanorocks_ros.simulation.scene.swing import PlateMotion
 
 # Outline of a sharp bead [px] and its standard deviation; that of a step this wide.
 _SHARP, _STEP_DEVIATION = 1.6, 0.2236
 
 # Towards the side away from the lamp, in heights: where the shadow of a bead falls.
 _CAST = np.array([0.45, 0.60])
-_SHADOW_BLUR = 0.5
+_SHADOW_BLUR, _WIDEST_BLUR = 0.5, 0.9
 
 
 class BeadPainter:
@@ -68,38 +70,38 @@ class BeadPainter:
         self._geometry, self._shadows = geometry, scene.shadows
         rng = np.random.default_rng(seed)
         self._dust = dust_pattern(rng)
-        self._shapes = grain_shapes(scene.irregularity, rng)
+        shapes = grain_shapes(scene.irregularity, rng)
+        self._shapes = shapes.astype(np.float32)
         self._counts = {number: len(one) for number, one in radii.items()}
         looks = [
             appearance_of(trays[number], scene, np.random.default_rng([seed, number]))
             for number in radii
         ]
         self._look = Appearance.joined(looks)
+        self._looks = self._look.looks.astype(np.float32)
         count = sum(self._counts.values())
-        size, centroid = outline_moments(self._shapes[:, :LOBES])
+        size, centroid, furthest = outline_moments(shapes[:, :LOBES])
         which = np.arange(count) % len(self._shapes)
         grain = self._look.kinds == GRAIN
         # An outline has the area of the grain, and its centroid where the grain is.
         spheres = np.concatenate([*radii.values(), np.empty(0)]) * geometry.scale
         self._radii_px = spheres / np.where(grain, size[which], 1.0)
         self._offsets = np.where(grain[:, np.newaxis], -centroid[which], 0.0)
-        self._reach = np.where(grain, 1.0 + 4.0 * scene.irregularity, 1.0)
+        self._reach = np.where(grain, furthest[which], 1.0)
         self._width = float(np.hypot(_SHARP * _STEP_DEVIATION, scene.defocus_px) / _STEP_DEVIATION)
+        counts = list(self._counts.values())
         corners = [geometry.regions[number][:2] for number in radii]
-        self._corners = np.repeat(
-            np.array(corners, dtype=np.float64).reshape(-1, 2), list(self._counts.values()), axis=0
-        )
-        self._floors = np.repeat(
-            np.array([_floor(geometry, number) for number in radii], np.int64).reshape(-1, 4),
-            list(self._counts.values()),
-            axis=0,
+        floors = [_floor(geometry, number) for number in radii]
+        self._corners, self._floors = (
+            np.repeat(np.array(one, dtype=np.float64).reshape(-1, size), counts, axis=0)
+            for one, size in ((corners, 2), (floors, 4))
         )
 
     def paint(
         self,
         canvas: NDArray[np.uint16],
         positions: Mapping[int, NDArray[np.float64]],
-        motion: PlateMotion,
+        displacement: tuple[float, float],
         turned: float,
     ) -> None:
         """Draw shadows and beads on a canvas; see `SceneCamera.picture`."""
@@ -111,17 +113,17 @@ class BeadPainter:
         lens = self._geometry.local_scales(points)
         if self._shadows > 0.0:
             height = places[:, 2] * self._geometry.scale
-            self._paint_shadows(canvas, points, height, lens, motion)
+            self._paint_shadows(canvas, points, height, lens, displacement)
         look = self._look
         draw_bodies(
             canvas,
-            rising(places[:, 2]),
-            self._rows(seen, lens, turned),
-            look.looks,
+            self._order(places[:, 2]),
+            self._rows(seen, lens, turned).astype(np.float32),
+            self._looks,
             look.kinds,
             self._shapes,
             self._dust,
-            self._width,
+            short(self._width),
         )
 
     def _checked(self, positions: Mapping[int, NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -140,6 +142,13 @@ class BeadPainter:
                     'give finite positions',
                 )
         return np.concatenate([np.empty((0, 3)), *(positions[k] for k in self._counts)])
+
+    def _order(self, heights: NDArray[np.float64]) -> NDArray[np.int64]:
+        """The lowest first, tray by tray: so what is drawn on stays in the cache."""
+        ends = np.cumsum([0, *self._counts.values()])
+        return np.concatenate(
+            [first + rising(heights[first:last]) for first, last in itertools.pairwise(ends)]
+        )
 
     def _rows(
         self, seen: NDArray[np.float64], lens: NDArray[np.float64], turned: float
@@ -174,23 +183,22 @@ class BeadPainter:
         points: NDArray[np.float64],
         height: NDArray[np.float64],
         lens: NDArray[np.float64],
-        motion: PlateMotion,
+        displacement: tuple[float, float],
     ) -> None:
         geometry = self._geometry
         local = np.sqrt(lens[:, 0, 0] * lens[:, 1, 1] - lens[:, 0, 1] * lens[:, 1, 0])
-        spots = np.empty((len(points), 4))
+        spots = np.empty((len(points), 10))
         spots[:, :2] = geometry.camera.distorted(points + height[:, np.newaxis] * _CAST)
-        spots[:, 2] = self._radii_px * local
-        spots[:, 3] = np.minimum(self._width + _SHADOW_BLUR * height * local, 2.0 * spots[:, 2])
-        across, down = (math.floor(d * geometry.scale + 0.5) for d in motion.displacement)
-        rows, columns = geometry.shape
-        bounds = self._floors + np.array([across, across, down, down])
-        bounds = np.clip(bounds, 0, [columns, columns, rows, rows])
-        draw_shadows(canvas, spots, bounds, self._shadows, np.empty(columns, np.uint32))
+        spots[:, 2:5] = (self._radii_px * local)[:, np.newaxis]
+        blur = self._width + _SHADOW_BLUR * height * local
+        spots[:, 5] = np.minimum(blur, _WIDEST_BLUR * spots[:, 4])
+        across, down = np.array(displacement) * geometry.scale
+        spots[:, 6:] = self._floors + np.array([across, across, down, down])
+        draw_shadows(canvas, spots.astype(np.float32), short(self._shadows))
 
 
 def _floor(geometry: SceneGeometry, tray: int) -> tuple[int, int, int, int]:
-    """First and last column and row (not included) of the floor of a tray."""
+    """First and last column and row of the picture that the floor of a tray reaches."""
     region = geometry.regions[tray]
     x, y, width, height = geometry.bounds(
         region.x, region.y, region.x + region.width, region.y + region.height

@@ -13,8 +13,8 @@ from nanorocks_ros.simulation.randomness import hashed, nearly_normal
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-BLOCK = 32
-"""Side of the squares that are shifted as one, [px]."""
+BLOCK = 16
+"""Side of the squares that the shift of a picture is given for, [px]."""
 
 # Light and noise are whole numbers: parts of 2^13, and of 2^19 gray levels.
 _LIGHT_BITS = 13
@@ -26,7 +26,7 @@ _HALF = 1 << (_LEVEL_BITS - 1)
 _STRIP_PLACES = 1 << 16
 
 
-@kernel
+@compiled
 def shift_blocks(
     picture: NDArray[np.uint16],
     still: NDArray[np.uint16],
@@ -34,34 +34,62 @@ def shift_blocks(
     left: int,
     top: int,
 ) -> None:
-    """Copy squares of a still picture from places between its pixels (bilinear).
+    """Copy a part of a still picture from places between its pixels (bilinear).
 
     Parameters
     ----------
     picture : ndarray of uint16, (3, rows, columns)
-        Written, in the squares only.
+        Written, in the part only.
     still : ndarray of uint16, (3, rows, columns)
     shifts : ndarray (m, n, 2), [px]
-        How far, along columns and rows, what is seen in each square has moved.
+        How far, along columns and rows, what is seen in each square of the part has moved;
+        along rows the shift goes evenly from the middle of a square to that of the next.
     left, top : int, [px]
         Corner of the first square. All must lie so far inside that no source is outside.
     """
+    columns = BLOCK * shifts.shape[1]
+    share = np.empty((2, columns), dtype=np.float32)
+    whole = np.empty((2, columns), dtype=np.int64)
     for a in range(shifts.shape[0]):
-        for b in range(shifts.shape[1]):
-            column, row = -shifts[a, b, 0], -shifts[a, b, 1]
-            i, j = math.floor(row), math.floor(column)
-            down = np.uint32((row - i) * 64.0 + 0.5)
-            across = np.uint32((column - j) * 64.0 + 0.5)
-            first, last = left + BLOCK * b, left + BLOCK * (b + 1)
-            for line in range(top + BLOCK * a, top + BLOCK * (a + 1)):
-                for channel in range(3):
-                    _blend(
-                        picture[channel, line, first:last],
-                        still[channel, line + i, first + j : last + j + 1],
-                        still[channel, line + i + 1, first + j : last + j + 1],
-                        across,
-                        down,
-                    )
+        for k in range(columns):
+            place = min(max((k + 0.5) / BLOCK - 0.5, 0.0), shifts.shape[1] - 1.0)
+            b = min(int(place), max(shifts.shape[1] - 2, 0))
+            after = min(b + 1, shifts.shape[1] - 1)
+            for axis in range(2):
+                before, change = shifts[a, b, axis], shifts[a, after, axis] - shifts[a, b, axis]
+                source = -(before + (place - b) * change)
+                whole[axis, k] = math.floor(source)
+                share[axis, k] = source - whole[axis, k]
+        _shift_rows(picture, still, share, whole, left, top + BLOCK * a)
+
+
+@kernel
+def _shift_rows(
+    picture: NDArray[np.uint16],
+    still: NDArray[np.uint16],
+    share: NDArray[np.float32],
+    whole: NDArray[np.int64],
+    left: int,
+    top: int,
+) -> None:
+    """Some rows, in pieces that come from the same whole number of pixels away."""
+    start = 0
+    while start < whole.shape[1]:
+        across, down = whole[0, start], whole[1, start]
+        end = start + 1
+        while end < whole.shape[1] and whole[0, end] == across and whole[1, end] == down:
+            end += 1
+        first, last = left + start + across, left + end + across
+        for line in range(top, top + BLOCK):
+            for channel in range(3):
+                _blend(
+                    picture[channel, line, left + start : left + end],
+                    still[channel, line + down, first : last + 1],
+                    still[channel, line + down + 1, first : last + 1],
+                    share[0, start:end],
+                    share[1, start:end],
+                )
+        start = end
 
 
 @kernel
@@ -69,17 +97,15 @@ def _blend(
     target: NDArray[np.uint16],
     upper: NDArray[np.uint16],
     lower: NDArray[np.uint16],
-    across: np.uint32,
-    down: np.uint32,
+    across: NDArray[np.float32],
+    down: NDArray[np.float32],
 ) -> None:
-    """A row of pixels between four others each, at parts of 64 of the way."""
-    one = np.uint32(64)
-    w00, w01 = (one - down) * (one - across), (one - down) * across
-    w10, w11 = down * (one - across), down * across
+    """A row of pixels between four others each."""
     for j in range(target.size):
-        value = w00 * np.uint32(upper[j]) + w01 * np.uint32(upper[j + 1])
-        value += w10 * np.uint32(lower[j]) + w11 * np.uint32(lower[j + 1])
-        target[j] = np.uint16((value + np.uint32(2048)) >> np.uint32(12))
+        x, y = across[j], down[j]
+        high = np.float32(upper[j]) + x * (np.float32(upper[j + 1]) - np.float32(upper[j]))
+        low = np.float32(lower[j]) + x * (np.float32(lower[j + 1]) - np.float32(lower[j]))
+        target[j] = np.uint16(np.int32(high + y * (low - high) + np.float32(0.5)))
 
 
 @kernel
@@ -136,7 +162,7 @@ def expose(
     down: NDArray[np.uint32],
     strip: NDArray[np.int32],
     key: np.uint64,
-    planes: NDArray[np.uint8],
+    picture: NDArray[np.uint8],
 ) -> None:
     """Turn a canvas into gray levels under uneven light, with noise.
 
@@ -151,11 +177,12 @@ def expose(
         See `noise_strip`.
     key : uint64
         Of the frame.
-    planes : ndarray of uint8, (3, rows, columns)
-        Written.
+    picture : ndarray of uint8, (rows, 3 columns)
+        Written: blue, green and red of each pixel in turn.
     """
     rows, columns = canvas.shape[1:]
     light = np.empty(columns, dtype=np.uint32)
+    planes = np.empty((3, columns), dtype=np.uint8)
     places = np.uint64(strip.size - columns + 1)
     for i in range(rows):
         for j in range(columns):
@@ -163,7 +190,8 @@ def expose(
         for channel in range(3):
             start = np.int64(hashed(key, 3 * i + channel) % places)
             noise = strip[start : start + columns]
-            _expose_row(canvas[channel, i], light, noise, planes[channel, i])
+            _expose_row(canvas[channel, i], light, noise, planes[channel])
+        _interleave(planes, picture[i])
 
 
 @kernel
@@ -178,3 +206,10 @@ def _expose_row(
         value = np.int32(np.uint32(canvas[j]) * light[j]) + noise[j] + np.int32(_HALF)
         value = value >> np.int32(_LEVEL_BITS)
         picture[j] = np.uint8(min(max(value, np.int32(0)), np.int32(255)))
+
+
+@kernel
+def _interleave(planes: NDArray[np.uint8], row: NDArray[np.uint8]) -> None:
+    for j in range(np.uint64(planes.shape[1])):
+        for channel in range(np.uint64(3)):
+            row[np.uint64(3) * j + channel] = planes[channel, j]
