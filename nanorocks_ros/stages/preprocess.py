@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
-from nanorocks_ros.experiment.calibration import calibrated, load_calibration
+from nanorocks_ros.experiment.calibration_file import calibrated, load_calibration
 from nanorocks_ros.experiment.plate import Region, regions_on_plate
 from nanorocks_ros.experiment.view import Straight, View
 from nanorocks_ros.records import Frame, Notice, Quality, TrayImage
