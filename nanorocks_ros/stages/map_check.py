@@ -31,6 +31,7 @@ _LEAST_SLOPE = 6.0
 _FOUND = 0.65
 _CLEARLY = 0.12
 _ABSENT = 0.4
+_AS_GOOD = 0.01
 _SCALE_MATTERS = 0.02
 _SHIFT_MATTERS_PX = 8.0
 # Reduced pixels around the trays that have to be there, and by which a size must differ.
@@ -74,15 +75,30 @@ def _best(
     reach: int,
     found: NDArray[np.float64],
 ) -> None:
-    """Scale and shift with most of the sides on edges: share, scale, shift along x and y."""
+    """Scale and shift with most of the sides on edges: share, scale, shift along x and y.
+
+    Edges are a few pixels wide, so several are as good: the middle of these.
+    """
     shares = np.empty(boxes.shape[0])
-    found[0] = -1.0
-    for scale in scales:
-        for y in range(-reach, reach + 1):
-            for x in range(-reach, reach + 1):
-                share = _coverage(across, down, boxes, scale, (float(x), float(y)), shares)
-                if share > found[0]:
-                    found[0], found[1], found[2], found[3] = share, scale, x, y
+    side = 2 * reach + 1
+    tried = np.empty((scales.size, side, side))
+    for k in range(scales.size):
+        for i in range(side):
+            for j in range(side):
+                shift = (float(j - reach), float(i - reach))
+                tried[k, i, j] = _coverage(across, down, boxes, scales[k], shift, shares)
+    found[:] = 0.0
+    best, count = tried.max(), 0
+    for k in range(scales.size):
+        for i in range(side):
+            for j in range(side):
+                if tried[k, i, j] >= best - _AS_GOOD:
+                    found[1] += scales[k]
+                    found[2] += j - reach
+                    found[3] += i - reach
+                    count += 1
+    found /= count
+    found[0] = best
 
 
 def _edge_sums(
