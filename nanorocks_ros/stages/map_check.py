@@ -35,7 +35,7 @@ _AS_GOOD = 0.01
 _SCALE_MATTERS = 0.02
 _SHIFT_MATTERS_PX = 8.0
 # Reduced pixels around the trays that have to be there, and by which a size must differ.
-_ROOM, _RESOLVED = 6.0, 5.0
+_ROOM, _RESOLVED = 2.0, 5.0
 
 
 @compiled

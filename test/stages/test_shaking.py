@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -9,7 +10,13 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.records import TrayImage
-from nanorocks_ros.stages.shaking import CycleFollower, MotionMeter, PlateMeter, ShakeCounter
+from nanorocks_ros.stages.shaking import (
+    CycleFollower,
+    MotionMeter,
+    PlateMeter,
+    ShakeCounter,
+    noise_power,
+)
 
 NS = 1_000_000_000
 STEP = NS // 30
@@ -110,9 +117,7 @@ def test_the_noise_is_the_lower_quantile_of_what_was_measured():
         np.clip(100 + rng.normal(0, 1 + k % 4, (50, 50)), 0, 255).astype(np.uint8)
         for k in range(400)
     ]
-    from nanorocks_ros.stages.shaking import noise_power
-
-    powers = [noise_power(b, a) for a, b in zip(grays, grays[1:], strict=False)]
+    powers = [noise_power(b, a) for a, b in itertools.pairwise(grays)]
     for k, gray in enumerate(grays):
         meter.push(gray)
         if k in (1, 7, 250, 399):
