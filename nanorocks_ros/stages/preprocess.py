@@ -16,6 +16,7 @@ from nanorocks_ros.stages.frame_checks import FrameChecks
 from nanorocks_ros.stages.map_check import map_problem
 from nanorocks_ros.stages.picture_checks import picture_quality
 from nanorocks_ros.stages.shaking import PlateMeter, ShakeCounter
+from nanorocks_ros.stages.stabilise import shift_of_plate
 from nanorocks_ros.stages.tray_crop import TrayCrop
 
 if TYPE_CHECKING:
@@ -154,20 +155,25 @@ class Preprocessor:
     def _tray_images(self, frame: Frame, rows: int, quality: Quality) -> tuple[TrayImage, ...]:
         image = np.ascontiguousarray(frame.image).reshape(*frame.image.shape[:2], -1)
         hint: Shift | None = None
-        pictures: list[tuple[TrayCrop, NDArray[np.uint8], NDArray[np.uint8] | None]] = []
-        jumps = []
+        whole = []
         for crop in self._crops:
             if rows < image.shape[0] and crop.lowest_row > rows:
-                # The images before and after it are not compared: it is as if it were lost.
+                # The images before and after it are compared as if it had not been.
                 crop.pending |= Quality.HALF_FRAME
                 continue
-            hint = crop.follow(frame.stamp_ns, image, hint) or hint
+            hint = crop.follow(image, hint) or hint
+            whole.append(crop)
+        plate = shift_of_plate([crop.shift for crop in whole if crop.shift is not None])
+        pictures: list[tuple[TrayCrop, NDArray[np.uint8], NDArray[np.uint8] | None]] = []
+        jumps = []
+        for crop in whole:
+            crop.settle(frame.stamp_ns, plate)
             gray, color = crop.crop(image)
             jumps.append(crop.meter.push(gray))
             pictures.append((crop, gray, color))
         if pictures:
-            plate = self._plate.push(frame.stamp_ns, *self._plate_speed())
-            self._counter.push(frame.stamp_ns, jumps, plate)
+            shaken = self._plate.push(frame.stamp_ns, *self._plate_speed())
+            self._counter.push(frame.stamp_ns, jumps, shaken)
         return tuple(
             self._tray_image(frame.stamp_ns, crop, gray, color, quality)
             for crop, gray, color in pictures

@@ -106,17 +106,39 @@ def test_trays_below_the_break_of_half_a_frame_are_left_out_and_flagged_afterwar
     assert any('breaks off at row 230 of 420' in text for text in texts)
 
 
-def test_a_tray_that_is_hidden_is_flagged_as_lost(plate):
+def test_a_tray_that_is_hidden_is_flagged_and_moves_with_its_plate(plate):
     frames = [plate.frame(k) for k in range(3)]
-    hidden = frames[1].image.copy()
+    hidden = plate.picture((1.5, 0.5), seed=9)
     x, y, width, height = plate.regions[3]
     hidden[y - 12 : y + height + 12, x - 12 : x + width + 12] = 90
     frames[1] = replace(frames[1], image=hidden)
     images, _ = pushed(preprocessor(), frames)
     lost = [one for one in images if one.quality & Quality.STABILISATION_LOST]
     assert [(one.tray, one.stamp_ns) for one in lost] == [(3, frames[1].stamp_ns)]
-    assert math.isnan(lost[0].displacement[0])
+    assert np.array(lost[0].displacement) * SCALE == pytest.approx([1.5, 0.5], abs=0.1)
     assert lost[0].quality & Quality.LOW_CONTRAST
+
+
+def test_a_tray_alone_that_is_hidden_is_not_known_to_be_anywhere(plate):
+    regions = list(plate.regions[3])
+    stage = preprocessor(**{'trays': [3], 'preprocess.regions_px': regions})
+    flat = replace(plate.frame(1), image=np.full((*plate.shape, 3), (88, 90, 92), np.uint8))
+    images, _ = pushed(stage, [plate.frame(0), flat, plate.frame(2)])
+    assert [math.isnan(one.displacement[0]) for one in images] == [False, True, False]
+    assert images[1].quality & Quality.STABILISATION_LOST
+
+
+def test_a_tray_that_seems_to_leave_its_plate_is_put_back(plate):
+    still = plate.picture(seed=1)
+    carried = still.copy()
+    x, y, width, height = plate.regions[3]
+    rows, columns = slice(y - 14, y + height + 14), slice(x - 11, x + width + 14)
+    carried[rows, columns] = still[rows, x - 14 : x + width + 11]
+    frames = [plate.frame(0), replace(plate.frame(1), image=carried)]
+    images, _ = pushed(preprocessor(), frames)
+    tray = images[8 + 2]
+    assert tray.quality & Quality.STABILISATION_LOST
+    assert np.abs(np.array(tray.displacement) * SCALE).max() < 0.1
 
 
 def test_glare_is_flagged_with_the_share_that_it_hides(plate):
