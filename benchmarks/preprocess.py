@@ -35,7 +35,7 @@ from nanorocks_ros.stages.stabilise import TrayFollower
 from nanorocks_ros.study.plate_fit import fit_plate
 
 _FRAMES = 75
-_ROUNDS = 5
+_ROUNDS = 3
 _QUALITY = 90
 _SCENE = SceneSettings()
 
@@ -117,7 +117,7 @@ def _stages(camera, frames):
 
     def meter(frame):
         for one, (_, gray) in zip(meters, crops, strict=True):
-            one.push(gray)
+            one.push(frame.stamp_ns, gray)
 
     def quality(frame):
         for _, gray in crops:

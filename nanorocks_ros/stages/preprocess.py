@@ -169,7 +169,7 @@ class Preprocessor:
         for crop in whole:
             crop.settle(frame.stamp_ns, plate)
             gray, color = crop.crop(image)
-            jumps.append(crop.meter.push(gray))
+            jumps.append(crop.meter.push(frame.stamp_ns, gray))
             pictures.append((crop, gray, color))
         if pictures:
             shaken = self._plate.push(frame.stamp_ns, *self._plate_speed())

@@ -30,6 +30,8 @@ NS = 1_000_000_000
 _MEMORY_FRAMES = 15
 _NOISE_FRAMES = 300
 _NOISE_QUANTILE = 0.2
+# A step in time so many times longer than usual means that frames are missing.
+_GAP = 1.75
 # Beyond 3 sigma a difference counts as motion; what is left of a Gaussian has this variance.
 _CLIP = 3.0
 _CLIPPED_VARIANCE = 0.9733
@@ -150,13 +152,22 @@ class MotionMeter:
         self._recent: deque[float] = deque(maxlen=_MEMORY_FRAMES)
         self._noise = _Quantile(_NOISE_QUANTILE, _NOISE_FRAMES)
         self._last: NDArray[np.uint8] | None = None
+        self._last_ns = 0
+        self._steps: deque[int] = deque(maxlen=_MEMORY_FRAMES)
         self.noise_power = 0.0
 
-    def push(self, gray: NDArray[np.uint8]) -> bool:
+    def push(self, stamp_ns: int, gray: NDArray[np.uint8]) -> bool:
         """Take the next image; True when the motion jumped since the one before."""
         gray = np.ascontiguousarray(gray)
         last, self._last = self._last, gray
+        step, self._last_ns = stamp_ns - self._last_ns, stamp_ns
         if last is None:
+            return False
+        usual = float(np.median(self._steps)) if self._steps else step
+        self._steps.append(step)
+        # Beads come further while frames are missing, and that is no jump. One that happened
+        # just then is seen with the next image.
+        if step > _GAP * usual:
             return False
         counts = _difference_counts(gray, last)
         # Slow motion hides in the noise, and a frame stored twice has none: neither the mean
@@ -264,7 +275,7 @@ class CycleFollower:
         before, first = self.cycle, self._first
         self._first = False
         if image.cycle is None or math.isnan(image.noise_power):
-            jump = self._meter.push(image.gray)
+            jump = self._meter.push(image.stamp_ns, image.gray)
             self._counter.push(image.stamp_ns, (jump,))
             self.noise_power = self._meter.noise_power
             self.cycle, self.cycle_start_ns = self._counter.cycle, self._counter.cycle_start_ns

@@ -119,7 +119,31 @@ def test_the_noise_is_the_lower_quantile_of_what_was_measured():
     ]
     powers = [noise_power(b, a) for a, b in itertools.pairwise(grays)]
     for k, gray in enumerate(grays):
-        meter.push(gray)
+        meter.push(k * STEP, gray)
         if k in (1, 7, 250, 399):
             expected = np.quantile(powers[max(0, k - 300) : k], 0.2)
             assert meter.noise_power == pytest.approx(expected, rel=1e-12)
+
+
+def moving(times, speed=30.0):
+    """Images of a striped pattern that moves evenly, [px/s], at given times."""
+    rng = np.random.default_rng(8)
+    x = np.arange(80)
+    for k, time in enumerate(times):
+        stripes = 120 + 60 * np.sin(2 * np.pi * (x - speed * time) / 40)
+        gray = np.tile(stripes, (60, 1)) + rng.normal(0, 2, (60, 80))
+        yield TrayImage(stamp_ns=round(time * NS), tray=1, gray=gray.astype(np.uint8)), k
+
+
+def test_frames_that_are_missing_are_no_shaking_event():
+    times = [k / 30 for k in range(90) if not 40 <= k < 47 and k not in (60, 70, 71)]
+    follower = CycleFollower(2.0, 0.0)
+    assert not any(follower.push(image) for image, _ in moving(times))
+
+
+def test_a_shake_while_frames_are_missing_is_seen_with_the_next():
+    before = [image for image, _ in moving([k / 30 for k in range(40)], speed=4.0)]
+    after = [image for image, _ in moving([k / 30 for k in range(48, 70)], speed=40.0)]
+    follower = CycleFollower(2.0, 0.0)
+    shaken = [image.stamp_ns for image in (*before, *after) if follower.push(image)]
+    assert shaken == [after[1].stamp_ns]
