@@ -9,6 +9,7 @@ ALL = (
     'offline',
     'live',
     'preprocess',
+    'scene',
     'speed_accuracy',
     'cor_coverage',
     'engine',
