@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from nanorocks_ros.experiment.calibration import calibrated
+from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._join import TrayJoiner

@@ -76,8 +76,8 @@ class FrameChecks:
 
     def push(self, frame: Frame) -> Verdict:
         """Judge the next frame; stamps rise."""
-        rows = frame.image[_ROW_STEP // 2 :: _ROW_STEP, ::_COLUMN_STEP]
-        sample = np.ascontiguousarray(rows)
+        sample = frame.image[_ROW_STEP // 2 :: _ROW_STEP, ::_COLUMN_STEP]
+        sample = np.ascontiguousarray(sample)
         height = frame.image.shape[0]
         blank = self._blankness(sample)
         if blank:

@@ -24,18 +24,14 @@ _TAIL = 0.01
 
 
 @compiled
-def _survey(gray: NDArray[np.uint8]) -> tuple[int, float, float]:
-    """Contrast, share of the pixels at full scale, and share that glare hides.
-
-    Levels are those of every other row; glare is in blocks that are at full scale all over.
-    """
+def _levels(gray: NDArray[np.uint8]) -> tuple[int, float]:
+    """Contrast, and share of the pixels at full scale, from every other row."""
     counts = np.zeros(256, dtype=np.int64)
     rows, columns = gray.shape
     for i in range(0, rows, 2):
         for j in range(columns):
             counts[np.uint64(gray[i, j])] += 1
     pixels = ((rows + 1) // 2) * columns
-    full = counts[_FULL:].sum() / pixels
     below, low, high = 0, -1, 255
     for level in range(256):
         below += counts[level]
@@ -44,18 +40,20 @@ def _survey(gray: NDArray[np.uint8]) -> tuple[int, float, float]:
         if below >= (1.0 - _TAIL) * pixels:
             high = level
             break
-    hidden = 0
+    return high - low, counts[_FULL:].sum() / pixels
+
+
+@compiled
+def _hidden(gray: NDArray[np.uint8]) -> float:
+    """Share of the picture in blocks that are at full scale all over."""
+    rows, columns = gray.shape
+    blocks = 0
     for i in range(0, rows - _BLOCK + 1, _BLOCK):
         for j in range(0, columns - _BLOCK + 1, _BLOCK):
-            if gray[i + _BLOCK // 2, j + _BLOCK // 2] < _FULL:
-                continue
-            covered = True
-            for a in range(i, i + _BLOCK):
-                for b in range(j, j + _BLOCK):
-                    covered = covered and gray[a, b] >= _FULL
-            if covered:
-                hidden += _BLOCK * _BLOCK
-    return high - low, full, hidden / gray.size
+            # Most blocks are dark in the middle, and need no closer look.
+            if gray[i + _BLOCK // 2, j + _BLOCK // 2] >= _FULL:
+                blocks += gray[i : i + _BLOCK, j : j + _BLOCK].min() >= _FULL
+    return blocks * _BLOCK * _BLOCK / gray.size
 
 
 def picture_quality(gray: NDArray[np.uint8]) -> tuple[Quality, float]:
@@ -65,7 +63,8 @@ def picture_quality(gray: NDArray[np.uint8]) -> tuple[Quality, float]:
     ----------
     gray : ndarray of uint8, (rows, columns)
     """
-    contrast, full, glare = _survey(gray)
+    contrast, full = _levels(gray)
+    glare = _hidden(gray)
     quality = Quality(0)
     if contrast < _FLAT:
         quality |= Quality.LOW_CONTRAST

@@ -30,6 +30,8 @@ NS = 1_000_000_000
 _MEMORY_FRAMES = 15
 _NOISE_FRAMES = 300
 _NOISE_QUANTILE = 0.2
+# A step in time so many times longer than usual means that frames are missing.
+_GAP = 1.75
 # Beyond 3 sigma a difference counts as motion; what is left of a Gaussian has this variance.
 _CLIP = 3.0
 _CLIPPED_VARIANCE = 0.9733
@@ -129,21 +131,18 @@ class _Quantile:
 
 
 class NoiseMeter:
-    """Noise of the images of one tray."""
+    """Noise of a series of images, moving or not."""
 
     def __init__(self) -> None:
-        self._found: deque[float] = deque(maxlen=_NOISE_FRAMES)
+        # Slow motion hides in the noise, and a frame stored twice has none: neither the mean
+        # nor the least will do.
+        self._found = _Quantile(_NOISE_QUANTILE, _NOISE_FRAMES)
         self._last: NDArray[np.uint8] | None = None
 
     def push(self, image: NDArray[np.uint8]) -> float:
         """Mean squared difference per pixel of two images of a scene at rest."""
         last, self._last = self._last, image
-        if last is None:
-            return 0.0
-        self._found.append(noise_power(image, last))
-        # Slow motion hides in the noise, and a frame stored twice has none: neither the mean
-        # nor the least will do.
-        return float(np.quantile(self._found, _NOISE_QUANTILE))
+        return 0.0 if last is None else self._found.push(noise_power(image, last))
 
 
 class MotionMeter:
@@ -169,26 +168,28 @@ class MotionMeter:
         self._noise = _Quantile(_NOISE_QUANTILE, _NOISE_FRAMES)
         self._last: NDArray[np.uint8] | None = None
         self._last_ns = 0
-        self._steps_ns: deque[int] = deque(maxlen=_MEMORY_FRAMES)
+        self._steps: deque[int] = deque(maxlen=_MEMORY_FRAMES)
         self.noise_power = 0.0
 
     def push(self, stamp_ns: int, gray: NDArray[np.uint8]) -> bool:
         """Take the next image; True when the motion jumped since the one before."""
         gray = np.ascontiguousarray(gray)
         last, self._last = self._last, gray
-        step_ns, self._last_ns = stamp_ns - self._last_ns, stamp_ns
+        step, self._last_ns = stamp_ns - self._last_ns, stamp_ns
         if last is None:
+            return False
+        usual = float(np.median(self._steps)) if self._steps else step
+        self._steps.append(step)
+        # Beads come further while frames are missing, and that is no jump. One that happened
+        # just then is seen with the next image.
+        if step > _GAP * usual:
             return False
         counts = _difference_counts(gray, last)
         # Slow motion hides in the noise, and a frame stored twice has none: neither the mean
         # nor the least will do.
         self.noise_power = self._noise.push(_power_of(counts))
         quiet = self.noise_power * gray.size
-        # Over a frame that was lost beads move twice as far, and the power is four times as much
-        # at most.
-        self._steps_ns.append(step_ns)
-        usual_ns = sorted(self._steps_ns)[len(self._steps_ns) // 2]
-        motion = (_total_power(counts) - quiet) * min(1.0, usual_ns / step_ns) ** 2
+        motion = _total_power(counts) - quiet
         # 15 frames rather than all: the gas may have been shaken harder long ago.
         before = max(self._recent, default=None)
         self._recent.append(motion)

@@ -18,6 +18,8 @@ from nanorocks_ros.stages.rectify import places_of
 from nanorocks_ros.stages.registration import register, sample, search
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.view import View
@@ -41,6 +43,7 @@ _LARGEST_ERROR = 0.2
 _SUSPECT = 3.0
 # What interpolation between pixels does to an edge, [px]: measured on simulated swings.
 _INTERPOLATION = 0.02
+_FEWEST_TRAYS = 3
 # Pictures averaged in the reference.
 _MEMORY = 64
 
@@ -58,6 +61,14 @@ class Shift:
     x: float
     y: float
     error: float
+
+
+def shift_of_plate(shifts: Sequence[Shift]) -> Shift | None:
+    """Where the plate is that the trays are on: the median of three or more."""
+    if len(shifts) < _FEWEST_TRAYS:
+        return None
+    x, y, error = np.median([(one.x, one.y, one.error) for one in shifts], axis=0)
+    return Shift(float(x), float(y), float(error))
 
 
 class TrayFollower:
@@ -130,6 +141,10 @@ class TrayFollower:
         usual = float(np.median(self._powers))
         self._trust = 1.0 / (1.0 + (self._powers / (_SUSPECT * usual)) ** 2)
         return found
+
+    def corrected(self, shift: Shift) -> None:
+        """Be told where the tray really was in the last picture."""
+        self._last = shift
 
     def _registered(self, image: NDArray[np.uint8], start: tuple[float, float]) -> Shift | None:
         assert self._places is not None

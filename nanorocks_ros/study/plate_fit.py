@@ -18,7 +18,8 @@ from scipy.optimize import least_squares
 
 from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, view_of
 from nanorocks_ros.experiment.plate import Region
-from nanorocks_ros.stages.find_trays import PlateGuess, find_edges, plate_places
+from nanorocks_ros.stages.find_edges import find_edges
+from nanorocks_ros.stages.find_trays import PlateGuess, plate_places
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.stages.find_trays import Edges
+    from nanorocks_ros.stages.find_edges import Edges
 
 # Places in the vector of unknowns.
 _BEND, _CENTRE, _K, _TURN, _SCALE, _PLACE = (
