@@ -144,7 +144,9 @@ def _named_rows(
             if not started:
                 _refuse_units(cells, (column, row), where, number)
                 continue
-            raise RecordingError(f'{where}:{number}', f'{line[:60]!r} is no row', _REMEDY) from error
+            raise RecordingError(
+                f'{where}:{number}', f'{line[:60]!r} is no row', _REMEDY
+            ) from error
         started = True
         if not math.isnan(bead):
             yield _checked(found, where, number)
@@ -170,7 +172,9 @@ def _number_rows(lines: Sequence[tuple[int, str]], where: str) -> Iterable[_Row]
         except ValueError as error:
             if not started:
                 continue
-            raise RecordingError(f'{where}:{number}', f'{line[:60]!r} is no row', _REMEDY) from error
+            raise RecordingError(
+                f'{where}:{number}', f'{line[:60]!r} is no row', _REMEDY
+            ) from error
         if len(values) < 3 or len(values) % 2 == 0:
             raise RecordingError(
                 f'{where}:{number}',
@@ -215,7 +219,9 @@ def _xml_rows(text: str, where: str) -> Iterable[_Row]:
                 for one in particle.iter('detection')
             ]
     except (KeyError, ValueError) as error:
-        raise RecordingError(where, f'lacks or garbles {error}', 'export the tracks again') from error
+        raise RecordingError(
+            where, f'lacks or garbles {error}', 'export the tracks again'
+        ) from error
     raise RecordingError(where, f'<{root.tag}> is not of TrackMate', _REMEDY)
 
 

@@ -38,12 +38,15 @@ def _balance(
     found = np.zeros((rows, columns), dtype=np.int32)
     own = np.uint8(1 << kind)
     for i in range(shown.shape[0]):
-        for j in range(shown.shape[1]):
-            if shown[i, j] == kind:
-                if not covered[i, j] & own:
-                    found[i // step, j // step] += 1
-            elif shown[i, j] == FLOOR:
-                found[i // step, j // step] -= floor_weight
+        row = i // step
+        for column in range(columns):
+            total = 0
+            for j in range(column * step, min((column + 1) * step, shown.shape[1])):
+                if shown[i, j] == kind:
+                    total += 0 if covered[i, j] & own else 1
+                elif shown[i, j] == FLOOR:
+                    total -= floor_weight
+            found[row, column] += total
     return found
 
 
@@ -229,9 +232,22 @@ def cover(
     int
         Beads found.
     """
+    if most == 0:
+        return 0
     balance = _balance(shown, covered, kind, step, floor_weight)
     found = _follow_hints(
-        shown, darkness, hue, kind, hue_sign, step, least_share, covered, discs, fits, hints, balance
+        shown,
+        darkness,
+        hue,
+        kind,
+        hue_sign,
+        step,
+        least_share,
+        covered,
+        discs,
+        fits,
+        hints,
+        balance,
     )
     rows, columns = balance.shape
     sizes = radii.size

@@ -43,6 +43,8 @@ _SIZE_SPREAD_PX = 0.3
 _SURPLUS = 1.2
 # A pixel of floor under a disc outweighs so many of the species; not where chalk may hide them.
 _FLOOR_WEIGHT = 2
+# Gray grains are many: fewer sizes are tried.
+_GRAY_SIZE_STEP = 1.45
 # Patches of chalk are smoothed over so many pixels.
 _DUSTY_BLUR_PX = 5
 
@@ -93,7 +95,10 @@ class BeadDetector:
 
     def __init__(self, settings: TrackingSettings, tray: Tray, pixels_per_metre: float) -> None:
         self._least_share = settings.least_area_seen
-        self._searches = [_search(one, pixels_per_metre) for one in tray.species]
+        area = tray.dimensions[0] * tray.dimensions[1]
+        self._searches = [
+            _search(one, pixels_per_metre, area * settings.most_crowded) for one in tray.species
+        ]
         self._gray_known = any(one.kind == GRAY for one in self._searches)
         largest = max(one.diameter_high for one in tray.species)
         self._reach = max(3, round(largest * pixels_per_metre))
@@ -200,16 +205,20 @@ class BeadDetector:
         return discs[:count], fits[:count]
 
 
-def _search(species: Species, pixels_per_metre: float) -> _Search:
+def _search(species: Species, pixels_per_metre: float, most_area: float) -> _Search:
     low = 0.5 * species.diameter_low * pixels_per_metre
     high = 0.5 * species.diameter_high * pixels_per_metre
-    sizes = max(1, int(np.ceil(np.log(high / low) / np.log(_SIZE_STEP))))
+    kind = KINDS.get(species.material, GRAY)
+    factor = _GRAY_SIZE_STEP if kind == GRAY else _SIZE_STEP
+    sizes = max(1, int(np.ceil(np.log(high / low) / np.log(factor))))
     ends = np.geomspace(low, high, 2 * sizes + 1)
+    covered = 0.25 * np.pi * species.diameter**2 * species.count
+    crowded = kind == GRAY and covered > most_area
     spread = max((high - low) / np.sqrt(12.0), _SIZE_SPREAD_PX)
     return _Search(
-        kind=KINDS.get(species.material, GRAY),
+        kind=kind,
         radii=ends[1::2].copy(),
         expected=np.array([0.5 * (low + high), spread]),
         step=max(2 if low >= _COARSE_FROM_PX else 1, int(low / _SQUARES_PER_RADIUS)),
-        most=int(_SURPLUS * species.count) + 2,
+        most=0 if crowded else int(_SURPLUS * species.count) + 2,
     )

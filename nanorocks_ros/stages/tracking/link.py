@@ -21,6 +21,8 @@ _COLLIDING, _SHAKEN = 0.15, 0.002
 # Of the size of one bead from picture to picture, beyond what its errors say, [px].
 _SIZE_JITTER_PX = 0.3
 _LARGEST_SIZE_COST = 6.0
+# A pair that is so much less likely than the best, as a logarithm, is none.
+_WORTH = 10.0
 # Pictures in a row that a new bead must be seen in.
 _CONFIRM = 3
 # Slowest change of velocity in a collision that is reckoned with, [px/s].
@@ -59,13 +61,18 @@ def _costs(
     costs : ndarray (n, m)
         Written.
     """
+    worst = errors.max() if errors.size else 0.0
     for i in range(predicted.shape[0]):
         reach = fastest * waits[i]
+        far = variances[i] + worst * worst + (collided * waits[i]) ** 2
+        far = max(16.0 * far, reach * reach)
         for j in range(places.shape[0]):
             costs[i, j] = np.inf
             dx = places[j, 0] - predicted[i, 0]
             dy = places[j, 1] - predicted[i, 1]
             d2 = dx * dx + dy * dy
+            if d2 > far:
+                continue
             free = variances[i] + errors[j] * errors[j]
             hit = free + (collided * waits[i]) ** 2
             shaken = free + (0.4 * reach) ** 2
@@ -77,6 +84,12 @@ def _costs(
             off = radii[j] - sizes[i]
             size = 0.5 * off * off / (_SIZE_JITTER_PX * _SIZE_JITTER_PX)
             costs[i, j] = min(size, _LARGEST_SIZE_COST) - math.log(likelihood)
+        if places.shape[0]:
+            # A bead that is hidden must not push the others from their places.
+            most = costs[i].min() + _WORTH
+            for j in range(places.shape[0]):
+                if costs[i, j] > most:
+                    costs[i, j] = np.inf
 
 
 @compiled
@@ -120,6 +133,8 @@ class Linker:
         Columns and rows of the tray.
     fastest : float, [px/s]
     longest_gap, window : float, [s]
+    systematic : float, [px]
+        Error of all places of a bead together.
     """
 
     def __init__(
@@ -129,7 +144,9 @@ class Linker:
         fastest: float,
         longest_gap: float,
         window: float,
+        systematic: float,
     ) -> None:
+        self.systematic = systematic
         self._expected = expected
         self._size = np.array(size)
         self._fastest = fastest

@@ -148,13 +148,13 @@ def _mean_distance(distances: NDArray[np.float64], variances: NDArray[np.float64
     return float(distances.mean()) * math.sqrt(left / square)
 
 
-def _distances(later: Tracks, middle: Tracks, earlier: Tracks, species: int | None) -> _Distances | None:
+def _distances(
+    later: Tracks, middle: Tracks, earlier: Tracks, species: int | None
+) -> _Distances | None:
     ids, places, variances = _shown(later, species)
     for one in (middle, earlier):
         other_ids, other_places, other_variances = _shown(one, species)
-        ids, here, there = np.intersect1d(
-            ids, other_ids, assume_unique=True, return_indices=True
-        )
+        ids, here, there = np.intersect1d(ids, other_ids, assume_unique=True, return_indices=True)
         places = [*(known[here] for known in places), other_places[0][there]]
         variances = [*(known[here] for known in variances), other_variances[0][there]]
     if ids.size < _FEWEST:
@@ -183,5 +183,3 @@ def _shown(
         [tracks.positions[shown] + tracks.displacement],
         [np.square(tracks.position_errors[shown])],
     )
-
-

@@ -22,6 +22,9 @@ _LEAST_STEP = 60.0
 # Gray levels of red minus blue across an edge between two species.
 _LEAST_HUE_STEP = 30.0
 _ROUNDS = 3
+# A smaller outline has fewer pixels than rays: every other ray does.
+_ALL_RAYS_FROM_PX = 8.0
+_MOST_NEIGHBOURS = 24
 # No value of a picture.
 _OUT = -10000.0
 # A step that needs no further one, [px].
@@ -74,8 +77,8 @@ def _edge(
         return np.nan
     inside = 0.0
     for t in range(reach - 1, reach + 1):
-        inside += 0.5 * sign * _at(
-            picture, disc[0] + (disc[2] - t) * c, disc[1] + (disc[2] - t) * s
+        inside += (
+            0.5 * sign * _at(picture, disc[0] + (disc[2] - t) * c, disc[1] + (disc[2] - t) * s)
         )
     step = inside - outside
     if step < least:
@@ -105,16 +108,30 @@ def _inverse(m: NDArray[np.float64], out: NDArray[np.float64]) -> None:
 
 
 @compiled
-def _hidden(discs: NDArray[np.float64], own: int, count: int, ray: int) -> bool:
-    """Whether the edge on this ray lies on or beside another bead."""
-    x = discs[own, 0] + discs[own, 2] * _COSINES[ray]
-    y = discs[own, 1] + discs[own, 2] * _SINES[ray]
+def _neighbours(discs: NDArray[np.float64], own: int, count: int) -> NDArray[np.float64]:
+    """The discs that touch, hide or nearly touch one, (k, 3), while it moves a little."""
+    found = np.empty((_MOST_NEIGHBOURS, 3))
+    n = 0
     for k in range(count):
-        if k != own:
-            near = discs[k, 2] + 0.5 * _NEAR_PX
-            dx, dy = discs[k, 0] - x, discs[k, 1] - y
-            if dx * dx + dy * dy < near * near:
-                return True
+        if k != own and n < _MOST_NEIGHBOURS:
+            reach = discs[k, 2] + discs[own, 2] + _NEAR_PX + _GUESS_PX
+            dx, dy = discs[k, 0] - discs[own, 0], discs[k, 1] - discs[own, 1]
+            if dx * dx + dy * dy < reach * reach:
+                found[n] = discs[k]
+                n += 1
+    return found[:n]
+
+
+@compiled
+def _hidden(disc: NDArray[np.float64], neighbours: NDArray[np.float64], ray: int) -> bool:
+    """Whether the edge on this ray lies on or beside another bead."""
+    x = disc[0] + disc[2] * _COSINES[ray]
+    y = disc[1] + disc[2] * _SINES[ray]
+    for k in range(neighbours.shape[0]):
+        near = neighbours[k, 2] + 0.5 * _NEAR_PX
+        dx, dy = neighbours[k, 0] - x, neighbours[k, 1] - y
+        if dx * dx + dy * dy < near * near:
+            return True
     return False
 
 
@@ -147,6 +164,8 @@ def fit_circle(
         Written: error of a coordinate and of the radius [px], share of the outline seen.
     """
     start_x, start_y = discs[own, 0], discs[own, 1]
+    neighbours = _neighbours(discs, own, count)
+    every = 1 if discs[own, 2] >= _ALL_RAYS_FROM_PX else 2
     covariance = np.zeros((3, 3))
     normal = np.zeros((3, 3))
     right = np.zeros(3)
@@ -158,8 +177,8 @@ def fit_circle(
         total = 0.0
         normal[:] = 0.0
         right[:] = 0.0
-        for k in range(_RAYS):
-            if _hidden(discs, own, count, k):
+        for k in range(0, _RAYS, every):
+            if _hidden(discs[own], neighbours, k):
                 continue
             edge = _edge(darkness, discs[own], k, 1.0, _LEAST_STEP, _FLOOR_DARKNESS)
             if edge != edge and hue_sign != 0.0:
@@ -200,7 +219,7 @@ def fit_circle(
     spread = _CORRELATED * (scatter2 + _LEAST_SCATTER_PX * _LEAST_SCATTER_PX)
     fit[0] = math.sqrt(0.5 * spread * (covariance[0, 0] + covariance[1, 1]))
     fit[1] = math.sqrt(spread * covariance[2, 2])
-    fit[2] = seen / _RAYS
+    fit[2] = seen * every / _RAYS
 
 
 @compiled

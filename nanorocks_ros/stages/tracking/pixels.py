@@ -31,6 +31,8 @@ _GRAY_DARK = 0.45
 _COLOURED = 0.2
 # Gray levels above the floor, in every channel, of a highlight.
 _BRIGHTER = 25
+# Darker than the floor by less is floor, without a closer look, in gray levels.
+_QUIET = 16
 # A floor as bright as this hides what lies on it.
 _SATURATED = 248
 
@@ -71,8 +73,13 @@ def look_at_pixels(
             up = min(blue - floor_b, green - floor_g, red - floor_r)
             level = max(floor_b, floor_g, floor_r, 1)
             warm = (red - blue) - (floor_r - floor_b)
-            darkness[i, j] = min(max(FULL * down, 0.0) / level, FULL)
             hue[i, j] = warm
+            if -_QUIET < down < _QUIET and up <= _BRIGHTER and level < _SATURATED:
+                # Most pixels are floor: no division for them.
+                darkness[i, j] = down if down > 0 else 0
+                shown[i, j] = FLOOR
+                continue
+            darkness[i, j] = min(max(FULL * down, 0.0) / level, FULL)
             if min(floor_b, floor_g, floor_r) >= _SATURATED or up > _BRIGHTER:
                 shown[i, j] = UNKNOWN
             elif down <= _DARK * level:

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
 
 _NS = 1e9
+# What light and shadow, and patches of chalk, move the outline of a bead by, [px]: the same from
+# picture to picture, so that velocities have no part in it.
+_SYSTEMATIC_PX, _DUSTY_PX = 0.06, 0.35
 
 
 class Tracker:
@@ -80,11 +83,10 @@ class Tracker:
             self._settings.fastest * self._scale,
             self._settings.longest_gap,
             self._settings.window,
+            _DUSTY_PX if self._tray.chalk else _SYSTEMATIC_PX,
         )
 
-    def _tracks(
-        self, stamp_ns: int, time: float, displacement: NDArray[np.float64]
-    ) -> Tracks:
+    def _tracks(self, stamp_ns: int, time: float, displacement: NDArray[np.float64]) -> Tracks:
         shift = displacement * self._scale
         parts = [_in_view(k, linker, time, shift) for k, linker in enumerate(self._linkers)]
         ids, species, places, errors, velocities, velocity_errors, radii, radius_errors, seen = (
@@ -122,7 +124,7 @@ def _in_view(
         linker.numbers,
         np.full(shown.size, species, dtype=np.int32),
         np.where(seen[:, None], places, predicted),
-        np.where(seen, errors, np.sqrt(variances)),
+        np.hypot(np.where(seen, errors, np.sqrt(variances)), linker.systematic),
         velocities,
         velocity_errors,
         linker.radii,
