@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 
-ALL = ('offline', 'live', 'speed_accuracy', 'cor_coverage', 'engine', 'engine_physics')
+ALL = ('offline', 'live', 'speed_accuracy', 'cor_coverage', 'engine', 'engine_physics', 'tracking')
 
 
 def main() -> int:
