@@ -199,6 +199,9 @@ def _detections(
     detector = BeadDetector(TrackingSettings(), tray, _SCALE)
     found, beads = [], []
     for shot in shots:
+        if number not in shot.images:
+            # Without noise, resting beads are the same picture twice, and left out.
+            continue
         one = detector.detect(shot.images[number].color)[index]
         truth = shot.truth[number]
         own = np.flatnonzero(truth.species == index)

@@ -45,6 +45,8 @@ _SURPLUS = 1.2
 _FLOOR_WEIGHT = 2
 # Gray grains are many: fewer sizes are tried.
 _GRAY_SIZE_STEP = 1.45
+# Of the light, a change that is followed at once.
+_LIGHT_CHANGE = 0.012
 # Patches of chalk are smoothed over so many pixels.
 _DUSTY_BLUR_PX = 5
 
@@ -159,7 +161,7 @@ class BeadDetector:
                     area_seen=fits[:, 3],
                 )
             )
-        renew_floor(
+        gain = renew_floor(
             color,
             self._covered,
             self._gray_known,
@@ -168,6 +170,10 @@ class BeadDetector:
             self._levels,
             self._sure,
         )
+        if abs(gain - 1.0) > _LIGHT_CHANGE:
+            # The rows in turn are too slow for a light that changes everywhere.
+            floor *= np.float32(gain)
+            self._levels = np.clip(floor + 0.5, 0.0, 255.0).astype(np.uint8)
         self._turn += 1
         return tuple(detections)
 

@@ -128,12 +128,20 @@ class _Distances:
         whole = _mean_distance(self.both, self.variances) / (later_time + earlier_time)
         # Collisions shorten the distance in proportion to the time, to first order.
         shortened = max(half - whole, 0.0)
-        jitter = math.sqrt(2.0 * float(self.variances.mean()) / self.both.size)
+        jitter = self._jitter_error(0.5 * (later_time + earlier_time) * half)
         per_time = 2.0 / (later_time + earlier_time)
         bead = np.hypot(self.later - self.earlier, 1e-3 * self.later) * per_time
         scatter = 0.5 * float(np.sqrt(np.mean(np.square(bead)))) / math.sqrt(self.both.size)
         error = math.hypot(jitter * per_time, 0.5 * shortened, 0.8 * scatter)
         return max(half + shortened, 0.0), error
+
+
+    def _jitter_error(self, mean: float) -> float:
+        """What jitter leaves open of a mean distance; less of a long one than of none, [m]."""
+        variance = float(self.variances.mean())
+        of_square = 4.0 * variance / math.sqrt(self.both.size)
+        of_none = min(math.sqrt(of_square), 0.5 * of_square / max(mean, 1e-12))
+        return math.hypot(math.sqrt(2.0 * variance / self.both.size), of_none)
 
 
 def _mean_distance(distances: NDArray[np.float64], variances: NDArray[np.float64]) -> float:
