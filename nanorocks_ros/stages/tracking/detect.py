@@ -170,8 +170,9 @@ class BeadDetector:
             self._levels,
             self._sure,
         )
-        if abs(gain - 1.0) > _LIGHT_CHANGE:
-            # The rows in turn are too slow for a light that changes everywhere.
+        if abs(gain - 1.0) > _LIGHT_CHANGE and not (self._gray_known or self._dusty):
+            # The rows in turn are too slow for a light that changes everywhere. Grains and
+            # chalk that pass for floor would lead this astray.
             floor *= np.float32(gain)
             self._levels = np.clip(floor + 0.5, 0.0, 255.0).astype(np.uint8)
         self._turn += 1
