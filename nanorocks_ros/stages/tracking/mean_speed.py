@@ -30,6 +30,11 @@ _LEAST_ERRORS = 14.0
 _FEWEST = 3
 # Times the usual error of a place, with which a bead is still used.
 _WORST = 5.0
+# Pictures from which the jitter is measured; and by how much their distances in time may differ.
+_JITTER_PICTURES = 10
+_UNEVEN = 0.2
+# Of a Gaussian of unit variance, the median of the squares.
+_MEDIAN_SQUARE = 0.4549
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,9 +81,12 @@ def mean_speed(
         None while there are fewer than three pictures or beads.
     """
     last = len(tracks) - 1
+    jitter = _jitter(tracks[-_JITTER_PICTURES:], species)
     lag, distances = 0, None
     for tried in _lags(last // 2):
-        found = _distances(tracks[last], tracks[last - tried], tracks[last - 2 * tried], species)
+        found = _distances(
+            tracks[last], tracks[last - tried], tracks[last - 2 * tried], species, jitter
+        )
         if found is None:
             break
         lag, distances = tried, found
@@ -135,7 +143,6 @@ class _Distances:
         error = math.hypot(jitter * per_time, 0.5 * shortened, 0.8 * scatter)
         return max(half + shortened, 0.0), error
 
-
     def _jitter_error(self, mean: float) -> float:
         """What jitter leaves open of a mean distance; less of a long one than of none, [m]."""
         variance = float(self.variances.mean())
@@ -159,21 +166,29 @@ def _mean_distance(distances: NDArray[np.float64], variances: NDArray[np.float64
 def _distances(
     later: Tracks, middle: Tracks, earlier: Tracks, species: int | None
 ) -> _Distances | None:
-    ids, places, variances = _shown(later, species)
-    for one in (middle, earlier):
-        other_ids, other_places, other_variances = _shown(one, species)
-        ids, here, there = np.intersect1d(ids, other_ids, assume_unique=True, return_indices=True)
-        places = [*(known[here] for known in places), other_places[0][there]]
-        variances = [*(known[here] for known in variances), other_variances[0][there]]
-    if ids.size < _FEWEST:
+    (end, half, start), variances = _common((later, middle, earlier), species)
+    if variances.size < _FEWEST:
         return None
-    end, half, start = places
     return _Distances(
         later=np.hypot(*(end - half).T),
         earlier=np.hypot(*(half - start).T),
         both=np.hypot(*(end - start).T),
-        variances=np.mean(variances, axis=0),
+        # Errors that places share from picture to picture move no bead.
+        variances=np.minimum(variances, jitter),
     )
+
+
+def _common(
+    records: Sequence[Tracks], species: int | None
+) -> tuple[list[NDArray[np.float64]], NDArray[np.float64]]:
+    """Places in each record of the beads that are seen in all, and their mean variance."""
+    ids, places, variances = _shown(records[0], species)
+    for one in records[1:]:
+        other_ids, other_places, other_variances = _shown(one, species)
+        ids, here, there = np.intersect1d(ids, other_ids, assume_unique=True, return_indices=True)
+        places = [*(known[here] for known in places), other_places[0][there]]
+        variances = [*(known[here] for known in variances), other_variances[0][there]]
+    return places, np.asarray(np.mean(variances, axis=0))
 
 
 def _shown(

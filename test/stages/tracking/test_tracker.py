@@ -15,7 +15,9 @@ from .films import SCALE, paired, pipeline_settings, tray_film
 
 def _follow(number, frames, **values):
     tracker = Tracker(pipeline_settings(number), load_trays()[number])
-    return [(tracker.push(image)[0], truth) for image, truth in tray_film(number, frames, **values)]
+    return [
+        (tracker.push(image)[0], truth) for image, truth in tray_film(number, frames, **values)
+    ]
 
 
 @pytest.fixture(scope='module')
@@ -127,9 +129,10 @@ def test_a_tray_that_swings_leaves_velocities_past_the_camera_alone():
             np.hypot(*(other.positions + other.displacement - one.positions[here]).T)
         )
         apart = other.velocities[nearest] - one.velocities[here]
-        assert np.hypot(*apart) < 4.0 * np.hypot(
-            one.velocity_errors[here], other.velocity_errors[nearest]
-        ) + 2e-5
+        assert (
+            np.hypot(*apart)
+            < 4.0 * np.hypot(one.velocity_errors[here], other.velocity_errors[nearest]) + 2e-5
+        )
 
 
 def test_the_same_pictures_give_the_same_tracks_and_a_stamp_that_goes_back_starts_afresh():
