@@ -163,8 +163,25 @@ def _mean_distance(distances: NDArray[np.float64], variances: NDArray[np.float64
     return float(distances.mean()) * math.sqrt(left / square)
 
 
+def _jitter(tracks: Sequence[Tracks], species: int | None) -> float:
+    """Variance of a coordinate from picture to picture, as the places themselves show it, [m^2].
+
+    Half of the beads fly straight through three pictures; a place off the middle of its
+    neighbours has 3/2 of that variance. What all pictures are off by together is no part of it.
+    """
+    found = []
+    for earlier, middle, later in zip(tracks, tracks[1:], tracks[2:], strict=False):
+        before, after = middle.stamp_ns - earlier.stamp_ns, later.stamp_ns - middle.stamp_ns
+        if abs(before - after) > _UNEVEN * before:
+            continue
+        (end, half, start), _ = _common((later, middle, earlier), species)
+        found.append(half - 0.5 * (start + end))
+    off = np.concatenate(found) if found else np.empty((0, 2))
+    return float(np.median(np.square(off))) / (1.5 * _MEDIAN_SQUARE) if off.size else np.inf
+
+
 def _distances(
-    later: Tracks, middle: Tracks, earlier: Tracks, species: int | None
+    later: Tracks, middle: Tracks, earlier: Tracks, species: int | None, jitter: float
 ) -> _Distances | None:
     (end, half, start), variances = _common((later, middle, earlier), species)
     if variances.size < _FEWEST:
