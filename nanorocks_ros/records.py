@@ -390,7 +390,7 @@ class Tracks:
     radius_errors: NDArray[np.float64]
     seen: NDArray[np.bool_]
     expected: NDArray[np.int32]
-    quality: Quality = Quality(0)
+    quality: Quality = NOTHING_WRONG
 
     def __post_init__(self) -> None:
         _freeze_arrays(self)

@@ -90,7 +90,7 @@ def _take(
     discs[own] = guess
     fit_circle(picture, search.hue_sign, discs, own, own + 1, search.expected, fits[own])
     fits[own, 3] = _explain(picture, search, discs[own], gains.balance)
-    good = fits[own, 3] >= _FIT_KEEPS * search.least_share
+    good = bool(fits[own, 3] >= _FIT_KEEPS * search.least_share)
     if not good:
         # The circle went elsewhere: these pixels are no bead, and not to be tried again.
         _explain(picture, search, guess, gains.balance)
@@ -159,7 +159,7 @@ def _explain(
                 covered[i, j] |= own
             if inner * inner < d2 <= outer * outer:
                 covered[i, j] |= ring
-    return taken / (np.pi * disc[2] * disc[2])
+    return float(taken / (np.pi * disc[2] * disc[2]))
 
 
 @compiled

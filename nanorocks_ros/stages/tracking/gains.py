@@ -93,7 +93,7 @@ def balance_of(picture: Picture, search: Search) -> NDArray[np.int32]:
 @compiled
 def least_gain(search: Search, size: int) -> float:
     """Pixels that a bead of a size must show."""
-    return search.least_share * np.pi * search.radii[size] * search.radii[size]
+    return float(search.least_share * np.pi * search.radii[size] * search.radii[size])
 
 
 @compiled

@@ -242,7 +242,8 @@ class Linker:
         costs = np.empty((self.last.size, found.radii.size))
         waits = time - self.last
         collided = max(_COLLISION * self._speed, _SLOWEST_PX_S)
-        fresh = waits <= 1.5 * waits.min(initial=np.inf)
+        latest: float = waits.min() if waits.size else 0.0
+        fresh = waits <= 1.5 * latest
         for shaken_now in (False, True):
             _costs(
                 *predicted,

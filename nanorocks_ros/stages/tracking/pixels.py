@@ -85,7 +85,7 @@ def look_at_pixels(
             floor_r = np.int32(floor[i, j, 2])
             down = int(max(floor_b - blue, floor_g - green, floor_r - red))
             up = int(min(blue - floor_b, green - floor_g, red - floor_r))
-            level = float(max(floor_b, floor_g, floor_r, 1))
+            level = max(int(floor_b), int(floor_g), int(floor_r), 1)
             warm = int((red - blue) - (floor_r - floor_b))
             hue[i, j] = warm
             if -_QUIET < down < _QUIET and up <= _BRIGHTER and level < _SATURATED:
@@ -127,7 +127,7 @@ def look_at_dusty_pixels(floor: NDArray[np.uint8], picture: Picture) -> None:
     for i in range(hue.shape[0]):
         for j in range(hue.shape[1]):
             warm = np.int32(hue[i, j])
-            darkness[i, j] = int(min(_DUSTY_STEPS * abs(warm), FULL))
+            darkness[i, j] = min(_DUSTY_STEPS * abs(warm), np.int32(255))
             if warm > _DUSTY_HUE:
                 shown[i, j] = RED
             elif warm < -_DUSTY_HUE:
