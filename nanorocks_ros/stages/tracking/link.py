@@ -258,7 +258,7 @@ class Linker:
                 costs,
             )
             lost = ~np.isfinite(costs).any(axis=1)
-            if np.count_nonzero(lost & fresh) <= _LOST * max(np.count_nonzero(fresh), 1):
+            if np.count_nonzero(lost & fresh) <= _LOST * int(np.count_nonzero(fresh)):
                 break
         return costs
 
