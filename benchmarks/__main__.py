@@ -10,6 +10,8 @@ ALL = (
     'live',
     'preprocess',
     'scene',
+    'tracking',
+    'speed_trays',
     'speed_accuracy',
     'cor_coverage',
     'engine',

@@ -466,6 +466,8 @@ class Tracks:
         False where the bead is hidden and its place is predicted.
     expected : ndarray of int32, (species,)
         Beads of each species that the tray should show.
+    quality : Quality
+        That of the image, and FEW_BEADS where much of a species is not seen.
     """
 
     stamp_ns: int
@@ -481,6 +483,7 @@ class Tracks:
     radius_errors: NDArray[np.float64]
     seen: NDArray[np.bool_]
     expected: NDArray[np.int32]
+    quality: Quality = NOTHING_WRONG
 
     def __post_init__(self) -> None:
         _freeze_arrays(self)

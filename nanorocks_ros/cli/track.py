@@ -193,8 +193,8 @@ def _print(found: TrackedBag, compared: dict[int, TrackComparison]) -> None:
         for row in _counts(found, number):
             share = _PERCENT * row['seen'] / row['expected']
             print(
-                f'  {row["material"]}: {row["seen"]:.1f} of {row["expected"]} seen ({share:.0f} %), '
-                f'{row["followed"]:.1f} followed, {row["tracks"]} tracks'
+                f'  {row["material"]}: {row["seen"]:.1f} of {row["expected"]} seen '
+                f'({share:.0f} %), {row["followed"]:.1f} followed, {row["tracks"]} tracks'
             )
         if number in compared:
             _print_comparison(compared[number])
@@ -202,8 +202,8 @@ def _print(found: TrackedBag, compared: dict[int, TrackComparison]) -> None:
 
 def _print_comparison(one: TrackComparison) -> None:
     print(
-        f'  by hand: {one.beads} beads, {_PERCENT * one.found:.1f} % of {one.places} places found, '
-        f'rms distance {_MM * one.rms_distance:.3f} mm'
+        f'  by hand: {one.beads} beads, {_PERCENT * one.found:.1f} % of {one.places} places '
+        f'found, rms distance {_MM * one.rms_distance:.3f} mm'
     )
     print(
         f'  {one.links_correct} of {one.links} links agree, {one.switches} identity switches, '

@@ -154,6 +154,12 @@ class TrackingSettings:
     least_area_seen: float = _setting(
         0.3, 'share of its disc that a bead must show to be found', low=0.05, high=1.0
     )
+    most_crowded: float = _setting(
+        0.6,
+        'a gray species whose grains, side by side, would cover more of the tray is not followed',
+        low=0.0,
+        high=10.0,
+    )
     longest_gap: float = _setting(
         1.0, 'a bead that is hidden for longer gets a new number', 's', low=0.0, high=60.0
     )

@@ -211,7 +211,12 @@ def _xml_rows(text: str, where: str) -> Iterable[_Row]:
             _refuse_unit(root.get('spaceUnits', ''), where)
             return [
                 _checked(
-                    (float(one.attrib['t']), bead, float(one.attrib['x']), float(one.attrib['y'])),
+                    (
+                        float(one.attrib['t']),
+                        float(bead),
+                        float(one.attrib['x']),
+                        float(one.attrib['y']),
+                    ),
                     where,
                     1,
                 )

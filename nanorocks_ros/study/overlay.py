@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -63,7 +63,7 @@ def overlay(
     large = cv2.resize(
         picture, None, fx=magnification, fy=magnification, interpolation=cv2.INTER_CUBIC
     )
-    canvas = large if large.ndim == 3 else cv2.cvtColor(large, cv2.COLOR_GRAY2BGR)
+    canvas: Any = large if large.ndim == 3 else cv2.cvtColor(large, cv2.COLOR_GRAY2BGR)
     scale = magnification * pixels_per_metre * 2**_SHIFT
     if tracks:
         for number, way in _ways(tracks[-path_frames:]).items():
@@ -82,11 +82,10 @@ def write_overlay(path: Path, pictures: Sequence[NDArray[np.uint8]]) -> None:
         When the file cannot be written.
     """
     width = max(one.shape[1] for one in pictures)
-    parts = []
-    for one in pictures:
-        parts.append(
-            cv2.copyMakeBorder(one, 0, _GAP_PX, 0, width - one.shape[1], cv2.BORDER_CONSTANT)
-        )
+    parts = [
+        cv2.copyMakeBorder(one, 0, _GAP_PX, 0, width - one.shape[1], cv2.BORDER_CONSTANT)
+        for one in pictures
+    ]
     encoded, content = cv2.imencode('.png', np.vstack(parts)[:-_GAP_PX])
     if not encoded:
         raise RecordingError(str(path), 'the picture cannot be encoded', 'name a .png file')

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -10,6 +10,45 @@ from nanorocks_ros.physics.compiled import compiled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+
+class _Pairing(NamedTuple):
+    """Who is paired with whom, prices, and the search for the next pair.
+
+    `distance`, `reached_from` and `done` are of columns, `touched` lists those with a distance,
+    `visited` the rows on the way, with their `row_distance`.
+    """
+
+    partner: NDArray[np.int64]
+    owner: NDArray[np.int64]
+    row_price: NDArray[np.float64]
+    column_price: NDArray[np.float64]
+    distance: NDArray[np.float64]
+    reached_from: NDArray[np.int64]
+    done: NDArray[np.bool_]
+    touched: NDArray[np.int64]
+    row_distance: NDArray[np.float64]
+    visited: NDArray[np.int64]
+
+
+@compiled
+def _possible(costs: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Columns that each row may be paired with, one row after the other, and where it starts."""
+    n, m = costs.shape
+    starts = np.zeros(n + 1, dtype=np.int64)
+    for i in range(n):
+        total = 0
+        for j in range(m):
+            total += costs[i, j] < np.inf
+        starts[i + 1] = starts[i] + total
+    columns = np.empty(starts[n], dtype=np.int64)
+    for i in range(n):
+        place = starts[i]
+        for j in range(m):
+            if costs[i, j] < np.inf:
+                columns[place] = j
+                place += 1
+    return starts, columns
 
 
 @compiled
@@ -33,60 +72,112 @@ def assign(costs: NDArray[np.float64], alone: float) -> NDArray[np.int64]:
     Shortest augmenting paths: Jonker and Volgenant (1987), Computing 38, 325.
     """
     n, m = costs.shape
-    partner = np.full(n, -1, dtype=np.int64)
-    owner = np.full(m, -1, dtype=np.int64)
-    row_price = np.zeros(n)
-    column_price = np.zeros(m)
-    distance = np.empty(m)
-    reached_from = np.empty(m, dtype=np.int64)
-    done = np.empty(m, dtype=np.bool_)
-    row_distance = np.empty(n)
-    visited = np.empty(n, dtype=np.int64)
+    starts, columns = _possible(costs)
+    state = _Pairing(
+        np.full(n, -1, dtype=np.int64),
+        np.full(m, -1, dtype=np.int64),
+        np.zeros(n),
+        np.zeros(m),
+        np.full(m, np.inf),
+        np.empty(m, dtype=np.int64),
+        np.zeros(m, dtype=np.bool_),
+        np.empty(m, dtype=np.int64),
+        np.empty(n),
+        np.empty(n, dtype=np.int64),
+    )
     for start in range(n):
-        distance[:] = np.inf
-        done[:] = False
-        visited[0], visits = start, 1
-        row_distance[start] = 0.0
-        row, end_column = start, -1
-        end_row, end_distance = start, alone - row_price[start]
-        while True:
-            for j in range(m):
-                if not done[j] and costs[row, j] < np.inf:
-                    reduced = costs[row, j] - row_price[row] - column_price[j]
-                    if row_distance[row] + reduced < distance[j]:
-                        distance[j] = row_distance[row] + reduced
-                        reached_from[j] = row
-            nearest, nearest_distance = -1, end_distance
-            for j in range(m):
-                if not done[j] and distance[j] < nearest_distance:
-                    nearest, nearest_distance = j, distance[j]
-            if nearest < 0:
-                break
-            done[nearest] = True
-            if owner[nearest] < 0:
-                end_column, end_distance = nearest, nearest_distance
-                break
-            row = owner[nearest]
-            row_distance[row] = nearest_distance
-            visited[visits] = row
-            visits += 1
-            if nearest_distance + alone - row_price[row] < end_distance:
-                end_row, end_distance = row, nearest_distance + alone - row_price[row]
-        for k in range(visits):
-            row_price[visited[k]] += end_distance - row_distance[visited[k]]
-        for j in range(m):
-            if done[j]:
-                column_price[j] -= end_distance - min(distance[j], end_distance)
-        # Go back from the end of the path, every row giving up its column to the one before.
-        if end_column >= 0:
-            column = end_column
-        else:
-            column = partner[end_row]
-            partner[end_row] = -1
-        while column >= 0:
-            row = reached_from[column]
-            before = partner[row]
-            partner[row] = column
-            owner[column] = row
-            column = before
-    return partner
+        _add_row(costs, alone, starts, columns, state, start)
+    return state.partner
+
+
+@compiled
+def _add_row(
+    costs: NDArray[np.float64],
+    alone: float,
+    starts: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    state: _Pairing,
+    start: int,
+) -> None:
+    """Pair one more row, along the path of least cost by which others make room for it."""
+    reached, visits = 0, 1
+    state.visited[0] = start
+    state.row_distance[start] = 0.0
+    row, end_column = start, -1
+    end_row, end_distance = start, alone - state.row_price[start]
+    while True:
+        reached = _reach_from(costs, starts, columns, state, row, reached)
+        nearest, nearest_distance = _nearest(state, reached, end_distance)
+        if nearest < 0:
+            break
+        state.done[nearest] = True
+        if state.owner[nearest] < 0:
+            end_column, end_distance = nearest, nearest_distance
+            break
+        row = state.owner[nearest]
+        state.row_distance[row] = nearest_distance
+        state.visited[visits] = row
+        visits += 1
+        given_up = nearest_distance + alone - state.row_price[row]
+        if given_up < end_distance:
+            end_row, end_distance = row, given_up
+    _settle_prices(state, visits, reached, end_distance)
+    # Go back from the end of the path, every row giving up its column to the one before.
+    column = end_column
+    if column < 0:
+        column = state.partner[end_row]
+        state.partner[end_row] = -1
+    while column >= 0:
+        row = state.reached_from[column]
+        before = state.partner[row]
+        state.partner[row] = column
+        state.owner[column] = row
+        column = before
+
+
+@compiled
+def _reach_from(
+    costs: NDArray[np.float64],
+    starts: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    state: _Pairing,
+    row: int,
+    reached: int,
+) -> int:
+    """Update the distances of the columns that a row may be paired with; how many have one."""
+    for k in range(starts[row], starts[row + 1]):
+        j = columns[k]
+        if state.done[j]:
+            continue
+        reduced = costs[row, j] - state.row_price[row] - state.column_price[j]
+        if state.row_distance[row] + reduced < state.distance[j]:
+            if state.distance[j] == np.inf:
+                state.touched[reached] = j
+                reached += 1
+            state.distance[j] = state.row_distance[row] + reduced
+            state.reached_from[j] = row
+    return reached
+
+
+@compiled
+def _nearest(state: _Pairing, reached: int, limit: float) -> tuple[int, float]:
+    nearest, distance = -1, limit
+    for k in range(reached):
+        j = state.touched[k]
+        if not state.done[j] and state.distance[j] < distance:
+            nearest, distance = j, state.distance[j]
+    return nearest, distance
+
+
+@compiled
+def _settle_prices(state: _Pairing, visits: int, reached: int, end: float) -> None:
+    """Keep all reduced costs positive, and make ready for the next row."""
+    for k in range(visits):
+        row = state.visited[k]
+        state.row_price[row] += end - state.row_distance[row]
+    for k in range(reached):
+        j = state.touched[k]
+        if state.done[j]:
+            state.column_price[j] -= end - min(state.distance[j], end)
+        state.distance[j] = np.inf
+        state.done[j] = False

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
 import numpy as np
 
 from nanorocks_ros.stages.tracking.cover import cover
 from nanorocks_ros.stages.tracking.floor import first_floor, renew_floor
+from nanorocks_ros.stages.tracking.gains import Search
 from nanorocks_ros.stages.tracking.outline import refit
 from nanorocks_ros.stages.tracking.pixels import (
     BLUE,
     GRAY,
     RED,
+    Picture,
     look_at_dusty_pixels,
     look_at_pixels,
 )
@@ -43,6 +45,10 @@ _SIZE_SPREAD_PX = 0.3
 _SURPLUS = 1.2
 # A pixel of floor under a disc outweighs so many of the species; not where chalk may hide them.
 _FLOOR_WEIGHT = 2
+# Gray grains are many: fewer sizes are tried.
+_GRAY_SIZE_STEP = 1.45
+# Of the light, a change that is followed at once.
+_LIGHT_CHANGE = 0.012
 # Patches of chalk are smoothed over so many pixels.
 _DUSTY_BLUR_PX = 5
 
@@ -70,17 +76,6 @@ class Detections:
     area_seen: NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class _Search:
-    """How one species is looked for."""
-
-    kind: int
-    radii: NDArray[np.float64]
-    expected: NDArray[np.float64]
-    step: int
-    most: int
-
-
 class BeadDetector:
     """Finds the beads of one tray.
 
@@ -92,14 +87,14 @@ class BeadDetector:
     """
 
     def __init__(self, settings: TrackingSettings, tray: Tray, pixels_per_metre: float) -> None:
-        self._least_share = settings.least_area_seen
-        self._searches = [_search(one, pixels_per_metre) for one in tray.species]
-        self._gray_known = any(one.kind == GRAY for one in self._searches)
+        self._settings = settings
+        self._gray_known = any(_kind(one) == GRAY for one in tray.species)
+        self._dusty = tray.chalk and not self._gray_known
+        self._searches = [self._search(tray, one, pixels_per_metre) for one in tray.species]
         largest = max(one.diameter_high for one in tray.species)
         self._reach = max(3, round(largest * pixels_per_metre))
-        self._dusty = tray.chalk and not self._gray_known
         self._turn = 0
-        self._floor: NDArray[np.float32] | None = None
+        self._ground: _Ground | None = None
 
     def detect(
         self, color: NDArray[np.uint8], hints: Sequence[NDArray[np.float64]] = ()
@@ -112,104 +107,120 @@ class BeadDetector:
         hints : sequence of ndarrays (k, 4), [px]
             For each species where beads should be: column, row, radius and its error.
         """
-        hints = hints or [np.empty((0, 4))] * len(self._searches)
-        if self._floor is None or self._floor.shape != color.shape:
-            self._start(color)
-        floor = self._floor
-        assert floor is not None
-        look_at_pixels(
-            color, self._levels, self._gray_known, self._darkness, self._hue, self._shown
-        )
-        if self._dusty:
-            self._hue = cv2.blur(self._hue, (_DUSTY_BLUR_PX, _DUSTY_BLUR_PX))
-            look_at_dusty_pixels(self._hue, self._levels, self._darkness, self._shown)
-        self._covered[:] = 0
-        found: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = [None] * len(hints)
-        # Gray ones last: the outline of a coloured bead looks gray.
-        for k in sorted(range(len(hints)), key=lambda k: self._searches[k].kind == GRAY):
-            found[k] = self._cover(self._searches[k], hints[k])
+        if self._ground is None or self._ground.floor.shape != color.shape:
+            self._ground = self._first_ground(color)
+        picture = self._look(color, self._ground)
+        found = self._find(picture, hints or [np.empty((0, 4))] * len(self._searches))
         every = np.concatenate([discs for discs, _ in found])
         detections = []
         first = 0
         for search, (discs, fits) in zip(self._searches, found, strict=True):
-            refit(
-                self._darkness,
-                self._hue,
-                _HUE_SIGN[search.kind],
-                every,
-                first,
-                len(discs),
-                search.expected,
-                fits,
-            )
-            fitted = every[first : first + len(discs)]
-            first += len(discs)
-            detections.append(
-                Detections(
-                    places=fitted[:, :2].copy(),
-                    place_errors=fits[:, 0],
-                    radii=fitted[:, 2].copy(),
-                    radius_errors=fits[:, 1],
-                    outline_seen=fits[:, 2],
-                    area_seen=fits[:, 3],
-                )
-            )
-        renew_floor(
-            color,
-            self._covered,
-            self._gray_known,
-            self._turn,
-            floor,
-            self._levels,
-            self._sure,
-        )
+            last = first + len(discs)
+            refit(picture, search.hue_sign, every, first, len(discs), search.expected, fits)
+            detections.append(_detections(every[first:last], fits))
+            first = last
+        self._renew(color, picture, self._ground)
         self._turn += 1
         return tuple(detections)
 
-    def _start(self, color: NDArray[np.uint8]) -> None:
-        self._floor, self._sure = first_floor(color, self._gray_known, self._reach)
-        self._levels = np.clip(self._floor + 0.5, 0.0, 255.0).astype(np.uint8)
+    def _first_ground(self, color: NDArray[np.uint8]) -> _Ground:
+        floor, sure = first_floor(color, self._gray_known, self._reach)
         shape = color.shape[:2]
-        self._darkness = np.empty(shape, dtype=np.uint8)
-        self._hue = np.empty(shape, dtype=np.int16)
-        self._shown = np.empty(shape, dtype=np.uint8)
-        self._covered = np.zeros(shape, dtype=np.uint8)
-
-    def _cover(
-        self, search: _Search, hints: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        discs = np.zeros((search.most, 3))
-        fits = np.zeros((search.most, 4))
-        count = cover(
-            self._shown,
-            self._darkness,
-            self._hue,
-            search.kind,
-            _HUE_SIGN[search.kind],
-            search.radii,
-            search.expected,
-            1 if self._dusty else _FLOOR_WEIGHT,
-            search.step,
-            search.most,
-            self._least_share,
-            self._covered,
-            discs,
-            fits,
-            hints,
+        picture = Picture(
+            np.empty(shape, dtype=np.uint8),
+            np.empty(shape, dtype=np.int16),
+            np.empty(shape, dtype=np.uint8),
+            np.zeros(shape, dtype=np.uint8),
         )
-        return discs[:count], fits[:count]
+        return _Ground(floor, _rounded(floor), sure, picture)
+
+    def _look(self, color: NDArray[np.uint8], ground: _Ground) -> Picture:
+        picture = ground.picture
+        look_at_pixels(color, ground.levels, self._gray_known, picture)
+        if self._dusty:
+            smooth = cv2.blur(picture.hue, (_DUSTY_BLUR_PX, _DUSTY_BLUR_PX))
+            picture = picture._replace(hue=np.asarray(smooth, dtype=np.int16))
+            look_at_dusty_pixels(ground.levels, picture)
+        picture.covered[:] = 0
+        return picture
+
+    def _find(
+        self, picture: Picture, hints: Sequence[NDArray[np.float64]]
+    ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Discs and fits of each species."""
+        found = [(np.zeros((one.most, 3)), np.zeros((one.most, 4))) for one in self._searches]
+        # Gray ones last: the outline of a coloured bead looks gray.
+        for k in sorted(range(len(found)), key=lambda k: self._searches[k].kind == GRAY):
+            discs, fits = found[k]
+            count = cover(picture, self._searches[k], hints[k], discs, fits)
+            found[k] = discs[:count], fits[:count]
+        return found
+
+    def _renew(self, color: NDArray[np.uint8], picture: Picture, ground: _Ground) -> None:
+        gain = renew_floor(
+            color,
+            picture.covered,
+            self._gray_known,
+            self._turn,
+            ground.floor,
+            ground.levels,
+            ground.sure,
+        )
+        if abs(gain - 1.0) > _LIGHT_CHANGE and not (self._gray_known or self._dusty):
+            # The rows in turn are too slow for a light that changes everywhere. Grains and
+            # chalk that pass for floor would lead this astray.
+            ground.floor[:] *= np.float32(gain)
+            ground.levels[:] = _rounded(ground.floor)
+
+    def _search(self, tray: Tray, species: Species, pixels_per_metre: float) -> Search:
+        low = 0.5 * species.diameter_low * pixels_per_metre
+        high = 0.5 * species.diameter_high * pixels_per_metre
+        kind = _kind(species)
+        factor = _GRAY_SIZE_STEP if kind == GRAY else _SIZE_STEP
+        sizes = max(1, int(np.ceil(np.log(high / low) / np.log(factor))))
+        grains = 0.25 * np.pi * species.diameter**2 * species.count
+        area = tray.dimensions[0] * tray.dimensions[1]
+        crowded = kind == GRAY and grains > self._settings.most_crowded * area
+        spread = max((high - low) / np.sqrt(12.0), _SIZE_SPREAD_PX)
+        return Search(
+            kind=kind,
+            hue_sign=_HUE_SIGN[kind],
+            radii=np.geomspace(low, high, 2 * sizes + 1)[1::2].copy(),
+            expected=np.array([0.5 * (low + high), spread]),
+            step=max(2 if low >= _COARSE_FROM_PX else 1, int(low / _SQUARES_PER_RADIUS)),
+            most=0 if crowded else int(_SURPLUS * species.count) + 2,
+            floor_weight=1 if self._dusty else _FLOOR_WEIGHT,
+            least_share=self._settings.least_area_seen,
+        )
 
 
-def _search(species: Species, pixels_per_metre: float) -> _Search:
-    low = 0.5 * species.diameter_low * pixels_per_metre
-    high = 0.5 * species.diameter_high * pixels_per_metre
-    sizes = max(1, int(np.ceil(np.log(high / low) / np.log(_SIZE_STEP))))
-    ends = np.geomspace(low, high, 2 * sizes + 1)
-    spread = max((high - low) / np.sqrt(12.0), _SIZE_SPREAD_PX)
-    return _Search(
-        kind=KINDS.get(species.material, GRAY),
-        radii=ends[1::2].copy(),
-        expected=np.array([0.5 * (low + high), spread]),
-        step=max(2 if low >= _COARSE_FROM_PX else 1, int(low / _SQUARES_PER_RADIUS)),
-        most=int(_SURPLUS * species.count) + 2,
+class _Ground(NamedTuple):
+    """The floor as far as it is known, and room to look at a picture.
+
+    `floor` and `levels` are (rows, columns, 3), as numbers and rounded; `sure` is where it has
+    been seen.
+    """
+
+    floor: NDArray[np.float32]
+    levels: NDArray[np.uint8]
+    sure: NDArray[np.bool_]
+    picture: Picture
+
+
+def _kind(species: Species) -> int:
+    return KINDS.get(species.material, GRAY)
+
+
+def _rounded(floor: NDArray[np.float32]) -> NDArray[np.uint8]:
+    return np.asarray(np.clip(floor + 0.5, 0.0, 255.0), dtype=np.uint8)
+
+
+def _detections(discs: NDArray[np.float64], fits: NDArray[np.float64]) -> Detections:
+    return Detections(
+        places=discs[:, :2].copy(),
+        place_errors=fits[:, 0],
+        radii=discs[:, 2].copy(),
+        radius_errors=fits[:, 1],
+        outline_seen=fits[:, 2],
+        area_seen=fits[:, 3],
     )

@@ -62,7 +62,9 @@ def fit_flight(
         dy = places[k, 1] - y - v * (times[k] - time)
         chi += (dx * dx + dy * dy) / (errors[k] * errors[k])
     line[0], line[1], line[2], line[3], line[4] = time, x, y, u, v
-    line[5], line[6], line[7], line[8] = 1.0 / total, 1.0 / spread, chi, count
+    # Places that scatter more than their errors say are worse than those.
+    worse = max(chi / (2 * count - 4), 1.0) if count > 3 else 1.0
+    line[5], line[6], line[7], line[8] = worse / total, worse / spread, chi, count
 
 
 @compiled

@@ -18,6 +18,8 @@ _ROWS_IN_TURN = 8
 _SHARE = 0.2
 # Where a gray bead may lie, darker values are believed slowly.
 _SLOW_SHARE = 0.004
+# Of its level, what differs more from the floor says nothing of the light as a whole.
+_LIKE_FLOOR = 0.15
 # Chroma above which a pixel is surely a bead, at the first picture.
 _COLOURED = 0.12
 # Of the local level of the floor: darker pixels of the first picture are gray beads.
@@ -118,7 +120,7 @@ def renew_floor(
     floor: NDArray[np.float32],
     levels: NDArray[np.uint8],
     sure: NDArray[np.bool_],
-) -> None:
+) -> float:
     """Follow the floor where no bead lies, in one of several sets of rows.
 
     Parameters
@@ -136,7 +138,13 @@ def renew_floor(
         Changed: the same, rounded.
     sure : ndarray of bool, (rows, columns)
         Changed: where the floor itself has been seen; elsewhere it is a guess.
+
+    Returns
+    -------
+    float
+        How bright these rows were, relative to the floor as it was known.
     """
+    shown, known = 1.0, 1.0
     for i in range(turn % _ROWS_IN_TURN, color.shape[0], _ROWS_IN_TURN):
         for j in range(color.shape[1]):
             if covered[i, j]:
@@ -145,6 +153,10 @@ def renew_floor(
             warm = (red - blue) - (floor[i, j, 2] - floor[i, j, 0])
             if abs(warm) > _COLOURED * (red + blue):
                 continue
+            green, floor_g = np.float64(color[i, j, 1]), np.float64(floor[i, j, 1])
+            if sure[i, j] and abs(green - floor_g) < _LIKE_FLOOR * floor_g:
+                shown += green
+                known += floor_g
             for k in range(3):
                 step = color[i, j, k] - floor[i, j, k]
                 share = _SHARE if sure[i, j] else 1.0
@@ -153,3 +165,4 @@ def renew_floor(
                 floor[i, j, k] += share * step
                 levels[i, j, k] = np.uint8(floor[i, j, k] + 0.5)
             sure[i, j] = True
+    return shown / known

@@ -18,9 +18,17 @@ if TYPE_CHECKING:
 
 # Shares of the beads that collide, or are shaken, between two pictures.
 _COLLIDING, _SHAKEN = 0.15, 0.002
+# Of a usual velocity component, how much a collision changes one; and so many of those, squared,
+# are the limit.
+_COLLISION = 1.4
+_REACH2 = 16.0
+# Share of the beads that must be out of reach of collisions for a tray to have been shaken.
+_LOST = 0.3
 # Of the size of one bead from picture to picture, beyond what its errors say, [px].
 _SIZE_JITTER_PX = 0.3
 _LARGEST_SIZE_COST = 6.0
+# A pair that is so much less likely than the best, as a logarithm, is none.
+_WORTH = 10.0
 # Pictures in a row that a new bead must be seen in.
 _CONFIRM = 3
 # Slowest change of velocity in a collision that is reckoned with, [px/s].
@@ -42,6 +50,7 @@ def _costs(
     radii: NDArray[np.float64],
     collided: float,
     fastest: float,
+    shaken_now: bool,
     costs: NDArray[np.float64],
 ) -> None:
     """Minus the logarithm of the likelihood of every pair; infinite out of reach.
@@ -56,20 +65,28 @@ def _costs(
     collided : float, [px/s]
         Usual change of a component of the velocity in a collision.
     fastest : float, [px/s]
+    shaken_now : bool
+        Whether beads may have got any speed since the last picture.
     costs : ndarray (n, m)
         Written.
     """
+    worst = errors.max() if errors.size else 0.0
     for i in range(predicted.shape[0]):
         reach = fastest * waits[i]
+        far = _REACH2 * (variances[i] + worst * worst + (collided * waits[i]) ** 2)
+        if shaken_now:
+            far = max(far, reach * reach)
         for j in range(places.shape[0]):
             costs[i, j] = np.inf
             dx = places[j, 0] - predicted[i, 0]
             dy = places[j, 1] - predicted[i, 1]
             d2 = dx * dx + dy * dy
+            if d2 > far:
+                continue
             free = variances[i] + errors[j] * errors[j]
             hit = free + (collided * waits[i]) ** 2
             shaken = free + (0.4 * reach) ** 2
-            if d2 > 16.0 * hit and d2 > reach * reach:
+            if d2 > _REACH2 * hit and not (shaken_now and d2 <= reach * reach):
                 continue
             likelihood = (1.0 - _COLLIDING) / free * math.exp(-0.5 * d2 / free)
             likelihood += _COLLIDING / hit * math.exp(-0.5 * d2 / hit)
@@ -77,6 +94,12 @@ def _costs(
             off = radii[j] - sizes[i]
             size = 0.5 * off * off / (_SIZE_JITTER_PX * _SIZE_JITTER_PX)
             costs[i, j] = min(size, _LARGEST_SIZE_COST) - math.log(likelihood)
+        if places.shape[0]:
+            # A bead that is hidden must not push the others from their places.
+            most = costs[i].min() + _WORTH
+            for j in range(places.shape[0]):
+                if costs[i, j] > most:
+                    costs[i, j] = np.inf
 
 
 @compiled
@@ -120,6 +143,8 @@ class Linker:
         Columns and rows of the tray.
     fastest : float, [px/s]
     longest_gap, window : float, [s]
+    systematic : float, [px]
+        Error of all places of a bead together.
     """
 
     def __init__(
@@ -129,7 +154,9 @@ class Linker:
         fastest: float,
         longest_gap: float,
         window: float,
+        systematic: float,
     ) -> None:
+        self.systematic = systematic
         self._expected = expected
         self._size = np.array(size)
         self._fastest = fastest
@@ -169,21 +196,7 @@ class Linker:
             New tracks.
         """
         places, variances = self.predicted(time, shift)
-        costs = np.empty((places.shape[0], found.radii.size))
-        waits = time - self.last
-        collided = max(self._speed, _SLOWEST_PX_S)
-        _costs(
-            places,
-            variances,
-            waits,
-            self.radii,
-            found.places,
-            found.place_errors,
-            found.radii,
-            collided,
-            self._fastest,
-            costs,
-        )
+        costs = self._pair_costs(time, found, (places, variances))
         finite = costs[np.isfinite(costs)]
         # Any pair within reach is better than none.
         alone = float(finite.max()) + 1.0 if finite.size else 0.0
@@ -214,6 +227,40 @@ class Linker:
         self._add(time, found, new, first_number)
         self._started = True
         return int(new.size)
+
+    def _pair_costs(
+        self,
+        time: float,
+        found: Detections,
+        predicted: tuple[NDArray[np.float64], NDArray[np.float64]],
+    ) -> NDArray[np.float64]:
+        """Costs of all pairs, (tracks, detections).
+
+        Any bead may collide, but when many are not where even a collision could have sent
+        them, the tray was shaken.
+        """
+        costs = np.empty((self.last.size, found.radii.size))
+        waits = time - self.last
+        collided = max(_COLLISION * self._speed, _SLOWEST_PX_S)
+        latest: float = waits.min() if waits.size else 0.0
+        fresh = waits <= 1.5 * latest
+        for shaken_now in (False, True):
+            _costs(
+                *predicted,
+                waits,
+                self.radii,
+                found.places,
+                found.place_errors,
+                found.radii,
+                collided,
+                self._fastest,
+                shaken_now,
+                costs,
+            )
+            lost = ~np.isfinite(costs).any(axis=1)
+            if np.count_nonzero(lost & fresh) <= _LOST * int(np.count_nonzero(fresh)):
+                break
+        return costs
 
     @property
     def confirmed(self) -> NDArray[np.bool_]:
@@ -279,7 +326,9 @@ class Linker:
         known = (self._counts >= 2) & self.confirmed
         if known.any():
             velocities = self._lines[known, 3:5]
-            usual = math.sqrt(float(np.mean(np.square(velocities))))
+            square = float(np.median(np.sum(np.square(velocities), axis=1)))
+            # Of a Maxwellian gas; the median does not heed beads that were confused.
+            usual = math.sqrt(square / (2.0 * math.log(2.0)))
             share = 1.0 if usual > self._speed else _SPEED_SHARE
             self._speed += share * (usual - self._speed)
 

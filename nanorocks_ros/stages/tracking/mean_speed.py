@@ -29,6 +29,11 @@ _LEAST_ERRORS = 14.0
 _FEWEST = 3
 # Times the usual error of a place, with which a bead is still used.
 _WORST = 5.0
+# Pictures from which the jitter is measured; and by how much their distances in time may differ.
+_JITTER_PICTURES = 10
+_UNEVEN = 0.2
+# Of a Gaussian of unit variance, the median of the squares.
+_MEDIAN_SQUARE = 0.4549
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,9 +80,12 @@ def mean_speed(
         None while there are fewer than three pictures or beads.
     """
     last = len(tracks) - 1
+    jitter = _jitter(tracks[-_JITTER_PICTURES:], species)
     lag, distances = 0, None
     for tried in _lags(last // 2):
-        found = _distances(tracks[last], tracks[last - tried], tracks[last - 2 * tried], species)
+        found = _distances(
+            tracks[last], tracks[last - tried], tracks[last - 2 * tried], species, jitter
+        )
         if found is None:
             break
         lag, distances = tried, found
@@ -127,12 +135,19 @@ class _Distances:
         whole = _mean_distance(self.both, self.variances) / (later_time + earlier_time)
         # Collisions shorten the distance in proportion to the time, to first order.
         shortened = max(half - whole, 0.0)
-        jitter = math.sqrt(2.0 * float(self.variances.mean()) / self.both.size)
+        jitter = self._jitter_error(0.5 * (later_time + earlier_time) * half)
         per_time = 2.0 / (later_time + earlier_time)
         bead = np.hypot(self.later - self.earlier, 1e-3 * self.later) * per_time
         scatter = 0.5 * float(np.sqrt(np.mean(np.square(bead)))) / math.sqrt(self.both.size)
         error = math.hypot(jitter * per_time, 0.5 * shortened, 0.8 * scatter)
         return max(half + shortened, 0.0), error
+
+    def _jitter_error(self, mean: float) -> float:
+        """What jitter leaves open of a mean distance; less of a long one than of none, [m]."""
+        variance = float(self.variances.mean())
+        of_square = 4.0 * variance / math.sqrt(self.both.size)
+        of_none = min(math.sqrt(of_square), 0.5 * of_square / max(mean, 1e-12))
+        return math.hypot(math.sqrt(2.0 * variance / self.both.size), of_none)
 
 
 def _mean_distance(distances: NDArray[np.float64], variances: NDArray[np.float64]) -> float:
@@ -147,24 +162,49 @@ def _mean_distance(distances: NDArray[np.float64], variances: NDArray[np.float64
     return float(distances.mean()) * math.sqrt(left / square)
 
 
+def _jitter(tracks: Sequence[Tracks], species: int | None) -> float:
+    """Variance of a coordinate from picture to picture, as the places themselves show it, [m^2].
+
+    Half of the beads fly straight through three pictures; a place off the middle of its
+    neighbours has 3/2 of that variance. What all pictures are off by together is no part of it.
+    """
+    found = []
+    for earlier, middle, later in zip(tracks, tracks[1:], tracks[2:], strict=False):
+        before, after = middle.stamp_ns - earlier.stamp_ns, later.stamp_ns - middle.stamp_ns
+        if abs(before - after) > _UNEVEN * before:
+            continue
+        (end, half, start), _ = _common((later, middle, earlier), species)
+        found.append(half - 0.5 * (start + end))
+    off = np.concatenate(found) if found else np.empty((0, 2))
+    return float(np.median(np.square(off))) / (1.5 * _MEDIAN_SQUARE) if off.size else np.inf
+
+
 def _distances(
-    later: Tracks, middle: Tracks, earlier: Tracks, species: int | None
+    later: Tracks, middle: Tracks, earlier: Tracks, species: int | None, jitter: float
 ) -> _Distances | None:
-    ids, places, variances = _shown(later, species)
-    for one in (middle, earlier):
-        other_ids, other_places, other_variances = _shown(one, species)
-        ids, here, there = np.intersect1d(ids, other_ids, assume_unique=True, return_indices=True)
-        places = [*(known[here] for known in places), other_places[0][there]]
-        variances = [*(known[here] for known in variances), other_variances[0][there]]
-    if ids.size < _FEWEST:
+    (end, half, start), variances = _common((later, middle, earlier), species)
+    if variances.size < _FEWEST:
         return None
-    end, half, start = places
     return _Distances(
         later=np.hypot(*(end - half).T),
         earlier=np.hypot(*(half - start).T),
         both=np.hypot(*(end - start).T),
-        variances=np.mean(variances, axis=0),
+        # Errors that places share from picture to picture move no bead.
+        variances=np.minimum(variances, jitter),
     )
+
+
+def _common(
+    records: Sequence[Tracks], species: int | None
+) -> tuple[list[NDArray[np.float64]], NDArray[np.float64]]:
+    """Places in each record of the beads that are seen in all, and their mean variance."""
+    ids, places, variances = _shown(records[0], species)
+    for one in records[1:]:
+        other_ids, other_places, other_variances = _shown(one, species)
+        ids, here, there = np.intersect1d(ids, other_ids, assume_unique=True, return_indices=True)
+        places = [*(known[here] for known in places), other_places[0][there]]
+        variances = [*(known[here] for known in variances), other_variances[0][there]]
+    return places, np.asarray(np.mean(variances, axis=0))
 
 
 def _shown(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.stages.tracking.pixels import Picture
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,7 +22,11 @@ _FLOOR_DARKNESS = 80.0
 _LEAST_STEP = 60.0
 # Gray levels of red minus blue across an edge between two species.
 _LEAST_HUE_STEP = 30.0
+_OTHER_HUE = 20.0
 _ROUNDS = 3
+# A smaller outline has fewer pixels than rays: every other ray does.
+_ALL_RAYS_FROM_PX = 8.0
+_MOST_NEIGHBOURS = 24
 # No value of a picture.
 _OUT = -10000.0
 # A step that needs no further one, [px].
@@ -40,7 +45,7 @@ _ENOUGH = 0.35
 
 
 @compiled
-def _at(picture: NDArray[np.uint8], x: float, y: float) -> float:
+def _at(picture: NDArray[np.integer[Any]], x: float, y: float) -> float:
     """Value between pixels, whose centres are at halves."""
     column, row = x - 0.5, y - 0.5
     j, i = math.floor(column), math.floor(row)
@@ -49,12 +54,12 @@ def _at(picture: NDArray[np.uint8], x: float, y: float) -> float:
     u, v = column - j, row - i
     upper = picture[i, j] * (1.0 - u) + picture[i, j + 1] * u
     lower = picture[i + 1, j] * (1.0 - u) + picture[i + 1, j + 1] * u
-    return upper * (1.0 - v) + lower * v
+    return float(upper * (1.0 - v) + lower * v)
 
 
 @compiled
 def _edge(
-    picture: NDArray[np.uint8],
+    picture: NDArray[np.integer[Any]],
     disc: NDArray[np.float64],
     ray: int,
     sign: float,
@@ -105,23 +110,36 @@ def _inverse(m: NDArray[np.float64], out: NDArray[np.float64]) -> None:
 
 
 @compiled
-def _hidden(discs: NDArray[np.float64], own: int, count: int, ray: int) -> bool:
-    """Whether the edge on this ray lies on or beside another bead."""
-    x = discs[own, 0] + discs[own, 2] * _COSINES[ray]
-    y = discs[own, 1] + discs[own, 2] * _SINES[ray]
+def _neighbours(discs: NDArray[np.float64], own: int, count: int) -> NDArray[np.float64]:
+    """The discs that touch, hide or nearly touch one, (k, 3), while it moves a little."""
+    found = np.empty((_MOST_NEIGHBOURS, 3))
+    n = 0
     for k in range(count):
-        if k != own:
-            near = discs[k, 2] + 0.5 * _NEAR_PX
-            dx, dy = discs[k, 0] - x, discs[k, 1] - y
-            if dx * dx + dy * dy < near * near:
-                return True
+        if k != own and n < _MOST_NEIGHBOURS:
+            reach = discs[k, 2] + discs[own, 2] + _NEAR_PX + _GUESS_PX
+            dx, dy = discs[k, 0] - discs[own, 0], discs[k, 1] - discs[own, 1]
+            if dx * dx + dy * dy < reach * reach:
+                found[n] = discs[k]
+                n += 1
+    return found[:n]
+
+
+@compiled
+def _hidden(disc: NDArray[np.float64], neighbours: NDArray[np.float64], ray: int) -> bool:
+    """Whether the edge on this ray lies on or beside another bead."""
+    x = disc[0] + disc[2] * _COSINES[ray]
+    y = disc[1] + disc[2] * _SINES[ray]
+    for k in range(neighbours.shape[0]):
+        near = neighbours[k, 2] + 0.5 * _NEAR_PX
+        dx, dy = neighbours[k, 0] - x, neighbours[k, 1] - y
+        if dx * dx + dy * dy < near * near:
+            return True
     return False
 
 
 @compiled
 def fit_circle(
-    darkness: NDArray[np.uint8],
-    hue: NDArray[np.int16],
+    picture: Picture,
     hue_sign: float,
     discs: NDArray[np.float64],
     own: int,
@@ -133,8 +151,7 @@ def fit_circle(
 
     Parameters
     ----------
-    darkness : ndarray of uint8, (rows, columns)
-    hue : ndarray of int16, (rows, columns)
+    picture : Picture
     hue_sign : float
         1 for a red, -1 for a blue, 0 for a gray bead.
     discs : ndarray (n, 3), [px]
@@ -143,64 +160,76 @@ def fit_circle(
         `count` of the discs are filled in.
     expected : ndarray (2,), [px]
         Radius and its standard deviation.
-    fit : ndarray (3,)
+    fit : ndarray (3 or more,)
         Written: error of a coordinate and of the radius [px], share of the outline seen.
     """
-    start_x, start_y = discs[own, 0], discs[own, 1]
-    covariance = np.zeros((3, 3))
-    normal = np.zeros((3, 3))
-    right = np.zeros(3)
-    edges = np.empty(_RAYS)
-    row = np.ones(3)
+    start = discs[own].copy()
+    neighbours = _neighbours(discs, own, count)
+    every = 1 if start[2] >= _ALL_RAYS_FROM_PX else 2
+    covariance, normal, right = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
     seen, scatter2 = 0, 0.0
     for turn in range(_ROUNDS):
-        seen = 0
-        total = 0.0
-        normal[:] = 0.0
-        right[:] = 0.0
-        for k in range(_RAYS):
-            if _hidden(discs, own, count, k):
-                continue
-            edge = _edge(darkness, discs[own], k, 1.0, _LEAST_STEP, _FLOOR_DARKNESS)
-            if edge != edge and hue_sign != 0.0:
-                edge = _edge(hue, discs[own], k, hue_sign, _LEAST_HUE_STEP, 20.0)
-            if edge != edge:
-                continue
-            off = edge / _HALF_WEIGHT_PX
-            weight = 1.0 / (1.0 + off * off) if turn > 0 else 1.0
-            seen += 1
-            total += weight * edge * edge
-            row[0], row[1] = _COSINES[k], _SINES[k]
-            for a in range(3):
-                right[a] += weight * row[a] * edge
-                for b in range(a, 3):
-                    normal[a, b] += weight * row[a] * row[b]
+        seen, total = _add_edges(
+            picture, hue_sign, discs[own], neighbours, every, turn > 0, normal, right
+        )
         scatter2 = total / max(seen - 3, 1)
         prior = max(scatter2, _LEAST_SCATTER_PX * _LEAST_SCATTER_PX)
         # What is known of the size and of the place, as further edges of the same scatter.
         size_weight = prior / (expected[1] * expected[1])
         place_weight = prior / (_GUESS_PX * _GUESS_PX)
-        normal[0, 0] += place_weight
-        normal[1, 1] += place_weight
+        for a in range(2):
+            normal[a, a] += place_weight
+            right[a] += place_weight * (start[a] - discs[own, a])
         normal[2, 2] += size_weight
-        right[0] += place_weight * (start_x - discs[own, 0])
-        right[1] += place_weight * (start_y - discs[own, 1])
         right[2] += size_weight * (expected[0] - discs[own, 2])
         _inverse(normal, covariance)
-        largest = 0.0
+        step = covariance @ right
         for a in range(3):
-            step = 0.0
-            for b in range(3):
-                step += covariance[a, b] * right[b]
-            largest = max(largest, abs(step))
-            discs[own, a] += min(max(step, -2.0), 2.0)
+            discs[own, a] += min(max(step[a], -2.0), 2.0)
         discs[own, 2] = max(discs[own, 2], 1.5)
-        if turn > 0 and largest < _SETTLED_PX:
+        if turn > 0 and np.abs(step).max() < _SETTLED_PX:
             break
     spread = _CORRELATED * (scatter2 + _LEAST_SCATTER_PX * _LEAST_SCATTER_PX)
     fit[0] = math.sqrt(0.5 * spread * (covariance[0, 0] + covariance[1, 1]))
     fit[1] = math.sqrt(spread * covariance[2, 2])
-    fit[2] = seen / _RAYS
+    fit[2] = seen * every / _RAYS
+
+
+@compiled
+def _add_edges(
+    picture: Picture,
+    hue_sign: float,
+    disc: NDArray[np.float64],
+    neighbours: NDArray[np.float64],
+    every: int,
+    robust: bool,
+    normal: NDArray[np.float64],
+    right: NDArray[np.float64],
+) -> tuple[int, float]:
+    """Normal equations of a circle through the edges; how many, and their weighted squares."""
+    normal[:] = 0.0
+    right[:] = 0.0
+    seen, total = 0, 0.0
+    row = np.ones(3)
+    for k in range(0, _RAYS, every):
+        if _hidden(disc, neighbours, k):
+            continue
+        edge = _edge(picture.darkness, disc, k, 1.0, _LEAST_STEP, _FLOOR_DARKNESS)
+        if edge != edge and hue_sign != 0.0:
+            # Against another species it is the hue that has a step.
+            edge = _edge(picture.hue, disc, k, hue_sign, _LEAST_HUE_STEP, _OTHER_HUE)
+        if edge != edge:
+            continue
+        off = edge / _HALF_WEIGHT_PX
+        weight = 1.0 / (1.0 + off * off) if robust else 1.0
+        seen += 1
+        total += weight * edge * edge
+        row[0], row[1] = _COSINES[k], _SINES[k]
+        for a in range(3):
+            right[a] += weight * row[a] * edge
+            for b in range(a, 3):
+                normal[a, b] += weight * row[a] * row[b]
+    return seen, total
 
 
 @compiled
@@ -216,8 +245,7 @@ def _has_neighbour(discs: NDArray[np.float64], own: int) -> bool:
 
 @compiled
 def refit(
-    darkness: NDArray[np.uint8],
-    hue: NDArray[np.int16],
+    picture: Picture,
     hue_sign: float,
     discs: NDArray[np.float64],
     first: int,
@@ -229,7 +257,7 @@ def refit(
 
     Parameters
     ----------
-    darkness, hue, hue_sign, expected
+    picture, hue_sign, expected
         See `fit_circle`.
     discs : ndarray (n, 3), [px]
         Of all species; `count` of them from `first` on are replaced.
@@ -242,10 +270,10 @@ def refit(
         if not _has_neighbour(discs, first + k):
             continue
         before = discs[first + k].copy()
-        fit_circle(darkness, hue, hue_sign, discs, first + k, discs.shape[0], expected, fit)
+        fit_circle(picture, hue_sign, discs, first + k, discs.shape[0], expected, fit)
         if fit[2] < _ENOUGH and hue_sign != 0.0:
             # Edges against the other species show in the colour.
             alone[k] = before
-            fit_circle(darkness, hue, hue_sign, alone, k, count, expected, fit)
+            fit_circle(picture, hue_sign, alone, k, count, expected, fit)
             discs[first + k] = alone[k]
         fits[k, :3] = fit

@@ -8,7 +8,7 @@ species it is follows from red minus blue over their sum, which shading does not
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,28 @@ if TYPE_CHECKING:
 
 FLOOR, RED, BLUE, GRAY, UNKNOWN = range(5)
 """What a pixel shows; UNKNOWN is a highlight, a glare, or what fits no species of the tray."""
+
+
+class Picture(NamedTuple):
+    """What the pixels of a tray show.
+
+    Parameters
+    ----------
+    darkness : ndarray of uint8, (rows, columns)
+        0 for the floor, 255 for black.
+    hue : ndarray of int16, (rows, columns), [gray levels]
+        Red minus blue, less that of the floor.
+    shown : ndarray of uint8, (rows, columns)
+        FLOOR to UNKNOWN.
+    covered : ndarray of uint8, (rows, columns)
+        Bit k is set where a bead of kind k was found.
+    """
+
+    darkness: NDArray[np.uint8]
+    hue: NDArray[np.int16]
+    shown: NDArray[np.uint8]
+    covered: NDArray[np.uint8]
+
 
 # Darkness is kept in 255 steps from the floor to black.
 FULL = 255.0
@@ -31,18 +53,15 @@ _GRAY_DARK = 0.45
 _COLOURED = 0.2
 # Gray levels above the floor, in every channel, of a highlight.
 _BRIGHTER = 25
+# Darker than the floor by less is floor, without a closer look, in gray levels.
+_QUIET = 16
 # A floor as bright as this hides what lies on it.
 _SATURATED = 248
 
 
 @compiled
 def look_at_pixels(
-    color: NDArray[np.uint8],
-    floor: NDArray[np.uint8],
-    gray_known: bool,
-    darkness: NDArray[np.uint8],
-    hue: NDArray[np.int16],
-    shown: NDArray[np.uint8],
+    color: NDArray[np.uint8], floor: NDArray[np.uint8], gray_known: bool, picture: Picture
 ) -> None:
     """Compare a picture with the empty floor, pixel by pixel.
 
@@ -51,13 +70,10 @@ def look_at_pixels(
     color, floor : ndarray of uint8, (rows, columns, 3), bgr
     gray_known : bool
         Whether the tray has a gray species: dark gray is UNKNOWN otherwise.
-    darkness : ndarray of uint8, (rows, columns)
-        Written: 0 for the floor or brighter, 255 for black.
-    hue : ndarray of int16, (rows, columns), [gray levels]
-        Written: red minus blue, less that of the floor.
-    shown : ndarray of uint8, (rows, columns)
-        Written: FLOOR to UNKNOWN.
+    picture : Picture
+        Written, but for `covered`.
     """
+    darkness, hue, shown = picture.darkness, picture.hue, picture.shown
     for i in range(color.shape[0]):
         for j in range(color.shape[1]):
             # Signed: differences of uint8 would wrap around.
@@ -67,12 +83,17 @@ def look_at_pixels(
             floor_b = np.int32(floor[i, j, 0])
             floor_g = np.int32(floor[i, j, 1])
             floor_r = np.int32(floor[i, j, 2])
-            down = max(floor_b - blue, floor_g - green, floor_r - red)
-            up = min(blue - floor_b, green - floor_g, red - floor_r)
-            level = max(floor_b, floor_g, floor_r, 1)
-            warm = (red - blue) - (floor_r - floor_b)
-            darkness[i, j] = min(max(FULL * down, 0.0) / level, FULL)
+            down = int(max(floor_b - blue, floor_g - green, floor_r - red))
+            up = int(min(blue - floor_b, green - floor_g, red - floor_r))
+            level = max(int(floor_b), int(floor_g), int(floor_r), 1)
+            warm = int((red - blue) - (floor_r - floor_b))
             hue[i, j] = warm
+            if -_QUIET < down < _QUIET and up <= _BRIGHTER and level < _SATURATED:
+                # Most pixels are floor: no division for them.
+                darkness[i, j] = down if down > 0 else 0
+                shown[i, j] = FLOOR
+                continue
+            darkness[i, j] = int(min(max(FULL * down, 0.0) / level, FULL))
             if min(floor_b, floor_g, floor_r) >= _SATURATED or up > _BRIGHTER:
                 shown[i, j] = UNKNOWN
             elif down <= _DARK * level:
@@ -92,28 +113,21 @@ _DUSTY_STEPS = 5
 
 
 @compiled
-def look_at_dusty_pixels(
-    hue: NDArray[np.int16],
-    floor: NDArray[np.uint8],
-    darkness: NDArray[np.uint8],
-    shown: NDArray[np.uint8],
-) -> None:
+def look_at_dusty_pixels(floor: NDArray[np.uint8], picture: Picture) -> None:
     """The same for beads and floor under chalk, and glare: only the hue tells them apart.
 
     Parameters
     ----------
-    hue : ndarray of int16, (rows, columns), [gray levels]
-        Smoothed: patches of chalk on a bead have none.
     floor : ndarray of uint8, (rows, columns, 3), bgr
-    darkness : ndarray of uint8, (rows, columns)
-        Written: how much hue there is, 255 for a bead.
-    shown : ndarray of uint8, (rows, columns)
-        Written: FLOOR, RED, BLUE or UNKNOWN.
+    picture : Picture
+        With its hue, smoothed: patches of chalk on a bead have none. `shown` is written, and
+        `darkness`, to how much hue there is.
     """
+    darkness, hue, shown = picture.darkness, picture.hue, picture.shown
     for i in range(hue.shape[0]):
         for j in range(hue.shape[1]):
             warm = np.int32(hue[i, j])
-            darkness[i, j] = min(_DUSTY_STEPS * abs(warm), FULL)
+            darkness[i, j] = min(_DUSTY_STEPS * abs(warm), np.int32(255))
             if warm > _DUSTY_HUE:
                 shown[i, j] = RED
             elif warm < -_DUSTY_HUE:

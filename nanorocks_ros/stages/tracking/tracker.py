@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.records import Tracks, TrayImage
+from nanorocks_ros.records import Quality, Tracks, TrayImage
 from nanorocks_ros.stages.tracking.detect import BeadDetector
 from nanorocks_ros.stages.tracking.link import Linker
 
@@ -18,6 +18,11 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
 
 _NS = 1e9
+# Of the beads of a species, a share below which speeds and counts are not to be relied upon.
+_FEW = 0.85
+# What light and shadow, and patches of chalk, move the outline of a bead by, [px]: the same from
+# picture to picture, so that velocities have no part in it.
+_SYSTEMATIC_PX, _DUSTY_PX = 0.06, 0.35
 
 
 class Tracker:
@@ -71,7 +76,7 @@ class Tracker:
             errors = np.hypot(found.place_errors, registration)
             moved = replace(found, places=found.places + shift, place_errors=errors)
             self._next_number += linker.push(time, moved, shift, self._next_number)
-        return (self._tracks(image.stamp_ns, time, displacement),)
+        return (self._tracks(image, time, displacement),)
 
     def _linker(self, expected: int, shape: tuple[int, ...]) -> Linker:
         return Linker(
@@ -80,9 +85,10 @@ class Tracker:
             self._settings.fastest * self._scale,
             self._settings.longest_gap,
             self._settings.window,
+            _DUSTY_PX if self._tray.chalk else _SYSTEMATIC_PX,
         )
 
-    def _tracks(self, stamp_ns: int, time: float, displacement: NDArray[np.float64]) -> Tracks:
+    def _tracks(self, image: TrayImage, time: float, displacement: NDArray[np.float64]) -> Tracks:
         shift = displacement * self._scale
         parts = [_in_view(k, linker, time, shift) for k, linker in enumerate(self._linkers)]
         ids, species, places, errors, velocities, velocity_errors, radii, radius_errors, seen = (
@@ -91,7 +97,7 @@ class Tracker:
         order = np.argsort(ids, kind='stable')
         metre = 1.0 / self._scale
         return Tracks(
-            stamp_ns=stamp_ns,
+            stamp_ns=image.stamp_ns,
             tray=self._tray.number,
             ids=ids[order],
             species=species[order],
@@ -104,7 +110,14 @@ class Tracker:
             radius_errors=metre * radius_errors[order],
             seen=seen[order],
             expected=self._expected,
+            quality=image.quality | self._few(species[seen]),
         )
+
+    def _few(self, species: NDArray[np.int32]) -> Quality:
+        """What the species of the beads that are seen say of how many are not."""
+        counts = np.bincount(species, minlength=self._expected.size)
+        few = (counts < _FEW * self._expected).any()
+        return Quality.FEW_BEADS if few else Quality(0)
 
 
 def _in_view(
@@ -120,7 +133,7 @@ def _in_view(
         linker.numbers,
         np.full(shown.size, species, dtype=np.int32),
         np.where(seen[:, None], places, predicted),
-        np.where(seen, errors, np.sqrt(variances)),
+        np.hypot(np.where(seen, errors, np.sqrt(variances)), linker.systematic),
         velocities,
         velocity_errors,
         linker.radii,

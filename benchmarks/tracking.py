@@ -1,0 +1,377 @@
+"""Tracks against the truth: beads found, links beside trackpy, mean speeds, and the cost.
+
+Everything is filmed: the whole plate through the lens with all effects (JPEG 85), or one tray
+after the other without any. A link is a bead in one picture joined to one in the next.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
+
+from nanorocks_ros.experiment.settings import (
+    PipelineSettings,
+    SceneSettings,
+    SimulationSettings,
+    TrackingSettings,
+    with_values,
+)
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.experiment.view import View
+from nanorocks_ros.records import BeadsTruth, Frame, Tracks, TrayImage
+from nanorocks_ros.simulation.scene.film import SceneFilm, without_effects
+from nanorocks_ros.stages.preprocess import Preprocessor
+from nanorocks_ros.stages.tracking.detect import BeadDetector, Detections
+from nanorocks_ros.stages.tracking.link import Linker
+from nanorocks_ros.stages.tracking.mean_speed import mean_speed
+from nanorocks_ros.stages.tracking.tracker import Tracker
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
+
+_SCALE = 12500.0
+_TRAYS = (1, 2, 3, 4, 5, 6, 7)
+_RATE = 30.0
+_WARM_UP = 45
+_FRAMES = 150
+_SPEEDS = (0.1e-3, 0.5e-3, 2e-3, 7e-3, 15e-3)
+# Mean speed in the image plane over that in space, of an isotropic gas.
+_PROJECTED = np.pi / 4.0
+# Gray levels added by a reflection, beyond which a place lies in the glare.
+_GLARE_LEVEL = 60.0
+_LEAST_DISTANCE = 1.5 / _SCALE
+_NS = 1e9
+
+
+@dataclass(frozen=True)
+class _Shot:
+    """One frame: its JPEG, the images of the trays, the truth."""
+
+    jpeg: NDArray[np.uint8]
+    images: dict[int, TrayImage]
+    truth: dict[int, BeadsTruth]
+
+
+def _filmed(
+    speed: float, *, effects: bool, frames: int, trays: tuple[int, ...] = _TRAYS, **values: float
+) -> tuple[list[_Shot], SceneFilm]:
+    scene = with_values(SceneSettings(trays=trays), {'swing_knocks': False}, 'benchmark')
+    scene = scene if effects else without_effects(scene)
+    simulation = SimulationSettings(
+        mean_speed=speed / _PROJECTED, first_shake=0.3, frame_rate=_RATE, **values
+    )
+    film = SceneFilm(simulation, scene)
+    names = {
+        'trays': list(trays),
+        'preprocess.layout': 'plate',
+        'preprocess.pixels_per_metre': _SCALE,
+    }
+    settings = with_values(PipelineSettings(), names, 'benchmark')
+    flown = load_trays()
+    view = View(camera=film.camera.geometry.camera)
+    stage = Preprocessor(settings, {n: flown[n] for n in trays}, 'film', view)
+    shots = []
+    for moment in film.moments(frames):
+        jpeg = cv2.imencode('.jpg', moment.frame.image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
+        image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR) if effects else moment.frame.image
+        frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
+        found = [one for one in stage.push(frame) if isinstance(one, TrayImage)]
+        shots.append(
+            _Shot(jpeg, {one.tray: one for one in found}, {one.tray: one for one in moment.beads})
+        )
+    return shots, film
+
+
+def _tracked(shots: list[_Shot], tray: int) -> Iterator[tuple[Tracks, BeadsTruth]]:
+    settings = with_values(
+        PipelineSettings(), {'preprocess.pixels_per_metre': _SCALE}, 'benchmark'
+    )
+    tracker = Tracker(settings, load_trays()[tray])
+    for shot in shots:
+        if tray in shot.images:
+            for tracks in tracker.push(shot.images[tray]):
+                yield tracks, shot.truth[tray]
+
+
+def _pairs(
+    known: NDArray[np.float64], found: NDArray[np.float64], reach: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    apart = cdist(known, found)
+    rows, columns = linear_sum_assignment(np.minimum(apart, reach))
+    near = apart[rows, columns] < reach
+    return rows[near], columns[near]
+
+
+def _in_glare(film: SceneFilm, tray: int, places: NDArray[np.float64]) -> NDArray[np.bool_]:
+    levels = film.camera.glare
+    if levels is None:
+        return np.zeros(len(places), dtype=bool)
+    geometry = film.camera.geometry
+    region = geometry.regions[tray]
+    points = geometry.camera.distorted(places * _SCALE + (region.x, region.y))
+    columns, rows = points.astype(np.int64).T
+    return levels[rows, columns] > _GLARE_LEVEL
+
+
+def _report_counts(shots: list[_Shot], film: SceneFilm) -> None:
+    """[B19] table 2: tracked over true particles; and what the places are off."""
+    print('\nTracked / true beads, all effects, 7 mm/s; "outside" is outside the glare\n')
+    print(
+        '| tray | species | true | seen | seen, outside | followed | found and right, outside | '
+        'rms error [px] | sd of error / its error |'
+    )
+    print('| --- | --- | --- | --- | --- | --- | --- | --- | --- |')
+    for number in _TRAYS:
+        tray = load_trays()[number]
+        records = list(_tracked(shots, number))[_WARM_UP:]
+        for index, species in enumerate(tray.species):
+            print(_count_row(records, film, number, index, species.material))
+
+
+def _count_row(
+    records: list[tuple[Tracks, BeadsTruth]], film: SceneFilm, number: int, index: int, name: str
+) -> str:
+    seen, seen_outside, followed, right, true, outside = [], [], [], [], [], []
+    errors, pulls = [np.empty((0, 2))], [np.empty((0, 2))]
+    for tracks, truth in records:
+        own = truth.species == index
+        places = truth.positions[own, :2]
+        clear = ~_in_glare(film, number, places)
+        ours = tracks.seen & (tracks.species == index)
+        positions = tracks.positions[ours]
+        rows, columns = _pairs(places, positions, 0.6 * float(truth.radii[own].min()))
+        true.append(own.sum())
+        outside.append(clear.sum())
+        seen.append(ours.sum())
+        seen_outside.append((~_in_glare(film, number, positions)).sum())
+        followed.append((tracks.species == index).sum())
+        right.append(clear[rows].sum())
+        error = positions[columns] - places[rows]
+        errors.append(error * _SCALE)
+        pulls.append(error / tracks.position_errors[ours][columns, None])
+    error, pull = np.concatenate(errors), np.concatenate(pulls)
+    if not error.size:
+        return f'| {number} | {name} | {np.mean(true):.0f} | not followed | | | | | |'
+    return (
+        f'| {number} | {name} | {np.mean(true):.0f} | {np.sum(seen) / np.sum(true):.1%} | '
+        f'{np.sum(seen_outside) / np.sum(outside):.1%} | {np.sum(followed) / np.sum(true):.1%} | '
+        f'{np.sum(right) / np.sum(outside):.1%} | {np.sqrt(np.mean(error**2)):.2f} | '
+        f'{np.median(np.abs(pull)) / 0.6745:.1f} |'
+    )
+
+
+def _report_links() -> None:
+    """Our linker and trackpy on the same detections, in one run."""
+    print('\nLinks, no effects; the same detections for both, made without knowledge of tracks\n')
+    print(
+        '| tray, species, v | linker | right / possible links | wrong / made links | '
+        'identity switches per bead and minute | ms per frame |'
+    )
+    print('| --- | --- | --- | --- | --- | --- |')
+    for number, index, speed in ((1, 0, 7e-3), (3, 0, 15e-3), (3, 1, 7e-3), (5, 0, 15e-3),
+                                 (5, 1, 15e-3), (7, 1, 7e-3)):  # fmt: skip
+        shots, _ = _filmed(speed, effects=False, frames=_FRAMES, trays=(number,))
+        found, beads = _detections(shots, number, index)
+        name = f'{number}, {load_trays()[number].species[index].material}, {1e3 * speed:g} mm/s'
+        for linker, link in (('ours', _link_ours), *_trackpy_linkers(found, beads, number, index)):
+            link(found, number, index)
+            start = time.process_time()
+            numbers = link(found, number, index)
+            cost = (time.process_time() - start) / len(found)
+            right, wrong, switches = _judge(numbers, beads)
+            print(f'| {name} | {linker} | {right:.2%} | {wrong:.3%} | {switches:.2f} | '
+                  f'{1e3 * cost:.2f} |', flush=True)  # fmt: skip
+
+
+def _trackpy_linkers(
+    found: list[Detections], beads: list[NDArray[np.int64]], number: int, index: int
+) -> list[tuple[str, Callable[..., list[NDArray[np.int64]]]]]:
+    """trackpy with its nearest-velocity prediction, at the range that links best here."""
+    import trackpy
+
+    best: tuple[float, float] | None = None
+    for diameters in (0.5, 0.75, 1.0, 1.5):
+        try:
+            numbers = _link_trackpy(found, number, index, diameters)
+        except trackpy.linking.SubnetOversizeException:
+            break
+        right = _judge(numbers, beads)[0]
+        if best is None or right > best[0]:
+            best = right, diameters
+    if best is None:
+        print(f'| {number}, {index} | trackpy | refuses: too crowded | | | |')
+        return []
+    link = partial(_link_trackpy, diameters=best[1])
+    return [(f'trackpy, range {best[1]:g} d', link)]
+
+
+def _detections(
+    shots: list[_Shot], number: int, index: int
+) -> tuple[list[Detections], list[NDArray[np.int64]]]:
+    """What is seen in each picture, and which bead each of them is; -1 for none."""
+    tray = load_trays()[number]
+    detector = BeadDetector(TrackingSettings(), tray, _SCALE)
+    found, beads = [], []
+    for shot in shots:
+        if number not in shot.images:
+            # Without noise, resting beads are the same picture twice, and left out.
+            continue
+        one = detector.detect(shot.images[number].color)[index]
+        truth = shot.truth[number]
+        own = np.flatnonzero(truth.species == index)
+        rows, columns = _pairs(
+            truth.positions[own, :2], one.places / _SCALE, 0.6 * float(truth.radii[own].min())
+        )
+        bead = np.full(one.radii.size, -1)
+        bead[columns] = own[rows]
+        found.append(one)
+        beads.append(bead)
+    return found[_WARM_UP // 3 :], beads[_WARM_UP // 3 :]
+
+
+def _link_ours(found: list[Detections], number: int, index: int) -> list[NDArray[np.int64]]:
+    tray, settings = load_trays()[number], TrackingSettings()
+    size = (tray.dimensions[0] * _SCALE, tray.dimensions[1] * _SCALE)
+    linker = Linker(
+        tray.species[index].count,
+        size,
+        settings.fastest * _SCALE,
+        settings.longest_gap,
+        settings.window,
+        0.0,
+    )
+    first, numbers = 0, []
+    for k, one in enumerate(found):
+        first += linker.push(k / _RATE, one, np.zeros(2), first)
+        places, _ = linker.places()
+        here = linker.last == k / _RATE
+        row = np.full(one.radii.size, -1)
+        apart = cdist(one.places, places[here])
+        nearest = apart.argmin(axis=1)
+        same = apart[np.arange(apart.shape[0]), nearest] == 0.0
+        row[same] = linker.numbers[here][nearest[same]]
+        numbers.append(row)
+    return numbers
+
+
+def _link_trackpy(
+    found: list[Detections], number: int, index: int, diameters: float
+) -> list[NDArray[np.int64]]:
+    import pandas as pd
+    import trackpy
+
+    trackpy.quiet()
+    tray = load_trays()[number]
+    reach = diameters * tray.species[index].diameter * _SCALE
+    frames = np.repeat(np.arange(len(found)), [one.radii.size for one in found])
+    places = np.concatenate([one.places for one in found])
+    table = pd.DataFrame({'frame': frames, 'x': places[:, 0], 'y': places[:, 1]})
+    predictor = trackpy.predict.NearestVelocityPredict()
+    linked = predictor.link_df(table, search_range=reach, memory=int(_RATE))
+    numbers = linked.sort_index()['particle'].to_numpy()
+    return np.split(numbers, np.cumsum([one.radii.size for one in found])[:-1])
+
+
+def _judge(
+    numbers: list[NDArray[np.int64]], beads: list[NDArray[np.int64]]
+) -> tuple[float, float, float]:
+    """Right links of those possible, wrong ones of those made, switches per bead and minute."""
+    possible = right = made = switches = 0
+    last_number: dict[int, int] = {}
+    before: tuple[dict[int, int], dict[int, int]] = ({}, {})
+    for row, bead in zip(numbers, beads, strict=True):
+        of_bead = {int(b): int(n) for n, b in zip(row, bead, strict=True) if b >= 0}
+        of_number = {int(n): int(b) for n, b in zip(row, bead, strict=True) if n >= 0}
+        possible += len(of_bead.keys() & before[0].keys())
+        right += sum(
+            before[0].get(b) == n and n >= 0 for b, n in of_bead.items() if b in before[0]
+        )
+        made += len(of_number.keys() & before[1].keys())
+        switches += sum(last_number.get(b, n) != n for b, n in of_bead.items() if n >= 0)
+        last_number.update({b: n for b, n in of_bead.items() if n >= 0})
+        before = of_bead, of_number
+    minutes = len(last_number) * len(numbers) / _RATE / 60.0
+    return right / possible, 1.0 - right / max(made, 1), switches / minutes
+
+
+def _report_speeds() -> None:
+    print('\nMean projected speed / truth (sd of one estimate), by tray and species\n')
+    heads = [f'{1e3 * one:g} mm/s' for one in _SPEEDS]
+    print('| tray, species, effects | ' + ' | '.join(heads) + ' |')
+    print('| --- |' + ' --- |' * len(heads))
+    for effects in (False, True):
+        cells: dict[str, list[str]] = {}
+        for speed in _SPEEDS:
+            frames = _FRAMES if speed < 1e-3 else 90
+            shots, _ = _filmed(
+                speed, effects=effects, frames=frames, restitution=1.0, wall_restitution=1.0
+            )
+            for number in _TRAYS:
+                for index, species in enumerate(load_trays()[number].species):
+                    name = f'{number}, {species.material}, {"all" if effects else "none"}'
+                    cells.setdefault(name, []).append(_speed_cell(shots, number, index))
+        for name, row in cells.items():
+            print(f'| {name} | ' + ' | '.join(row) + ' |', flush=True)
+
+
+def _speed_cell(shots: list[_Shot], number: int, index: int) -> str:
+    records = list(_tracked(shots, number))[12:]
+    stamps = np.array([one.stamp_ns for one, _ in records])
+    true = np.array([one.projected_speeds[one.species == index].mean() for _, one in records])
+    ratios = []
+    for end in range(40, len(records), 5):
+        tracks = [one for one, _ in records[:end]]
+        found = mean_speed(tracks, least_distance=_LEAST_DISTANCE, species=index)
+        if found is not None:
+            inside = np.abs(stamps - found.stamp_ns) <= 0.5 * found.window * _NS + 1e6
+            ratios.append(found.mean_projected_speed / true[inside].mean())
+    return f'{np.mean(ratios):.3f} ({np.std(ratios):.3f})' if ratios else 'unknown'
+
+
+def _report_cost(shots: list[_Shot]) -> None:
+    """Processor time of the trackers, beside that of decoding the same frames."""
+    start = time.process_time()
+    for shot in shots:
+        cv2.imdecode(shot.jpeg, cv2.IMREAD_COLOR)
+    decoding = (time.process_time() - start) / len(shots)
+    print('\n| tray | ms per frame | / decoding the JPEG of the frame |')
+    print('| --- | --- | --- |')
+    total = 0.0
+    for number in _TRAYS:
+        settings = with_values(
+            PipelineSettings(), {'preprocess.pixels_per_metre': _SCALE}, 'benchmark'
+        )
+        tracker = Tracker(settings, load_trays()[number])
+        images = [shot.images[number] for shot in shots if number in shot.images]
+        for image in images[:_WARM_UP]:
+            tracker.push(image)
+        start = time.process_time()
+        for image in images[_WARM_UP:]:
+            tracker.push(image)
+        cost = (time.process_time() - start) / (len(images) - _WARM_UP)
+        total += cost
+        print(f'| {number} | {1e3 * cost:.2f} | {cost / decoding:.2f} |')
+    print(f'| all | {1e3 * total:.2f} | {total / decoding:.2f} |')
+
+
+def report() -> None:
+    """Print the tables."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        shots, film = _filmed(7e-3, effects=True, frames=_FRAMES)
+        _report_counts(shots, film)
+        _report_cost(shots)
+        _report_links()
+        _report_speeds()
+    finally:
+        cv2.setNumThreads(threads)

@@ -1,0 +1,101 @@
+"""Mean speed from tracks: of made-up tracks, whose speeds are known, and of a film."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.records import Tracks
+from nanorocks_ros.stages.tracking.mean_speed import mean_speed
+from nanorocks_ros.stages.tracking.tracker import Tracker
+
+from .films import RATE, SCALE, pipeline_settings, tray_film
+
+PIXEL = 1.0 / SCALE
+
+
+def _tracks(velocities, jitter, frames, seed=1, species=None):
+    """Beads in free flight, with places that jitter."""
+    rng = np.random.default_rng(seed)
+    n = len(velocities)
+    start = rng.uniform(0.0, 0.01, (n, 2))
+    species = np.zeros(n, dtype=np.int32) if species is None else species
+    for k in range(frames):
+        yield Tracks(
+            stamp_ns=round(k / RATE * 1e9),
+            tray=1,
+            ids=np.arange(n, dtype=np.int32),
+            species=species,
+            displacement=np.zeros(2),
+            positions=start + velocities * k / RATE + rng.normal(0.0, jitter, (n, 2)),
+            position_errors=np.full(n, jitter),
+            velocities=np.full((n, 2), np.nan),
+            velocity_errors=np.full(n, np.nan),
+            radii=np.full(n, 1e-3),
+            radius_errors=np.full(n, 1e-5),
+            seen=np.ones(n, dtype=bool),
+            expected=np.array([n], dtype=np.int32),
+        )
+
+
+@pytest.mark.parametrize('speed', [0.1e-3, 0.5e-3, 2e-3, 15e-3])
+def test_the_speed_of_a_maxwellian_gas_is_right_whatever_the_jitter(speed):
+    rng = np.random.default_rng(5)
+    velocities = rng.normal(0.0, speed * np.sqrt(2.0 / np.pi), (400, 2))
+    true = np.hypot(*velocities.T).mean()
+    for jitter in (0.02 * PIXEL, 0.3 * PIXEL):
+        found = mean_speed(list(_tracks(velocities, jitter, 90)), least_distance=1.5 * PIXEL)
+        assert found.mean_projected_speed == pytest.approx(true, rel=0.03)
+
+
+def test_resting_beads_do_not_move():
+    found = [
+        mean_speed(
+            list(_tracks(np.zeros((40, 2)), 0.1 * PIXEL, 60, seed)), least_distance=1.5 * PIXEL
+        )
+        for seed in range(10)
+    ]
+    speeds = [one.mean_projected_speed for one in found]
+    # Jitter from picture to picture alone would look like 5 px/s.
+    assert np.mean(speeds) < 0.1 * PIXEL
+    assert all(one.mean_projected_speed <= 4.0 * one.mean_projected_speed_error for one in found)
+
+
+def test_each_species_has_a_speed_of_its_own():
+    velocities = np.zeros((20, 2))
+    velocities[:10, 0], velocities[10:, 1] = 2e-3, 6e-3
+    species = np.repeat([0, 1], 10).astype(np.int32)
+    tracks = list(_tracks(velocities, 0.05 * PIXEL, 30, species=species))
+    for index, speed in ((0, 2e-3), (1, 6e-3)):
+        found = mean_speed(tracks, least_distance=1.5 * PIXEL, species=index)
+        assert found.mean_projected_speed == pytest.approx(speed, rel=0.03)
+        assert found.beads == 10
+    both = mean_speed(tracks, least_distance=1.5 * PIXEL)
+    assert both.mean_projected_speed == pytest.approx(4e-3, rel=0.03)
+
+
+def test_nothing_is_said_of_two_beads_or_two_pictures():
+    tracks = list(_tracks(np.full((5, 2), 1e-3), 1e-6, 20))
+    assert mean_speed(tracks[:2], least_distance=PIXEL) is None
+    assert mean_speed([], least_distance=PIXEL) is None
+    few = list(_tracks(np.full((2, 2), 1e-3), 1e-6, 20))
+    assert mean_speed(few, least_distance=PIXEL) is None
+
+
+@pytest.mark.parametrize('speed', [0.5e-3, 7e-3])
+def test_the_mean_speed_of_a_filmed_gas_is_right_within_five_percent(speed):
+    tracker = Tracker(pipeline_settings(1), load_trays()[1])
+    tracks, true, ratios = [], [], []
+    for k, (image, truth) in enumerate(
+        tray_film(1, 90, speed=speed, restitution=1.0, wall_restitution=1.0)
+    ):
+        if k > 7:
+            tracks += tracker.push(image)
+            true.append(np.hypot(*truth.velocities[:, :2].T).mean())
+            found = mean_speed(tracks, least_distance=1.5 * PIXEL)
+            if found is not None and len(tracks) > 30:
+                frames = round(found.window * RATE)
+                ratios.append(found.mean_projected_speed / np.mean(true[-frames - 1 :]))
+    assert len(ratios) > 40
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.05)
