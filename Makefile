@@ -35,15 +35,20 @@ help: ## List the targets
 demo: venv ## Simulate a tray, watch it cool, estimate the coefficient of restitution
 	@$(RUN) python $(VENV)/lib/nanorocks_ros/demo
 
+# Nodes talk to one another in real time, so their tests have the machine for themselves.
+ALONE := test/nodes test/test_colcon.py
+SIDE_BY_SIDE := --numprocesses auto --dist loadfile $(patsubst %,--ignore=%,$(ALONE))
+
 test: venv ## Run all tests, then those of the core with the oldest dependencies
-	@$(RUN) python -m pytest $(PYTEST_ARGS)
+	@$(RUN) python -m pytest $(SIDE_BY_SIDE) $(PYTEST_ARGS)
+	@$(RUN) python -m pytest $(ALONE) $(PYTEST_ARGS)
 	@$(MAKE) test-oldest
 
 # Published values are compared once: the engine is the same, bit by bit, with all dependencies.
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 PATH="$(CURDIR)/$(OLDEST)/bin:$$PATH" python -m pytest \
-	    --ignore=test/nodes --ignore=test/test_colcon.py --ignore=test/validation $(PYTEST_ARGS)
+	    $(SIDE_BY_SIDE) --ignore=test/validation $(PYTEST_ARGS)
 
 lint: venv ## Check style, format, types and which module may import which
 	@$(RUN) ruff check .

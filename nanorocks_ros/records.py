@@ -250,7 +250,7 @@ class SpeedEstimate:
     mean_projected_speed_error: float
     window: float
     method: SpeedMethod
-    quality: Quality = Quality(0)
+    quality: Quality = NOTHING_WRONG
     first_species_speed: float = UNKNOWN
     first_species_speed_error: float = UNKNOWN
     second_species_speed: float = UNKNOWN

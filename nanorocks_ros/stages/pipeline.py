@@ -14,6 +14,7 @@ from nanorocks_ros.records import (
     MotionMask,
     Notice,
     SpeedEstimate,
+    Tracks,
     TrayImage,
 )
 from nanorocks_ros.stages.clusters import ClusterAutocorrelator
@@ -30,6 +31,7 @@ Result = (
     TrayImage
     | MotionMask
     | SpeedEstimate
+    | Tracks
     | ClusterEstimate
     | Autocorrelation
     | CorEstimate

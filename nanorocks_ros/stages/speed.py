@@ -49,6 +49,7 @@ class SpeedEstimator:
         self._area.emit_speed = speed.method == 'binarised_area'
         self._structure = StructureSpeed(self._settings, self._tray)
         self._tracks = TrackSpeed(self._settings, self._tray)
+        self._idle = False
         self._held: list[SpeedEstimate] = []
         self._last_emitted_ns: int | None = None
         self._last_stamp_ns: int | None = None
@@ -73,12 +74,14 @@ class SpeedEstimator:
             records = self._tracks.push(image, self._shakes, shaken)
             found += [one for one in records if isinstance(one, Tracks) and self.emit_tracks]
             found += self._by_tracks([one for one in records if isinstance(one, SpeedEstimate)])
-        if method in ('auto', 'structure_function'):
-            speeds = self._structure.push(image, self._shakes, shaken)
-            if method == 'structure_function' or (
-                self._tracks.judged and not self._tracks.reliable
-            ):
+        if method == 'structure_function' or (method == 'auto' and not self._tracks.reliable):
+            # After a while without images those from before are of no use.
+            speeds = self._structure.push(image, self._shakes, shaken or self._idle)
+            self._idle = False
+            if method == 'structure_function' or self._tracks.judged:
                 found += speeds
+        else:
+            self._idle = True
         return tuple(one for one in found if self._in_order(one))
 
     def _by_tracks(self, speeds: list[SpeedEstimate]) -> list[SpeedEstimate]:

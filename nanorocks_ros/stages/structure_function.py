@@ -99,6 +99,8 @@ class StructureFunction:
 
     def shaken(self) -> None:
         """Forget the images from before a shaking event, all but the last."""
+        if not self._images:
+            return
         last, shift = self._images[-1], self._shifts[-1]
         self._images.clear()
         self._images.append(last)

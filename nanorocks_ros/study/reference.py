@@ -10,7 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.experiment import settings as st
-from nanorocks_ros.records import ClusterEstimate, CorEstimate, GroundTruth, SpeedEstimate, TrayState
+from nanorocks_ros.records import (
+    ClusterEstimate,
+    CorEstimate,
+    GroundTruth,
+    SpeedEstimate,
+    TrayState,
+)
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.beads import beads_layout
 from nanorocks_ros.wire.layouts import layout
