@@ -30,6 +30,7 @@ from nanorocks_ros.records import (
     GroundTruth,
     MotionMask,
     Notice,
+    Quality,
     SpeedEstimate,
     TrayImage,
 )
@@ -49,6 +50,7 @@ _IMAGES = {
 RESULT_TOPICS = (
     *_ARRAYS.values(),
     topics.STATE,
+    topics.TRACKS,
     *(topic for both in _IMAGES.values() for topic, _ in both),
 )
 _OVERRIDABLE = QoSOverridingOptions(
@@ -212,6 +214,13 @@ class NanorocksNode(Node):
                     frame_id = f'tray_{record.tray}'
                     message = image_message(record.stamp_ns, frame_id, pixels)
                     self.send(topic, message, record.tray)
+        if isinstance(record, SpeedEstimate | TrayImage):
+            flags = [flag.name.lower() for flag in Quality if flag in record.quality]
+            self.state[f'tray {record.tray} quality'] = ', '.join(flags) or 'good'
+        if isinstance(record, SpeedEstimate):
+            method = record.method.name.lower().replace('_', ' ')
+            speed = f'{1e3 * record.mean_projected_speed:.3f} mm/s by {method}'
+            self.state[f'tray {record.tray} speed'] = speed
         if isinstance(record, CorEstimate):
             name = f'tray {record.tray} COR'
             self.state[name] = f'{record.restitution:.4f} {record.status.name.lower()}'

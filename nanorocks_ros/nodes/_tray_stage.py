@@ -10,8 +10,9 @@ from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._join import TrayJoiner
 from nanorocks_ros.nodes._node import NanorocksNode
+from nanorocks_ros.nodes._tracks import TracksPicture
 from nanorocks_ros.recordings.images import frame_from_image
-from nanorocks_ros.records import TrayImage, TrayState
+from nanorocks_ros.records import Tracks, TrayImage, TrayState
 from nanorocks_ros.stages.pipeline import trays_of
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import from_array
@@ -55,6 +56,7 @@ class TrayStageNode(NanorocksNode):
 
     def _adopt(self, settings, stages):
         self._settings, self._stages = settings, stages
+        self._picture = TracksPicture(self, calibrated(settings).preprocess.pixels_per_metre)
 
     def _take_gray(self, tray, message):
         frame = frame_from_image(message, self.resolve_topic_name(topics.GRAY.of(tray)))
@@ -89,7 +91,10 @@ class TrayStageNode(NanorocksNode):
         stage = self._stages[image.tray]
         self.prepare(stage, image.tray)
         for record in stage.push(image):
-            self.publish_result(record, self._epoch.ns)
+            if isinstance(record, Tracks):
+                self._picture.send(image, record)
+            else:
+                self.publish_result(record, self._epoch.ns)
 
     def prepare(self, stage, tray):
         """Tell the stage which pictures somebody wants to see."""

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.experiment import settings as st
+from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.nodes import _sources
 from nanorocks_ros.nodes._camera import Camera
 from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._node import RESULT_TOPICS, NanorocksNode
 from nanorocks_ros.nodes._pacing import Pacer
+from nanorocks_ros.nodes._tracks import TracksPicture
+from nanorocks_ros.records import Tracks, TrayImage
 from nanorocks_ros.stages.pipeline import Pipeline
 from nanorocks_ros.stages.warm_up import warm_up
 from nanorocks_ros.wire import topics
@@ -52,6 +55,7 @@ class PipelineNode(NanorocksNode):
 
     def _adopt(self, settings, pipeline):
         self._settings, self._pipeline = settings, pipeline
+        self._picture = TracksPicture(self, calibrated(settings).preprocess.pixels_per_metre)
 
     def _straighten(self):
         self._view = self._camera.view
@@ -97,9 +101,17 @@ class PipelineNode(NanorocksNode):
     def _push(self, frame):
         for number, tray in self._pipeline.trays.items():
             tray.speed.emit_mask = self.wanted(topics.MOTION, number)
+            tray.speed.emit_tracks = self._picture.wanted(number)
             tray.clusters.emit_image = self.wanted(topics.AUTOCORRELATION, number)
+        image = None
         for record in self._pipeline.push(frame):
-            self.publish_result(record, self._epoch.ns)
+            if isinstance(record, TrayImage):
+                image = record
+            if isinstance(record, Tracks):
+                # What follows from an image comes right after it.
+                self._picture.send(image, record)
+            else:
+                self.publish_result(record, self._epoch.ns)
 
     def _finish(self):
         if self._reader is not None:

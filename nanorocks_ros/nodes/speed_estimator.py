@@ -11,9 +11,10 @@ class SpeedEstimatorNode(TrayStageNode):
     """Measures the mean projected speed of each tray."""
 
     def __init__(self):
-        outputs = (topics.SPEED, topics.MOTION)
+        outputs = (topics.SPEED, topics.MOTION, topics.TRACKS)
         super().__init__('speed_estimator', SpeedEstimator, outputs, in_color=True)
 
     def prepare(self, stage, tray):
-        """Masks are made only while somebody looks."""
+        """Masks and pictures of tracks are made only while somebody looks."""
         stage.emit_mask = self.wanted(topics.MOTION, tray)
+        stage.emit_tracks = self.wanted(topics.TRACKS, tray)

@@ -68,6 +68,12 @@ MOTION = Topic(
     name='tray_{tray}/motion', type=IMAGE, depth=10, doc='motion mask, mono8: 255 where it moves'
 )
 SPEED = Topic(name='tray_{tray}/speed', type=ARRAY, depth=1000, doc='SpeedEstimate')
+TRACKS = Topic(
+    name='tray_{tray}/tracks',
+    type=IMAGE,
+    depth=10,
+    doc='the tray with its beads and the ways they came, bgr8; hidden beads are magenta',
+)
 CLUSTER = Topic(name='tray_{tray}/cluster', type=ARRAY, depth=1000, doc='ClusterEstimate')
 AUTOCORRELATION = Topic(
     name='tray_{tray}/autocorrelation',
@@ -99,6 +105,7 @@ TOPICS = (
     STATE,
     MOTION,
     SPEED,
+    TRACKS,
     CLUSTER,
     AUTOCORRELATION,
     COR,

@@ -152,13 +152,22 @@ def test_the_simulator_drives_the_graph_and_tells_the_truth(graph):
     assert labels.size == len(layout(CorEstimate).fields)
     names = {status.name for one in diagnostics for status in one.status}
     assert names >= {f'/nanorocks/{name}' for name in STAGES}
+    said = {pair.key for one in diagnostics for status in one.status for pair in status.values}
+    assert said >= {'tray 1 quality', 'tray 1 speed'}
     for stage in stages:
         assert graph.interrupt(stage).code == 0
 
 
 def test_images_are_made_when_somebody_looks(graph):
     seen = defaultdict(list)
-    wanted = (topics.RAW, topics.GRAY, topics.RECTIFIED, topics.MOTION, topics.AUTOCORRELATION)
+    wanted = (
+        topics.RAW,
+        topics.GRAY,
+        topics.RECTIFIED,
+        topics.MOTION,
+        topics.TRACKS,
+        topics.AUTOCORRELATION,
+    )
     for topic in wanted:
         graph.node.create_subscription(Image, topic.of(1), seen[topic.name].append, qos_of(topic))
     process = graph.start('pipeline', 'source:=bag', f'bag:={SAMPLE}', 'loop:=true')
@@ -170,6 +179,7 @@ def test_images_are_made_when_somebody_looks(graph):
         topics.GRAY.name: 'mono8',
         topics.RECTIFIED.name: 'bgr8',
         topics.MOTION.name: 'mono8',
+        topics.TRACKS.name: 'bgr8',
         topics.AUTOCORRELATION.name: '32FC1',
     }
     for found in seen.values():
