@@ -121,7 +121,7 @@ def turned_since(time: float, events: list[float]) -> float:
     ends = [*events[1:], time]
     return sum(
         _COOLING * math.log1p((end - start) / _COOLING)
-        for start, end in zip(events, ends, strict=len(events) > 0)
+        for start, end in zip(events, ends[: len(events)], strict=True)
     )
 
 
