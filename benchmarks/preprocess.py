@@ -1,8 +1,8 @@
 """Preprocessing of all eight trays at 1080p by stage, beside decoding the same JPEGs.
 
 Frames of the simulated plate with all effects, while it swings; one thread; each stage alone,
-best of several rounds, in CPU time. Also how far the stabilisation is from the truth, and the calibration
-from the lens that the scene was filmed with.
+best of several rounds, in CPU time. Also how far the stabilisation is from the truth, and the
+calibration from the lens that the scene was filmed with.
 """
 
 from __future__ import annotations

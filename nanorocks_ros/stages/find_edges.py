@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
 
+# Place across a side [px], strength [gray levels/px] and sign of an edge.
+Peak = tuple[float, float, float]
 Mapping = Callable[['NDArray[np.float64]', int], 'NDArray[np.float64]']
 
 # Along a side, from one place to the next, [px]; the corners are left out, as a share of it.
@@ -28,12 +30,12 @@ _STEP = 0.5
 # Least slope of an edge, in units of what noise gives.
 _CLEAR = 2.0
 _LEAST_SLOPE = 1.5
-# Below this reach [px] all places of a side agree, and so near to one another.
-_NARROW = 10.0
+# Places of a side agree so nearly, [px].
 _NEAR = 2.5
-# Edges that count, as a share of the strongest, and widths of walls, [px].
+# Edges that count, as a share of the strongest; widths of walls, [px] and [m].
 _AS_STRONG = 0.2
-_NARROWEST_WALL, _WIDEST_WALL = 2.5, 24.0
+_NARROWEST_WALL, _WIDEST_WALL = 2.5, 1.9e-3
+_OFF = 3.0
 _WALL_SPREAD = 0.8
 
 
@@ -91,6 +93,8 @@ def find_edges(
     to_picture: Mapping,
     pixels_per_metre: float,
     reach: float,
+    *,
+    walls: bool,
 ) -> Edges:
     """Look for the edges of the trays next to where they should be.
 
@@ -103,19 +107,21 @@ def find_edges(
     pixels_per_metre : float, [px/m]
         About.
     reach : float, [px]
-        To each side of where the edge should be. Below 10 px the outer edges of the walls are
-        told from the inner ones, and from what lies on the floor.
+        To each side of where the edge should be.
+    walls : bool
+        Whether the outer edges of the walls are told from the inner ones, and from what lies on
+        the floor; for that they have to be where they should to a few pixels.
     """
     smooth = np.asarray(cv2.GaussianBlur(gray, (0, 0), 0.8), dtype=np.float32)
     looks = [_look(smooth, tray, to_picture, pixels_per_metre, reach) for tray in trays]
-    wall, anchors = (math.nan, {}) if reach >= _NARROW else _walls(looks)
+    wall, anchors = _walls(looks) if walls else (math.nan, {})
     parts = []
     for look in looks:
         offsets, good = np.empty(len(look.at)), np.zeros(len(look.at), dtype=bool)
         for side in range(4):
             own = look.sides == side
             anchor = anchors.get((look.tray, side))
-            if reach < _NARROW and anchor is None:
+            if walls and anchor is None:
                 continue
             offsets[own], good[own] = _offsets(look.across, look.slope[own], reach, anchor)
         good &= (look.at > reach).all(axis=1)
@@ -151,7 +157,7 @@ def _look(
     # A thousandth of the floor outwards.
     normals = to_picture(places + 1e-3 * _OUTWARD[sides], tray.number) - at
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    across, slope = _slopes(gray, at, normals, max(reach, _WIDEST_WALL))
+    across, slope = _slopes(gray, at, normals, max(reach, _WIDEST_WALL * scale))
     return _Look(tray.number, sides, places, at, normals, across, slope)
 
 
@@ -178,7 +184,7 @@ def _walls(looks: Sequence[_Look]) -> tuple[float, dict[tuple[int, int], float]]
     for key, found in peaks.items():
         if width > 0.0:
             fitting = [one for one in pairs[key] if abs(one[1][0] - one[0][0] - width) < 1.5]
-            best = max(fitting, key=lambda one: min(one[0][1], one[1][1]), default=None)
+            best = max(fitting, key=_likelihood, default=None)
             if best is not None:
                 anchors[key] = best[1][0]
         elif found:
@@ -186,9 +192,17 @@ def _walls(looks: Sequence[_Look]) -> tuple[float, dict[tuple[int, int], float]]
     return width, anchors
 
 
-def _peaks(
-    across: NDArray[np.float64], slope: NDArray[np.float64]
-) -> list[tuple[float, float, float]]:
+def _likelihood(pair: tuple[Peak, Peak]) -> float:
+    """Of two edges that make a wall: strong, and one of them near where the edge should be.
+
+    The wall of the next tray looks the same.
+    """
+    inner, outer = pair
+    off = min(abs(inner[0]), abs(outer[0])) / _OFF
+    return min(inner[1], outer[1]) * math.exp(-0.5 * off * off)
+
+
+def _peaks(across: NDArray[np.float64], slope: NDArray[np.float64]) -> list[Peak]:
     """Place, strength and sign of the edges across a side."""
     strength = np.abs(slope)
     top = (strength[1:-1] > strength[:-2]) & (strength[1:-1] >= strength[2:])
@@ -200,8 +214,8 @@ def _peaks(
 
 
 def _pairs(
-    peaks: list[tuple[float, float, float]],
-) -> list[tuple[tuple[float, float, float], tuple[float, float, float]]]:
+    peaks: list[Peak],
+) -> list[tuple[Peak, Peak]]:
     return [(a, b) for a in peaks for b in peaks if b[0] - a[0] > _NARROWEST_WALL and a[2] != b[2]]
 
 

@@ -55,6 +55,28 @@ def test_a_30_hz_film_in_a_60_hz_file_gives_every_picture_once():
     assert 'the same as the one before it' in text
 
 
+def test_the_same_holds_when_the_second_copy_was_compressed_anew():
+    def recoded(number):
+        image = picture(number // 2).copy()
+        if number % 2:
+            image[::3, ::5] ^= 1
+        return image
+
+    _, verdicts, _ = judged([frame(k, recoded(k), step=NS // 60) for k in range(60)])
+    # From the first frames one cannot tell what is usual.
+    assert [one.usable for one in verdicts[10:]] == [True, False] * 25
+
+
+def test_pictures_that_change_little_from_frame_to_frame_are_all_used():
+    rng = np.random.default_rng(3)
+    still = picture(0)
+    frames = [
+        frame(k, still + (rng.random(still.shape) < 0.02).astype(np.uint8)) for k in range(40)
+    ]
+    _, verdicts, _ = judged(frames)
+    assert all(one.usable for one in verdicts)
+
+
 def test_a_frozen_picture_is_passed_on_with_a_flag_and_told_once():
     frames = [frame(k, picture(min(k, 5))) for k in range(60)]
     _, verdicts, texts = judged(frames)
