@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 # Shares of the beads that collide, or are shaken, between two pictures.
 _COLLIDING, _SHAKEN = 0.15, 0.002
+# Share of the places that are off by more than their error says, and by how much, in radii:
+# within its radius there is no other bead to confuse one with, unless above or below it.
+_MISPLACED, _MISPLACED_BY = 0.02, 0.4
 # Of a usual velocity component, how much a collision changes one; and so many of those, squared,
 # are the limit.
 _COLLISION = 1.4
@@ -48,6 +51,7 @@ def _costs(
     places: NDArray[np.float64],
     errors: NDArray[np.float64],
     radii: NDArray[np.float64],
+    radius_errors: NDArray[np.float64],
     collided: float,
     fastest: float,
     shaken_now: bool,
@@ -60,7 +64,7 @@ def _costs(
     predicted, variances : ndarrays (n, 2), (n,), [px], [px^2]
     waits : ndarray (n,), [s]
         Since each track was seen.
-    sizes, radii : ndarrays (n,), (m,), [px]
+    sizes, radii, radius_errors : ndarrays (n,), (m,), (m,), [px]
     places, errors : ndarrays (m, 2), (m,), [px]
     collided : float, [px/s]
         Usual change of a component of the velocity in a collision.
@@ -74,6 +78,7 @@ def _costs(
     for i in range(predicted.shape[0]):
         reach = fastest * waits[i]
         far = _REACH2 * (variances[i] + worst * worst + (collided * waits[i]) ** 2)
+        far = max(far, sizes[i] * sizes[i])
         if shaken_now:
             far = max(far, reach * reach)
         for j in range(places.shape[0]):
@@ -85,14 +90,18 @@ def _costs(
                 continue
             free = variances[i] + errors[j] * errors[j]
             hit = free + (collided * waits[i]) ** 2
+            missed = free + (_MISPLACED_BY * sizes[i]) ** 2
             shaken = free + (0.4 * reach) ** 2
-            if d2 > _REACH2 * hit and not (shaken_now and d2 <= reach * reach):
+            near = d2 <= max(_REACH2 * hit, sizes[i] * sizes[i])
+            if not near and not (shaken_now and d2 <= reach * reach):
                 continue
             likelihood = (1.0 - _COLLIDING) / free * math.exp(-0.5 * d2 / free)
             likelihood += _COLLIDING / hit * math.exp(-0.5 * d2 / hit)
+            likelihood += _MISPLACED / missed * math.exp(-0.5 * d2 / missed)
             likelihood += _SHAKEN / shaken * math.exp(-0.5 * d2 / shaken)
             off = radii[j] - sizes[i]
-            size = 0.5 * off * off / (_SIZE_JITTER_PX * _SIZE_JITTER_PX)
+            usual = _SIZE_JITTER_PX * _SIZE_JITTER_PX + radius_errors[j] * radius_errors[j]
+            size = 0.5 * off * off / usual
             costs[i, j] = min(size, _LARGEST_SIZE_COST) - math.log(likelihood)
         if places.shape[0]:
             # A bead that is hidden must not push the others from their places.
@@ -252,6 +261,7 @@ class Linker:
                 found.places,
                 found.place_errors,
                 found.radii,
+                found.radius_errors,
                 collided,
                 self._fastest,
                 shaken_now,
