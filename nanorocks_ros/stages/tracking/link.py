@@ -112,6 +112,32 @@ def _costs(
 
 
 @compiled
+def _predict(
+    lines: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    time: float,
+    near_wall: NDArray[np.float64],
+    far_wall: NDArray[np.float64],
+    places: NDArray[np.float64],
+    variances: NDArray[np.float64],
+) -> None:
+    """Where lines lead, (n, 2), and the variance of a coordinate, (n,); walls reflect."""
+    for i in range(lines.shape[0]):
+        after = time - lines[i, 0]
+        moving = lines[i, 6] < np.inf
+        spread = lines[i, 6] if moving else _SLOWEST_PX_S * _SLOWEST_PX_S
+        variances[i] = lines[i, 5] + spread * after * after
+        for axis in range(2):
+            place = lines[i, 1 + axis] + (lines[i, 3 + axis] * after if moving else 0.0)
+            low, high = near_wall[axis] + radii[i], far_wall[axis] - radii[i]
+            # A bead may be a little beyond where its wall should be.
+            if high > low and not low - 1.0 <= place <= high + 1.0:
+                room = high - low
+                place = low + abs((place - low + room) % (2.0 * room) - room)
+            places[i, axis] = place
+
+
+@compiled
 def _extend_all(
     chosen: NDArray[np.int64],
     times: NDArray[np.float64],
@@ -284,19 +310,9 @@ class Linker:
 
         Beads that would have reached a wall come back from it.
         """
-        lines = self._lines
-        after = time - lines[:, 0]
-        moving = np.isfinite(lines[:, 6])
-        velocity = np.where(moving[:, None], lines[:, 3:5], 0.0)
-        places = lines[:, 1:3] + velocity * after[:, None]
-        low = self.radii[:, None] + shift
-        room = np.maximum(self._size - 2.0 * self.radii[:, None], 1.0)
-        folded = np.abs(np.mod(places - low + room, 2.0 * room) - room)
-        # A bead may be a little beyond where its wall should be.
-        outside = np.abs(places - low - 0.5 * room) > 0.5 * room + 1.0
-        places = np.where(outside, low + folded, places)
-        spread = np.where(moving, lines[:, 6], _SLOWEST_PX_S**2)
-        return places, lines[:, 5] + spread * after**2
+        places, variances = np.empty((self.last.size, 2)), np.empty(self.last.size)
+        _predict(self._lines, self.radii, time, shift, shift + self._size, places, variances)
+        return places, variances
 
     def hints(self, time: float, shift: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where beads should be: column, row, radius and its error, (n, 4), [px].
