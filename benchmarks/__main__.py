@@ -5,7 +5,17 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 
-ALL = ('offline', 'live', 'speed_accuracy', 'cor_coverage', 'engine', 'engine_physics', 'tracking')
+ALL = (
+    'offline',
+    'live',
+    'preprocess',
+    'scene',
+    'speed_accuracy',
+    'cor_coverage',
+    'engine',
+    'engine_physics',
+    'tracking',
+)
 
 
 def main() -> int:

@@ -43,7 +43,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Calibrate or show, print, write; the exit code."""
-    from nanorocks_ros.experiment.calibration import load_calibration, write_calibration
+    from nanorocks_ros.experiment.calibration_file import load_calibration, write_calibration
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.study.bag_frames import BagFrames
     from nanorocks_ros.study.calibrate import calibrate, shown, still_picture, write_picture

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nanorocks_ros.experiment.calibration import calibrated
+from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._node import NanorocksNode

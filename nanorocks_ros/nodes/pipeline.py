@@ -10,6 +10,7 @@ from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._node import RESULT_TOPICS, NanorocksNode
 from nanorocks_ros.nodes._pacing import Pacer
 from nanorocks_ros.stages.pipeline import Pipeline
+from nanorocks_ros.stages.warm_up import warm_up
 from nanorocks_ros.wire import topics
 
 
@@ -28,6 +29,7 @@ class PipelineNode(NanorocksNode):
         self._reader = None
         self._where = self._source
         self._camera, self._view = None, None
+        warm_up()
         self._offer_everything()
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(st.PipelineSettings(), self._build, self._adopt)

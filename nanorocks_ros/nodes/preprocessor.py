@@ -8,6 +8,7 @@ from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.stages.pipeline import trays_of
 from nanorocks_ros.stages.preprocess import Preprocessor
+from nanorocks_ros.stages.warm_up import warm_up
 from nanorocks_ros.wire import topics
 
 
@@ -17,6 +18,7 @@ class PreprocessorNode(NanorocksNode):
     def __init__(self):
         super().__init__('preprocessor')
         self._settings = self.declare(PipelineSettings(), fixed=False)
+        warm_up()
         look = None if self._settings.preprocess.calibration else self._straighten
         self._camera = Camera(self, self.declare(CameraSettings()), self._take, look)
         self._epoch = Epoch(self, may_set=True)

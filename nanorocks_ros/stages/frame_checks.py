@@ -6,8 +6,10 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 
+from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.records import Notice, Quality
 
 if TYPE_CHECKING:
@@ -23,6 +25,9 @@ _BLACK, _WHITE = 4.0, 251.0
 # A picture that stays the same for longer is not stored twice, it stands still.
 _FROZEN_NS = NS // 4
 _FROZEN_TOLD_NS = NS
+# Compressed anew, a frame stored twice differs a little from itself: by less than such a share of
+# what noise and motion change from frame to frame, where that is so many gray levels.
+_RECODED, _NOISY = 0.1, 0.5
 # Filled rows that count, as a share of the height, beyond those that frames usually end in.
 _HALF = 0.03
 _FEWEST_ROWS = 12
@@ -65,6 +70,7 @@ class FrameChecks:
         self._camera = camera
         self._sample: NDArray[np.uint8] | None = None
         self._image: NDArray[np.uint8] | None = None
+        self._changes: deque[float] = deque(maxlen=_USUAL_FRAMES)
         self._changed_ns = 0
         self._ends: deque[int] = deque(maxlen=_USUAL_FRAMES)
         self._same: deque[int] = deque(maxlen=_USUAL_FRAMES)
@@ -76,6 +82,7 @@ class FrameChecks:
     def push(self, frame: Frame) -> Verdict:
         """Judge the next frame; stamps rise."""
         sample = frame.image[_ROW_STEP // 2 :: _ROW_STEP, ::_COLUMN_STEP]
+        sample = np.ascontiguousarray(sample)
         height = frame.image.shape[0]
         blank = self._blankness(sample)
         if blank:
@@ -89,7 +96,8 @@ class FrameChecks:
         rows = self._filled_from(frame)
         self._sample, self._image = sample, frame.image
         self._changed_ns, self._frozen_told = frame.stamp_ns, False
-        quality = Quality(0) if _has_colors(sample) else Quality.GRAY_CAMERA
+        colored = sample.ndim == 3 and _has_colors(sample)
+        quality = Quality(0) if colored else Quality.GRAY_CAMERA
         if rows < height:
             text = (
                 f'a frame breaks off at row {rows} of {height}; the trays below it are left out, '
@@ -122,8 +130,17 @@ class FrameChecks:
     def _unchanged(self, frame: Frame, sample: NDArray[np.uint8]) -> bool:
         if self._image is None or self._sample is None:
             return False
-        # The whole frame is compared only where its sample is the same.
-        return np.array_equal(sample, self._sample) and np.array_equal(frame.image, self._image)
+        change = float(cv2.norm(sample, self._sample, cv2.NORM_L1)) / sample.size
+        if change == 0.0:
+            # The whole frame is compared only where its sample is the same.
+            return np.array_equal(frame.image, self._image)
+        # Until copies are known as such, they are half of what is seen.
+        known = len(self._changes) >= _HISTORY
+        usual = float(np.quantile(self._changes, 0.75)) if known else 0.0
+        if usual >= _NOISY and change <= _RECODED * usual:
+            return True
+        self._changes.append(change)
+        return False
 
     def _stands_still(self, frame: Frame, notices: tuple[Notice, ...]) -> Verdict:
         rows = frame.image.shape[0]
@@ -131,8 +148,8 @@ class FrameChecks:
         if still_ns < _FROZEN_NS:
             self.duplicates += 1
             text = (
-                'a frame is the same as the one before it, to the last bit; such frames are left '
-                'out, here and whenever it happens'
+                'a frame is the same as the one before it; such frames are left out, here and '
+                'whenever it happens'
             )
             notices = (*notices, *self._once(frame, 'duplicate', text))
             return Verdict(False, rows, Quality(0), notices)
@@ -157,11 +174,13 @@ class FrameChecks:
         return int(height - cut)
 
 
+@compiled
 def _has_colors(sample: NDArray[np.uint8]) -> bool:
-    if sample.ndim == 2:
-        return False
-    first = sample[..., 0]
-    return not (np.array_equal(first, sample[..., 1]) and np.array_equal(first, sample[..., 2]))
+    for i in range(sample.shape[0]):
+        for j in range(sample.shape[1]):
+            if sample[i, j, 0] != sample[i, j, 1] or sample[i, j, 0] != sample[i, j, 2]:
+                return True
+    return False
 
 
 def _filled_rows(image: NDArray[np.uint8]) -> int:

@@ -24,24 +24,36 @@ _TAIL = 0.01
 
 
 @compiled
-def _survey(gray: NDArray[np.uint8], counts: NDArray[np.int64]) -> int:
-    """Count the levels of every other row, and the pixels of all blocks at full scale."""
+def _levels(gray: NDArray[np.uint8]) -> tuple[int, float]:
+    """Contrast, and share of the pixels at full scale, from every other row."""
+    counts = np.zeros(256, dtype=np.int64)
     rows, columns = gray.shape
     for i in range(0, rows, 2):
         for j in range(columns):
-            counts[gray[i, j]] += 1
-    hidden = 0
+            counts[np.uint64(gray[i, j])] += 1
+    pixels = ((rows + 1) // 2) * columns
+    below, low, high = 0, -1, 255
+    for level in range(256):
+        below += counts[level]
+        if low < 0 and below >= _TAIL * pixels:
+            low = level
+        if below >= (1.0 - _TAIL) * pixels:
+            high = level
+            break
+    return high - low, counts[_FULL:].sum() / pixels
+
+
+@compiled
+def _hidden(gray: NDArray[np.uint8]) -> float:
+    """Share of the picture in blocks that are at full scale all over."""
+    rows, columns = gray.shape
+    blocks = 0
     for i in range(0, rows - _BLOCK + 1, _BLOCK):
         for j in range(0, columns - _BLOCK + 1, _BLOCK):
-            if gray[i + _BLOCK // 2, j + _BLOCK // 2] < _FULL:
-                continue
-            full = True
-            for a in range(i, i + _BLOCK):
-                for b in range(j, j + _BLOCK):
-                    full = full and gray[a, b] >= _FULL
-            if full:
-                hidden += _BLOCK * _BLOCK
-    return hidden
+            # Most blocks are dark in the middle, and need no closer look.
+            if gray[i + _BLOCK // 2, j + _BLOCK // 2] >= _FULL:
+                blocks += gray[i : i + _BLOCK, j : j + _BLOCK].min() >= _FULL
+    return blocks * _BLOCK * _BLOCK / gray.size
 
 
 def picture_quality(gray: NDArray[np.uint8]) -> tuple[Quality, float]:
@@ -51,15 +63,13 @@ def picture_quality(gray: NDArray[np.uint8]) -> tuple[Quality, float]:
     ----------
     gray : ndarray of uint8, (rows, columns)
     """
-    counts = np.zeros(256, dtype=np.int64)
-    glare = _survey(gray, counts) / gray.size
-    cumulative = np.cumsum(counts) / max(1, int(counts.sum()))
-    low, high = np.searchsorted(cumulative, (_TAIL, 1.0 - _TAIL))
+    contrast, full = _levels(gray)
+    glare = _hidden(gray)
     quality = Quality(0)
-    if high - low < _FLAT:
+    if contrast < _FLAT:
         quality |= Quality.LOW_CONTRAST
-    if 1.0 - cumulative[_FULL - 1] > _SATURATED:
+    if full > _SATURATED:
         quality |= Quality.SATURATED
     if glare > _GLARE:
         quality |= Quality.GLARE
-    return quality, glare
+    return quality, float(glare)

@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
-from nanorocks_ros.experiment.calibration import calibrated, load_calibration
+from nanorocks_ros.experiment.calibration_file import calibrated, load_calibration
 from nanorocks_ros.experiment.plate import Region, regions_on_plate
 from nanorocks_ros.experiment.view import Straight, View
 from nanorocks_ros.records import Frame, Notice, Quality, TrayImage
 from nanorocks_ros.stages.frame_checks import FrameChecks
+from nanorocks_ros.stages.map_check import map_problem
 from nanorocks_ros.stages.picture_checks import picture_quality
 from nanorocks_ros.stages.shaking import PlateMeter, ShakeCounter
+from nanorocks_ros.stages.stabilise import shift_of_plate
 from nanorocks_ros.stages.tray_crop import TrayCrop
 
 if TYPE_CHECKING:
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 
 CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
 NS = 1_000_000_000
+# Frames at which the trays are looked for.
+_MAP_CHECKS = (1, 16)
 
 
 class Preprocessor:
@@ -109,13 +113,17 @@ class Preprocessor:
         if not verdict.usable:
             return (*notices, *verdict.notices)
         images = self._tray_images(frame, verdict.rows, verdict.quality)
-        return (*notices, *images, *verdict.notices)
+        return (*notices, *images, *verdict.notices, *self._check_map(frame))
 
     def _start(self) -> None:
         """Forget everything but where the trays are."""
         speed = self._pipeline.speed
-        size = {'height': self._shape[0], 'width': self._shape[1]} if self._shape else {}
-        view = self._view or View(camera=Straight(**size))
+        height, width = (self._shape or (1, 1))[:2]
+        self._straight = View(camera=Straight(width=width, height=height))
+        view = self._view or self._straight
+        self._frames = 0
+        self._suspects: frozenset[int] = frozenset()
+        self._misplaced: frozenset[int] = frozenset()
         self._checks = FrameChecks(self._camera)
         self._counter = ShakeCounter(speed.shortest_cycle)
         self._plate = PlateMeter(speed.shake_ratio, self._settings.shake_speed)
@@ -131,23 +139,46 @@ class Preprocessor:
             for tray, region in zip(self._trays, self._regions, strict=True)
         )
 
+    def _check_map(self, frame: Frame) -> tuple[Notice, ...]:
+        """Whether the trays are where they should be: at first, and once more to be sure."""
+        self._frames += 1
+        if self._frames not in _MAP_CHECKS:
+            return ()
+        view = self._view or self._straight
+        image = np.ascontiguousarray(frame.image).reshape(*frame.image.shape[:2], -1)
+        numbers = [tray.number for tray in self._trays]
+        text, wrong = map_problem(image, view, self._regions, numbers, self._settings)
+        before, self._suspects = self._suspects, wrong
+        if self._frames != _MAP_CHECKS[-1]:
+            return ()
+        # One picture may have been taken in the middle of a jolt.
+        self._misplaced = before & wrong
+        if not self._misplaced:
+            return ()
+        return (Notice(stamp_ns=frame.stamp_ns, text=f'{self._camera}: {text}'),)
+
     def _tray_images(self, frame: Frame, rows: int, quality: Quality) -> tuple[TrayImage, ...]:
         image = np.ascontiguousarray(frame.image).reshape(*frame.image.shape[:2], -1)
         hint: Shift | None = None
-        pictures: list[tuple[TrayCrop, NDArray[np.uint8], NDArray[np.uint8] | None]] = []
-        jumps = []
+        whole = []
         for crop in self._crops:
             if rows < image.shape[0] and crop.lowest_row > rows:
-                # The images before and after it are not compared: it is as if it were lost.
+                # The images before and after it are compared as if it had not been.
                 crop.pending |= Quality.HALF_FRAME
                 continue
-            hint = crop.follow(frame.stamp_ns, image, hint) or hint
+            hint = crop.follow(image, hint) or hint
+            whole.append(crop)
+        plate = shift_of_plate([crop.shift for crop in whole if crop.shift is not None])
+        pictures: list[tuple[TrayCrop, NDArray[np.uint8], NDArray[np.uint8] | None]] = []
+        jumps = []
+        for crop in whole:
+            crop.settle(frame.stamp_ns, plate)
             gray, color = crop.crop(image)
-            jumps.append(crop.meter.push(gray))
+            jumps.append(crop.meter.push(frame.stamp_ns, gray))
             pictures.append((crop, gray, color))
         if pictures:
-            plate = self._plate.push(frame.stamp_ns, *self._plate_speed())
-            self._counter.push(frame.stamp_ns, jumps, plate)
+            shaken = self._plate.push(frame.stamp_ns, *self._plate_speed())
+            self._counter.push(frame.stamp_ns, jumps, shaken)
         return tuple(
             self._tray_image(frame.stamp_ns, crop, gray, color, quality)
             for crop, gray, color in pictures
@@ -172,6 +203,8 @@ class Preprocessor:
     ) -> TrayImage:
         own, glare = picture_quality(gray)
         pending, crop.pending = crop.pending, Quality(0)
+        if crop.tray in self._misplaced:
+            pending |= Quality.WRONG_SCALE
         return TrayImage(
             stamp_ns=stamp_ns,
             tray=crop.tray,

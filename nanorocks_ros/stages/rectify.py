@@ -33,16 +33,27 @@ _HALF = np.int32(1 << (2 * _WEIGHT - 1))
 def _moved(
     nodes: NDArray[np.float64], shift: tuple[float, float], axis: int, pixels: int
 ) -> NDArray[np.int32]:
-    """Where the nodes lie along one axis, kept within the picture."""
+    """Where the nodes lie along one axis, kept near the picture."""
     places = np.empty(nodes.shape[:2], dtype=np.int32)
     for i in range(nodes.shape[0]):
         for j in range(nodes.shape[1]):
             place = nodes[i, j, axis] - 0.5
             place += nodes[i, j, 2 + axis] * shift[0] + nodes[i, j, 4 + axis] * shift[1]
-            # The last place has a neighbour still, with almost all of the weight.
-            place = min(max(place, 0.0), pixels - 1.001)
-            places[i, j] = np.int32(place * (1 << _FRACTION))
+            place = min(max(place, -1.0 * pixels), 2.0 * pixels)
+            # Half a weight more, so that cutting off the rest rounds.
+            places[i, j] = np.int32(place * (1 << _FRACTION)) + (1 << (_FRACTION - _WEIGHT - 1))
     return places
+
+
+@compiled
+def _within(place: np.int32, last: np.int32) -> np.int32:
+    return np.int32(min(max(place, np.int32(0)), last))
+
+
+@compiled
+def _last(pixels: int) -> np.int32:
+    """The last place with a neighbour, which gets almost all of the weight."""
+    return np.int32(((pixels - 1) << _FRACTION) - 1)
 
 
 @compiled
@@ -110,6 +121,7 @@ def resample_color(
     m0, m1, m2 = np.int32(mix[0]), np.int32(mix[1]), np.int32(mix[2])
     places_x = _moved(nodes, shift, 0, image.shape[1])
     places_y = _moved(nodes, shift, 1, image.shape[0])
+    last_x, last_y = _last(image.shape[1]), _last(image.shape[0])
     for row in range(rows):
         i, down = row // STEP, np.int32(row % STEP)
         for j in range((columns + STEP - 1) // STEP):
@@ -119,8 +131,9 @@ def resample_color(
             end_y = _between(places_y[i, j + 1], places_y[i + 1, j + 1], down)
             step_x, step_y = np.int32((end_x - x) >> 3), np.int32((end_y - y) >> 3)
             for column in range(j * STEP, min(columns, (j + 1) * STEP)):
-                here = np.uint64((y >> _FRACTION) * 3 * image.shape[1] + (x >> _FRACTION) * 3)
-                a, b = np.int32((x >> _WEIGHT) & 127), np.int32((y >> _WEIGHT) & 127)
+                u, v = _within(x, last_x), _within(y, last_y)
+                here = np.uint64((v >> _FRACTION) * 3 * image.shape[1] + (u >> _FRACTION) * 3)
+                a, b = np.int32((u >> _WEIGHT) & 127), np.int32((v >> _WEIGHT) & 127)
                 v0 = _blend(pixels, here, right, below, a, b)
                 v1 = _blend(pixels, here + one, right, below, a, b)
                 v2 = _blend(pixels, here + two, right, below, a, b)
@@ -146,6 +159,7 @@ def resample_gray(
     below, right = np.uint64(image.shape[1]), np.uint64(1)
     places_x = _moved(nodes, shift, 0, image.shape[1])
     places_y = _moved(nodes, shift, 1, image.shape[0])
+    last_x, last_y = _last(image.shape[1]), _last(image.shape[0])
     for row in range(rows):
         i, down = row // STEP, np.int32(row % STEP)
         for j in range((columns + STEP - 1) // STEP):
@@ -155,8 +169,9 @@ def resample_gray(
             end_y = _between(places_y[i, j + 1], places_y[i + 1, j + 1], down)
             step_x, step_y = np.int32((end_x - x) >> 3), np.int32((end_y - y) >> 3)
             for column in range(j * STEP, min(columns, (j + 1) * STEP)):
-                here = np.uint64((y >> _FRACTION) * image.shape[1] + (x >> _FRACTION))
-                a, b = np.int32((x >> _WEIGHT) & 127), np.int32((y >> _WEIGHT) & 127)
+                u, v = _within(x, last_x), _within(y, last_y)
+                here = np.uint64((v >> _FRACTION) * image.shape[1] + (u >> _FRACTION))
+                a, b = np.int32((u >> _WEIGHT) & 127), np.int32((v >> _WEIGHT) & 127)
                 out[np.uint64(row * columns + column)] = np.uint8(
                     _blend(pixels, here, right, below, a, b)
                 )

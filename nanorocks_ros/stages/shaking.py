@@ -8,6 +8,7 @@ of its own, which finds the same events in the same images.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, insort
 from collections import deque
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,8 @@ NS = 1_000_000_000
 _MEMORY_FRAMES = 15
 _NOISE_FRAMES = 300
 _NOISE_QUANTILE = 0.2
+# A step in time so many times longer than usual means that frames are missing.
+_GAP = 1.75
 # Beyond 3 sigma a difference counts as motion; what is left of a Gaussian has this variance.
 _CLIP = 3.0
 _CLIPPED_VARIANCE = 0.9733
@@ -38,7 +41,6 @@ _ROUNDING_POWER = 1.0 / 6.0
 _SWING_NS = 5 * NS
 # A speed of the tray counts when it is known to be one.
 _SIGNIFICANT = 5.0
-_SQUARES = np.arange(256.0) ** 2
 
 
 def difference_power(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> float:
@@ -60,12 +62,29 @@ def _difference_counts(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> 
     return total
 
 
-def _power_of(counts: NDArray[np.float64]) -> float:
-    power = float(counts @ _SQUARES / counts.sum())
+@compiled
+def _total_power(counts: NDArray[np.int64]) -> float:
+    """Sum of the squared differences, [gray levels^2]; exact, for they are whole numbers."""
+    total = 0.0
+    for level in range(256):
+        total += counts[level] * float(level * level)
+    return total
+
+
+@compiled
+def _power_of(counts: NDArray[np.int64]) -> float:
+    pixels = 0.0
+    for level in range(256):
+        pixels += counts[level]
+    power = _total_power(counts) / pixels
     for _ in range(30):
-        bound = max(1.0, _CLIP**2 * power)
-        kept = np.less_equal(_SQUARES, bound)
-        clipped = float((counts * kept) @ _SQUARES / (counts @ kept)) / _CLIPPED_VARIANCE
+        bound = max(1.0, _CLIP * _CLIP * power)
+        kept, kept_power = 0.0, 0.0
+        for level in range(256):
+            if level * level <= bound:
+                kept += counts[level]
+                kept_power += counts[level] * float(level * level)
+        clipped = kept_power / kept / _CLIPPED_VARIANCE
         if abs(clipped - power) <= 1e-6 * power:
             break
         power = clipped
@@ -83,7 +102,32 @@ def noise_power(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> float:
         Twice the variance of the sensor noise.
     """
     counts = _difference_counts(np.ascontiguousarray(later), np.ascontiguousarray(earlier))
-    return _power_of(counts.astype(np.float64))
+    return float(_power_of(counts))
+
+
+class _Quantile:
+    """Quantile of the last values, kept in order: `numpy.quantile` sorts them anew each time."""
+
+    def __init__(self, share: float, length: int) -> None:
+        self._share = share
+        self._length = length
+        self._values: deque[float] = deque()
+        self._sorted: list[float] = []
+
+    def push(self, value: float) -> float:
+        """Take a value; the quantile of the last ones, interpolated."""
+        self._values.append(value)
+        insort(self._sorted, value)
+        if len(self._values) > self._length:
+            del self._sorted[bisect_left(self._sorted, self._values.popleft())]
+        place = self._share * (len(self._sorted) - 1)
+        low = int(place)
+        high = min(low + 1, len(self._sorted) - 1)
+        step, rest = self._sorted[high] - self._sorted[low], place - low
+        # Rounded as numpy rounds it.
+        if rest < 0.5:
+            return self._sorted[low] + step * rest
+        return self._sorted[high] - step * (1.0 - rest)
 
 
 class MotionMeter:
@@ -106,23 +150,31 @@ class MotionMeter:
     def __init__(self, ratio: float) -> None:
         self._ratio = ratio
         self._recent: deque[float] = deque(maxlen=_MEMORY_FRAMES)
-        self._noise: deque[float] = deque(maxlen=_NOISE_FRAMES)
+        self._noise = _Quantile(_NOISE_QUANTILE, _NOISE_FRAMES)
         self._last: NDArray[np.uint8] | None = None
+        self._last_ns = 0
+        self._steps: deque[int] = deque(maxlen=_MEMORY_FRAMES)
         self.noise_power = 0.0
 
-    def push(self, gray: NDArray[np.uint8]) -> bool:
+    def push(self, stamp_ns: int, gray: NDArray[np.uint8]) -> bool:
         """Take the next image; True when the motion jumped since the one before."""
         gray = np.ascontiguousarray(gray)
         last, self._last = self._last, gray
+        step, self._last_ns = stamp_ns - self._last_ns, stamp_ns
         if last is None:
             return False
-        counts = _difference_counts(gray, last).astype(np.float64)
-        self._noise.append(_power_of(counts))
+        usual = float(np.median(self._steps)) if self._steps else step
+        self._steps.append(step)
+        # Beads come further while frames are missing, and that is no jump. One that happened
+        # just then is seen with the next image.
+        if step > _GAP * usual:
+            return False
+        counts = _difference_counts(gray, last)
         # Slow motion hides in the noise, and a frame stored twice has none: neither the mean
         # nor the least will do.
-        self.noise_power = float(np.quantile(self._noise, _NOISE_QUANTILE))
+        self.noise_power = self._noise.push(_power_of(counts))
         quiet = self.noise_power * gray.size
-        motion = float(counts @ _SQUARES) - quiet
+        motion = _total_power(counts) - quiet
         # 15 frames rather than all: the gas may have been shaken harder long ago.
         before = max(self._recent, default=None)
         self._recent.append(motion)
@@ -223,7 +275,7 @@ class CycleFollower:
         before, first = self.cycle, self._first
         self._first = False
         if image.cycle is None or math.isnan(image.noise_power):
-            jump = self._meter.push(image.gray)
+            jump = self._meter.push(image.stamp_ns, image.gray)
             self._counter.push(image.stamp_ns, (jump,))
             self.noise_power = self._meter.noise_power
             self.cycle, self.cycle_start_ns = self._counter.cycle, self._counter.cycle_start_ns

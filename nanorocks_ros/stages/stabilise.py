@@ -18,6 +18,8 @@ from nanorocks_ros.stages.rectify import places_of
 from nanorocks_ros.stages.registration import register, sample, search
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.view import View
@@ -41,6 +43,7 @@ _LARGEST_ERROR = 0.2
 _SUSPECT = 3.0
 # What interpolation between pixels does to an edge, [px]: measured on simulated swings.
 _INTERPOLATION = 0.02
+_FEWEST_TRAYS = 3
 # Pictures averaged in the reference.
 _MEMORY = 64
 
@@ -58,6 +61,14 @@ class Shift:
     x: float
     y: float
     error: float
+
+
+def shift_of_plate(shifts: Sequence[Shift]) -> Shift | None:
+    """Where the plate is that the trays are on: the median of three or more."""
+    if len(shifts) < _FEWEST_TRAYS:
+        return None
+    x, y, error = np.median([(one.x, one.y, one.error) for one in shifts], axis=0)
+    return Shift(float(x), float(y), float(error))
 
 
 class TrayFollower:
@@ -131,6 +142,10 @@ class TrayFollower:
         self._trust = 1.0 / (1.0 + (self._powers / (_SUSPECT * usual)) ** 2)
         return found
 
+    def corrected(self, shift: Shift) -> None:
+        """Be told where the tray really was in the last picture."""
+        self._last = shift
+
     def _registered(self, image: NDArray[np.uint8], start: tuple[float, float]) -> Shift | None:
         assert self._places is not None
         found = np.empty(5)
@@ -175,8 +190,10 @@ class TrayFollower:
         places = places_of(grid, self._view)
         gray = np.empty(rows * columns)
         sample(image, self._mix, places.reshape(-1, 6), (0.0, 0.0), gray)
+        # Chosen where they are no noise, but followed by how steep they are.
         smooth = cv2.GaussianBlur(gray.reshape(rows, columns), (3, 3), 0.0)
-        slopes = np.stack(np.gradient(smooth)[::-1], axis=-1)
+        steepness = np.stack(np.gradient(smooth)[::-1], axis=-1)
+        slopes = np.stack(np.gradient(gray.reshape(rows, columns))[::-1], axis=-1)
         usable = np.zeros((rows, columns), dtype=bool)
         usable[1:-1, 1:-1] = True
         inner = margin - _BLUR
@@ -184,7 +201,7 @@ class TrayFollower:
         height, width = image.shape[:2]
         usable &= (places[..., 0] >= 1.0) & (places[..., 0] <= width - 1.0)
         usable &= (places[..., 1] >= 1.0) & (places[..., 1] <= height - 1.0)
-        chosen = [_steepest(np.abs(slopes[..., axis]), usable) for axis in (0, 1)]
+        chosen = [_steepest(np.abs(steepness[..., axis]), usable) for axis in (0, 1)]
         if min(len(one) for one in chosen) < _FEWEST_POINTS:
             return np.empty((0, 2)), np.empty((0, 2))
         both = np.unique(np.concatenate(chosen))

@@ -24,6 +24,8 @@ NS = 1_000_000_000
 # A smaller shift is not worth the sharpness that an interpolation costs.
 _NEGLIGIBLE_PX = 0.04
 _WHOLE = (0.0, 0.0)
+# A tray does not leave its plate: one that seems to was mistaken for what moves beside it.
+_STRAYED_PX = 1.0
 
 
 class TrayCrop:
@@ -79,6 +81,7 @@ class TrayCrop:
         self.velocity = (UNKNOWN, UNKNOWN)
         self.velocity_error = UNKNOWN
         self.pending = Quality(0)
+        self._last: Shift | None = None
         self._last_ns = 0
 
     @property
@@ -98,28 +101,47 @@ class TrayCrop:
         """One standard error of each component, [m]."""
         return UNKNOWN if self.shift is None else self.shift.error / self._scale
 
-    def follow(self, stamp_ns: int, image: NDArray[np.uint8], hint: Shift | None) -> Shift | None:
+    def follow(self, image: NDArray[np.uint8], hint: Shift | None) -> Shift | None:
         """Find the tray in the next frame.
 
         Parameters
         ----------
-        stamp_ns : int
         image : ndarray of uint8, (height, width, channels)
         hint : Shift or None
             Of another tray in the same frame.
         """
         if self._follower is None:
             return None
-        last, last_ns = self.shift, self._last_ns
-        self.shift, self._last_ns = self._follower.push(image, hint), stamp_ns
-        self.velocity, self.velocity_error = (UNKNOWN, UNKNOWN), UNKNOWN
+        self.shift = self._follower.push(image, hint)
         if self.shift is None:
             self.pending |= Quality.STABILISATION_LOST
-        elif last is not None and stamp_ns > last_ns:
+        return self.shift
+
+    def settle(self, stamp_ns: int, plate: Shift | None) -> None:
+        """Take where the plate is, if the tray was lost or strayed from it, and the speed.
+
+        Parameters
+        ----------
+        stamp_ns : int
+        plate : Shift or None
+            What most of the trays on the plate say; None when there are too few.
+        """
+        own = self.shift
+        if plate is not None and self._follower is not None:
+            strayed = (
+                own is not None and math.hypot(own.x - plate.x, own.y - plate.y) > _STRAYED_PX
+            )
+            if own is None or strayed:
+                self.pending |= Quality.STABILISATION_LOST
+                self.shift = plate
+                self._follower.corrected(plate)
+        last, last_ns = self._last, self._last_ns
+        self._last, self._last_ns = self.shift, stamp_ns
+        self.velocity, self.velocity_error = (UNKNOWN, UNKNOWN), UNKNOWN
+        if self.shift is not None and last is not None and stamp_ns > last_ns:
             rate = NS / ((stamp_ns - last_ns) * self._scale)
             self.velocity = (self.shift.x - last.x) * rate, (self.shift.y - last.y) * rate
             self.velocity_error = math.hypot(self.shift.error, last.error) * rate
-        return self.shift
 
     def crop(self, image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:
         """The gray mix and the colours of the tray at rest.

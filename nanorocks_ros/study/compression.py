@@ -119,8 +119,7 @@ class _SizeKeeper:
 def _through_h264(
     moments: Iterable[SceneMoment], size: float, quality: int, frame_rate: float
 ) -> Iterator[tuple[SceneMoment, bytes]]:
-    av = _av()
-    stream = _Stream(av, size, frame_rate)
+    stream = H264Stream(size, frame_rate)
     waiting: deque[SceneMoment] = deque()
     for moment in moments:
         waiting.append(moment)
@@ -137,15 +136,28 @@ def _seen(
     return replace(moment, frame=frame), encode_jpeg(image, quality)
 
 
-class _Stream:
-    """An encoder and the decoder behind it."""
+class H264Stream:
+    """An encoder and the decoder behind it.
 
-    def __init__(self, av: Any, size: float, frame_rate: float) -> None:
-        self._av = av
+    Parameters
+    ----------
+    size : float, [bytes]
+        Of a frame, in the mean.
+    frame_rate : float, [1/s]
+
+    Raises
+    ------
+    ConfigurationError
+        When PyAV is not installed; at the first picture, for sides that are not even.
+    """
+
+    def __init__(self, size: float, frame_rate: float) -> None:
+        self._av = _av()
+        self.bytes_written = 0
         self._rate = Fraction(frame_rate).limit_denominator(1000)
         self._bits = round(8.0 * size * frame_rate)
         self._encoder: Any = None
-        self._decoder = av.CodecContext.create('h264', 'r')
+        self._decoder = self._av.CodecContext.create('h264', 'r')
         self._decoder.thread_count = 1
         self._number = 0
 
@@ -157,12 +169,14 @@ class _Stream:
         frame.pts = self._number
         self._number += 1
         for packet in self._encoder.encode(frame):
+            self.bytes_written += packet.size
             yield from self._decoded(packet)
 
     def finish(self) -> Iterator[NDArray[np.uint8]]:
         """The last pictures."""
         if self._encoder is not None:
             for packet in self._encoder.encode(None):
+                self.bytes_written += packet.size
                 yield from self._decoded(packet)
             yield from self._decoded(None)
 

@@ -18,7 +18,8 @@ from scipy.optimize import least_squares
 
 from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, view_of
 from nanorocks_ros.experiment.plate import Region
-from nanorocks_ros.stages.find_trays import PlateGuess, find_edges, plate_places
+from nanorocks_ros.stages.find_edges import find_edges
+from nanorocks_ros.stages.find_trays import PlateGuess, plate_places
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.stages.find_trays import Edges
+    from nanorocks_ros.stages.find_edges import Edges
 
 # Places in the vector of unknowns.
 _BEND, _CENTRE, _K, _TURN, _SCALE, _PLACE = (
@@ -51,8 +52,15 @@ _TILT_USUAL = math.radians(3.0)
 _EDGE_ERROR = 0.15
 _NO_WALL = 0.01e-3
 _LONGEST_FOCAL = 20.0
+# Below this bend, 1 / (f / width)^2, a lens is no fisheye; and the coefficients with which an
+# equidistant one bends nothing, the series of the tangent.
+_STRAIGHT = 0.02
+_TANGENT = np.array([1.0 / 3.0, 2.0 / 15.0])
 _OUTWARDS = np.array([-1.0, -1.0, 2.0, 2.0])
-_REACHES = (24.0, 14.0, 9.0, 8.0, 6.0, 6.0)
+# How far from where they should be edges are looked for: at first in metres, less than half of
+# what lies between two trays, and once the walls are told from the floors in pixels.
+_FIRST_REACHES = (1.9e-3, 1.1e-3)
+_REACHES = (9.0, 8.0, 6.0, 6.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +102,7 @@ class PlateModel:
         self._boxes = np.array(list(plate_places(trays).values()))
         self.values = np.zeros(_COMMON + 4 * len(trays))
         middle = 0.5 * np.array(size)
+        self._usual_k = np.zeros(2)
         # 1 / (f / width) squared: no lens at all is 0, and not infinitely far away.
         self.values[_BEND] = 0.1
         self.values[_CENTRE] = middle
@@ -150,6 +159,10 @@ class PlateModel:
 
     def fit(self, edges: Edges, free_lens: bool) -> None:
         """Adjust to the edges; the coefficients of the lens too, or its focal length alone."""
+        if free_lens and self.values[_BEND] < _STRAIGHT:
+            # Not a fisheye: a lens that bends nothing, so that it may bend the other way too.
+            self.values[_BEND], self._usual_k = 0.25, _TANGENT
+            self.values[_K] = _TANGENT
         free = np.ones(self.values.size, dtype=bool)
         free[_K if not free_lens else _BEND] = False
         start = self.values[free]
@@ -172,7 +185,7 @@ class PlateModel:
             bounded = np.sign(distances) * np.sqrt(2.0 * (np.sqrt(1.0 + distances**2) - 1.0))
             known = [
                 (values[_CENTRE] - middle) / (_CENTRE_SHARE * self.size[0]),
-                values[_K] / _K_USUAL,
+                (values[_K] - self._usual_k) / _K_USUAL,
                 values[_TURN][:2] / _TILT_USUAL,
                 (values[_WALL : _WALL + 1] - wall) / wall_error,
                 values[_COMMON:],
@@ -197,13 +210,16 @@ def fit_plate(
     """
     size = (gray.shape[1], gray.shape[0])
     model = PlateModel(trays, size, guess)
+    scale = guess.pixels_per_metre
+    rounds = [(reach * scale, False, False) for reach in _FIRST_REACHES]
+    rounds += [(reach, True, number > 0) for number, reach in enumerate(_REACHES)]
     edges = None
-    for number, reach in enumerate(_REACHES):
+    for reach, walls, free_lens in rounds:
         scale = float(model.values[_SCALE])
-        edges = find_edges(gray, trays, model.picture, scale, reach)
+        edges = find_edges(gray, trays, model.picture, scale, reach, walls=walls)
         if len(edges.trays) < 4 * model.values.size:
             return None
-        model.fit(edges, free_lens=number >= 3)
+        model.fit(edges, free_lens=free_lens)
     assert edges is not None
     residuals = model.residuals(model.values, edges)
     return PlateFit(

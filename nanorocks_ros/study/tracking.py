@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import FrameError, RecordingError
-from nanorocks_ros.experiment.calibration import calibrated, load_calibration
+from nanorocks_ros.experiment.calibration_file import calibrated, load_calibration
 from nanorocks_ros.records import Notice, TrayImage
 from nanorocks_ros.stages.pipeline import trays_of
 from nanorocks_ros.stages.preprocess import Preprocessor

@@ -23,6 +23,7 @@ from rclpy.node import Node
 from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.simulation.film import film
+from nanorocks_ros.stages.warm_up import warm_up
 
 # Two runs of the tests at once must not hear one another; 101 is the last safe number.
 _DOMAINS = itertools.cycle(random.Random(os.getpid()).sample(range(1, 102), 101))
@@ -31,10 +32,11 @@ _PATIENCE_S = 40.0
 
 @pytest.fixture(scope='session', autouse=True)
 def compiled_simulation():
-    """Compile the engine once, before two nodes do so while a test waits for them."""
+    """Compile engine and preprocessing, before two nodes do so while a test waits for them."""
     settings = SimulationSettings(first_shake=0.0)
     for _ in film(settings, load_trays()[1], frames=2):
         pass
+    warm_up()
 
 
 @dataclass

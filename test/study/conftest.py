@@ -7,8 +7,12 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
+
+# The plate that is drawn for the stages is fitted here.
+sys.path.append(str(Path(__file__).parents[1] / 'stages'))
 
 _PATIENCE = 60.0
 

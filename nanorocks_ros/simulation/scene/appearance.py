@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nanorocks_ros.simulation.initial import stock
 from nanorocks_ros.simulation.materials import looks_of
-from nanorocks_ros.simulation.scene.bodies import FACETS, GRAIN, LOBES, SHAPE, SPHERE
+from nanorocks_ros.simulation.scene.bodies import GRAIN, SPHERE
+from nanorocks_ros.simulation.scene.grains import FACETS, LOBES, SHAPE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,6 +54,26 @@ class Appearance:
     rates: NDArray[np.float64]
     dust: NDArray[np.float64]
     species: NDArray[np.int32]
+
+    @staticmethod
+    def joined(parts: list[Appearance]) -> Appearance:
+        """Those of several trays, one after the other."""
+        first = parts or [_NOTHING]
+        names = [field.name for field in fields(Appearance)]
+        return Appearance(
+            **{name: np.concatenate([getattr(one, name) for one in first]) for name in names}
+        )
+
+
+_NOTHING = Appearance(
+    looks=np.empty((0, 9)),
+    kinds=np.empty(0, dtype=np.int64),
+    stretch=np.empty(0),
+    angles=np.empty(0),
+    rates=np.empty(0),
+    dust=np.empty(0),
+    species=np.empty(0, dtype=np.int32),
+)
 
 
 def appearance_of(tray: Tray, scene: SceneSettings, rng: np.random.Generator) -> Appearance:
@@ -109,7 +130,7 @@ def turned_since(time: float, events: list[float]) -> float:
 
 
 def grain_shapes(irregularity: float, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Outlines and facets of grains, see `bodies.SHAPE`; every outline has the area of a disc.
+    """Outlines and facets of grains, see `grains.SHAPE`; every outline has the area of a disc.
 
     Parameters
     ----------
@@ -135,8 +156,23 @@ def grain_shapes(irregularity: float, rng: np.random.Generator) -> NDArray[np.fl
     return shapes
 
 
-def outline_moments(lobes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Root of the area in discs of radius 1, (n,), and centroid, (n, 2), of outlines (n, 6)."""
+def outline_moments(
+    lobes: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """What the outlines of grains of mean radius 1 come to.
+
+    Parameters
+    ----------
+    lobes : ndarray (n, 6)
+
+    Returns
+    -------
+    size : ndarray (n,)
+        Radius of the disc of the same area.
+    centroid : ndarray (n, 2)
+    furthest : ndarray (n,)
+        Largest distance from the origin.
+    """
     angle = np.linspace(0.0, 2.0 * math.pi, 360, endpoint=False)
     waves = np.stack([f(k * angle) for k in (2, 3, 4) for f in (np.cos, np.sin)])
     radius = 1.0 + lobes @ waves
@@ -144,4 +180,4 @@ def outline_moments(lobes: NDArray[np.float64]) -> tuple[NDArray[np.float64], ND
     unit = np.stack([np.cos(angle), np.sin(angle)])
     # Of a sector, the centroid lies at two thirds of the radius.
     centroid = (2.0 / 3.0) * np.mean(radius[:, np.newaxis] ** 3 * unit, axis=2) / area[:, None]
-    return np.sqrt(area), centroid
+    return np.sqrt(area), centroid, radius.max(axis=1)

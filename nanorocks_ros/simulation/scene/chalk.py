@@ -44,8 +44,8 @@ def dusted_floor(
 def dust_pattern(rng: np.random.Generator) -> NDArray[np.float32]:
     """Shares of dust on the beads, (128, 128): coarse patches and specks, mean about 0.4."""
     shape = (_PATTERN, _PATTERN)
-    field = 0.9 * _blotches(shape, 4.0, rng, wrap=True) + 0.5 * _blotches(shape, 1.2, rng, True)
-    return np.asarray(np.clip(0.38 + 0.30 * field, 0.05, 0.95), dtype=np.float32)
+    field = 0.9 * _blotches(shape, 6.0, rng, wrap=True) + 0.45 * _blotches(shape, 2.2, rng, True)
+    return np.asarray(np.clip(0.38 + 0.24 * field, 0.05, 0.9), dtype=np.float32)
 
 
 def _blotches(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.simulation.scene.bodies import LEVEL
+from nanorocks_ros.simulation.scene.lanes import LEVEL
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,7 +29,7 @@ _LEDS = (
 _CORE, _BLOOM, _HAZE = 0.0011, 0.0028, 0.0075
 _CORE_LEVEL, _BLOOM_LEVEL, _HAZE_LEVEL = 700.0, 95.0, 40.0
 # Beyond so many times the reach of the haze there is nothing.
-_FURTHEST = 2.5
+_FURTHEST = 2.2
 _COLOUR = np.array([1.05, 1.0, 0.94])
 
 
@@ -39,7 +39,7 @@ class Glare(NamedTuple):
     Parameters
     ----------
     region : Region
-    light : ndarray of uint16, (rows, columns, 3), bgr, [1/64 gray levels]
+    light : ndarray of uint16, (3, rows, columns), bgr, [1/64 gray levels]
     """
 
     region: Region
@@ -71,5 +71,5 @@ def led_glare(geometry: SceneGeometry, strength: float) -> Glare:
         bloom = _BLOOM_LEVEL * np.exp(-((distance / _BLOOM) ** 2))
         haze = _HAZE_LEVEL * np.maximum(1.0 - (distance / (_FURTHEST * _HAZE)) ** 2, 0.0) ** 4
         level += brightness * (core + bloom + haze)
-    light = np.minimum(strength * level[..., np.newaxis] * _COLOUR * LEVEL, 65535.0)
+    light = np.minimum(strength * LEVEL * level * _COLOUR[:, np.newaxis, np.newaxis], 65535.0)
     return Glare(region, np.asarray(light, dtype=np.uint16))

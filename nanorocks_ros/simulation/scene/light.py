@@ -37,7 +37,7 @@ class Illumination:
         self._across = np.exp(-lost * x * x) * (1.0 - tilt * x)
         self._down = np.exp(-lost * y * y) * (1.0 - 0.5 * tilt * y * columns / rows)
         self._phase = 2.0 * math.pi * _BANDS * np.arange(rows) / rows
-        self.across: NDArray[np.uint32] = np.repeat(_parts(self._across), 3)
+        self.across: NDArray[np.uint32] = _parts(self._across)
 
     def down(self, time: float) -> NDArray[np.uint32]:
         """Light along a column at a time [s], (rows,), in parts of 2^13."""
@@ -46,7 +46,7 @@ class Illumination:
 
     def levels(self, time: float) -> NDArray[np.float64]:
         """The light itself, (rows, columns)."""
-        return self.down(time)[:, np.newaxis] * (self.across[::3] / ONE) / ONE
+        return self.down(time)[:, np.newaxis] * (self.across / ONE) / ONE
 
 
 def _parts(light: NDArray[np.float64]) -> NDArray[np.uint32]:

@@ -24,7 +24,7 @@ class MovingPlate:
     Parameters
     ----------
     geometry : SceneGeometry
-    still : ndarray of uint16, (rows, columns, 3)
+    still : ndarray of uint16, (3, rows, columns)
         The scene with the plate in its place.
     """
 
@@ -70,7 +70,7 @@ class MovingPlate:
             self._moved = False
         else:
             for x, y, width, height in self._touched:
-                part = slice(y, y + height), slice(x, x + width)
+                part = np.s_[:, y : y + height, x : x + width]
                 self._canvas[part] = self._still[part]
         return self._canvas
 

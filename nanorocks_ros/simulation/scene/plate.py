@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.experiment.plate import PLATE
-from nanorocks_ros.simulation.scene.bodies import LEVEL
 from nanorocks_ros.simulation.scene.chalk import dusted_floor
+from nanorocks_ros.simulation.scene.lanes import LEVEL
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,7 +59,7 @@ def empty_scene(
 
     Returns
     -------
-    ndarray of uint16, (rows, columns, 3), bgr, [1/64 gray levels]
+    ndarray of uint16, (3, rows, columns), bgr, [1/64 gray levels]
     """
     rng = np.random.default_rng(seed)
     left, top, _, _ = geometry.plate
@@ -80,7 +80,8 @@ def empty_scene(
     )
     around = _housing(geometry.shape, rng)
     scene = around + share[..., np.newaxis] * (seen - around)
-    return np.asarray(np.clip(scene, 0.0, 255.0) * LEVEL + 0.5, dtype=np.uint16)
+    levels = np.asarray(np.clip(scene, 0.0, 255.0) * LEVEL + 0.5, dtype=np.uint16)
+    return np.ascontiguousarray(levels.transpose(2, 0, 1))
 
 
 def streaks(
@@ -242,9 +243,9 @@ def _housing(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
     scale = small[0] / 270.0
     middle = 0.5 * small[1]
     for column, row in ((-158.0, 136.0), (152.0, 62.0), (152.0, 208.0)):
-        for turn in range(5):
-            centre = round(middle + column * scale), round((row - 12 + 6 * turn) * scale)
-            axes = max(round(19 * scale), 1), max(round(7 * scale), 1)
-            cv2.ellipse(image, centre, axes, 0, 0, 360, (96.0, 95.0, 92.0), 2, cv2.LINE_AA)
-    blurred = cv2.GaussianBlur(image, (0, 0), 1.6)
+        for turn in range(4):
+            centre = round(middle + column * scale), round((row - 15 + 10 * turn) * scale)
+            axes = max(round(18 * scale), 1), max(round(5 * scale), 1)
+            cv2.ellipse(image, centre, axes, 0, 0, 360, (104.0, 103.0, 100.0), 1, cv2.LINE_AA)
+    blurred = cv2.GaussianBlur(image, (0, 0), 1.4 * scale)
     return np.asarray(cv2.resize(blurred, shape[::-1], interpolation=cv2.INTER_CUBIC))

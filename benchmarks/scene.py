@@ -1,0 +1,149 @@
+"""The whole scene at 1080p with all effects: ms of a frame by part, on one core.
+
+Times are those of the processor, medians over the frames of 2 s right after a shaking event,
+when the plate swings and the gas is fast. Compression is stated apart. Ratios are to encoding
+the same frames as bare JPEG (quality 90), which anything that hands on pictures must do.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import contextmanager
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from nanorocks_ros.experiment.settings import (
+    CompressionSettings,
+    SceneSettings,
+    SimulationSettings,
+)
+from nanorocks_ros.simulation.scene import camera, film, moving_plate, painter
+from nanorocks_ros.study.compression import H264Stream, compressed
+
+_FRAMES = 60
+_QUALITY = 90
+_MEGA = 1e6
+_FLIGHT = 96e6 / 1800.0
+
+# What is timed: label, where it is looked up, its name.
+_PARTS = (
+    ('gas in eight trays', film.ShakenTray, 'at'),
+    ('plate, shifted while it swings', moving_plate.MovingPlate, 'moved_to'),
+    ('shadows', painter, 'draw_shadows'),
+    ('beads and grains', painter, 'draw_bodies'),
+    ('glare', camera, 'add_light'),
+    ('light, noise, gray levels', camera, 'expose'),
+)
+
+
+def report() -> None:
+    """Print the tables."""
+    cv2.setNumThreads(1)
+    with _timed() as spent:
+        images, moving = _run(SceneSettings(), spent)
+    parts = {name: 1e3 * np.median(times) for name, times in spent.items()}
+    jpeg = 1e3 * np.median([_seconds(_encode, image) for image in images])
+    decode = 1e3 * np.median([_seconds(_decode, _encode(image)) for image in images])
+    print('| part | ms | of JPEG encoding |\n| --- | --- | --- |')
+    for name, cost in parts.items():
+        print(f'| {name} | {cost:.1f} | {cost / jpeg:.2f} |')
+    rest = moving - sum(parts.values())
+    print(f'| everything else | {rest:.1f} | {rest / jpeg:.2f} |')
+    print(f'| **a frame, all effects** | **{moving:.1f}** | **{moving / jpeg:.2f}** |')
+    print(f'\nThat is {1e3 / moving:.0f} frames a second.\n')
+    _print_single(jpeg)
+    _print_compression(images, jpeg, decode)
+
+
+def _run(scene: SceneSettings, spent=None):
+    shaken = SimulationSettings(first_shake=0.0)
+    filmed = film.SceneFilm(shaken, scene)
+    images, times = [], []
+    filmed.at(0, 0)
+    for times_of_part in (spent or {}).values():
+        times_of_part.clear()
+    for number in range(1, _FRAMES + 1):
+        start = time.thread_time()
+        moment = filmed.at(number, 0)
+        times.append(time.thread_time() - start)
+        images.append(moment.frame.image)
+        for times_of_part in (spent or {}).values():
+            times_of_part[number - 1 :] = [sum(times_of_part[number - 1 :])]
+    return images, 1e3 * np.median(times)
+
+
+@contextmanager
+def _timed():
+    """Time every call of the parts."""
+    spent = {label: [] for label, _, _ in _PARTS}
+    kept = []
+    for label, place, name in _PARTS:
+        kept.append((place, name, getattr(place, name)))
+        setattr(place, name, _timing(getattr(place, name), spent[label]))
+    try:
+        yield spent
+    finally:
+        for place, name, function in kept:
+            setattr(place, name, function)
+
+
+def _timing(function, times):
+    def timed(*arguments, **named):
+        start = time.thread_time()
+        made = function(*arguments, **named)
+        times.append(time.thread_time() - start)
+        return made
+
+    return timed
+
+
+def _print_single(jpeg: float) -> None:
+    """What leaving out one effect saves."""
+    everything = SceneSettings()
+    print('| scene | ms | of JPEG encoding |\n| --- | --- | --- |')
+    cases = {
+        'all effects, plate at rest': replace(everything, swing=0.0),
+        'all effects but shadows': replace(everything, shadows=0.0),
+        'all effects, trays 1 to 5': replace(everything, trays=(1, 2, 3, 4, 5)),
+        'no effects': film.without_effects(everything),
+    }
+    for name, scene in cases.items():
+        _, cost = _run(scene)
+        print(f'| {name} | {cost:.1f} | {cost / jpeg:.2f} |')
+    print()
+
+
+def _print_compression(images, jpeg: float, decode: float) -> None:
+    size = np.mean([len(_encode(image)) for image in images])
+    print('| compression | ms | MB per minute |\n| --- | --- | --- |')
+    print(f'| JPEG, quality {_QUALITY} | {jpeg:.1f} | {1800 * size / _MEGA:.0f} |')
+    print(f'| decoding that | {decode:.1f} | |')
+    flight = CompressionSettings(codec='jpeg_rate')
+    shaken = SimulationSettings(first_shake=0.0)
+    moments = film.SceneFilm(shaken, SceneSettings()).moments(_FRAMES)
+    sizes = [len(content) for _, content in compressed(moments, flight, quality=1, frame_rate=30)]
+    print(f'| JPEG of the rate of the flight | | {1800 * np.mean(sizes) / _MEGA:.0f} |')
+    try:
+        stream = H264Stream(_FLIGHT, 30.0)
+    except Exception as error:
+        print(f'| H.264 | {error} | |')
+        return
+    times = [_seconds(lambda one: list(stream.push(one)), image) for image in images]
+    rate = 1800 * stream.bytes_written / len(images) / _MEGA
+    print(f'| H.264 there and back | {1e3 * np.median(times):.1f} | {rate:.0f} |')
+
+
+def _encode(image):
+    return cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1]
+
+
+def _decode(content):
+    return cv2.imdecode(content, cv2.IMREAD_COLOR)
+
+
+def _seconds(function, argument) -> float:
+    start = time.thread_time()
+    function(argument)
+    return time.thread_time() - start
