@@ -97,6 +97,11 @@ class BeadDetector:
         self._turn = 0
         self._ground: _Ground | None = None
 
+    @property
+    def crowded(self) -> bool:
+        """Whether there are too many grains to look for."""
+        return any(one.most == 0 for one in self._searches)
+
     def detect(
         self, color: NDArray[np.uint8], hints: Sequence[NDArray[np.float64]] = ()
     ) -> tuple[Detections, ...]:
