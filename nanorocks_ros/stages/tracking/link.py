@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 # Shares of the beads that collide, or are shaken, between two pictures.
 _COLLIDING, _SHAKEN = 0.15, 0.002
+_COLLIDING_A_SECOND = 5.0
 # Share of the places that are off by more than their error says, and by how much, in radii:
 # within its radius there is no other bead to confuse one with, unless above or below it.
 _MISPLACED, _MISPLACED_BY = 0.02, 0.4
@@ -333,6 +334,13 @@ class Linker:
     def places(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Last place of each bead, (n, 2), and the error of a coordinate, (n,), [px]."""
         return self._places[:, 0], self._errors[:, 0]
+
+    def strayed(self, time: float) -> NDArray[np.float64]:
+        """Variance of a coordinate by collisions that nobody saw, (n,), [px^2]."""
+        rate = _COLLIDING_A_SECOND * (time - self.last)
+        kick = _COLLISION * self._speed * (time - self.last)
+        # On average the collision was half way.
+        return np.asarray(np.minimum(rate, 1.0) * np.square(kick) / 3.0)
 
     def radius_errors(self) -> NDArray[np.float64]:
         """Standard errors of the radii, (n,), [px]."""

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 _NS = 1e9
 # Of the beads of a species, a share below which speeds and counts are not to be relied upon.
 _FEW = 0.85
-# What light, shadow and an uneven outline move a bead by, the same from picture to picture, so that
-# velocities have no part in it, [px]: measured with all effects of the simulated camera; under
-# chalk; and among grains that are not followed.
+# What light, shadow and an uneven outline move a bead by, the same from picture to picture, so
+# that velocities have no part in it, [px]: measured with all effects of the simulated camera;
+# under chalk; and among grains that are not followed.
 _SYSTEMATIC_PX = {'acrylic': 0.09, 'glass': 0.09, 'copper': 0.2, 'JSC-1': 0.3}
 _CHALKY_PX = {'acrylic': 0.5, 'glass': 0.6, 'copper': 1.3}
 _CROWDED_PX = 0.6
@@ -140,11 +140,12 @@ def _in_view(
     predicted, variances = linker.predicted(time, shift)
     places, errors = linker.places()
     velocities, velocity_errors = linker.velocities()
+    lost = np.sqrt(variances + linker.strayed(time))
     columns = (
         linker.numbers,
         np.full(shown.size, species, dtype=np.int32),
         np.where(seen[:, None], places, predicted),
-        np.hypot(np.where(seen, errors, np.sqrt(variances)), linker.systematic),
+        np.hypot(np.where(seen, errors, lost), linker.systematic),
         velocities,
         velocity_errors,
         linker.radii,
