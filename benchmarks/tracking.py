@@ -304,9 +304,7 @@ def _judge(
 
 
 def _report_speeds() -> None:
-    print(
-        '\nMean projected speed / truth (sd of one estimate), by tray and species; "!": says itself that it is not reliable\n'
-    )
+    print('\nMean projected speed / truth (sd of one estimate); "!": says it is not reliable\n')
     heads = [f'{1e3 * one:g} mm/s' for one in _SPEEDS]
     print('| tray, species, effects | ' + ' | '.join(heads) + ' |')
     print('| --- |' + ' --- |' * len(heads))

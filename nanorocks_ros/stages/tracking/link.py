@@ -7,165 +7,33 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.stages.tracking.assignment import assign
-from nanorocks_ros.stages.tracking.flight import KEPT, extend_flight
+from nanorocks_ros.stages.tracking.flight import KEPT
+from nanorocks_ros.stages.tracking.pairs import (
+    SIZE_JITTER_PX,
+    SLOWEST_PX_S,
+    extend_all,
+    pair_costs,
+    predict,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.stages.tracking.detect import Detections
 
-# Shares of the beads that collide, or are shaken, between two pictures.
-_COLLIDING, _SHAKEN = 0.15, 0.002
+# Collisions of a bead that nobody sees.
 _COLLIDING_A_SECOND = 5.0
-# Share of the places that are off by more than their error says, and by how much, in radii:
-# within its radius there is no other bead to confuse one with, unless above or below it.
-_MISPLACED, _MISPLACED_BY = 0.02, 0.4
-# Of a usual velocity component, how much a collision changes one; and so many of those, squared,
-# are the limit.
+# Of a usual velocity component, how much a collision changes one.
 _COLLISION = 1.4
-_REACH2 = 16.0
 # Share of the beads that must be out of reach of collisions for a tray to have been shaken.
 _LOST = 0.3
-# Of the size of one bead from picture to picture, beyond what its errors say, [px].
-_SIZE_JITTER_PX = 0.3
-_LARGEST_SIZE_COST = 6.0
-# A pair that is so much less likely than the best, as a logarithm, is none.
-_WORTH = 10.0
 # Pictures in a row that a new bead must be seen in.
 _CONFIRM = 3
-# Slowest change of velocity in a collision that is reckoned with, [px/s].
-_SLOWEST_PX_S = 6.0
 # Share of a new mean speed taken over in each picture.
 _SPEED_SHARE = 0.1
 # The size of a bead is measured with an error that pictures share, [px].
 _SIZE_FLOOR_PX = 0.03
-
-
-@compiled
-def _costs(
-    predicted: NDArray[np.float64],
-    variances: NDArray[np.float64],
-    waits: NDArray[np.float64],
-    sizes: NDArray[np.float64],
-    places: NDArray[np.float64],
-    errors: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    radius_errors: NDArray[np.float64],
-    collided: float,
-    fastest: float,
-    shaken_now: bool,
-    costs: NDArray[np.float64],
-) -> None:
-    """Minus the logarithm of the likelihood of every pair; infinite out of reach.
-
-    Parameters
-    ----------
-    predicted, variances : ndarrays (n, 2), (n,), [px], [px^2]
-    waits : ndarray (n,), [s]
-        Since each track was seen.
-    sizes, radii, radius_errors : ndarrays (n,), (m,), (m,), [px]
-    places, errors : ndarrays (m, 2), (m,), [px]
-    collided : float, [px/s]
-        Usual change of a component of the velocity in a collision.
-    fastest : float, [px/s]
-    shaken_now : bool
-        Whether beads may have got any speed since the last picture.
-    costs : ndarray (n, m)
-        Written.
-    """
-    worst = errors.max() if errors.size else 0.0
-    for i in range(predicted.shape[0]):
-        reach = fastest * waits[i]
-        far = _REACH2 * (variances[i] + worst * worst + (collided * waits[i]) ** 2)
-        far = max(far, sizes[i] * sizes[i])
-        if shaken_now:
-            far = max(far, reach * reach)
-        for j in range(places.shape[0]):
-            costs[i, j] = np.inf
-            dx = places[j, 0] - predicted[i, 0]
-            dy = places[j, 1] - predicted[i, 1]
-            d2 = dx * dx + dy * dy
-            if d2 > far:
-                continue
-            free = variances[i] + errors[j] * errors[j]
-            hit = free + (collided * waits[i]) ** 2
-            missed = free + (_MISPLACED_BY * sizes[i]) ** 2
-            shaken = free + (0.4 * reach) ** 2
-            near = d2 <= max(_REACH2 * hit, sizes[i] * sizes[i])
-            if not near and not (shaken_now and d2 <= reach * reach):
-                continue
-            likelihood = (1.0 - _COLLIDING) / free * math.exp(-0.5 * d2 / free)
-            likelihood += _COLLIDING / hit * math.exp(-0.5 * d2 / hit)
-            likelihood += _MISPLACED / missed * math.exp(-0.5 * d2 / missed)
-            likelihood += _SHAKEN / shaken * math.exp(-0.5 * d2 / shaken)
-            off = radii[j] - sizes[i]
-            usual = _SIZE_JITTER_PX * _SIZE_JITTER_PX + radius_errors[j] * radius_errors[j]
-            size = 0.5 * off * off / usual
-            costs[i, j] = min(size, _LARGEST_SIZE_COST) - math.log(likelihood)
-        if places.shape[0]:
-            # A bead that is hidden must not push the others from their places.
-            most = costs[i].min() + _WORTH
-            for j in range(places.shape[0]):
-                if costs[i, j] > most:
-                    costs[i, j] = np.inf
-
-
-@compiled
-def _predict(
-    lines: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    time: float,
-    near_wall: NDArray[np.float64],
-    far_wall: NDArray[np.float64],
-    places: NDArray[np.float64],
-    variances: NDArray[np.float64],
-) -> None:
-    """Where lines lead, (n, 2), and the variance of a coordinate, (n,); walls reflect."""
-    for i in range(lines.shape[0]):
-        after = time - lines[i, 0]
-        moving = lines[i, 6] < np.inf
-        spread = lines[i, 6] if moving else _SLOWEST_PX_S * _SLOWEST_PX_S
-        variances[i] = lines[i, 5] + spread * after * after
-        for axis in range(2):
-            place = lines[i, 1 + axis] + (lines[i, 3 + axis] * after if moving else 0.0)
-            low, high = near_wall[axis] + radii[i], far_wall[axis] - radii[i]
-            # A bead may be a little beyond where its wall should be.
-            if high > low and not low - 1.0 <= place <= high + 1.0:
-                room = high - low
-                place = low + abs((place - low + room) % (2.0 * room) - room)
-            places[i, axis] = place
-
-
-@compiled
-def _extend_all(
-    chosen: NDArray[np.int64],
-    times: NDArray[np.float64],
-    places: NDArray[np.float64],
-    errors: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    lines: NDArray[np.float64],
-    time: float,
-    found: NDArray[np.float64],
-    found_errors: NDArray[np.float64],
-    window: float,
-) -> None:
-    for i in range(chosen.size):
-        j = chosen[i]
-        if j >= 0:
-            counts[i] = extend_flight(
-                times[i],
-                places[i],
-                errors[i],
-                counts[i],
-                lines[i],
-                time,
-                found[j, 0],
-                found[j, 1],
-                found_errors[j],
-                window,
-            )
 
 
 class Linker:
@@ -237,7 +105,7 @@ class Linker:
         # Any pair within reach is better than none.
         alone = float(finite.max()) + 1.0 if finite.size else 0.0
         chosen = assign(costs, alone)
-        _extend_all(
+        extend_all(
             chosen,
             self._times,
             self._places,
@@ -277,11 +145,11 @@ class Linker:
         """
         costs = np.empty((self.last.size, found.radii.size))
         waits = time - self.last
-        collided = max(_COLLISION * self._speed, _SLOWEST_PX_S)
+        collided = max(_COLLISION * self._speed, SLOWEST_PX_S)
         latest: float = waits.min() if waits.size else 0.0
         fresh = waits <= 1.5 * latest
         for shaken_now in (False, True):
-            _costs(
+            pair_costs(
                 *predicted,
                 waits,
                 self.radii,
@@ -312,7 +180,7 @@ class Linker:
         Beads that would have reached a wall come back from it.
         """
         places, variances = np.empty((self.last.size, 2)), np.empty(self.last.size)
-        _predict(self._lines, self.radii, time, shift, shift + self._size, places, variances)
+        predict(self._lines, self.radii, time, shift, shift + self._size, places, variances)
         return places, variances
 
     def hints(self, time: float, shift: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -321,7 +189,7 @@ class Linker:
         Those of which most was seen come first: they lie on top.
         """
         places, _ = self.predicted(time, shift)
-        sizes = np.maximum(self.radius_errors(), _SIZE_JITTER_PX)
+        sizes = np.maximum(self.radius_errors(), SIZE_JITTER_PX)
         order = np.argsort(-self._shares, kind='stable')
         return np.column_stack([places - shift, self.radii, sizes])[order]
 
