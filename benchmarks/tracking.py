@@ -304,7 +304,7 @@ def _judge(
 
 
 def _report_speeds() -> None:
-    print('\nMean projected speed / truth (sd of one estimate), by tray and species\n')
+    print('\nMean projected speed / truth (sd of one estimate); "!": says it is not reliable\n')
     heads = [f'{1e3 * one:g} mm/s' for one in _SPEEDS]
     print('| tray, species, effects | ' + ' | '.join(heads) + ' |')
     print('| --- |' + ' --- |' * len(heads))
@@ -327,14 +327,18 @@ def _speed_cell(shots: list[_Shot], number: int, index: int) -> str:
     records = list(_tracked(shots, number))[12:]
     stamps = np.array([one.stamp_ns for one, _ in records])
     true = np.array([one.projected_speeds[one.species == index].mean() for _, one in records])
-    ratios = []
+    ratios, reliable = [], []
     for end in range(40, len(records), 5):
         tracks = [one for one, _ in records[:end]]
         found = mean_speed(tracks, least_distance=_LEAST_DISTANCE, species=index)
         if found is not None:
             inside = np.abs(stamps - found.stamp_ns) <= 0.5 * found.window * _NS + 1e6
             ratios.append(found.mean_projected_speed / true[inside].mean())
-    return f'{np.mean(ratios):.3f} ({np.std(ratios):.3f})' if ratios else 'unknown'
+            reliable.append(found.reliable)
+    if not ratios:
+        return 'unknown'
+    flag = '' if np.mean(reliable) > 0.5 else ' !'
+    return f'{np.mean(ratios):.3f} ({np.std(ratios):.3f}){flag}'
 
 
 def _report_cost(shots: list[_Shot]) -> None:

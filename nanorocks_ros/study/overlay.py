@@ -23,7 +23,7 @@ _COLOURS = (
     (80, 255, 120),
     (0, 235, 255),
     (255, 255, 90),
-    (255, 120, 255),
+    (255, 255, 255),
     (90, 200, 255),
     (200, 255, 200),
 )
@@ -39,7 +39,7 @@ def overlay(
     pixels_per_metre: float,
     *,
     magnification: int = 3,
-    path_frames: int = 90,
+    path_frames: int = 30,
 ) -> NDArray[np.uint8]:
     """Draw the beads of one picture, and the ways they came.
 

@@ -17,6 +17,7 @@ from nanorocks_ros.stages.tracking.pixels import (
     GRAY,
     RED,
     Picture,
+    lift_dark_hues,
     look_at_dusty_pixels,
     look_at_pixels,
 )
@@ -96,6 +97,11 @@ class BeadDetector:
         self._turn = 0
         self._ground: _Ground | None = None
 
+    @property
+    def crowded(self) -> bool:
+        """Whether there are too many grains to look for."""
+        return any(one.most == 0 for one in self._searches)
+
     def detect(
         self, color: NDArray[np.uint8], hints: Sequence[NDArray[np.float64]] = ()
     ) -> tuple[Detections, ...]:
@@ -138,6 +144,7 @@ class BeadDetector:
         picture = ground.picture
         look_at_pixels(color, ground.levels, self._gray_known, picture)
         if self._dusty:
+            lift_dark_hues(color, picture.hue)
             smooth = cv2.blur(picture.hue, (_DUSTY_BLUR_PX, _DUSTY_BLUR_PX))
             picture = picture._replace(hue=np.asarray(smooth, dtype=np.int16))
             look_at_dusty_pixels(ground.levels, picture)

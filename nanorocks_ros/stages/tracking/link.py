@@ -7,129 +7,33 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.stages.tracking.assignment import assign
-from nanorocks_ros.stages.tracking.flight import KEPT, extend_flight
+from nanorocks_ros.stages.tracking.flight import KEPT
+from nanorocks_ros.stages.tracking.pairs import (
+    SIZE_JITTER_PX,
+    SLOWEST_PX_S,
+    extend_all,
+    pair_costs,
+    predict,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.stages.tracking.detect import Detections
 
-# Shares of the beads that collide, or are shaken, between two pictures.
-_COLLIDING, _SHAKEN = 0.15, 0.002
-# Of a usual velocity component, how much a collision changes one; and so many of those, squared,
-# are the limit.
+# Collisions of a bead that nobody sees.
+_COLLIDING_A_SECOND = 5.0
+# Of a usual velocity component, how much a collision changes one.
 _COLLISION = 1.4
-_REACH2 = 16.0
 # Share of the beads that must be out of reach of collisions for a tray to have been shaken.
 _LOST = 0.3
-# Of the size of one bead from picture to picture, beyond what its errors say, [px].
-_SIZE_JITTER_PX = 0.3
-_LARGEST_SIZE_COST = 6.0
-# A pair that is so much less likely than the best, as a logarithm, is none.
-_WORTH = 10.0
 # Pictures in a row that a new bead must be seen in.
 _CONFIRM = 3
-# Slowest change of velocity in a collision that is reckoned with, [px/s].
-_SLOWEST_PX_S = 6.0
 # Share of a new mean speed taken over in each picture.
 _SPEED_SHARE = 0.1
 # The size of a bead is measured with an error that pictures share, [px].
 _SIZE_FLOOR_PX = 0.03
-
-
-@compiled
-def _costs(
-    predicted: NDArray[np.float64],
-    variances: NDArray[np.float64],
-    waits: NDArray[np.float64],
-    sizes: NDArray[np.float64],
-    places: NDArray[np.float64],
-    errors: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    collided: float,
-    fastest: float,
-    shaken_now: bool,
-    costs: NDArray[np.float64],
-) -> None:
-    """Minus the logarithm of the likelihood of every pair; infinite out of reach.
-
-    Parameters
-    ----------
-    predicted, variances : ndarrays (n, 2), (n,), [px], [px^2]
-    waits : ndarray (n,), [s]
-        Since each track was seen.
-    sizes, radii : ndarrays (n,), (m,), [px]
-    places, errors : ndarrays (m, 2), (m,), [px]
-    collided : float, [px/s]
-        Usual change of a component of the velocity in a collision.
-    fastest : float, [px/s]
-    shaken_now : bool
-        Whether beads may have got any speed since the last picture.
-    costs : ndarray (n, m)
-        Written.
-    """
-    worst = errors.max() if errors.size else 0.0
-    for i in range(predicted.shape[0]):
-        reach = fastest * waits[i]
-        far = _REACH2 * (variances[i] + worst * worst + (collided * waits[i]) ** 2)
-        if shaken_now:
-            far = max(far, reach * reach)
-        for j in range(places.shape[0]):
-            costs[i, j] = np.inf
-            dx = places[j, 0] - predicted[i, 0]
-            dy = places[j, 1] - predicted[i, 1]
-            d2 = dx * dx + dy * dy
-            if d2 > far:
-                continue
-            free = variances[i] + errors[j] * errors[j]
-            hit = free + (collided * waits[i]) ** 2
-            shaken = free + (0.4 * reach) ** 2
-            if d2 > _REACH2 * hit and not (shaken_now and d2 <= reach * reach):
-                continue
-            likelihood = (1.0 - _COLLIDING) / free * math.exp(-0.5 * d2 / free)
-            likelihood += _COLLIDING / hit * math.exp(-0.5 * d2 / hit)
-            likelihood += _SHAKEN / shaken * math.exp(-0.5 * d2 / shaken)
-            off = radii[j] - sizes[i]
-            size = 0.5 * off * off / (_SIZE_JITTER_PX * _SIZE_JITTER_PX)
-            costs[i, j] = min(size, _LARGEST_SIZE_COST) - math.log(likelihood)
-        if places.shape[0]:
-            # A bead that is hidden must not push the others from their places.
-            most = costs[i].min() + _WORTH
-            for j in range(places.shape[0]):
-                if costs[i, j] > most:
-                    costs[i, j] = np.inf
-
-
-@compiled
-def _extend_all(
-    chosen: NDArray[np.int64],
-    times: NDArray[np.float64],
-    places: NDArray[np.float64],
-    errors: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    lines: NDArray[np.float64],
-    time: float,
-    found: NDArray[np.float64],
-    found_errors: NDArray[np.float64],
-    window: float,
-) -> None:
-    for i in range(chosen.size):
-        j = chosen[i]
-        if j >= 0:
-            counts[i] = extend_flight(
-                times[i],
-                places[i],
-                errors[i],
-                counts[i],
-                lines[i],
-                time,
-                found[j, 0],
-                found[j, 1],
-                found_errors[j],
-                window,
-            )
 
 
 class Linker:
@@ -201,7 +105,7 @@ class Linker:
         # Any pair within reach is better than none.
         alone = float(finite.max()) + 1.0 if finite.size else 0.0
         chosen = assign(costs, alone)
-        _extend_all(
+        extend_all(
             chosen,
             self._times,
             self._places,
@@ -241,17 +145,18 @@ class Linker:
         """
         costs = np.empty((self.last.size, found.radii.size))
         waits = time - self.last
-        collided = max(_COLLISION * self._speed, _SLOWEST_PX_S)
+        collided = max(_COLLISION * self._speed, SLOWEST_PX_S)
         latest: float = waits.min() if waits.size else 0.0
         fresh = waits <= 1.5 * latest
         for shaken_now in (False, True):
-            _costs(
+            pair_costs(
                 *predicted,
                 waits,
                 self.radii,
                 found.places,
                 found.place_errors,
                 found.radii,
+                found.radius_errors,
                 collided,
                 self._fastest,
                 shaken_now,
@@ -274,19 +179,9 @@ class Linker:
 
         Beads that would have reached a wall come back from it.
         """
-        lines = self._lines
-        after = time - lines[:, 0]
-        moving = np.isfinite(lines[:, 6])
-        velocity = np.where(moving[:, None], lines[:, 3:5], 0.0)
-        places = lines[:, 1:3] + velocity * after[:, None]
-        low = self.radii[:, None] + shift
-        room = np.maximum(self._size - 2.0 * self.radii[:, None], 1.0)
-        folded = np.abs(np.mod(places - low + room, 2.0 * room) - room)
-        # A bead may be a little beyond where its wall should be.
-        outside = np.abs(places - low - 0.5 * room) > 0.5 * room + 1.0
-        places = np.where(outside, low + folded, places)
-        spread = np.where(moving, lines[:, 6], _SLOWEST_PX_S**2)
-        return places, lines[:, 5] + spread * after**2
+        places, variances = np.empty((self.last.size, 2)), np.empty(self.last.size)
+        predict(self._lines, self.radii, time, shift, shift + self._size, places, variances)
+        return places, variances
 
     def hints(self, time: float, shift: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where beads should be: column, row, radius and its error, (n, 4), [px].
@@ -294,7 +189,7 @@ class Linker:
         Those of which most was seen come first: they lie on top.
         """
         places, _ = self.predicted(time, shift)
-        sizes = np.maximum(self.radius_errors(), _SIZE_JITTER_PX)
+        sizes = np.maximum(self.radius_errors(), SIZE_JITTER_PX)
         order = np.argsort(-self._shares, kind='stable')
         return np.column_stack([places - shift, self.radii, sizes])[order]
 
@@ -307,6 +202,13 @@ class Linker:
     def places(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Last place of each bead, (n, 2), and the error of a coordinate, (n,), [px]."""
         return self._places[:, 0], self._errors[:, 0]
+
+    def strayed(self, time: float) -> NDArray[np.float64]:
+        """Variance of a coordinate by collisions that nobody saw, (n,), [px^2]."""
+        rate = _COLLIDING_A_SECOND * (time - self.last)
+        kick = _COLLISION * self._speed * (time - self.last)
+        # On average the collision was half way.
+        return np.asarray(np.minimum(rate, 1.0) * np.square(kick) / 3.0)
 
     def radius_errors(self) -> NDArray[np.float64]:
         """Standard errors of the radii, (n,), [px]."""

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.records import Tracks
 
+RELIABLE_SHARE = 0.7
+"""Of the beads, to be followed through the window: with fewer, simulated speeds were off by more
+than 20 % now and then."""
+
 _NS = 1e9
 # Least distance wanted, in units of the error of a coordinate: the jitter then adds 2 % to the
 # mean square.
@@ -50,6 +54,8 @@ class MeanSpeed:
     window : float, [s]
     beads : int
         Beads followed through the window.
+    share : float
+        Of the beads there are.
     """
 
     stamp_ns: int
@@ -57,6 +63,12 @@ class MeanSpeed:
     mean_projected_speed_error: float
     window: float
     beads: int
+    share: float
+
+    @property
+    def reliable(self) -> bool:
+        """Whether enough beads were followed: where many are lost, others are confused."""
+        return self.share >= RELIABLE_SHARE
 
 
 def mean_speed(
@@ -95,6 +107,8 @@ def mean_speed(
         return None
     first, middle, end = (tracks[last - k * lag].stamp_ns for k in (2, 1, 0))
     window = (end - first) / _NS
+    counts = tracks[last].expected
+    expected = counts.sum() if species is None else counts[species]
     value, error = distances.speed((end - middle) / _NS, (middle - first) / _NS)
     return MeanSpeed(
         stamp_ns=(first + end) // 2,
@@ -102,6 +116,7 @@ def mean_speed(
         mean_projected_speed_error=error,
         window=window,
         beads=distances.both.size,
+        share=distances.both.size / max(int(expected), 1),
     )
 
 

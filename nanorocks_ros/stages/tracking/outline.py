@@ -30,7 +30,7 @@ _MOST_NEIGHBOURS = 24
 # No value of a picture.
 _OUT = -10000.0
 # A step that needs no further one, [px].
-_SETTLED_PX = 0.02
+_SETTLED_PX = 0.06
 # An edge off the circle by so many pixels counts half.
 _HALF_WEIGHT_PX = 0.35
 # Neighbouring rays see the same pixels; what a scatter of nothing would still hide, [px].

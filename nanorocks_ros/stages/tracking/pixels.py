@@ -112,6 +112,28 @@ _DUSTY_HUE = 16
 _DUSTY_STEPS = 5
 
 
+# Red and blue together of a well lit bead, and how much a dark one is lifted at most.
+_LIT = 250.0
+_LIFTED = 3.0
+_BLACK = 20.0
+
+
+@compiled
+def lift_dark_hues(color: NDArray[np.uint8], hue: NDArray[np.int16]) -> None:
+    """Give the dark side of a bead the hue of its lit side.
+
+    Parameters
+    ----------
+    color : ndarray of uint8, (rows, columns, 3), bgr
+    hue : ndarray of int16, (rows, columns), [gray levels]
+        Changed.
+    """
+    for i in range(hue.shape[0]):
+        for j in range(hue.shape[1]):
+            light = float(color[i, j, 0]) + float(color[i, j, 2]) + _BLACK
+            hue[i, j] = int(hue[i, j] * min(max(_LIT / light, 1.0), _LIFTED))
+
+
 @compiled
 def look_at_dusty_pixels(floor: NDArray[np.uint8], picture: Picture) -> None:
     """The same for beads and floor under chalk, and glare: only the hue tells them apart.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -35,7 +37,7 @@ def _tracks(velocities, jitter, frames, seed=1, species=None):
             radii=np.full(n, 1e-3),
             radius_errors=np.full(n, 1e-5),
             seen=np.ones(n, dtype=bool),
-            expected=np.array([n], dtype=np.int32),
+            expected=np.bincount(species).astype(np.int32),
         )
 
 
@@ -73,6 +75,15 @@ def test_each_species_has_a_speed_of_its_own():
         assert found.beads == 10
     both = mean_speed(tracks, least_distance=1.5 * PIXEL)
     assert both.mean_projected_speed == pytest.approx(4e-3, rel=0.03)
+
+
+def test_a_speed_of_half_of_the_beads_is_not_reliable():
+    tracks = list(_tracks(np.full((20, 2), 1e-3), 1e-6, 20))
+    assert mean_speed(tracks, least_distance=PIXEL).reliable
+    seen = np.arange(20) < 10
+    half = [replace(one, seen=seen) for one in tracks]
+    found = mean_speed(half, least_distance=PIXEL)
+    assert (found.beads, found.share, found.reliable) == (10, 0.5, False)
 
 
 def test_nothing_is_said_of_two_beads_or_two_pictures():
