@@ -33,7 +33,7 @@ _SCALE = 12500.0
 _TRAYS = (1, 2, 3, 4, 5, 6, 7)
 _SPEEDS = (0.1e-3, 0.5e-3, 2e-3, 7e-3, 15e-3)
 # Slow beads need time to leave their places.
-_SECONDS = (60.0, 40.0, 15.0, 10.0, 10.0)
+_SECONDS = (40.0, 25.0, 12.0, 8.0, 8.0)
 _METHODS = {
     'auto': {},
     'tracking': {'speed.method': 'tracking'},
@@ -116,9 +116,10 @@ def _pictures(
             jpeg = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
             image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR)
         frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
-        yield frame, {
-            one.tray: float(np.hypot(*one.velocities[:, :2].T).mean()) for one in moment.beads
-        }
+        yield (
+            frame,
+            {one.tray: float(np.hypot(*one.velocities[:, :2].T).mean()) for one in moment.beads},
+        )
 
 
 def _cell(found: list[SpeedEstimate], truth: np.ndarray) -> str:

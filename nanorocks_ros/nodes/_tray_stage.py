@@ -14,7 +14,7 @@ from nanorocks_ros.nodes._tracks import TracksPicture
 from nanorocks_ros.recordings.images import frame_from_image
 from nanorocks_ros.records import Tracks, TrayImage, TrayState
 from nanorocks_ros.stages.pipeline import trays_of
-from nanorocks_ros.stages.warm_up import warm_up_counting
+from nanorocks_ros.stages.warm_up import warm_up_counting, warm_up_speed
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import from_array
 
@@ -44,6 +44,8 @@ class TrayStageNode(NanorocksNode):
         self._settings = self.declare(PipelineSettings(), fixed=False)
         self._epoch = Epoch(self, may_set=False)
         warm_up_counting()
+        if in_color:
+            warm_up_speed()
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
         self._joiners = {tray: TrayJoiner(tray) for tray in self._settings.trays}

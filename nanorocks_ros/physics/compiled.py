@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 LOGGER = logging.getLogger('nanorocks_ros')
 
-# The function that takes longest to compile.
-_SLOWEST = 'run_until'
+# The functions that take longest to compile, and what they belong to.
+_SLOWEST = {'run_until': 'the simulation', 'cover': 'the tracking'}
 
 Function = TypeVar('Function', bound='Callable[..., Any]')
 
@@ -38,16 +38,16 @@ def kernel(function: Function) -> Function:
 
 
 class _Announcer(event.Listener):
-    """Tells the log once when the loop over events must be compiled, which takes its time."""
+    """Tells the log once when what takes its time must be compiled."""
 
     def __init__(self) -> None:
-        self._told = False
+        self._told: set[str] = set()
 
     def on_start(self, event: event.Event) -> None:
         name = event.data['dispatcher'].py_func.__name__
-        if name == _SLOWEST and not self._told:
-            self._told = True
-            LOGGER.info('compiling the simulation, once on this machine: about half a minute')
+        if name in _SLOWEST and name not in self._told:
+            self._told.add(name)
+            LOGGER.info('compiling %s, once on this machine: about half a minute', _SLOWEST[name])
 
     def on_end(self, event: event.Event) -> None:
         pass

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from nanorocks_ros.experiment.settings import PipelineSettings, with_values
@@ -10,6 +11,7 @@ from nanorocks_ros.experiment.view import Straight, View
 from nanorocks_ros.records import Frame, TrayImage
 from nanorocks_ros.stages.preprocess import Preprocessor
 from nanorocks_ros.stages.shaking import CycleFollower
+from nanorocks_ros.stages.speed import SpeedEstimator
 
 _SIDE = 160
 _REGION = (40, 40, 80, 80)
@@ -40,3 +42,17 @@ def warm_up() -> None:
         for number, image in enumerate(noise):
             pixels = image if encoding == 'bgr8' else np.ascontiguousarray(image[:, :, 0])
             stage.push(Frame(stamp_ns=number, encoding=encoding, image=pixels))
+
+
+def warm_up_speed() -> None:
+    """Push a few pictures of moving discs through what measures speeds in colour images."""
+    settings = PipelineSettings()
+    estimator = SpeedEstimator(settings, load_trays()[3])
+    for number in range(8):
+        color = np.full((80, 160, 3), 150, dtype=np.uint8)
+        for k in range(8):
+            place = 18 + 18 * k
+            cv2.circle(color, (place, 20 + number), 12, (30, 30, 200), -1)
+            cv2.circle(color, (place, 60 - number), 7, (200, 60, 30), -1)
+        gray = np.ascontiguousarray(color[:, :, 0])
+        estimator.push(TrayImage(stamp_ns=number * 33_333_333, tray=3, gray=gray, color=color))
