@@ -54,6 +54,10 @@ class Quality(IntFlag):
     HALF_FRAME = 128
     WRONG_SCALE = 256
 
+    def names(self) -> list[str]:
+        """The flags that are set, in small letters."""
+        return [flag.name.lower() for flag in type(self) if flag in self and flag.name]
+
 
 NOTHING_WRONG = Quality(0)
 

@@ -30,7 +30,6 @@ from nanorocks_ros.records import (
     GroundTruth,
     MotionMask,
     Notice,
-    Quality,
     SpeedEstimate,
     TrayImage,
 )
@@ -215,8 +214,7 @@ class NanorocksNode(Node):
                     message = image_message(record.stamp_ns, frame_id, pixels)
                     self.send(topic, message, record.tray)
         if isinstance(record, SpeedEstimate | TrayImage):
-            flags = [flag.name.lower() for flag in Quality if flag in record.quality]
-            self.state[f'tray {record.tray} quality'] = ', '.join(flags) or 'good'
+            self.state[f'tray {record.tray} quality'] = ', '.join(record.quality.names()) or 'good'
         if isinstance(record, SpeedEstimate):
             method = record.method.name.lower().replace('_', ' ')
             speed = f'{1e3 * record.mean_projected_speed:.3f} mm/s by {method}'

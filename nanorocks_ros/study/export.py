@@ -72,6 +72,10 @@ def _tray_as_json(analysis: Analysis, results: TrayResults) -> dict[str, Any]:
         'mean_projected_speed_error': [
             _known(one.mean_projected_speed_error) for one in results.speeds
         ],
+        'first_species_speed': [_known(one.first_species_speed) for one in results.speeds],
+        'second_species_speed': [_known(one.second_species_speed) for one in results.speeds],
+        'method': [one.method.name.lower() for one in results.speeds],
+        'quality': [one.quality.names() for one in results.speeds],
         'cycles': [
             _cycle_as_json(one, seconds(starts[one.stamp_ns] or 0))
             for one in last_of_each_cycle(results.cors)

@@ -170,6 +170,11 @@ def test_the_command_prints_one_json_object(capsys, tmp_path):
     assert set(found) >= {'frames', 'frames_lost', 'seconds', 'trays'}
     tray = found['trays']['1']
     assert len(tray['time']) == len(tray['mean_projected_speed'])
+    assert len(tray['time']) == len(tray['method']) == len(tray['quality'])
+    assert set(tray['method']) == {'tracking'}
+    assert not any(tray['quality'])
+    assert all(one > 0.0 for one in tray['first_species_speed'][-5:])
+    assert set(tray['second_species_speed']) == {None}
     assert set(tray['cycles'][0]) >= {
         'start',
         'initial_speed',
