@@ -44,7 +44,6 @@ class Appearance:
         Orientation at first, and how fast it turns right after shaking.
     dust : ndarray (n,)
         Share of it on the bead, 0 to 2.
-    species : ndarray of int32, (n,)
     """
 
     looks: NDArray[np.float64]
@@ -53,7 +52,6 @@ class Appearance:
     angles: NDArray[np.float64]
     rates: NDArray[np.float64]
     dust: NDArray[np.float64]
-    species: NDArray[np.int32]
 
     @staticmethod
     def joined(parts: list[Appearance]) -> Appearance:
@@ -72,7 +70,6 @@ _NOTHING = Appearance(
     angles=np.empty(0),
     rates=np.empty(0),
     dust=np.empty(0),
-    species=np.empty(0, dtype=np.int32),
 )
 
 
@@ -98,7 +95,6 @@ def appearance_of(tray: Tray, scene: SceneSettings, rng: np.random.Generator) ->
         angles=angles,
         rates=rates,
         dust=dust * (scene.chalk if tray.chalk else 0.0),
-        species=drawn.species,
     )
 
 
@@ -125,7 +121,7 @@ def turned_since(time: float, events: list[float]) -> float:
     ends = [*events[1:], time]
     return sum(
         _COOLING * math.log1p((end - start) / _COOLING)
-        for start, end in zip(events, ends, strict=len(events) > 0)
+        for start, end in zip(events, ends[: len(events)], strict=True)
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 
 from nanorocks_ros.simulation.randomness import Purpose, hashed, key_for
@@ -62,21 +61,21 @@ class SceneCamera:
         self._noise_key = key_for(simulation.seed, 0, Purpose.NOISE)
         chalk = {number: scene.chalk for number, tray in trays.items() if tray.chalk}
         still = empty_scene(self.geometry, defocus=scene.defocus_px, chalk=chalk, seed=seed)
-        self._plate = MovingPlate(self.geometry, still)
         self._glare = led_glare(self.geometry, scene.glare) if scene.glare > 0.0 else None
+        glaring = [] if self._glare is None else [self._glare.region]
+        self._plate = MovingPlate(self.geometry, still, glaring)
         self._light = Illumination(scene, self.geometry.shape)
         self._strip = noise_strip(simulation.width_px, scene.noise, self._noise_key)
-        self._planes = np.empty((3, *self.geometry.shape), dtype=np.uint8)
         self._painter = BeadPainter(self.geometry, scene, trays, radii, seed)
 
     @property
     def glare(self) -> NDArray[np.float64] | None:
-        """Levels that the LEDs add to the picture, (rows, columns), or None."""
+        """Gray levels that the LEDs add to green, (rows, columns), before the light; or None."""
         if self._glare is None:
             return None
         levels = np.zeros(self.geometry.shape)
         x, y, width, height = self._glare.region
-        levels[y : y + height, x : x + width] = self._glare.light.mean(axis=0) / LEVEL
+        levels[y : y + height, x : x + width] = self._glare.light[1] / LEVEL
         return levels
 
     def picture(
@@ -116,12 +115,14 @@ class SceneCamera:
         if self._glare is not None:
             x, y, _, _ = self._glare.region
             add_light(canvas, self._glare.light, x, y)
+        rows, columns = self.geometry.shape
+        picture = np.empty((rows, columns, 3), dtype=np.uint8)
         expose(
             canvas,
             self._light.across,
             self._light.down(time),
             self._strip,
             np.uint64(hashed(self._noise_key, number)),
-            self._planes,
+            picture.reshape(rows, 3 * columns),
         )
-        return np.asarray(cv2.merge(list(self._planes)), dtype=np.uint8)
+        return picture

@@ -15,6 +15,7 @@ from nanorocks_ros.records import BeadsTruth, Frame, GroundTruth
 from nanorocks_ros.simulation.initial import stock
 from nanorocks_ros.simulation.scene.appearance import turned_since
 from nanorocks_ros.simulation.scene.camera import SceneCamera
+from nanorocks_ros.simulation.scene.moving_plate import FURTHEST_PX
 from nanorocks_ros.simulation.scene.swing import plate_motion, wall_motion_of
 from nanorocks_ros.simulation.shaking import ShakenTray, check_settings
 
@@ -99,6 +100,7 @@ class SceneFilm:
     ) -> None:
         check_settings(simulation)
         check_scene(scene)
+        _check_swing(simulation, scene)
         self._simulation = simulation
         cells = dict(trays or load_trays())
         self._swing = wall_motion_of(simulation, scene)
@@ -196,6 +198,23 @@ def _gas(simulation: SimulationSettings, scene: SceneSettings, tray: Tray) -> Sh
     swing = wall_motion_of(simulation, scene) if scene.swing_knocks else None
     one = replace(simulation, tray=tray.number)
     return ShakenTray(one, tray, run=tray.number, swing=swing)
+
+
+def _check_swing(simulation: SimulationSettings, scene: SceneSettings) -> None:
+    """Refuse a swing that would end the film at the first shaking event."""
+    furthest = FURTHEST_PX / scene.pixels_per_metre
+    if scene.swing >= furthest:
+        raise ConfigurationError(
+            'swing',
+            f'{scene.swing:g} m is {FURTHEST_PX} px or more in the picture',
+            f'give less than {furthest:.3g} m',
+        )
+    if scene.swing > 0.0 and simulation.wall_sticking_speed > 0.0:
+        raise ConfigurationError(
+            'wall_sticking_speed',
+            f'{simulation.wall_sticking_speed:g} m/s, but beads cannot stick to walls that swing',
+            'set it or the swing to 0',
+        )
 
 
 def check_scene(scene: SceneSettings) -> None:

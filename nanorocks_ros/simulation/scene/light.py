@@ -44,10 +44,6 @@ class Illumination:
         angle = 2.0 * math.pi * time / self._period - self._phase
         return _parts(self._down * (1.0 + self._flicker * np.sin(angle)))
 
-    def levels(self, time: float) -> NDArray[np.float64]:
-        """The light itself, (rows, columns)."""
-        return self.down(time)[:, np.newaxis] * (self.across / ONE) / ONE
-
 
 def _parts(light: NDArray[np.float64]) -> NDArray[np.uint32]:
     return np.asarray(np.rint(light * ONE), dtype=np.uint32)

@@ -10,12 +10,18 @@ from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.simulation.scene.passes import BLOCK, shift_blocks
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
+    from nanorocks_ros.experiment.plate import Region
     from nanorocks_ros.simulation.scene.geometry import SceneGeometry
 
 # Around the plate the shift falls to nothing within so many squares.
 _FADE = 2
+
+FURTHEST_PX = BLOCK - 1
+"""A plate that is displaced by so much, or more, cannot be drawn, [px]."""
 
 
 class MovingPlate:
@@ -26,9 +32,16 @@ class MovingPlate:
     geometry : SceneGeometry
     still : ndarray of uint16, (3, rows, columns)
         The scene with the plate in its place.
+    drawn_on : sequence of Region, [px]
+        Where the canvas is drawn on, besides on the trays.
     """
 
-    def __init__(self, geometry: SceneGeometry, still: NDArray[np.uint16]) -> None:
+    def __init__(
+        self,
+        geometry: SceneGeometry,
+        still: NDArray[np.uint16],
+        drawn_on: Sequence[Region] = (),
+    ) -> None:
         self._still, self._scale = still, geometry.scale
         self._canvas = still.copy()
         self._moved = False
@@ -46,6 +59,7 @@ class MovingPlate:
             geometry.bounds(r.x - 40, r.y - 40, r.x + r.width + 40, r.y + r.height + 40)
             for r in geometry.regions.values()
         ]
+        self._drawn_on = list(drawn_on)
 
     def moved_to(self, displacement: tuple[float, float]) -> NDArray[np.uint16]:
         """The canvas with the plate that far from its place [m]; to be drawn on.
@@ -56,12 +70,13 @@ class MovingPlate:
             When that is further than it can be drawn.
         """
         shift = np.array(displacement) * self._scale
-        if not (np.abs(shift) < BLOCK - 1).all():
+        if not (np.abs(shift) < FURTHEST_PX).all():
             raise SimulationError(
                 'plate',
                 f'displaced by {np.abs(shift).max():.3g} px',
-                f'give less than {BLOCK - 1} px: a weaker swing, or fewer pixels_per_metre',
+                f'give less than {FURTHEST_PX} px: a weaker swing, or fewer pixels_per_metre',
             )
+        self._renew(self._drawn_on)
         if shift.any():
             shift_blocks(self._canvas, self._still, self._lens @ shift, self._left, self._top)
             self._moved = True
@@ -69,10 +84,13 @@ class MovingPlate:
             self._canvas[:] = self._still
             self._moved = False
         else:
-            for x, y, width, height in self._touched:
-                part = np.s_[:, y : y + height, x : x + width]
-                self._canvas[part] = self._still[part]
+            self._renew(self._touched)
         return self._canvas
+
+    def _renew(self, regions: list[Region]) -> None:
+        for x, y, width, height in regions:
+            part = np.s_[:, y : y + height, x : x + width]
+            self._canvas[part] = self._still[part]
 
     def _local_shifts(
         self, geometry: SceneGeometry, down: int, across: int

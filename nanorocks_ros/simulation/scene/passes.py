@@ -162,7 +162,7 @@ def expose(
     down: NDArray[np.uint32],
     strip: NDArray[np.int32],
     key: np.uint64,
-    planes: NDArray[np.uint8],
+    picture: NDArray[np.uint8],
 ) -> None:
     """Turn a canvas into gray levels under uneven light, with noise.
 
@@ -177,11 +177,12 @@ def expose(
         See `noise_strip`.
     key : uint64
         Of the frame.
-    planes : ndarray of uint8, (3, rows, columns)
-        Written.
+    picture : ndarray of uint8, (rows, 3 columns)
+        Written: blue, green and red of each pixel in turn.
     """
     rows, columns = canvas.shape[1:]
     light = np.empty(columns, dtype=np.uint32)
+    planes = np.empty((3, columns), dtype=np.uint8)
     places = np.uint64(strip.size - columns + 1)
     for i in range(rows):
         for j in range(columns):
@@ -189,7 +190,8 @@ def expose(
         for channel in range(3):
             start = np.int64(hashed(key, 3 * i + channel) % places)
             noise = strip[start : start + columns]
-            _expose_row(canvas[channel, i], light, noise, planes[channel, i])
+            _expose_row(canvas[channel, i], light, noise, planes[channel])
+        _interleave(planes, picture[i])
 
 
 @kernel
@@ -204,3 +206,10 @@ def _expose_row(
         value = np.int32(np.uint32(canvas[j]) * light[j]) + noise[j] + np.int32(_HALF)
         value = value >> np.int32(_LEVEL_BITS)
         picture[j] = np.uint8(min(max(value, np.int32(0)), np.int32(255)))
+
+
+@kernel
+def _interleave(planes: NDArray[np.uint8], row: NDArray[np.uint8]) -> None:
+    for j in range(np.uint64(planes.shape[1])):
+        for channel in range(np.uint64(3)):
+            row[np.uint64(3) * j + channel] = planes[channel, j]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -32,6 +33,8 @@ def with_one(number, material='acrylic', diameter=0.002, chalk=None):
     return {**TRAYS, number: replace(tray, species=(one,), chalk=dusty)}
 
 
+# A picture depends on nothing that was drawn before, so cameras can be shared.
+@lru_cache(maxsize=4)
 def camera_with_one(number, scene=PLAIN, simulation=SIMULATION, **bead):
     """A camera over the plate with a single bead in one tray."""
     cells = with_one(number, **bead)
@@ -39,6 +42,7 @@ def camera_with_one(number, scene=PLAIN, simulation=SIMULATION, **bead):
     return SceneCamera(simulation, scene, cells, {number: np.array([radius])})
 
 
+@lru_cache(maxsize=4)
 def empty_camera(scene=PLAIN, simulation=SIMULATION):
     """A camera over the plate without beads."""
     return SceneCamera(simulation, scene, TRAYS, {})

@@ -153,5 +153,9 @@ def test_scenes_that_cannot_be_filmed_are_refused():
         SceneFilm(SHAKEN, replace(SMALL, trays=(1,)), {1: replace(TRAYS[1], place=None)})
     with pytest.raises(ConfigurationError, match='tray 3: does not exist'):
         SceneFilm(SHAKEN, SMALL, {1: TRAYS[1]})
+    with pytest.raises(ConfigurationError, match=r'swing: 0.002 m is 15 px .* less than 0.002 m'):
+        SceneFilm(SHAKEN, replace(SMALL, swing=0.002))
+    with pytest.raises(ConfigurationError, match='but beads cannot stick to walls'):
+        SceneFilm(replace(SHAKEN, wall_sticking_speed=0.001), SWINGING)
     with pytest.raises(SimulationError, match='frames: -1'):
         film(scene=replace(SMALL, trays=(1,))).moments(-1)
