@@ -39,7 +39,9 @@ def warm_up() -> None:
     noise[:2, y : y + height, x : x + width] += 80
     for encoding in ('bgr8', 'mono8'):
         stage = Preprocessor(settings, {1: load_trays()[1]}, 'warm-up', view)
-        for number, image in enumerate(noise):
+        # Enough frames for the look at the map of the trays.
+        for number in range(10):
+            image = noise[2 if number == 9 else number % 2]
             pixels = image if encoding == 'bgr8' else np.ascontiguousarray(image[:, :, 0])
             stage.push(Frame(stamp_ns=number, encoding=encoding, image=pixels))
 
