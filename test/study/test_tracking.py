@@ -143,5 +143,5 @@ def test_a_gray_camera_is_refused_with_the_remedy(tmp_path):
             stamp_ns = NS + number * NS // 30
             message = image_message(stamp_ns, 'camera', 'mono8', pixels)
             bag.write(topics.RAW.absolute(), stamp_ns, message)
-    with pytest.raises(FrameError, match='the camera is gray.*record in colour'):
+    with pytest.raises(FrameError, match=r'the camera is gray.*record in colour'):
         track_bag(path, PipelineSettings())
