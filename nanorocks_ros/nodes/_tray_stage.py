@@ -9,6 +9,7 @@ from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.nodes._shell import tray_image
 from nanorocks_ros.recordings.images import frame_from_image
 from nanorocks_ros.stages.pipeline import trays_of
+from nanorocks_ros.stages.warm_up import warm_up_counting
 from nanorocks_ros.wire import topics
 
 
@@ -30,6 +31,7 @@ class TrayStageNode(NanorocksNode):
         self._make = stage
         self._settings = self.declare(PipelineSettings(), fixed=False)
         self._epoch = Epoch(self, may_set=False)
+        warm_up_counting()
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
         for tray in self._settings.trays:

@@ -29,8 +29,9 @@ class PipelineNode(NanorocksNode):
         self._reader = None
         self._where = self._source
         self._camera, self._view = None, None
-        warm_up()
         self._offer_everything()
+        # Others find the publishers meanwhile.
+        warm_up()
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(st.PipelineSettings(), self._build, self._adopt)
         if self._source == 'topic':

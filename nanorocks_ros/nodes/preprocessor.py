@@ -18,12 +18,13 @@ class PreprocessorNode(NanorocksNode):
     def __init__(self):
         super().__init__('preprocessor')
         self._settings = self.declare(PipelineSettings(), fixed=False)
+        for tray in self._settings.trays:
+            self.offer((topics.GRAY, topics.RECTIFIED), tray)
+        # Others find the publishers meanwhile, and no frame is waiting yet.
         warm_up()
         look = None if self._settings.preprocess.calibration else self._straighten
         self._camera = Camera(self, self.declare(CameraSettings()), self._take, look)
         self._epoch = Epoch(self, may_set=True)
-        for tray in self._settings.trays:
-            self.offer((topics.GRAY, topics.RECTIFIED), tray)
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
 NS = 1_000_000_000
 # Frames at which the trays are looked for.
-_MAP_CHECKS = (1, 16)
+_MAP_CHECKS = (8, 16)
 
 
 class Preprocessor:
@@ -140,7 +140,7 @@ class Preprocessor:
         )
 
     def _check_map(self, frame: Frame) -> tuple[Notice, ...]:
-        """Whether the trays are where they should be: at first, and once more to be sure."""
+        """Whether the trays are where they should be: early on, and once more to be sure."""
         self._frames += 1
         if self._frames not in _MAP_CHECKS:
             return ()

@@ -142,6 +142,11 @@ class TrayFollower:
         self._trust = 1.0 / (1.0 + (self._powers / (_SUSPECT * usual)) ** 2)
         return found
 
+    @property
+    def sighted(self) -> bool:
+        """Whether there are walls to follow the tray by."""
+        return self._reference.size > 0
+
     def corrected(self, shift: Shift) -> None:
         """Be told where the tray really was in the last picture."""
         self._last = shift

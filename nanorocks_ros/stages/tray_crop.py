@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 NS = 1_000_000_000
 # A smaller shift is not worth the sharpness that an interpolation costs.
 _NEGLIGIBLE_PX = 0.04
+_SIGNIFICANT = 2.0
 _WHOLE = (0.0, 0.0)
 # A tray does not leave its plate: one that seems to was mistaken for what moves beside it.
 _STRAYED_PX = 1.0
@@ -113,7 +114,7 @@ class TrayCrop:
         if self._follower is None:
             return None
         self.shift = self._follower.push(image, hint)
-        if self.shift is None:
+        if self.shift is None and self._follower.sighted:
             self.pending |= Quality.STABILISATION_LOST
         return self.shift
 
@@ -151,8 +152,8 @@ class TrayCrop:
         image : ndarray of uint8, (height, width, channels)
             In one piece.
         """
-        shift = _WHOLE if self.shift is None else (self.shift.x, self.shift.y)
-        if not self._bent and math.hypot(*shift) < _NEGLIGIBLE_PX:
+        shift = self._worth_while()
+        if not self._bent and shift == _WHOLE:
             return self._cut(image)
         size = (self.region.height, self.region.width)
         gray = np.empty(size, dtype=np.uint8)
@@ -162,6 +163,15 @@ class TrayCrop:
         color = np.empty((*size, 3), dtype=np.uint8)
         resample_color(image, self._nodes, shift, self._weights, color, gray)
         return gray, self._as_bgr(color)
+
+    def _worth_while(self) -> tuple[float, float]:
+        """The shift to take out, which is none where the tray may as well be at rest."""
+        if self.shift is None:
+            return _WHOLE
+        least = max(_NEGLIGIBLE_PX, _SIGNIFICANT * self.shift.error)
+        if math.hypot(self.shift.x, self.shift.y) < least:
+            return _WHOLE
+        return self.shift.x, self.shift.y
 
     def _cut(self, image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:
         x, y, width, height = self.region

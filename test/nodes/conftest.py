@@ -23,7 +23,7 @@ from rclpy.node import Node
 from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.simulation.film import film
-from nanorocks_ros.stages.warm_up import warm_up
+from nanorocks_ros.stages.warm_up import warm_up, warm_up_counting
 
 # Two runs of the tests at once must not hear one another; 101 is the last safe number.
 _DOMAINS = itertools.cycle(random.Random(os.getpid()).sample(range(1, 102), 101))
@@ -37,6 +37,7 @@ def compiled_simulation():
     for _ in film(settings, load_trays()[1], frames=2):
         pass
     warm_up()
+    warm_up_counting()
 
 
 @dataclass
