@@ -196,8 +196,11 @@ def _trackpy_linkers(
     found: list[Detections], beads: list[NDArray[np.int64]], number: int, index: int
 ) -> list[tuple[str, Callable[..., list[NDArray[np.int64]]]]]:
     """trackpy with its nearest-velocity prediction, at the range that links best here."""
-    import trackpy
-
+    try:
+        import trackpy
+    except ImportError:
+        print('| | trackpy is not installed: `make venv`, or pip install trackpy | | | | |')
+        return []
     best: tuple[float, float] | None = None
     for diameters in (0.5, 0.75, 1.0, 1.5):
         try:

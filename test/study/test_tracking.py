@@ -11,12 +11,16 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.cli.main import main
-from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings
+from nanorocks_ros.recordings.messages import image_message, time_message
+from nanorocks_ros.recordings.writer import BagWriter
 from nanorocks_ros.study.film_bag import film_into_bag
 from nanorocks_ros.study.overlay import overlay
-from nanorocks_ros.study.tracking import track_bag
+from nanorocks_ros.study.results_bag import offered
+from nanorocks_ros.study.tracking import NS, track_bag
 from nanorocks_ros.study.tracks_files import COLUMNS, write_tracks
+from nanorocks_ros.wire import topics
 
 FRAMES = 40
 
@@ -126,3 +130,18 @@ def test_a_wrong_ending_is_a_wrong_call(bag, tmp_path, capsys):
 def test_a_bag_that_is_not_there_is_refused():
     with pytest.raises(RecordingError):
         track_bag('nowhere', PipelineSettings())
+
+
+def test_a_gray_camera_is_refused_with_the_remedy(tmp_path):
+    names = (topics.EPOCH, topics.RAW)
+    path = tmp_path / 'gray'
+    rng = np.random.default_rng(1)
+    with BagWriter(path, {one.absolute(): offered(one) for one in names}, metadata={}) as bag:
+        bag.write(topics.EPOCH.absolute(), NS, time_message(NS))
+        for number in range(4):
+            pixels = rng.integers(90, 110, (210, 210), dtype=np.uint8)
+            stamp_ns = NS + number * NS // 30
+            message = image_message(stamp_ns, 'camera', 'mono8', pixels)
+            bag.write(topics.RAW.absolute(), stamp_ns, message)
+    with pytest.raises(FrameError, match=r'the camera is gray.*record in colour'):
+        track_bag(path, PipelineSettings())

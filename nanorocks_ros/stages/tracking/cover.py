@@ -28,7 +28,7 @@ _FIT_KEEPS = 0.7
 # The outline of a coloured bead has lost its colour to the compression in a ring so wide, [px].
 _GRAY_RING_PX = 2.5
 # Of its radius, how far from where it should be a bead is taken for the expected one.
-_HINT_REACH = 0.6
+_HINT_REACH = 0.3
 
 
 @compiled

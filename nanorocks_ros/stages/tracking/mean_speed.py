@@ -29,6 +29,10 @@ _NS = 1e9
 # Least distance wanted, in units of the error of a coordinate: the jitter then adds 2 % to the
 # mean square.
 _LEAST_ERRORS = 14.0
+# The same for the errors that places share for a while, as those by patches of chalk; and the
+# part of it without which a speed is not to be relied upon.
+_PLACE_ERRORS = 3.0
+_SOME = 0.8
 # Fewer beads than this say nothing of a mean.
 _FEWEST = 3
 # Times the usual error of a place, with which a bead is still used.
@@ -56,6 +60,9 @@ class MeanSpeed:
         Beads followed through the window.
     share : float
         Of the beads there are.
+    reliable : bool
+        Whether enough beads were followed (where many are lost, others are confused), and far
+        enough to see beyond the errors of their places.
     """
 
     stamp_ns: int
@@ -64,11 +71,7 @@ class MeanSpeed:
     window: float
     beads: int
     share: float
-
-    @property
-    def reliable(self) -> bool:
-        """Whether enough beads were followed: where many are lost, others are confused."""
-        return self.share >= RELIABLE_SHARE
+    reliable: bool
 
 
 def mean_speed(
@@ -109,6 +112,7 @@ def mean_speed(
     window = (end - first) / _NS
     counts = tracks[last].expected
     expected = counts.sum() if species is None else counts[species]
+    share = distances.both.size / max(int(expected), 1)
     value, error = distances.speed((end - middle) / _NS, (middle - first) / _NS)
     return MeanSpeed(
         stamp_ns=(first + end) // 2,
@@ -116,7 +120,8 @@ def mean_speed(
         mean_projected_speed_error=error,
         window=window,
         beads=distances.both.size,
-        share=distances.both.size / max(int(expected), 1),
+        share=share,
+        reliable=share >= RELIABLE_SHARE and distances.beyond_errors(),
     )
 
 
@@ -136,11 +141,23 @@ class _Distances:
     earlier: NDArray[np.float64]
     both: NDArray[np.float64]
     variances: NDArray[np.float64]
+    place_variance: float
+
+    @property
+    def square(self) -> float:
+        """Mean square distance in half of the window."""
+        return float(np.mean(np.square(self.later) + np.square(self.earlier))) / 2.0
 
     def far_enough(self, least: float) -> bool:
-        square = float(np.mean(np.square(self.later) + np.square(self.earlier))) / 2.0
         jitter = float(self.variances.mean())
-        return square >= max(least * least, _LEAST_ERRORS**2 * jitter)
+        enough = max(
+            least * least, _LEAST_ERRORS**2 * jitter, _PLACE_ERRORS**2 * self.place_variance
+        )
+        return self.square >= enough
+
+    def beyond_errors(self) -> bool:
+        """Whether distances are beyond what chalk that turns does to places."""
+        return self.square >= (_SOME * _PLACE_ERRORS) ** 2 * self.place_variance
 
     def speed(self, later_time: float, earlier_time: float) -> tuple[float, float]:
         half = 0.5 * (
@@ -206,6 +223,7 @@ def _distances(
         both=np.hypot(*(end - start).T),
         # Errors that places share from picture to picture move no bead.
         variances=np.minimum(variances, jitter),
+        place_variance=float(np.median(variances)),
     )
 
 

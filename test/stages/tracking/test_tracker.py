@@ -7,7 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nanorocks_ros.experiment.settings import (
+    PipelineSettings,
+    SceneSettings,
+    SimulationSettings,
+    with_values,
+)
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.experiment.view import View
+from nanorocks_ros.records import Quality, TrayImage
+from nanorocks_ros.simulation.scene.film import SceneFilm
+from nanorocks_ros.stages.preprocess import Preprocessor
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 from .films import SCALE, paired, pipeline_settings, tray_film
@@ -150,3 +160,47 @@ def test_a_gray_camera_gives_no_tracks():
     image, _ = next(tray_film(3, 1))
     tracker = Tracker(pipeline_settings(3), load_trays()[3])
     assert tracker.push(replace(image, color=None)) == ()
+
+
+def test_a_tray_that_lacks_beads_is_flagged(tray_3):
+    assert not any(tracks.quality & Quality.FEW_BEADS for tracks, _ in tray_3[:5])
+    image, _ = next(tray_film(1, 1))
+    fewer = replace(load_trays()[1], species=(replace(load_trays()[1].species[0], count=20),))
+    tracks = Tracker(pipeline_settings(1), fewer).push(image)[0]
+    assert tracks.quality & Quality.FEW_BEADS
+    assert tracks.expected.tolist() == [20]
+
+
+def test_more_beads_than_there_should_be_are_seen_all_the_same():
+    image, _ = next(tray_film(1, 1))
+    species = replace(load_trays()[1].species[0], count=13)
+    tracks = Tracker(pipeline_settings(1), replace(load_trays()[1], species=(species,))).push(
+        image
+    )
+    assert tracks[0].seen.sum() == 15
+
+
+def test_lens_chalk_shadows_glare_and_swing_leave_most_beads_to_be_tracked():
+    scene = with_values(SceneSettings(trays=(2, 3)), {'swing_knocks': False}, 'test')
+    film = SceneFilm(SimulationSettings(first_shake=0.1), scene)
+    names = {'trays': [2, 3], 'preprocess.layout': 'plate', 'preprocess.pixels_per_metre': SCALE}
+    settings = with_values(PipelineSettings(), names, 'test')
+    trays = {number: load_trays()[number] for number in (2, 3)}
+    stage = Preprocessor(settings, trays, 'film', View(camera=film.camera.geometry.camera))
+    trackers = {number: Tracker(settings, tray) for number, tray in trays.items()}
+    shares = {(2, 0): [], (2, 1): [], (3, 0): [], (3, 1): []}
+    for moment in film.moments(40):
+        known = {one.tray: one for one in moment.beads}
+        for image in stage.push(moment.frame):
+            if not isinstance(image, TrayImage):
+                continue
+            tracks, truth = trackers[image.tray].push(image)[0], known[image.tray]
+            for index in (0, 1):
+                beads, _ = _beads_of(tracks, truth, index)
+                shares[image.tray, index].append(beads.size / np.sum(truth.species == index))
+    means = {key: np.mean(values[15:]) for key, values in shares.items()}
+    assert means[3, 0] > 0.99
+    assert means[3, 1] > 0.92
+    # Some of tray 2 lies under the glare for good.
+    assert means[2, 0] > 0.7
+    assert means[2, 1] > 0.75
