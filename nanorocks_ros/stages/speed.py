@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.records import MotionMask, SpeedEstimate, Tracks, TrayImage
+from nanorocks_ros.records import MotionMask, Quality, SpeedEstimate, Tracks, TrayImage
 from nanorocks_ros.stages.shaking import CycleFollower
 from nanorocks_ros.stages.speed_by_area import AreaSpeed
 from nanorocks_ros.stages.speed_by_structure import StructureSpeed
@@ -75,6 +76,8 @@ class SpeedEstimator:
             found += [one for one in records if isinstance(one, Tracks) and self.emit_tracks]
             found += self._by_tracks([one for one in records if isinstance(one, SpeedEstimate)])
         if method == 'structure_function' or (method == 'auto' and not self._tracks.reliable):
+            if self._tracks.judged:
+                image = replace(image, quality=image.quality | Quality.FEW_BEADS)
             # After a while without images those from before are of no use.
             speeds = self._structure.push(image, self._shakes, shaken or self._idle)
             self._idle = False
