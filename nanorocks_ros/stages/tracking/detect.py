@@ -48,6 +48,8 @@ _SURPLUS = 1.2
 _FLOOR_WEIGHT = 2
 # Gray grains are many: fewer sizes are tried.
 _GRAY_SIZE_STEP = 1.45
+# Least share of its disc that a bead under chalk must show where sizes differ by a factor.
+_LEAST_SLIVER, _MANY_SIZES = 0.45, 1.5
 # Of the light, a change that is followed at once.
 _LIGHT_CHANGE = 0.012
 # Patches of chalk are smoothed over so many pixels.
@@ -188,6 +190,8 @@ class BeadDetector:
         grains = 0.25 * np.pi * species.diameter**2 * species.count
         area = tray.dimensions[0] * tray.dimensions[1]
         crowded = kind == GRAY and grains > self._settings.most_crowded * area
+        # Under chalk, what is left of a large bead may pass for a small one.
+        least = _LEAST_SLIVER if self._dusty and high > _MANY_SIZES * low else 0.0
         spread = max((high - low) / np.sqrt(12.0), _SIZE_SPREAD_PX)
         return Search(
             kind=kind,
@@ -197,7 +201,7 @@ class BeadDetector:
             step=max(2 if low >= _COARSE_FROM_PX else 1, int(low / _SQUARES_PER_RADIUS)),
             most=0 if crowded else int(_SURPLUS * species.count) + 2,
             floor_weight=1 if self._dusty else _FLOOR_WEIGHT,
-            least_share=self._settings.least_area_seen,
+            least_share=max(self._settings.least_area_seen, least),
         )
 
 
