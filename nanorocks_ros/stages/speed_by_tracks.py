@@ -9,7 +9,7 @@ import numpy as np
 
 from nanorocks_ros.records import UNKNOWN, Quality, SpeedEstimate, SpeedMethod, Tracks, TrayImage
 from nanorocks_ros.stages.shaking import NS, CycleFollower
-from nanorocks_ros.stages.tracking.mean_speed import mean_speed
+from nanorocks_ros.stages.tracking.mean_speed import RELIABLE_SHARE, mean_speed
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # A bead should come so many pixels in half of the window: jitter is far less.
 _LEAST_PATH_PX = 1.5
 # Tracks are looked back upon for so long; slower beads rest.
-_LOOK_BACK_NS = 4 * NS
+_LOOK_BACK_NS = 3 * NS
 # Share of the beads that must be followed, of each species, to begin and to go on.
 _ENOUGH, _STILL_ENOUGH = 0.85, 0.7
 # Pictures over which the median of that share is taken.
@@ -86,8 +86,6 @@ class TrackSpeed:
         least = float(np.median(self._shares, axis=0).min())
         self.judged = len(self._shares) == _MEMORY_FRAMES
         self.reliable = self.judged and least >= (_STILL_ENOUGH if self.reliable else _ENOUGH)
-        if least < _STILL_ENOUGH:
-            self._flags |= Quality.FEW_BEADS
 
     def _speeds(self, shakes: CycleFollower) -> list[SpeedEstimate]:
         series = list(self._recent)
@@ -106,6 +104,8 @@ class TrackSpeed:
                 else (UNKNOWN, UNKNOWN)
             )
         flags, self._flags = self._flags, Quality(0)
+        if mean.share < RELIABLE_SHARE:
+            flags |= Quality.FEW_BEADS
         return [
             SpeedEstimate(
                 stamp_ns=mean.stamp_ns,

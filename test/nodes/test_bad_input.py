@@ -27,7 +27,7 @@ def lines_with(output, text):
         ('haff_fitter', 'cooling.duration:=.nan', 'parameter cooling.duration'),
         ('haff_fitter', 'cooling.duration:=-3.0', 'parameter cooling.duration'),
         ('speed_estimator', 'trays:=[9]', 'trays: 9 is outside [1, 8]'),
-        ('pipeline', 'speed.method:=guess', "'guess' is none of structure_function"),
+        ('pipeline', 'speed.method:=guess', "'guess' is none of auto"),
         ('pipeline', 'simulation.tray:=3', 'parameter simulation.tray: 3 is not among trays'),
         ('preprocessor', 'trays_file:=/nowhere.yaml', '/nowhere.yaml: No such file'),
         ('simulator', 'noise:=-1.0', 'parameter noise'),
@@ -187,7 +187,7 @@ def test_an_array_of_another_release_is_refused(graph):
     process = graph.start('haff_fitter')
     graph.until(lambda: publisher.get_subscription_count() == 1)
     publisher.publish(Float32MultiArray(data=[1.0, 2.0]))
-    graph.until(lambda: '2 elements where SpeedEstimate has 7' in graph.output(process))
+    graph.until(lambda: '2 elements where SpeedEstimate has 12' in graph.output(process))
     assert graph.interrupt(process).code == 0
 
 
