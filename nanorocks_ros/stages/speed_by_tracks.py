@@ -22,8 +22,10 @@ _LEAST_PATH_PX = 1.5
 _LOOK_BACK_NS = 3 * NS
 # Share of the beads that must be followed, of each species, to begin and to go on.
 _ENOUGH, _STILL_ENOUGH = 0.85, 0.7
-# Pictures over which the median of that share is taken.
+# Pictures over which the median of that share is taken; and speeds, for the share of the beads
+# that could be followed through the window of a speed.
 _MEMORY_FRAMES = 30
+_MEMORY_SPEEDS = 10
 
 
 class TrackSpeed:
@@ -50,6 +52,7 @@ class TrackSpeed:
         self._tracker = Tracker(settings, tray)
         self._recent: deque[Tracks] = deque()
         self._shares: deque[np.ndarray] = deque(maxlen=_MEMORY_FRAMES)
+        self._followed: deque[float] = deque(maxlen=_MEMORY_SPEEDS)
         self._next_ns: int | None = None
         self._flags = Quality(0)
         self._last_ns: int | None = None
@@ -85,7 +88,10 @@ class TrackSpeed:
         # A track is believed after some pictures only: the first ones show none.
         least = float(np.median(self._shares, axis=0).min())
         self.judged = len(self._shares) == _MEMORY_FRAMES
-        self.reliable = self.judged and least >= (_STILL_ENOUGH if self.reliable else _ENOUGH)
+        enough = least >= (_STILL_ENOUGH if self.reliable else _ENOUGH)
+        # Where many beads are lost and found again, others are taken for them.
+        followed = bool(self._followed) and float(np.median(self._followed)) >= RELIABLE_SHARE
+        self.reliable = self.judged and enough and followed
 
     def _speeds(self, shakes: CycleFollower) -> list[SpeedEstimate]:
         series = list(self._recent)
@@ -95,14 +101,17 @@ class TrackSpeed:
         if self._last_ns is not None and mean.stamp_ns <= self._last_ns:
             return []
         self._last_ns = mean.stamp_ns
-        species = []
-        for number in range(self._counts.size):
-            one = mean_speed(series, least_distance=self._least_distance, species=number)
-            species.append(
-                (one.mean_projected_speed, one.mean_projected_speed_error)
-                if one
-                else (UNKNOWN, UNKNOWN)
-            )
+        each = [
+            mean_speed(series, least_distance=self._least_distance, species=number)
+            for number in range(self._counts.size)
+        ]
+        species = [
+            (one.mean_projected_speed, one.mean_projected_speed_error)
+            if one
+            else (UNKNOWN, UNKNOWN)
+            for one in each
+        ]
+        self._followed.append(min(one.share if one else 0.0 for one in each))
         flags, self._flags = self._flags, Quality(0)
         if mean.share < RELIABLE_SHARE:
             flags |= Quality.FEW_BEADS
