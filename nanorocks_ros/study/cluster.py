@@ -192,10 +192,17 @@ def _gathered(
     tries: Counter[str] = Counter()
     try:
         for future in _done(client, scheduler, keys):
-            key = keys.pop(future)
+            key = keys[future]
             try:
-                result = future.result()
+                result = future.result(timeout=_LOOK)
+            except _TIMED_OUT:
+                if future.status == 'error':
+                    raise
+                # The only worker that had the result is gone: it will be worked out again.
+                _await_workers(client, scheduler, _WORKERS_BACK)
+                continue
             except KilledWorker as error:
+                del keys[future]
                 tries[key] += 1
                 if tries[key] == _MOST_TRIES:
                     raise _deadly(key, error) from error
@@ -208,6 +215,7 @@ def _gathered(
                     'the scheduler was lost',
                     'start it again, and then the same command',
                 ) from error
+            del keys[future]
             yield key, result
     finally:
         with suppress(OSError, CancelledError):
