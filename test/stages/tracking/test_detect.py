@@ -8,8 +8,7 @@ import pytest
 from nanorocks_ros.experiment.settings import TrackingSettings
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.stages.tracking.detect import BeadDetector
-
-from .films import SCALE, paired, tray_film
+from tracking.films import SCALE, paired, tray_film
 
 
 def _errors(number, index, frames=24, clear=0.8):

@@ -11,8 +11,7 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import Tracks
 from nanorocks_ros.stages.tracking.mean_speed import mean_speed
 from nanorocks_ros.stages.tracking.tracker import Tracker
-
-from .films import RATE, SCALE, pipeline_settings, tray_film
+from tracking.films import RATE, SCALE, pipeline_settings, tray_film
 
 PIXEL = 1.0 / SCALE
 

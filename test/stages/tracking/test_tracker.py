@@ -19,8 +19,7 @@ from nanorocks_ros.records import Quality, TrayImage
 from nanorocks_ros.simulation.scene.film import SceneFilm
 from nanorocks_ros.stages.preprocess import Preprocessor
 from nanorocks_ros.stages.tracking.tracker import Tracker
-
-from .films import SCALE, paired, pipeline_settings, tray_film
+from tracking.films import SCALE, paired, pipeline_settings, tray_film
 
 
 def _follow(number, frames, **values):
