@@ -17,8 +17,8 @@ from pathlib import Path
 
 from benchmarks.engine import DENSE, gas_of, mean_free_time
 
-SIZES = 864, 10_976, 97_556
-FEW, MANY = 20_000, 60_000
+SIZES = 864, 10_976
+FEW, MANY = 4_000, 14_000
 # As cachegrind's summary names them: instructions, reads and writes that miss the first and the
 # last level.
 COUNTS = 'Ir', 'D1mr', 'D1mw', 'DLmr', 'DLmw'
