@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import FrameError, RecordingError
-from nanorocks_ros.experiment.calibration_file import calibrated, load_calibration
+from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.records import Notice, TrayImage
 from nanorocks_ros.stages.pipeline import trays_of
 from nanorocks_ros.stages.preprocess import Preprocessor
@@ -95,12 +95,9 @@ def track_bag(
     epoch_ns = bag.epoch_ns()
     if epoch_ns is None:
         raise RecordingError(bag.where, 'holds no frame', 'pass another bag or --image-topic')
-    view = bag.view()
-    if settings.preprocess.calibration:
-        view = load_calibration(settings.preprocess.calibration).view
     settings = calibrated(settings)
     trays = trays_of(settings)
-    stage = Preprocessor(settings, trays, bag.where, view)
+    stage = Preprocessor(settings, trays, bag.where, bag.view())
     trackers = {number: Tracker(settings, tray) for number, tray in trays.items()}
     found = TrackedBag(
         epoch_ns=epoch_ns,
@@ -108,7 +105,7 @@ def track_bag(
         trays=trays,
         tracks={number: [] for number in trays},
         numbers={number: [] for number in trays},
-        view=view,
+        view=stage.view,
     )
     refused: FrameError | None = None
     for number, frame in enumerate(bag.frames()):
