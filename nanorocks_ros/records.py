@@ -33,12 +33,14 @@ class CorStatus(IntEnum):
     COOLING = 1
     FINAL = 2
     NO_DECAY = 3
+    UNDETERMINED = 4
 
 
 class CorRelation(IntEnum):
     """Which relation turned a decay into a restitution (constants of ``CorEstimate.msg``)."""
 
     PAPER = 1
+    LIBRARY = 2
 
 
 class Quality(IntFlag):
@@ -322,16 +324,29 @@ class CorEstimate:
     relation : CorRelation
         What turned the decay into a restitution.
     restitution, restitution_lower, restitution_upper : float, 0 to 1
-        Estimate and interval; statistical only for ``CorRelation.PAPER``.
+        Of two beads: median of what is probable, and interval; statistical only for
+        ``CorRelation.PAPER``.
     initial_speed, initial_speed_error : float, [m/s]
         Mean projected speed at the shaking event, from the fit.
     haff_time, haff_time_error : float, [s]
     reduced_chi_square : float
-        Of the fit, with the errors of the speeds themselves.
+        Of the fit. For ``CorRelation.LIBRARY`` with the fluctuations of the gas and the errors of
+        the speeds, near 1; for ``PAPER`` with the errors of the speeds alone.
     samples : int
         Speeds in the cooling window.
     mean_restitution, mean_restitution_error : float
-        Running mean over the cycles finished so far and its standard error.
+        Of all cycles finished so far, and its standard error.
+    wall_restitution, wall_restitution_lower, wall_restitution_upper : float, 0 to 1
+        Of beads and side walls, as `restitution`.
+    correlation : float, -1 to 1
+        Of what is known of the two restitutions: near -1 in the valley in which a higher one of
+        the beads makes up for a lower one of the walls.
+    paper_restitution : float
+        What the closed form of the paper makes of the decay, for comparison.
+    quality : Quality
+        What was wrong with the pictures behind the speeds.
+    window_start, window_end : float, [s]
+        First and last speed used, since the shaking event.
     """
 
     stamp_ns: int
@@ -350,6 +365,14 @@ class CorEstimate:
     samples: int = 0
     mean_restitution: float = UNKNOWN
     mean_restitution_error: float = UNKNOWN
+    wall_restitution: float = UNKNOWN
+    wall_restitution_lower: float = UNKNOWN
+    wall_restitution_upper: float = UNKNOWN
+    correlation: float = UNKNOWN
+    paper_restitution: float = UNKNOWN
+    quality: Quality = NOTHING_WRONG
+    window_start: float = UNKNOWN
+    window_end: float = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.experiment.settings import PipelineSettings
+from nanorocks_ros.records import CorRelation, CorStatus
 
 if TYPE_CHECKING:
     import argparse
@@ -73,16 +74,29 @@ def _print_cycles(results: TrayResults) -> None:
         print('  no COR: no shaking event with a decay after it was found')
     for one in cycles:
         print(f'  cycle {one.cycle}: {_cor_text(one)}')
+    if len(cycles) > 1:
+        last = cycles[-1]
+        print(
+            f'  all cycles: COR {last.mean_restitution:.4f} +- {last.mean_restitution_error:.4f}'
+        )
     if cycles and results.truth:
-        last = results.truth[-1]
-        print(f'  truth:   COR {last.restitution:g}, walls {last.wall_restitution:g}')
-    if cycles:
+        truth = results.truth[-1]
+        print(f'  truth:   COR {truth.restitution:g}, walls {truth.wall_restitution:g}')
+    if cycles and cycles[-1].relation is CorRelation.PAPER:
         print("  relation 'paper': its interval is statistical only, see docs/physics.md")
 
 
 def _cor_text(cor: CorEstimate) -> str:
+    if cor.status in (CorStatus.NO_DECAY, CorStatus.UNDETERMINED):
+        return f'COR unknown ({cor.status.name.lower()}: the decay tells too little)'
+    walls = (
+        f', walls {cor.wall_restitution:.3f} [{cor.wall_restitution_lower:.3f}, '
+        f'{cor.wall_restitution_upper:.3f}], paper says {cor.paper_restitution:.3f}'
+        if cor.relation is CorRelation.LIBRARY
+        else ''
+    )
     return (
         f'COR {cor.restitution:.4f} [{cor.restitution_lower:.4f}, {cor.restitution_upper:.4f}] '
         f'({cor.relation.name.lower()}, {cor.status.name.lower()}), '
-        f'v0 {cor.initial_speed * 1e3:.2f} mm/s, tau {cor.haff_time:.2f} s'
+        f'v0 {cor.initial_speed * 1e3:.2f} mm/s, tau {cor.haff_time:.2f} s{walls}'
     )

@@ -183,8 +183,19 @@ class ClusterSettings:
 class CoolingSettings:
     """From speeds to the coefficient of restitution."""
 
+    relation: str = _setting(
+        'library',
+        'what turns a decay into a restitution: simulated decays of the tray, or the closed form '
+        'of the paper, which is wrong and kept for comparison',
+        choices=('library', 'paper'),
+    )
+    library: str = _setting(
+        '',
+        'file of simulated decays, made by `nanorocks library`; empty: the one for the tray that '
+        'comes with the package',
+    )
     delay: float = _setting(
-        0.5, 'time from the shaking event to the first speed used', 's', low=0.0, high=600.0
+        1.75, 'time from the shaking event to the first speed used', 's', low=0.0, high=600.0
     )
     duration: float = _setting(
         20.0,
@@ -201,6 +212,59 @@ class CoolingSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PriorSettings:
+    """From decays to the restitutions of beads and walls: what is known beforehand."""
+
+    wall_low: float = _setting(
+        0.8,
+        'lowest restitution that the walls may have, before anything is measured',
+        low=0.78,
+        high=1.0,
+    )
+    wall_high: float = _setting(
+        1.0, 'highest; equal to the lowest where it is known', low=0.78, high=1.0
+    )
+    floor_lid_spread: float = _setting(
+        0.4,
+        'standard deviation of the logarithm of 1 - restitution of floor and lid over that of the '
+        'side walls; 0: alike',
+        low=0.0,
+        high=1.0,
+    )
+    height_error: float = _setting(
+        0.1e-3, 'standard error of the inner height of a tray', 'm', low=0.0, high=1e-3
+    )
+    diameter_error: float = _setting(
+        0.01, 'relative standard error of the diameter of the beads', low=0.0, high=0.1
+    )
+    count_error: float = _setting(
+        0.3, 'standard error of the number of beads, where they were counted', low=0.0, high=100.0
+    )
+    anisotropy_spread: float = _setting(
+        0.5,
+        'standard deviation of the logarithm of vertical over horizontal speeds after a shaking '
+        'event',
+        low=0.0,
+        high=2.0,
+    )
+    start_spread: float = _setting(
+        1.0,
+        'how far speeds after a shaking event may be from between even (1) and Maxwellian (-1)',
+        low=0.0,
+        high=2.0,
+    )
+    scale_error: float = _setting(
+        0.005, 'relative standard error of the scale of the picture', low=0.0, high=0.1
+    )
+    speed_bias: float = _setting(
+        0.01,
+        'standard deviation of a relative error of the speeds for each factor e in speed',
+        low=0.0,
+        high=0.2,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PipelineSettings:
     """The settings of the whole data path."""
 
@@ -211,6 +275,7 @@ class PipelineSettings:
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
     clusters: ClusterSettings = field(default_factory=ClusterSettings)
     cooling: CoolingSettings = field(default_factory=CoolingSettings)
+    prior: PriorSettings = field(default_factory=PriorSettings)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -230,6 +295,12 @@ class SimulationSettings:
     )
     wall_restitution: float = _setting(
         0.99, 'coefficient of restitution at the walls', low=0.0, high=1.0
+    )
+    floor_lid_difference: float = _setting(
+        0.0,
+        'restitution of floor and lid less that of the side walls; both stay within 0 and 1',
+        low=-1.0,
+        high=1.0,
     )
     sticking_speed: float = _setting(
         0.0, 'beads that meet more slowly stick together', 'm/s', low=0.0, high=1.0
@@ -256,6 +327,13 @@ class SimulationSettings:
         'speeds after a shaking event: even in [0, 2 mean], Maxwellian, or those of a tray whose '
         'walls were really shaken, scaled to the mean',
         choices=('uniform', 'maxwellian', 'shaken'),
+    )
+    vertical_speed_factor: float = _setting(
+        1.0,
+        'by how much velocities across the tray, towards the camera, are larger after a shaking '
+        'event than `speeds` says',
+        low=0.0,
+        high=100.0,
     )
     shake_frequency: float = _setting(
         5.0, 'speeds=shaken: frequency of the walls', '1/s', low=0.1, high=1000.0

@@ -65,8 +65,8 @@ class DemoNode(NanorocksNode):
         truth = self._records[GroundTruth]
         seconds = (cor.stamp_ns - self._epoch.ns) / 1e9
         known = f'  truth {truth[-1].restitution:g}' if truth else ''
-        if cor.status is CorStatus.NO_DECAY:
-            print(f'\r{seconds:5.1f} s  no decay to be seen yet           ', flush=True)
+        if cor.status in (CorStatus.NO_DECAY, CorStatus.UNDETERMINED):
+            print(f'\r{seconds:5.1f} s  the decay tells too little yet      ', flush=True)
             return
         print(
             f'\r{seconds:5.1f} s  COR {cor.restitution:.4f} '
@@ -91,9 +91,11 @@ class DemoNode(NanorocksNode):
             of_cycle[CorEstimate],
             of_cycle[GroundTruth],
         )
+        last = self._records[CorEstimate][-1]
         print(
-            "The relation is the paper's closed form: precise, and known to read high; its "
-            'interval is\nstatistical only (docs/physics.md).'
+            f'walls {last.wall_restitution:.3f} [{last.wall_restitution_lower:.3f}, '
+            f"{last.wall_restitution_upper:.3f}]; the paper's closed form says "
+            f'{last.paper_restitution:.3f}; see docs/restitution.md'
         )
         print(f'figure: {_FIGURE.resolve()}', flush=True)
 

@@ -7,18 +7,20 @@ from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.records import SpeedEstimate
 from nanorocks_ros.stages.cooling import HaffFitter
 from nanorocks_ros.stages.pipeline import trays_of
+from nanorocks_ros.stages.warm_up import warm_up_cooling
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import from_array
 
 
 class HaffFitterNode(NanorocksNode):
-    """Fits Haff's law to the speeds of each tray."""
+    """Reads restitutions from the speeds of each tray."""
 
     # Times are only ever compared with one another, so any epoch does.
     _EPOCH_NS = 0
 
     def __init__(self):
         super().__init__('haff_fitter')
+        warm_up_cooling()
         self._settings = self.declare(PipelineSettings(), fixed=False)
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(PipelineSettings(), self._build, self._adopt)

@@ -152,6 +152,7 @@ def _small_run(
         keys,
         settings.mean_speed,
         settings.speeds == 'maxwellian',
+        settings.vertical_speed_factor,
         np.concatenate((instants, ends)),
         rows,
     )
@@ -178,6 +179,7 @@ def _cool(
     keys: NDArray[np.uint64],
     mean_speed: float,
     maxwell: bool,
+    vertical: float,
     times: NDArray[np.float64],
     rows: NDArray[np.float64],
 ) -> int:
@@ -190,7 +192,7 @@ def _cool(
     if placed < n:
         return _NO_ROOM
     masses = sphere_masses(diameters, ranges[2])
-    velocities = drawn_velocities(masses, mean_speed, maxwell, keys[2], 0)
+    velocities = drawn_velocities(masses, mean_speed, maxwell, vertical, keys[2], 0)
     state = new_state(positions, velocities, radii, masses, species, rules)
     nothing = np.empty((0, 0, 3))
     output = Output(

@@ -101,7 +101,7 @@ def rules_of(settings: SimulationSettings, tray: Tray, run: int = 0) -> Collisio
     return CollisionRules(
         box=tray.dimensions,
         restitution=restitution,
-        wall_restitution=settings.wall_restitution,
+        wall_restitution=_walls(settings),
         sticking_speed=settings.sticking_speed,
         wall_sticking_speed=settings.wall_sticking_speed,
         sticking_measure=settings.sticking_measure,
@@ -110,6 +110,13 @@ def rules_of(settings: SimulationSettings, tray: Tray, run: int = 0) -> Collisio
         seed=settings.seed,
         run=run,
     )
+
+
+def _walls(settings: SimulationSettings) -> tuple[float, ...]:
+    """Restitution of the side walls, two for each axis, and of floor and lid."""
+    side = settings.wall_restitution
+    ends = min(max(side + settings.floor_lid_difference, 0.0), 1.0)
+    return (side, side, side, side, ends, ends)
 
 
 def wall_motion(settings: SimulationSettings) -> WallMotion:
@@ -176,9 +183,21 @@ def sphere_masses(
 
 @compiled
 def drawn_velocities(
-    masses: NDArray[np.float64], mean_speed: float, maxwell: bool, key: np.uint64, shake: int
+    masses: NDArray[np.float64],
+    mean_speed: float,
+    maxwell: bool,
+    vertical: float,
+    key: np.uint64,
+    shake: int,
 ) -> NDArray[np.float64]:
-    """Velocities after a shaking event, (n, 3), [m/s]; walls give all masses the same speeds."""
+    """Velocities after a shaking event, (n, 3), [m/s]; walls give all masses the same speeds.
+
+    `vertical` is a factor on the velocities along z.
+    """
     if maxwell:
-        return maxwellian(masses, mean_speed, key, shake, False)
-    return uniform_speeds(masses.size, mean_speed, key, shake)
+        velocities = maxwellian(masses, mean_speed, key, shake, False)
+    else:
+        velocities = uniform_speeds(masses.size, mean_speed, key, shake)
+    for i in range(masses.size):
+        velocities[i, 2] *= vertical
+    return velocities

@@ -230,7 +230,8 @@ def after_shaking(
     """
     key = key_for(settings.seed, run, Purpose.VELOCITIES)
     maxwell = settings.speeds == 'maxwellian'
-    velocities = drawn_velocities(beads.masses, settings.mean_speed, maxwell, key, cycle)
+    vertical = settings.vertical_speed_factor
+    velocities = drawn_velocities(beads.masses, settings.mean_speed, maxwell, vertical, key, cycle)
     started = replace(beads, velocities=velocities, spins=None)
     if settings.speeds != 'shaken' or settings.mean_speed == 0.0:
         return started

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from functools import partial, reduce
+from operator import or_
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import special
 
 from nanorocks_ros.errors import ConfigurationError, FitError
-from nanorocks_ros.physics.haff_fit import HaffFit, fit_haff
-from nanorocks_ros.physics.paper import paper_restitution_of_decay
-from nanorocks_ros.records import CorEstimate, CorRelation, CorStatus, SpeedEstimate
+from nanorocks_ros.records import CorEstimate, CorStatus, Quality, SpeedEstimate
+from nanorocks_ros.stages.readings import Decay, LibraryReading, PaperReading, Reading
 from nanorocks_ros.stages.shaking import NS
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ _STAMP_ROUNDING_NS = 1_000_000
 
 
 class HaffFitter:
-    """Fits Haff's law to the speeds of each cycle and reads a restitution from the decay.
+    """Reads a restitution from the decay of the speeds of each cycle, and of all of them.
 
     While a cycle cools it publishes an estimate every `update_interval`; the last one of the
     cycle, at the end of the cooling window or at the next shaking event, is final.
@@ -33,6 +33,11 @@ class HaffFitter:
     ----------
     settings : PipelineSettings
     tray : Tray
+
+    Raises
+    ------
+    ConfigurationError
+        For a window that cannot be, or a tray without a library of simulated decays.
     """
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
@@ -44,7 +49,8 @@ class HaffFitter:
                 f'{self._settings.duration:g} s',
                 'choose a window that holds speeds',
             )
-        self._tray = tray
+        reading = LibraryReading if self._settings.relation == 'library' else PaperReading
+        self._make_reading = partial(reading, settings, tray)
         self._restart()
 
     def _restart(self) -> None:
@@ -53,7 +59,7 @@ class HaffFitter:
         self._cycle = 0
         self._finished = True
         self._last_update_ns: int | None = None
-        self._finals: list[tuple[float, float]] = []
+        self._reading: Reading = self._make_reading()
 
     def push(self, speed: SpeedEstimate) -> tuple[CorEstimate, ...]:
         """Take the next speed; empty between two updates and before the first shake.
@@ -101,68 +107,35 @@ class HaffFitter:
             return ()
         last = self._samples[-1]
         start_ns = last.cycle_start_ns or 0
+        decay = Decay(
+            time=np.array([(one.stamp_ns - start_ns) / NS for one in self._samples]),
+            speed=np.array([one.mean_projected_speed for one in self._samples]),
+            error=np.array([one.mean_projected_speed_error for one in self._samples]),
+        )
+        fields: dict[str, Any] = {'status': status}
         try:
-            fit = fit_haff(
-                np.array([(one.stamp_ns - start_ns) / NS for one in self._samples]),
-                np.array([one.mean_projected_speed for one in self._samples]),
-                np.array([one.mean_projected_speed_error for one in self._samples]),
-                self._tray.count,
-            )
+            fields.update(self._reading.read(decay, final=status is CorStatus.FINAL))
         except FitError:
             # Nothing is known of the restitution then, and that is what is published.
-            return (
-                CorEstimate(
-                    stamp_ns=last.stamp_ns,
-                    tray=last.tray,
-                    cycle=last.cycle,
-                    status=CorStatus.NO_DECAY,
-                    relation=CorRelation.PAPER,
-                    restitution_lower=0.0,
-                    restitution_upper=1.0,
-                    samples=len(self._samples),
-                ),
-            )
-        return (self._restitution(last, status, fit),)
-
-    def _restitution(self, last: SpeedEstimate, status: CorStatus, fit: HaffFit) -> CorEstimate:
-        quantile = float(
-            special.stdtrit(fit.degrees_of_freedom, 0.5 + 0.5 * self._settings.probability)
+            fields = {
+                'status': CorStatus.NO_DECAY,
+                'restitution_lower': 0.0,
+                'restitution_upper': 1.0,
+            }
+        quality = reduce(or_, (one.quality for one in self._samples))
+        return (
+            CorEstimate(
+                stamp_ns=last.stamp_ns,
+                tray=last.tray,
+                cycle=last.cycle,
+                relation=self._reading.relation,
+                samples=len(self._samples),
+                quality=Quality(quality),
+                window_start=float(decay.time[0]),
+                window_end=float(decay.time[-1]),
+                **fields,
+            ),
         )
-        spread = math.exp(quantile * fit.log_decay_rate_error)
-        rates = (fit.decay_rate, fit.decay_rate * spread, fit.decay_rate / spread)
-        value, lower, upper = (
-            paper_restitution_of_decay(rate, self._tray.diameter, self._tray.number_density)
-            for rate in rates
-        )
-        if status is CorStatus.FINAL:
-            self._finals.append((value, (upper - lower) / (2.0 * quantile)))
-        mean, mean_error = self._running_mean()
-        return CorEstimate(
-            stamp_ns=last.stamp_ns,
-            tray=last.tray,
-            cycle=last.cycle,
-            status=status,
-            relation=CorRelation.PAPER,
-            restitution=value,
-            restitution_lower=lower,
-            restitution_upper=upper,
-            initial_speed=fit.initial_speed,
-            initial_speed_error=fit.initial_speed_error,
-            haff_time=fit.haff_time,
-            haff_time_error=fit.haff_time_error,
-            reduced_chi_square=fit.reduced_chi_square,
-            samples=fit.samples,
-            mean_restitution=mean,
-            mean_restitution_error=mean_error,
-        )
-
-    def _running_mean(self) -> tuple[float, float]:
-        if not self._finals:
-            return float('nan'), float('nan')
-        values = np.array([value for value, _ in self._finals])
-        if values.size == 1:
-            return float(values[0]), self._finals[0][1]
-        return float(values.mean()), float(values.std(ddof=1) / math.sqrt(values.size))
 
 
 def _usable(speed: SpeedEstimate) -> bool:

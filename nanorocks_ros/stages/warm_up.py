@@ -8,7 +8,8 @@ import numpy as np
 from nanorocks_ros.experiment.settings import PipelineSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import Straight, View
-from nanorocks_ros.records import Frame, TrayImage
+from nanorocks_ros.records import Frame, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.stages.cooling import HaffFitter
 from nanorocks_ros.stages.preprocess import Preprocessor
 from nanorocks_ros.stages.shaking import CycleFollower
 from nanorocks_ros.stages.speed import SpeedEstimator
@@ -44,6 +45,26 @@ def warm_up() -> None:
             image = noise[2 if number == 9 else number % 2]
             pixels = image if encoding == 'bgr8' else np.ascontiguousarray(image[:, :, 0])
             stage.push(Frame(stamp_ns=number, encoding=encoding, image=pixels))
+
+
+def warm_up_cooling() -> None:
+    """Hold a decay against the simulated ones."""
+    fitter = HaffFitter(PipelineSettings(), load_trays()[1])
+    for number in range(1, 60):
+        time_ns = number * 100_000_000
+        speed = 0.005 / (1.0 + 1e-10 * time_ns)
+        fitter.push(
+            SpeedEstimate(
+                stamp_ns=time_ns,
+                tray=1,
+                cycle=1,
+                cycle_start_ns=0,
+                mean_projected_speed=speed,
+                mean_projected_speed_error=0.02 * speed,
+                window=0.1,
+                method=SpeedMethod.TRACKING,
+            )
+        )
 
 
 def warm_up_speed() -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
 
 from nanorocks_ros.physics.haff import granular_energy, haff_speed
-from nanorocks_ros.records import CorStatus
+from nanorocks_ros.records import CorRelation, CorStatus
 from nanorocks_ros.wire.layouts import NS
 
 mpl.use('Agg')
@@ -87,7 +88,7 @@ def _draw_energy(
         label='from the frames',
     )
     last = cors[-1]
-    if last.status is not CorStatus.NO_DECAY:
+    if math.isfinite(last.haff_time):
         line = np.linspace(0.0, max(time), 300)
         fitted = haff_speed(line, last.initial_speed, last.haff_time)
         axes.plot(
@@ -109,6 +110,7 @@ def _draw_convergence(
     axes: Axes, cors: Sequence[CorEstimate], truth: Sequence[GroundTruth], start_ns: int
 ) -> None:
     known = [one for one in cors if one.status is not CorStatus.NO_DECAY]
+    by_paper = bool(cors) and cors[-1].relation is CorRelation.PAPER
     time = [(one.stamp_ns - start_ns) / NS for one in known]
     axes.fill_between(
         time,
@@ -117,7 +119,7 @@ def _draw_convergence(
         color=_FIT,
         alpha=0.2,
         lw=0,
-        label='interval (statistics only)',
+        label='interval (statistics only)' if by_paper else 'interval',
     )
     axes.plot(
         time,
@@ -125,7 +127,7 @@ def _draw_convergence(
         '-o',
         ms=3,
         color=_FIT,
-        label=f'closed form of the paper: {known[-1].restitution:.3f}' if known else None,
+        label=_name(known[-1], by_paper) if known else None,
     )
     if truth:
         axes.axhline(
@@ -137,6 +139,20 @@ def _draw_convergence(
         )
     axes.set_xlabel('time since the shaking event [s]')
     axes.set_ylabel('coefficient of restitution')
+    if not by_paper:
+        axes.plot(
+            time,
+            [one.paper_restitution for one in known],
+            ':',
+            lw=1.2,
+            color=_MEASURED,
+            label='closed form of the paper',
+        )
     axes.set_ylim(top=1.005)
     axes.legend(frameon=False, loc='lower right')
     axes.grid(alpha=0.25)
+
+
+def _name(last: CorEstimate, by_paper: bool) -> str:
+    what = 'closed form of the paper' if by_paper else 'from simulated decays'
+    return f'{what}: {last.restitution:.3f}'

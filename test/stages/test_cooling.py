@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from nanorocks_ros.experiment.settings import PipelineSettings, with_values
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.physics.haff import haff_speed
 from nanorocks_ros.physics.paper import paper_restitution_of_decay
-from nanorocks_ros.records import CorStatus, SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import CorRelation, CorStatus, Quality, SpeedEstimate, SpeedMethod
+from nanorocks_ros.simulation.ensemble import cooling_runs
 from nanorocks_ros.stages.cooling import HaffFitter
 
 NS = 1_000_000_000
@@ -46,21 +49,72 @@ def all_estimates(stage, speeds):
     return [one for item in speeds for one in stage.push(item)]
 
 
-def test_a_decay_is_read_by_the_relation_that_is_named():
-    *_, final = all_estimates(fitter(), cooling_cycle())
+def simulated_cycle(cycle=1, start=0.0, restitution=0.89, wall=0.97):
+    settings = SimulationSettings(restitution=restitution, wall_restitution=wall, seed=9)
+    times = np.arange(0.1, 25.0, 0.1)
+    (values,) = cooling_runs(settings, TRAY, times, [cycle]).mean_projected_speed
+    return [speed(start + t, v, cycle, start) for t, v in zip(times, values, strict=True)]
+
+
+def test_a_decay_is_read_by_the_closed_form_of_the_paper_when_that_is_asked_for():
+    *_, final = all_estimates(fitter(**{'cooling.relation': 'paper'}), cooling_cycle())
     expected = paper_restitution_of_decay(1 / (6e-3 * 5.0), TRAY.diameter, TRAY.number_density)
     assert final.status is CorStatus.FINAL
+    assert final.relation is CorRelation.PAPER
     assert final.restitution_lower < expected < final.restitution_upper
+    assert final.paper_restitution == final.restitution
     assert final.initial_speed == pytest.approx(6e-3, rel=0.02)
     assert final.haff_time == pytest.approx(5.0, rel=0.04)
 
 
+def test_both_restitutions_of_a_simulated_gas_lie_in_their_intervals():
+    *_, final = all_estimates(fitter(), simulated_cycle())
+    assert final.status is CorStatus.FINAL
+    assert final.relation is CorRelation.LIBRARY
+    assert final.restitution_lower < 0.89 < final.restitution_upper
+    assert final.wall_restitution_lower < 0.97 < final.wall_restitution_upper
+    assert final.correlation < -0.5
+    assert final.paper_restitution > 0.95
+    assert 0.3 < final.reduced_chi_square < 2.5
+    assert final.window_start == pytest.approx(1.8, abs=0.1)
+    assert final.window_end == pytest.approx(20.0, abs=0.11)
+
+
+def test_walls_that_are_known_leave_the_beads_to_be_found():
+    known = {'prior.wall_low': 0.97, 'prior.wall_high': 0.97, 'prior.floor_lid_spread': 0.0}
+    *_, final = all_estimates(fitter(**known), simulated_cycle())
+    *_, free = all_estimates(fitter(), simulated_cycle())
+    assert final.wall_restitution == pytest.approx(0.97)
+    assert abs(final.restitution - 0.89) < 0.06
+    width = final.restitution_upper - final.restitution_lower
+    assert width < 0.7 * (free.restitution_upper - free.restitution_lower)
+
+
 def test_the_interval_tightens_as_the_gas_cools():
-    found = all_estimates(fitter(), cooling_cycle())
+    found = all_estimates(fitter(), simulated_cycle())
     widths = [one.restitution_upper - one.restitution_lower for one in found]
     assert len(found) > 20
     assert [one.status for one in found].count(CorStatus.FINAL) == 1
-    assert widths[-1] < 0.2 * widths[0]
+    assert widths[-1] < 0.7 * widths[0]
+
+
+def test_a_decay_that_tells_too_little_says_so():
+    vague = [
+        replace(one, mean_projected_speed_error=0.5 * one.mean_projected_speed)
+        for one in simulated_cycle()
+    ]
+    first, *_ = all_estimates(fitter(), vague)
+    assert first.status is CorStatus.UNDETERMINED
+    assert (first.restitution_lower, first.restitution_upper) == (0.0, 1.0)
+    assert math.isnan(first.restitution)
+    assert first.initial_speed > 0.0
+
+
+def test_what_was_wrong_with_the_pictures_goes_with_the_estimate():
+    speeds = simulated_cycle()
+    speeds[60] = replace(speeds[60], quality=Quality.GLARE)
+    *_, final = all_estimates(fitter(), speeds)
+    assert final.quality is Quality.GLARE
 
 
 def test_a_cycle_that_the_next_shake_cuts_short_is_final_then():
@@ -77,8 +131,8 @@ def test_the_end_of_the_recording_ends_the_cycle():
     assert stage.flush() == ()
 
 
-def test_the_running_mean_is_over_the_final_estimates():
-    stage = fitter()
+def test_the_mean_of_the_paper_is_over_the_final_estimates():
+    stage = fitter(**{'cooling.relation': 'paper'})
     finals = []
     for cycle in (1, 2, 3):
         speeds = cooling_cycle(cycle, start=60.0 * (cycle - 1), noise=0.05)
@@ -86,6 +140,23 @@ def test_the_running_mean_is_over_the_final_estimates():
     values = [one.restitution for one in finals]
     assert finals[-1].mean_restitution == pytest.approx(np.mean(values))
     assert finals[-1].mean_restitution_error == pytest.approx(np.std(values, ddof=1) / 3**0.5)
+
+
+def test_many_cycles_together_say_more():
+    stage = fitter(**{'prior.wall_low': 0.97, 'prior.wall_high': 0.97})
+    finals = []
+    for cycle in range(1, 7):
+        speeds = simulated_cycle(cycle, start=60.0 * (cycle - 1))
+        finals += [one for one in all_estimates(stage, speeds) if one.status is CorStatus.FINAL]
+    assert finals[-1].mean_restitution_error < 0.8 * finals[0].mean_restitution_error
+    off = finals[-1].mean_restitution - 0.89
+    assert abs(off) < 3.0 * finals[-1].mean_restitution_error
+
+
+def test_another_tray_than_that_of_the_library_is_refused_at_once():
+    tray = replace(TRAY, dimensions=(0.02, 0.02, 0.003))
+    with pytest.raises(ConfigurationError, match='nanorocks library --tray 1'):
+        HaffFitter(PipelineSettings(), tray)
 
 
 def test_nothing_is_said_before_the_first_shake():
@@ -125,5 +196,5 @@ def test_time_that_goes_back_starts_all_afresh():
 def test_the_asked_probability_widens_the_interval():
     *_, narrow = all_estimates(fitter(**{'cooling.probability': 0.68}), cooling_cycle())
     *_, wide = all_estimates(fitter(**{'cooling.probability': 0.95}), cooling_cycle())
-    assert narrow.restitution == wide.restitution
+    assert narrow.restitution == pytest.approx(wide.restitution)
     assert narrow.restitution_lower > wide.restitution_lower

@@ -1,0 +1,1 @@
+"""From measured decays and collisions to restitutions: likelihoods, libraries, posteriors."""

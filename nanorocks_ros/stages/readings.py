@@ -1,0 +1,230 @@
+"""What turns the decay of one cycle into a restitution: simulated decays, or the paper's form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from scipy import special
+
+from nanorocks_ros.errors import FitError
+from nanorocks_ros.inference.decay_library import library_of
+from nanorocks_ros.inference.decay_likelihood import DecayLikelihood, decay_likelihood
+from nanorocks_ros.inference.restitution import Posterior, posterior_of, tables_of
+from nanorocks_ros.physics.haff_fit import HaffFit, fit_haff
+from nanorocks_ros.physics.paper import paper_restitution_of_decay
+from nanorocks_ros.records import CorRelation, CorStatus
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.settings import PipelineSettings
+    from nanorocks_ros.experiment.trays import Tray
+
+# With less known than that, nothing is: anything from 0 to 1 has a deviation of 0.29.
+_LEAST_KNOWN = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decay:
+    """Speeds of one cycle.
+
+    Parameters
+    ----------
+    time : ndarray (n,), [s]
+        Since the shaking event.
+    speed, error : ndarray (n,), [m/s]
+    """
+
+    time: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    error: NDArray[np.float64]
+
+
+class Reading(Protocol):
+    """What a way to read decays does; it remembers the cycles that are finished."""
+
+    relation: CorRelation
+
+    def read(self, decay: Decay, *, final: bool) -> dict[str, Any]:
+        """Fields of a CorEstimate; raises FitError where there is no decay."""
+
+
+class PaperReading:
+    """The closed form of [B19] on a fit of Haff's law.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    tray : Tray
+    """
+
+    relation = CorRelation.PAPER
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self._probability = settings.cooling.probability
+        self._tray = tray
+        self._finals: list[tuple[float, float]] = []
+
+    def read(self, decay: Decay, *, final: bool) -> dict[str, Any]:
+        """Fields of a CorEstimate.
+
+        Raises
+        ------
+        FitError
+            When the speeds do not fall.
+        """
+        fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
+        quantile = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + 0.5 * self._probability))
+        spread = math.exp(quantile * fit.log_decay_rate_error)
+        value, lower, upper = (
+            _by_paper(rate, self._tray)
+            for rate in (fit.decay_rate, fit.decay_rate * spread, fit.decay_rate / spread)
+        )
+        if final:
+            self._finals.append((value, (upper - lower) / (2.0 * quantile)))
+        mean, mean_error = self._running_mean()
+        return {
+            'restitution': value,
+            'restitution_lower': lower,
+            'restitution_upper': upper,
+            'paper_restitution': value,
+            'reduced_chi_square': fit.reduced_chi_square,
+            'mean_restitution': mean,
+            'mean_restitution_error': mean_error,
+            **_haff_fields(fit),
+        }
+
+    def _running_mean(self) -> tuple[float, float]:
+        if not self._finals:
+            return math.nan, math.nan
+        values = np.array([value for value, _ in self._finals])
+        if values.size == 1:
+            return float(values[0]), self._finals[0][1]
+        return float(values.mean()), float(values.std(ddof=1) / math.sqrt(values.size))
+
+
+class LibraryReading:
+    """Simulated decays of the tray, held against the measured one.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    tray : Tray
+
+    Raises
+    ------
+    ConfigurationError
+        When there is no library of such a tray.
+    """
+
+    relation = CorRelation.LIBRARY
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self._tray = tray
+        known = settings.prior
+        library = library_of(tray, settings.cooling.library)
+        self._tables = tables_of(library, tray, known)
+        # What the library itself is off by acts as a wrong scale would.
+        self._camera = (math.hypot(known.scale_error, library.misfit), known.speed_bias)
+        self._walls = (known.wall_low, known.wall_high)
+        half = 0.5 * settings.cooling.probability
+        self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
+        self._finished: DecayLikelihood | None = None
+        self._mean_so_far: dict[str, float] = {}
+
+    def read(self, decay: Decay, *, final: bool) -> dict[str, Any]:
+        """Fields of a CorEstimate.
+
+        Raises
+        ------
+        FitError
+            When the speeds do not fall.
+        """
+        if np.polyfit(decay.time, np.log(decay.speed), 1)[0] >= 0.0:
+            raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
+        likelihood = decay_likelihood(
+            self._tables, decay.time, decay.speed, decay.error, self._camera
+        )
+        integrated = likelihood.integrated()
+        posterior = posterior_of(self._tables, integrated, self._walls)
+        best = int(np.argmax(integrated))
+        fields = {
+            **self._speeds(decay, likelihood, best, final=final),
+            'reduced_chi_square': float(likelihood.deviation[best])
+            / max(likelihood.samples - 1, 1),
+        }
+        if math.sqrt(posterior.covariance[0, 0]) > _LEAST_KNOWN:
+            return {
+                **fields,
+                'status': CorStatus.UNDETERMINED,
+                'restitution_lower': 0.0,
+                'restitution_upper': 1.0,
+                **self._mean(likelihood, final=final),
+            }
+        return {
+            **fields,
+            **_known(posterior, self._ends),
+            **self._mean(likelihood, final=final),
+        }
+
+    def _mean(self, likelihood: DecayLikelihood, *, final: bool) -> dict[str, float]:
+        """The mean of what all finished cycles together say; a final one is among them."""
+        if not final:
+            return self._mean_so_far
+        before = self._finished
+        self._finished = likelihood if before is None else before + likelihood
+        posterior = posterior_of(self._tables, self._finished.integrated(), self._walls)
+        self._mean_so_far = {
+            'mean_restitution': posterior.mean[0],
+            'mean_restitution_error': math.sqrt(posterior.covariance[0, 0]),
+        }
+        return self._mean_so_far
+
+    def _speeds(
+        self, decay: Decay, likelihood: DecayLikelihood, best: int, *, final: bool
+    ) -> dict[str, float]:
+        """Speed at the shaking event, and Haff time; with errors once the cycle is over."""
+        if final:
+            fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
+            return {
+                **_haff_fields(fit),
+                'paper_restitution': _by_paper(fit.decay_rate, self._tray),
+            }
+        slope, offset = np.polyfit(decay.time, 1.0 / decay.speed, 1)
+        return {
+            'initial_speed': math.exp(float(likelihood.log_amplitude[best])),
+            'haff_time': float(offset / slope) if slope > 0.0 < offset else math.nan,
+            'paper_restitution': _by_paper(float(slope), self._tray),
+        }
+
+
+def _known(posterior: Posterior, ends: NDArray[np.float64]) -> dict[str, float]:
+    lower, value, upper = (float(one) for one in posterior.quantiles(ends))
+    wall_lower, wall, wall_upper = (float(one) for one in posterior.wall_quantiles(ends))
+    spread = posterior.covariance
+    product = math.sqrt(spread[0, 0] * spread[1, 1])
+    return {
+        'restitution': value,
+        'restitution_lower': lower,
+        'restitution_upper': upper,
+        'wall_restitution': wall,
+        'wall_restitution_lower': wall_lower,
+        'wall_restitution_upper': wall_upper,
+        'correlation': float(spread[0, 1]) / product if product > 0.0 else 0.0,
+    }
+
+
+def _haff_fields(fit: HaffFit) -> dict[str, float]:
+    return {
+        'initial_speed': fit.initial_speed,
+        'initial_speed_error': fit.initial_speed_error,
+        'haff_time': fit.haff_time,
+        'haff_time_error': fit.haff_time_error,
+    }
+
+
+def _by_paper(rate: float, tray: Tray) -> float:
+    return paper_restitution_of_decay(rate, tray.diameter, tray.number_density)
