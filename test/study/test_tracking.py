@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import sys
 from dataclasses import replace
 
 import cv2
@@ -74,6 +75,19 @@ def test_parquet_and_csv_hold_the_same(found, tmp_path):
     rows = _rows(tmp_path / 'tracks.csv')
     assert [str(one) for one in table['id']] == [one['id'] for one in rows]
     np.testing.assert_allclose(table['radius'], [float(one['radius']) for one in rows], rtol=1e-6)
+    assert table['species'] == [one['species'] for one in rows]
+    # Where CSV leaves a field empty.
+    assert np.isnan(table['vx'][0])
+    # One group of rows for a frame each would make the file many times as large.
+    assert parquet.ParquetFile(tmp_path / 'tracks.parquet').num_row_groups == 1
+
+
+def test_without_pyarrow_the_command_refuses_before_it_tracks(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'pyarrow', None)
+    assert main(['track', 'no_such_bag', '-o', str(tmp_path / 'tracks.parquet')]) == 2
+    said = capsys.readouterr().err
+    assert said.count('\n') == 1
+    assert "choose another ending, or run: pip install 'nanorocks_ros[parquet]'" in said
 
 
 def test_the_overlay_draws_a_ring_around_each_bead_and_leaves_the_rest(found):
