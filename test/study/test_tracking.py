@@ -19,9 +19,10 @@ from nanorocks_ros.recordings.writer import BagWriter
 from nanorocks_ros.study.film_bag import film_into_bag
 from nanorocks_ros.study.overlay import overlay
 from nanorocks_ros.study.results_bag import offered
-from nanorocks_ros.study.tracking import NS, track_bag
+from nanorocks_ros.study.tracking import track_bag
 from nanorocks_ros.study.tracks_files import COLUMNS, write_tracks
 from nanorocks_ros.wire import topics
+from nanorocks_ros.wire.layouts import NS
 
 FRAMES = 40
 

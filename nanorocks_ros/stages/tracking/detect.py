@@ -104,6 +104,11 @@ class BeadDetector:
         """Whether there are too many grains to look for."""
         return any(one.most == 0 for one in self._searches)
 
+    @property
+    def darkness(self) -> NDArray[np.uint8] | None:
+        """Of the last picture, where discs are looked for: 0 floor, 255 black; None before it."""
+        return None if self._ground is None else self._ground.picture.darkness.copy()
+
     def detect(
         self, color: NDArray[np.uint8], hints: Sequence[NDArray[np.float64]] = ()
     ) -> tuple[Detections, ...]:
