@@ -13,10 +13,11 @@ ALL = (
     'tracking',
     'speed_trays',
     'speed_accuracy',
+    'area_calibration',
     'cor_coverage',
     'engine',
     'engine_physics',
-    'tracking',
+    'validation',
 )
 
 

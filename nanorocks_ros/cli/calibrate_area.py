@@ -106,7 +106,7 @@ def _write(
     options: argparse.Namespace, found: AreaCalibration, settings: PipelineSettings
 ) -> None:
     if options.output:
-        from nanorocks_ros.study.area_calibration import write_parameters
+        from nanorocks_ros.study.area_file import write_parameters
 
         files = _files(options, settings.trays)
         for number, fit in found.fits.items():

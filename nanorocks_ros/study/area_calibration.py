@@ -14,7 +14,6 @@ from nanorocks_ros.stages.speed import SpeedEstimator
 from nanorocks_ros.stages.tracking.mean_speed import MeanSpeed, mean_speed
 from nanorocks_ros.study.area_fit import AreaFit, SpeedPair, fit_area
 from nanorocks_ros.study.bag_images import BagImages
-from nanorocks_ros.study.output_files import whole_file
 from nanorocks_ros.study.track_comparison import Place, manual_reference
 from nanorocks_ros.wire.layouts import NS
 
@@ -38,14 +37,6 @@ _LOOK_BACK_NS = 3 * NS
 _MOVING = 3.0
 # Share of windows without a speed by the area of which the user hears.
 _MOST_FULL = 0.2
-_READING = (
-    'speed.geometry',
-    'speed.averaging',
-    'speed.averaged_frames',
-    'speed.time_step',
-    'speed.threshold',
-)
-"""Settings that a calibration holds for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,12 +134,6 @@ def calibrate_area(
             by_hand = _manual_speeds(marks, pictures[number], tray, scale)
             _fit(found, tray, speeds[number], by_hand)
     return _checked(found)
-
-
-def reading(settings: PipelineSettings) -> dict[str, str | int | float]:
-    """The settings that select a reading of the binarised area, by their last names."""
-    names = [name.removeprefix('speed.') for name in _READING]
-    return {name: getattr(settings.speed, name) for name in names}
 
 
 def _checked(found: AreaCalibration) -> AreaCalibration:
@@ -271,39 +256,3 @@ def _pairs(
             )
         )
     return pairs, full
-
-
-def write_parameters(path: Path, fit: AreaFit, settings: PipelineSettings, remark: str) -> None:
-    """Write a calibration as a ROS parameter file, with the reading that it holds for.
-
-    Parameters
-    ----------
-    path : Path
-        A file there is replaced.
-    fit : AreaFit
-    settings : PipelineSettings
-        That were calibrated.
-    remark : str
-        What the calibration is of.
-
-    Raises
-    ------
-    RecordingError
-        When the file cannot be written.
-    """
-    values = {
-        'method': 'binarised_area',
-        **reading(settings),
-        'area_factor': fit.factor,
-        'area_offset': fit.offset,
-    }
-    lines = [
-        f'# nanorocks calibrate-area: {remark}; {fit.windows} windows,',
-        f'# {fit.slowest:.3g} to {fit.fastest:.3g} m/s. For this tray alone.',
-        '/**:',
-        '  ros__parameters:',
-        '    speed:',
-        *(f'      {name}: {value}' for name, value in values.items()),
-    ]
-    with whole_file(path) as part:
-        part.write_text('\n'.join(lines) + '\n', encoding='utf-8')
