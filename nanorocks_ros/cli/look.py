@@ -115,10 +115,11 @@ def _known(value: float) -> float | None:
 def _print(steps: FrameSteps) -> None:
     print(f'frame {steps.number} at {steps.time:.3f} s')
     for number, one in steps.trays.items():
-        x, y = (_MM * value for value in one.image.displacement)
         flags = ', '.join(one.image.quality.names()) or 'none'
         print(f'tray {number}: cycle {one.image.cycle}, flags: {flags}')
-        print(f'  the tray is {x:+.3f}, {y:+.3f} mm from its place')
+        x, y = (_MM * value for value in one.image.displacement)
+        followed = f'{x:+.3f}, {y:+.3f} mm from its place'
+        print(f'  the tray is {followed if math.isfinite(x) else "not followed: no walls seen"}')
         if one.tracks is not None:
             print(f'  {int(one.tracks.seen.sum())} of {one.tray.count} beads seen')
         if one.moving_area is not None:
