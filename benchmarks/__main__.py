@@ -14,6 +14,7 @@ ALL = (
     'speed_trays',
     'speed_accuracy',
     'area_calibration',
+    'deflections',
     'cor_coverage',
     'engine',
     'engine_physics',

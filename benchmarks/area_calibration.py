@@ -56,7 +56,7 @@ def table(bag: Path) -> list[str]:
     }
     before, after = _ratios(bag, raw), _ratios(bag, calibrated)
     lines = [
-        '| tray | reading | area / truth (sd) | factor (error) | offset [mm/s] | calibrated (sd) |',
+        '| tray | reading | area / truth (sd) | factor (error) | offset [mm/s] | calibrated |',
         '| --- | --- | --- | --- | --- | --- |',
     ]
     for case in raw:
