@@ -13,11 +13,15 @@ import pytest
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.recordings.messages import image_message, time_message
+from nanorocks_ros.recordings.writer import BagWriter
 from nanorocks_ros.records import GroundTruth, SpeedEstimate, SpeedMethod
 from nanorocks_ros.study import speeds as study
 from nanorocks_ros.study.film_bag import film_into_bag
 from nanorocks_ros.study.offline import analyse
+from nanorocks_ros.study.results_bag import offered
 from nanorocks_ros.study.speeds import AUTO, METHODS, ComparedSpeeds, compare_speeds
+from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import NS
 
 SECONDS = 6.0
@@ -127,6 +131,24 @@ def test_a_cycle_that_is_not_there_and_a_wrong_ending_are_wrong_calls(bag, tmp_p
     assert 'ends in none of .png' in capsys.readouterr().err
     assert main(['speeds', str(tmp_path / 'nowhere')]) == 1
     assert capsys.readouterr().err.count('\n') == 1
+
+
+def test_a_gray_camera_at_rest_is_drawn_too(tmp_path, capsys):
+    names = (topics.EPOCH, topics.RAW)
+    path = tmp_path / 'gray'
+    rng = np.random.default_rng(1)
+    with BagWriter(path, {one.absolute(): offered(one) for one in names}, metadata={}) as bag:
+        bag.write(topics.EPOCH.absolute(), NS, time_message(NS))
+        for number in range(20):
+            pixels = rng.integers(90, 110, (210, 210), dtype=np.uint8)
+            stamp_ns = NS + number * NS // 30
+            message = image_message(stamp_ns, 'camera', 'mono8', pixels)
+            bag.write(topics.RAW.absolute(), stamp_ns, message)
+    assert main(['speeds', str(path), '-o', str(tmp_path / 'speeds.png')]) == 0
+    said = capsys.readouterr()
+    assert 'tray 1, cycle 0:\n' in said.out
+    assert 'tracking: 0 speeds\n' in said.out
+    assert cv2.imread(str(tmp_path / 'speeds.png')) is not None
 
 
 def test_an_interruption_says_that_nothing_was_written(bag, tmp_path, capsys, monkeypatch):

@@ -16,6 +16,7 @@ from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.recordings.messages import image_message, time_message
 from nanorocks_ros.recordings.writer import BagWriter
+from nanorocks_ros.study import parquet as parquet_files
 from nanorocks_ros.study.film_bag import film_into_bag
 from nanorocks_ros.study.overlay import overlay
 from nanorocks_ros.study.results_bag import offered
@@ -81,6 +82,18 @@ def test_parquet_and_csv_hold_the_same(found, tmp_path):
     assert np.isnan(table['vx'][0])
     # One group of rows for a frame each would make the file many times as large.
     assert parquet.ParquetFile(tmp_path / 'tracks.parquet').num_row_groups == 1
+
+
+def test_parquet_in_many_groups_of_rows_reads_the_same(found, tmp_path, monkeypatch):
+    parquet = pytest.importorskip('pyarrow.parquet')
+    write_tracks(tmp_path / 'one.parquet', found)
+    monkeypatch.setattr(parquet_files, '_GROUP_ROWS', 100)
+    write_tracks(tmp_path / 'many.parquet', found)
+    # Seven frames of 15 beads are the first 100 rows.
+    assert parquet.ParquetFile(tmp_path / 'many.parquet').num_row_groups == -(-FRAMES // 7)
+    one, many = (parquet.read_table(tmp_path / f'{name}.parquet') for name in ('one', 'many'))
+    assert one['id'].to_pylist() == many['id'].to_pylist()
+    assert one['species'].to_pylist() == many['species'].to_pylist()
 
 
 def test_without_pyarrow_the_command_refuses_before_it_tracks(tmp_path, capsys, monkeypatch):
