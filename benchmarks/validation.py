@@ -139,22 +139,29 @@ def _table_2(bag: Path) -> list[str]:
     counts = _counts(bag)
     lines = [
         '| tray | species | true | paper [%] | seen [%] | seen, outside [%] | '
-        'right, outside [%] | goal [%] | missed by |',
-        '| --- |' + ' --- |' * 8,
+        'right, outside [%] | goal [%] | seen: missed by | right: missed by |',
+        '| --- |' + ' --- |' * 9,
     ]
     trays = load_trays()
     for (number, material), one in counts.items():
         true = next(s.count for s in trays[number].species if s.material == material)
         if not one.seen:
-            lines.append(f'| {number} | {material} | {true} | | not followed | | | | |')
+            lines.append(f'| {number} | {material} | {true} | | not followed | | | | | |')
             continue
         low, high = _COUNTS.get((number, material), (None, None))
+        right = one.right_outside / one.true_outside
         counted = one.seen_outside / one.true_outside if number == 4 else one.seen / one.true
-        lines.append(
-            f'| {number} | {material} | {true} | {theirs[number]} | {_percent(one.seen, one.true)}'
-            f' | {_percent(one.seen_outside, one.true_outside)} | '
-            f'{_percent(one.right_outside, one.true_outside)} | {_goal(counted, low, high)} |'
-        )
+        cells = [
+            str(number),
+            material,
+            str(true),
+            '' if low is None else theirs[number],
+            _percent(one.seen, one.true),
+            _percent(one.seen_outside, one.true_outside),
+            _percent(one.right_outside, one.true_outside),
+            _goal(counted, right, low, high),
+        ]
+        lines.append(f'| {" | ".join(cells)} |')
     return lines
 
 
@@ -162,11 +169,11 @@ def _percent(part: int, whole: int) -> str:
     return f'{100.0 * part / max(whole, 1):.1f}'
 
 
-def _goal(share: float, low: float | None, high: float | None) -> str:
+def _goal(share: float, right: float, low: float | None, high: float | None) -> str:
     if low is None or high is None:
-        return 'none | '
-    missed = max(low - share, share - high, 0.0)
-    return f'{100 * low:.0f} to {100 * high:.0f} | {_missed(missed)}'
+        return 'none | |'
+    missed = _missed(max(low - share, share - high, 0.0))
+    return f'{100 * low:.0f} to {100 * high:.0f} | {missed} | {_missed(max(low - right, 0.0))}'
 
 
 def _missed(share: float) -> str:
@@ -186,7 +193,7 @@ def _speeds(bag: Path) -> list[str]:
         taken = ', '.join(f'{100 * share:.0f} % {name[0]}' for name, share in shares if share)
         goal = _SPEEDS.get(number)
         off = abs(float(np.mean(tray.ratios(AUTO, 1))) - 1.0)
-        judged = f'{100 * goal:.0f} % | {_missed(max(0.0, off - goal))}' if goal else 'none | '
+        judged = f'{100 * goal:.0f} % | {_missed(max(0.0, off - goal))}' if goal else 'none |'
         lines.append(
             f'| {number} | {" | ".join(cells)}: {taken} | {judged} | {_silent(tray):.1%} |'
         )

@@ -128,7 +128,8 @@ def fit_area(pairs: Sequence[SpeedPair], beads: int, where: str) -> AreaFit:
         found = inverse @ (design.T @ (weights * manual))
     residuals = manual - design @ found
     chi_square = float(np.sum(weights * residuals**2)) / (len(pairs) - found.size)
-    errors = np.sqrt(np.diag(inverse) * max(chi_square, 1.0))
+    scattered = np.sqrt(np.diag(inverse) * max(chi_square, 1.0))
+    errors = np.hypot(scattered, found * float(np.median(_sample_spread(pairs, beads))))
     fit = AreaFit(
         factor=float(found[0]),
         factor_error=float(errors[0]),
@@ -147,10 +148,18 @@ def _variances(
 ) -> NDArray[np.float64]:
     """Of the manual speed less the calibrated one, [m^2/s^2]."""
     measured = np.array([one.manual_speed_error for one in pairs])
-    marked = np.minimum(np.array([one.beads for one in pairs]), beads)
-    sample = _RAYLEIGH_SPREAD * expected * np.sqrt((1.0 - marked / beads) / marked)
+    sample = expected * _sample_spread(pairs, beads)
     by_area = factor * np.array([one.area_speed_error for one in pairs])
     return np.asarray(measured**2 + sample**2 + by_area**2 + 1e-18)
+
+
+def _sample_spread(pairs: Sequence[SpeedPair], beads: int) -> NDArray[np.float64]:
+    """How far the mean of the beads that were marked may be off that of all, relatively.
+
+    It is usually the same beads that are marked throughout, so more windows do not make it less.
+    """
+    marked = np.minimum(np.array([one.beads for one in pairs]), beads)
+    return np.asarray(_RAYLEIGH_SPREAD * np.sqrt((1.0 - marked / beads) / marked))
 
 
 def _check(fit: AreaFit, where: str) -> None:
