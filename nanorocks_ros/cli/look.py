@@ -56,15 +56,18 @@ def run(options: argparse.Namespace) -> int:
         check_outputs(
             {'--output': Path(options.output)}, {'--output': ('.png',)}, force=options.force
         )
-    with Progress('looking') as progress:
-        steps = steps_of_bag(
-            Path(options.bag),
-            settings,
-            number=options.frame,
-            time=options.at,
-            image_topic=options.image_topic,
-            progress=progress.count,
-        )
+    try:
+        with Progress('looking') as progress:
+            steps = steps_of_bag(
+                Path(options.bag),
+                settings,
+                number=options.frame,
+                time=options.at,
+                image_topic=options.image_topic,
+                progress=progress.count,
+            )
+    except KeyboardInterrupt as interruption:
+        raise KeyboardInterrupt('nothing was written') from interruption
     for notice in steps.notices:
         print(f'nanorocks: {notice}', file=sys.stderr)
     if options.json:
