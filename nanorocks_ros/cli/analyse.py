@@ -18,32 +18,29 @@ if TYPE_CHECKING:
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.flags import add_flags
+    from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser('analyse', help='analyse a bag as fast as the machine can')
-    parser.add_argument('bag', help='rosbag2 folder or .mcap file')
-    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    add_bag(parser)
     parser.add_argument(
         '-o', '--output', help='folder for tables and results bag; default BAG_results'
     )
     parser.add_argument('--no-output', action='store_true', help='write no files')
-    parser.add_argument('--image-topic', default='', help="the camera topic, if it isn't ours")
-    parser.add_argument('--parameters', help='ROS parameter file, as the nodes take it')
-    add_flags(parser, PipelineSettings(), skip=set())
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Analyse the bag, print, write; the exit code."""
     from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.study.export import as_json, write_results
     from nanorocks_ros.study.offline import analyse
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
     source = Path(options.bag)
-    with _Progress() as progress:
+    with Progress('analysing') as progress:
         analysis = analyse(
-            source, settings, image_topic=options.image_topic, progress=progress.update
+            source, settings, image_topic=options.image_topic, progress=progress.count
         )
     for notice in analysis.notices:
         print(f'nanorocks: {notice}', file=sys.stderr)
@@ -58,25 +55,6 @@ def run(options: argparse.Namespace) -> int:
     if analysis.error is not None:
         raise analysis.error
     return 0
-
-
-class _Progress:
-    """A progress line on a terminal, silence elsewhere."""
-
-    def __enter__(self) -> _Progress:
-        self._bar: Any = None
-        return self
-
-    def update(self, done: int, total: int) -> None:
-        if self._bar is None:
-            from tqdm import tqdm
-
-            self._bar = tqdm(total=total, unit='frame', leave=False, disable=None)
-        self._bar.update(done - self._bar.n)
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.close()
 
 
 def _print(analysis: Analysis) -> None:

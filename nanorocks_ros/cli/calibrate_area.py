@@ -22,12 +22,12 @@ _KINDS = {'--output': ('.yaml', '.yml'), '--picture': ('.png',)}
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.flags import add_flags
+    from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser(
         'calibrate-area', help='calibrate the binarised area by tracks made by hand'
     )
-    parser.add_argument('bag', help='rosbag2 folder or .mcap file')
+    add_bag(parser, skip={'speed.method', 'speed.area_factor', 'speed.area_offset'})
     parser.add_argument(
         'tracks',
         help='tracks made by hand: CSV (frame, id, x, y), TrackMate CSV or XML, NASA Spotlight',
@@ -42,11 +42,6 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument('--picture', help='picture of both speeds to write, .png')
     parser.add_argument('--force', action='store_true', help='replace files that exist')
-    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
-    parser.add_argument('--image-topic', default='', help="the camera topic, if it isn't ours")
-    parser.add_argument('--parameters', help='ROS parameter file, as the nodes take it')
-    skipped = {'speed.method', 'speed.area_factor', 'speed.area_offset'}
-    add_flags(parser, PipelineSettings(), skip=skipped)
     parser.set_defaults(run=run)
 
 

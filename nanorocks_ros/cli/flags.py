@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import yaml
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.settings import SettingRow, rows, with_values
+from nanorocks_ros.experiment.settings import PipelineSettings, SettingRow, rows, with_values
 
 SettingsType = TypeVar('SettingsType')
 
@@ -30,6 +30,15 @@ def add_flags(
             nargs='*' if isinstance(row.default, tuple) else None,
             help=f'{row.doc}{unit}; default {_shown(row)}'.replace('%', '%%'),
         )
+
+
+def add_bag(parser: argparse.ArgumentParser, skip: set[str] | None = None) -> None:
+    """What every command that takes a bag through the stages asks for, settings included."""
+    parser.add_argument('bag', help='rosbag2 folder or .mcap file')
+    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    parser.add_argument('--image-topic', default='', help="the camera topic, if it isn't ours")
+    parser.add_argument('--parameters', help='ROS parameter file, as the nodes take it')
+    add_flags(parser, PipelineSettings(), skip=skip or set())
 
 
 def flag_of(name: str) -> str:

@@ -21,12 +21,12 @@ _MM, _MM2 = 1e3, 1e6
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.flags import add_flags
+    from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser(
         'look', help='show what the preprocessing makes of one frame, step by step'
     )
-    parser.add_argument('bag', help='rosbag2 folder or .mcap file')
+    add_bag(parser)
     moment = parser.add_mutually_exclusive_group()
     moment.add_argument(
         '--frame', type=int, metavar='N', help='frame to show, counted from 0; default: the middle'
@@ -36,10 +36,6 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument('-o', '--output', help='picture of the steps to write, .png')
     parser.add_argument('--force', action='store_true', help='replace a file that exists')
-    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
-    parser.add_argument('--image-topic', default='', help="the camera topic, if it isn't ours")
-    parser.add_argument('--parameters', help='ROS parameter file, as the nodes take it')
-    add_flags(parser, PipelineSettings(), skip=set())
     parser.set_defaults(run=run)
 
 

@@ -20,20 +20,16 @@ if TYPE_CHECKING:
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.flags import add_flags
+    from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser('speeds', help='measure the speed by every method, and compare')
-    parser.add_argument('bag', help='rosbag2 folder or .mcap file')
+    add_bag(parser, skip={'speed.method'})
     parser.add_argument('-o', '--output', help='picture of one cycle to write, .png')
     parser.add_argument('--table', help='table of all speeds to write, .csv')
     parser.add_argument(
         '--cycle', type=int, metavar='N', help='cycle to draw; default: the first after shaking'
     )
     parser.add_argument('--force', action='store_true', help='replace files that exist')
-    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
-    parser.add_argument('--image-topic', default='', help="the camera topic, if it isn't ours")
-    parser.add_argument('--parameters', help='ROS parameter file, as the nodes take it')
-    add_flags(parser, PipelineSettings(), skip={'speed.method'})
     parser.set_defaults(run=run)
 
 

@@ -22,10 +22,10 @@ _PERCENT = 100.0
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.flags import add_flags
+    from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser('track', help='follow every bead through a bag')
-    parser.add_argument('bag', help='rosbag2 folder or .mcap file')
+    add_bag(parser)
     parser.add_argument('-o', '--output', help='table of the tracks to write, .csv or .parquet')
     parser.add_argument('--picture', help='picture of the last frame with tracks to write, .png')
     parser.add_argument(
@@ -37,10 +37,6 @@ def add_parser(commands: Any) -> None:
         '--first-frame', type=int, default=0, help='number of the first frame in FILE; default 0'
     )
     parser.add_argument('--force', action='store_true', help='replace files that exist')
-    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
-    parser.add_argument('--image-topic', default='', help="the camera topic, if it isn't ours")
-    parser.add_argument('--parameters', help='ROS parameter file, as the nodes take it')
-    add_flags(parser, PipelineSettings(), skip=set())
     parser.set_defaults(run=run)
 
 

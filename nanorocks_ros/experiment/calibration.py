@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.camera import Camera
-from nanorocks_ros.experiment.view import IDENTITY, PlumbBob, View, view_from_matrices
+from nanorocks_ros.experiment.camera import Camera, PlumbBob
+from nanorocks_ros.experiment.view import IDENTITY, View, view_from_matrices
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

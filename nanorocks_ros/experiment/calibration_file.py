@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import yaml
 
@@ -29,6 +29,7 @@ from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, view_of
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.experiment.view import IDENTITY
+from nanorocks_ros.experiment.yaml_lines import YamlLines, composed, read_text
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.settings import PipelineSettings
@@ -42,34 +43,20 @@ def load_calibration(path: str | Path) -> Calibration:
     ConfigurationError
         When it cannot be read or an entry cannot be used; names the line.
     """
-    try:
-        text = Path(path).read_text(encoding='utf-8')
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, 'strerror', None) or 'is not UTF-8 text'
-        raise ConfigurationError(str(path), reason, 'name a calibration file') from error
-    except yaml.YAMLError as error:
-        mark = getattr(error, 'problem_mark', None)
-        line = mark.line + 1 if mark else 1
-        raise ConfigurationError(f'{path}:{line}', 'not YAML', 'correct this line') from error
-    return _File(str(path)).calibration(root)
+    text = read_text(Path(path), 'a calibration file')
+    return _File(str(path)).calibration(composed(str(path), text))
 
 
-class _File:
-    """Reads the composed YAML, in which every node still knows its line."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
+class _File(YamlLines):
+    """A calibration from the nodes of a file."""
 
     def calibration(self, root: yaml.Node | None) -> Calibration:
-        top = self._entries(root, {'camera_info', 'pixels_per_metre', 'trays'}, {'residual_px'})
+        top = self.mapping(root, {'camera_info', 'pixels_per_metre', 'trays'}, {'residual_px'})
         info = self._info(top['camera_info'])
-        where = self._where(top['camera_info'])
+        where = self.place(top['camera_info'])
         (scale,) = self._numbers(top['pixels_per_metre'], 1)
         if scale <= 0.0:
-            raise self._error(
-                top['pixels_per_metre'], f'a scale of {scale:g}', 'give px per metre'
-            )
+            raise self.error(top['pixels_per_metre'], f'a scale of {scale:g}', 'give px per metre')
         residual = self._numbers(top['residual_px'], 1)[0] if 'residual_px' in top else math.nan
         return Calibration(
             view=view_of(info, where),
@@ -80,13 +67,13 @@ class _File:
         )
 
     def _info(self, node: yaml.Node) -> CameraInfo:
-        entry = self._entries(node, {'width', 'height', 'distortion_model', 'd', 'k'}, {'r', 'p'})
+        entry = self.mapping(node, {'width', 'height', 'distortion_model', 'd', 'k'}, {'r', 'p'})
         (width,) = self._numbers(entry['width'], 1)
         (height,) = self._numbers(entry['height'], 1)
         for name, value in (('width', width), ('height', height)):
             if value < 1 or not value.is_integer():
-                raise self._error(entry[name], f'{name} of {value:g} px', 'give the picture size')
-        model = self._plain(entry['distortion_model'])
+                raise self.error(entry[name], f'{name} of {value:g} px', 'give the picture size')
+        model = self.scalar(entry['distortion_model'])
         return CameraInfo(
             width=int(width),
             height=int(height),
@@ -99,64 +86,27 @@ class _File:
 
     def _regions(self, node: yaml.Node) -> dict[int, Region]:
         regions = {}
-        for key, value in self._pairs(node):
+        for key, value in self.pairs(node):
             if isinstance(key, bool) or not isinstance(key, int) or key < 1:
-                raise self._error(value, f'tray {key!r}', 'number the trays 1, 2, ...')
+                raise self.error(value, f'tray {key!r}', 'number the trays 1, 2, ...')
             numbers = self._numbers(value, 4)
             whole = all(one.is_integer() for one in numbers)
             if not whole or min(numbers) < 0 or min(numbers[2:]) < 8:
-                raise self._error(
+                raise self.error(
                     value,
                     f'a region of {[f"{one:g}" for one in numbers]}',
                     'give x, y, width, height in whole pixels, the sides 8 or more',
                 )
             regions[key] = Region(*(int(one) for one in numbers))
         if not regions:
-            raise self._error(node, 'lists no tray', 'add at least one')
+            raise self.error(node, 'lists no tray', 'add at least one')
         return regions
 
-    def _where(self, node: yaml.Node | None) -> str:
-        return self._name if node is None else f'{self._name}:{node.start_mark.line + 1}'
-
-    def _error(self, node: yaml.Node | None, what: str, do: str) -> ConfigurationError:
-        return ConfigurationError(self._where(node), what, do)
-
-    def _pairs(self, node: yaml.Node | None) -> list[tuple[Any, yaml.Node]]:
-        if not isinstance(node, yaml.MappingNode):
-            raise self._error(node, 'expected "name: value" entries', 'correct this line')
-        return [(self._plain(key), value) for key, value in node.value]
-
-    def _entries(
-        self, node: yaml.Node | None, needed: set[str], allowed: set[str]
-    ) -> dict[str, yaml.Node]:
-        entry = {str(key): value for key, value in self._pairs(node)}
-        missing = sorted(needed - set(entry))
-        unknown = sorted(set(entry) - needed - allowed)
-        if missing:
-            raise self._error(node, f'lacks {", ".join(missing)}', 'add it')
-        if unknown:
-            known = ', '.join(sorted(needed | allowed))
-            raise self._error(entry[unknown[0]], f'unknown entry {unknown[0]!r}', f'use {known}')
-        return entry
-
-    def _plain(self, node: yaml.Node) -> Any:
-        if not isinstance(node, yaml.ScalarNode):
-            raise self._error(node, 'expected a single value', 'correct this line')
-        try:
-            return yaml.safe_load(node.value) if node.style is None else node.value
-        except (yaml.YAMLError, ValueError) as error:
-            raise self._error(node, f'{node.value!r} cannot be read', 'correct it') from error
-
     def _numbers(self, node: yaml.Node, count: int | None) -> tuple[float, ...]:
-        nodes = node.value if isinstance(node, yaml.SequenceNode) else [node]
-        values = [self._plain(one) for one in nodes]
-        for one, value in zip(nodes, values, strict=True):
-            usable = isinstance(value, int | float) and not isinstance(value, bool)
-            if not usable or not math.isfinite(value):
-                raise self._error(one, f'{value!r} is no finite number', 'correct this value')
+        values = tuple(self.number(one) for one in self.listed(node))
         if count is not None and len(values) != count:
-            raise self._error(node, f'{len(values)} numbers', f'give {count}')
-        return tuple(float(value) for value in values)
+            raise self.error(node, f'{len(values)} numbers', f'give {count}')
+        return values
 
 
 def write_calibration(calibration: Calibration, path: Path, remark: str) -> None:

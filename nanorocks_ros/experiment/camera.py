@@ -53,15 +53,7 @@ class Camera:
     distortion: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        numbers = (*self.focal, *self.centre, *self.distortion)
-        if not all(math.isfinite(value) for value in numbers) or min(self.focal) <= 0.0:
-            raise ConfigurationError(
-                'camera', f'numbers {numbers}', 'give finite ones, and positive focal lengths'
-            )
-        if self.width < 1 or self.height < 1:
-            raise ConfigurationError(
-                'camera', f'a picture of {self.width} x {self.height} px', 'give its size'
-            )
+        _check(self)
         angles = np.linspace(0.0, self._widest_angle(), 200)
         if (self._slope(angles) <= 0.0).any():
             raise ConfigurationError(
@@ -73,13 +65,7 @@ class Camera:
     @property
     def matrix(self) -> NDArray[np.float64]:
         """The matrix K of ROS and OpenCV, (3, 3): they count from the centre of a pixel."""
-        return np.array(
-            [
-                [self.focal[0], 0.0, self.centre[0] - 0.5],
-                [0.0, self.focal[1], self.centre[1] - 0.5],
-                [0.0, 0.0, 1.0],
-            ]
-        )
+        return _matrix(self)
 
     def distorted(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where points of the rectified picture are in the picture of the lens.
@@ -150,3 +136,73 @@ class Camera:
             1.0
             + square * (3.0 * k1 + square * (5.0 * k2 + square * (7.0 * k3 + square * 9.0 * k4)))
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlumbBob:
+    """A camera with the polynomial lens that ROS calls ``plumb_bob``.
+
+    Parameters
+    ----------
+    width, height : int, [px]
+    focal, centre : tuple of 2 floats, [px]
+    distortion : tuple of 5 floats
+        k1, k2, p1, p2, k3 (Brown 1966, Photogrammetric Engineering 32, 444).
+
+    Raises
+    ------
+    ConfigurationError
+        For numbers that no camera has.
+    """
+
+    width: int
+    height: int
+    focal: tuple[float, float]
+    centre: tuple[float, float]
+    distortion: tuple[float, float, float, float, float]
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """The matrix K of ROS and OpenCV, (3, 3): they count from the centre of a pixel."""
+        return _matrix(self)
+
+    def distorted(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where points of the straight picture are in the picture of the lens, [px]."""
+        k1, k2, p1, p2, k3 = self.distortion
+        flat = (np.asarray(points, dtype=np.float64) - self.centre) / self.focal
+        x, y = flat[..., 0], flat[..., 1]
+        square = x * x + y * y
+        radial = 1.0 + square * (k1 + square * (k2 + square * k3))
+        bent = np.stack(
+            [
+                x * radial + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x),
+                y * radial + p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y,
+            ],
+            axis=-1,
+        )
+        return np.asarray(bent * self.focal + self.centre)
+
+
+def _check(camera: Camera | PlumbBob) -> None:
+    numbers = (*camera.focal, *camera.centre, *camera.distortion)
+    if not all(math.isfinite(value) for value in numbers) or min(camera.focal) <= 0.0:
+        raise ConfigurationError(
+            'camera', f'numbers {numbers}', 'give finite ones, and positive focal lengths'
+        )
+    if camera.width < 1 or camera.height < 1:
+        raise ConfigurationError(
+            'camera', f'a picture of {camera.width} x {camera.height} px', 'give its size'
+        )
+
+
+def _matrix(camera: Camera | PlumbBob) -> NDArray[np.float64]:
+    return np.array(
+        [
+            [camera.focal[0], 0.0, camera.centre[0] - 0.5],
+            [0.0, camera.focal[1], camera.centre[1] - 0.5],
+            [0.0, 0.0, 1.0],
+        ]
+    )

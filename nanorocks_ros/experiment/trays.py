@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import yaml
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.yaml_lines import YamlLines, composed, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -120,17 +121,8 @@ def load_trays(path: str | Path | None = None) -> dict[int, Tray]:
         text = resources.files(__package__).joinpath(name).read_text(encoding='utf-8')
     else:
         name = str(path)
-        text = _read(Path(path))
-    try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.YAMLError as error:
-        mark = getattr(error, 'problem_mark', None)
-        line = mark.line + 1 if mark else 1
-        what = getattr(error, 'problem', None) or getattr(error, 'reason', 'cannot be read')
-        raise ConfigurationError(
-            f'{name}:{line}', f'not YAML: {what}', 'correct this line'
-        ) from error
-    return _TrayFile(name).trays(root)
+        text = read_text(Path(path), 'a readable YAML file of trays')
+    return _TrayFile(name).trays(composed(name, text))
 
 
 def tray_by_number(trays: Mapping[int, Tray], number: int) -> Tray:
@@ -147,55 +139,42 @@ def tray_by_number(trays: Mapping[int, Tray], number: int) -> Tray:
     return trays[number]
 
 
-def _read(path: Path) -> str:
-    try:
-        return path.read_text(encoding='utf-8')
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, 'strerror', None) or 'is not UTF-8 text'
-        raise ConfigurationError(
-            str(path), reason, 'name a readable YAML file of trays'
-        ) from error
-
-
-class _TrayFile:
-    """Reads the composed YAML, in which every node still knows its line."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
+class _TrayFile(YamlLines):
+    """Trays from the nodes of a file."""
 
     def trays(self, root: yaml.Node | None) -> dict[int, Tray]:
         if root is None:
-            raise self._error(None, 'is empty', 'list densities_g_cm3 and trays')
-        top = self._mapping(root, {'densities_g_cm3', 'trays'}, set())
+            raise self.error(None, 'is empty', 'list densities_g_cm3 and trays')
+        top = self.mapping(root, {'densities_g_cm3', 'trays'}, set())
         densities = {
-            str(key): self._number(value) for key, value in self._pairs(top['densities_g_cm3'])
+            str(key): self.positive(value) for key, value in self.pairs(top['densities_g_cm3'])
         }
         trays = {}
-        for key, node in self._pairs(top['trays']):
+        for key, node in self.pairs(top['trays']):
             number = self._tray_number(key, node)
             trays[number] = self._tray(number, node, densities)
         if not trays:
-            raise self._error(top['trays'], 'lists no tray', 'add at least one')
+            raise self.error(top['trays'], 'lists no tray', 'add at least one')
         return trays
 
     def _tray_number(self, key: object, node: yaml.Node) -> int:
         if isinstance(key, bool) or not isinstance(key, int) or key < 1:
-            raise self._error(node, f'tray number {key!r}', 'number the trays 1, 2, ...')
+            raise self.error(node, f'tray number {key!r}', 'number the trays 1, 2, ...')
         return key
 
     def _tray(self, number: int, node: yaml.Node, densities: Mapping[str, float]) -> Tray:
-        entry = self._mapping(node, {'dimensions_mm', 'species'}, {'chalk', 'place_mm'})
-        sides = self._numbers(entry['dimensions_mm'])
+        entry = self.mapping(node, {'dimensions_mm', 'species'}, {'chalk', 'place_mm'})
+        sides = self._lengths(entry['dimensions_mm'])
         if len(sides) != 3:
-            raise self._error(
+            raise self.error(
                 entry['dimensions_mm'], f'{len(sides)} dimensions', 'give length, width, height'
             )
         if not isinstance(entry['species'], yaml.SequenceNode) or not entry['species'].value:
-            raise self._error(entry['species'], 'species is no list', 'list at least one')
+            raise self.error(entry['species'], 'species is no list', 'list at least one')
         species = tuple(self._species(one, densities) for one in entry['species'].value)
         for node_one, one in zip(entry['species'].value, species, strict=True):
             if one.diameter_high > min(sides) * MILLIMETRE * (1.0 + 1e-12):
-                raise self._error(
+                raise self.error(
                     node_one,
                     f'beads of {one.diameter_high / MILLIMETRE:g} mm in a tray of '
                     f'{min(sides):g} mm',
@@ -212,24 +191,24 @@ class _TrayFile:
     def _place(self, node: yaml.Node | None) -> tuple[float, float] | None:
         if node is None:
             return None
-        found = self._numbers(node)
-        if len(found) != 2:
-            raise self._error(node, f'{len(found)} numbers for a place', 'give column and row')
+        found = [self.number(one) for one in self.listed(node)]
+        if len(found) != 2 or min(found) < 0.0:
+            raise self.error(node, f'a place of {found}', 'give column and row, 0 or more')
         return found[0] * MILLIMETRE, found[1] * MILLIMETRE
 
     def _species(self, node: yaml.Node, densities: Mapping[str, float]) -> Species:
-        entry = self._mapping(node, {'material', 'diameter_mm', 'count'}, {'mass_g'})
-        material = str(self._scalar(entry['material']))
+        entry = self.mapping(node, {'material', 'diameter_mm', 'count'}, {'mass_g'})
+        material = str(self.scalar(entry['material']))
         if material not in densities:
             known = ', '.join(sorted(densities))
-            raise self._error(
+            raise self.error(
                 entry['material'],
                 f'no density for {material!r} (known: {known})',
                 'add it to densities_g_cm3',
             )
-        diameters = self._numbers(entry['diameter_mm'])
-        if len(diameters) > 2 or diameters[0] > diameters[-1]:
-            raise self._error(
+        diameters = self._lengths(entry['diameter_mm'])
+        if len(diameters) not in (1, 2) or diameters[0] > diameters[-1]:
+            raise self.error(
                 entry['diameter_mm'], f'diameter {diameters}', 'give one, or the lower and upper'
             )
         mass = entry.get('mass_g')
@@ -239,69 +218,22 @@ class _TrayFile:
             diameter_high=diameters[-1] * MILLIMETRE,
             density=densities[material] * GRAM_PER_CUBIC_CENTIMETRE,
             count=self._count(entry['count']),
-            mass=None if mass is None else self._number(mass) * GRAM,
+            mass=None if mass is None else self.positive(mass) * GRAM,
         )
 
-    def _error(self, node: yaml.Node | None, what: str, do: str) -> ConfigurationError:
-        where = self._name if node is None else f'{self._name}:{node.start_mark.line + 1}'
-        return ConfigurationError(where, what, do)
-
-    def _pairs(self, node: yaml.Node) -> list[tuple[object, yaml.Node]]:
-        if not isinstance(node, yaml.MappingNode):
-            raise self._error(node, 'expected "name: value" entries', 'correct this line')
-        seen: set[object] = set()
-        pairs = []
-        for key_node, value in node.value:
-            key = self._scalar(key_node)
-            if key in seen:
-                raise self._error(key_node, f'{key!r} stands twice', 'remove one')
-            seen.add(key)
-            pairs.append((key, value))
-        return pairs
-
-    def _mapping(
-        self, node: yaml.Node, needed: set[str], allowed: set[str]
-    ) -> dict[str, yaml.Node]:
-        entry = {str(key): value for key, value in self._pairs(node)}
-        missing = sorted(needed - set(entry))
-        unknown = sorted(set(entry) - needed - allowed)
-        if missing:
-            raise self._error(node, f'lacks {", ".join(missing)}', 'add it')
-        if unknown:
-            names = ', '.join(sorted(needed | allowed))
-            raise self._error(entry[unknown[0]], f'unknown entry {unknown[0]!r}', f'use {names}')
-        return entry
-
-    def _scalar(self, node: yaml.Node) -> object:
-        if not isinstance(node, yaml.ScalarNode):
-            raise self._error(node, 'expected a single value', 'correct this line')
-        try:
-            return yaml.safe_load(node.value) if node.style is None else node.value
-        except (yaml.YAMLError, ValueError) as error:
-            raise self._error(node, f'{node.value!r} cannot be read', 'correct it') from error
-
-    def _number(self, node: yaml.Node) -> float:
-        value = self._scalar(node)
-        usable = isinstance(value, int | float) and not isinstance(value, bool)
-        if not usable or not math.isfinite(value) or value <= 0:  # type: ignore[arg-type,operator]
-            raise self._error(node, f'{value!r} is no positive number', 'correct this value')
-        return float(value)  # type: ignore[arg-type]
-
-    def _numbers(self, node: yaml.Node) -> list[float]:
-        if isinstance(node, yaml.SequenceNode) and node.value:
-            return [self._number(one) for one in node.value]
-        return [self._number(node)]
+    def _lengths(self, node: yaml.Node) -> list[float]:
+        return [self.positive(one) for one in self.listed(node)]
 
     def _count(self, node: yaml.Node) -> int:
-        value = self._number(node)
+        value = self.positive(node)
         if not value.is_integer():
-            raise self._error(node, f'count {value:g} is no whole number', 'correct it')
+            raise self.error(node, f'count {value:g} is no whole number', 'correct it')
         return int(value)
 
     def _flag(self, node: yaml.Node | None) -> bool:
         if node is None:
             return False
-        value = self._scalar(node)
+        value = self.scalar(node)
         if not isinstance(value, bool):
-            raise self._error(node, f'chalk is {value!r}', 'say true or false')
+            raise self.error(node, f'chalk is {value!r}', 'say true or false')
         return value

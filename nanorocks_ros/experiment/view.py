@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -149,56 +148,3 @@ def view_from_matrices(
 
 # From the centre of the first pixel, where ROS counts from, to its corner.
 _CORNER = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlumbBob:
-    """A camera with the polynomial lens that ROS calls ``plumb_bob``.
-
-    Parameters
-    ----------
-    width, height : int, [px]
-    focal, centre : tuple of 2 floats, [px]
-    distortion : tuple of 5 floats
-        k1, k2, p1, p2, k3 (Brown 1966, Photogrammetric Engineering 32, 444).
-    """
-
-    width: int
-    height: int
-    focal: tuple[float, float]
-    centre: tuple[float, float]
-    distortion: tuple[float, float, float, float, float]
-
-    def __post_init__(self) -> None:
-        numbers = (*self.focal, *self.centre, *self.distortion)
-        if not all(math.isfinite(value) for value in numbers) or min(self.focal) <= 0.0:
-            raise ConfigurationError(
-                'camera', f'numbers {numbers}', 'give finite ones, and positive focal lengths'
-            )
-
-    @property
-    def matrix(self) -> NDArray[np.float64]:
-        """The matrix K of ROS and OpenCV, (3, 3): they count from the centre of a pixel."""
-        return np.array(
-            [
-                [self.focal[0], 0.0, self.centre[0] - 0.5],
-                [0.0, self.focal[1], self.centre[1] - 0.5],
-                [0.0, 0.0, 1.0],
-            ]
-        )
-
-    def distorted(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points of the straight picture are in the picture of the lens, [px]."""
-        k1, k2, p1, p2, k3 = self.distortion
-        flat = (np.asarray(points, dtype=np.float64) - self.centre) / self.focal
-        x, y = flat[..., 0], flat[..., 1]
-        square = x * x + y * y
-        radial = 1.0 + square * (k1 + square * (k2 + square * k3))
-        bent = np.stack(
-            [
-                x * radial + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x),
-                y * radial + p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y,
-            ],
-            axis=-1,
-        )
-        return np.asarray(bent * self.focal + self.centre)

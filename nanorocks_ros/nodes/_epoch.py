@@ -50,8 +50,9 @@ class Epoch:
 
         Parameters
         ----------
-        stamp_ns : int
-            Of the message: the epoch, if it falls to this node to set it.
+        stamp_ns : int or None
+            Of the message: the epoch, if it falls to this node to set it. None where the message
+            has no stamp that could be one; such a node never sets it.
         """
         if self.ns is None and self._may_set and not self._others_will(stamp_ns):
             self.set(self._held_stamps[0] if self._held_stamps else stamp_ns)

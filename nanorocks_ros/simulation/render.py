@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.simulation.drawing import copy_surface, draw_beads, expose
 from nanorocks_ros.simulation.materials import looks_of
 from nanorocks_ros.simulation.randomness import Purpose, hashed, key_for
@@ -30,15 +31,6 @@ _STRIP_PLACES = 1 << 16
 
 # Counters of the two hashes under the key of the noise of one frame.
 _SURROUNDINGS, _TRAY = 0, 1
-
-
-class Region(NamedTuple):
-    """A rectangle of the picture, [px]."""
-
-    x: int
-    y: int
-    width: int
-    height: int
 
 
 class TrayCamera:

@@ -75,9 +75,9 @@ class Preprocessor:
         self._check_regions()
 
     @property
-    def straightened(self) -> bool:
-        """Whether anything is known of the lens."""
-        return self._view is not None
+    def view(self) -> View | None:
+        """What is known of the lens."""
+        return self._view
 
     @property
     def regions(self) -> dict[int, Region]:

@@ -62,6 +62,14 @@ def _between(low: np.int32, high: np.int32, eighths: np.int32) -> np.int32:
 
 
 @compiled
+def _run(places: NDArray[np.int32], i: int, j: int, down: np.int32) -> tuple[np.int32, np.int32]:
+    """Where eight pixels of a row begin along one axis, and the step from one to the next."""
+    first = _between(places[i, j], places[i + 1, j], down)
+    last = _between(places[i, j + 1], places[i + 1, j + 1], down)
+    return first, np.int32((last - first) >> 3)
+
+
+@compiled
 def _blend(
     pixels: NDArray[np.uint8],
     here: np.uint64,
@@ -125,11 +133,8 @@ def resample_color(
     for row in range(rows):
         i, down = row // STEP, np.int32(row % STEP)
         for j in range((columns + STEP - 1) // STEP):
-            x = _between(places_x[i, j], places_x[i + 1, j], down)
-            y = _between(places_y[i, j], places_y[i + 1, j], down)
-            end_x = _between(places_x[i, j + 1], places_x[i + 1, j + 1], down)
-            end_y = _between(places_y[i, j + 1], places_y[i + 1, j + 1], down)
-            step_x, step_y = np.int32((end_x - x) >> 3), np.int32((end_y - y) >> 3)
+            x, step_x = _run(places_x, i, j, down)
+            y, step_y = _run(places_y, i, j, down)
             for column in range(j * STEP, min(columns, (j + 1) * STEP)):
                 u, v = _within(x, last_x), _within(y, last_y)
                 here = np.uint64((v >> _FRACTION) * 3 * image.shape[1] + (u >> _FRACTION) * 3)
@@ -163,11 +168,8 @@ def resample_gray(
     for row in range(rows):
         i, down = row // STEP, np.int32(row % STEP)
         for j in range((columns + STEP - 1) // STEP):
-            x = _between(places_x[i, j], places_x[i + 1, j], down)
-            y = _between(places_y[i, j], places_y[i + 1, j], down)
-            end_x = _between(places_x[i, j + 1], places_x[i + 1, j + 1], down)
-            end_y = _between(places_y[i, j + 1], places_y[i + 1, j + 1], down)
-            step_x, step_y = np.int32((end_x - x) >> 3), np.int32((end_y - y) >> 3)
+            x, step_x = _run(places_x, i, j, down)
+            y, step_y = _run(places_y, i, j, down)
             for column in range(j * STEP, min(columns, (j + 1) * STEP)):
                 u, v = _within(x, last_x), _within(y, last_y)
                 here = np.uint64((v >> _FRACTION) * image.shape[1] + (u >> _FRACTION))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.errors import FrameError, RecordingError
-from nanorocks_ros.experiment.calibration_file import calibrated, load_calibration
+from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.records import Frame, Notice, TrayImage
 from nanorocks_ros.stages.pipeline import trays_of
 from nanorocks_ros.stages.preprocess import Preprocessor
@@ -77,11 +77,10 @@ class BagImages:
                 self.bag.where, 'holds no frame', 'pass another bag or --image-topic'
             )
         self.epoch_ns = epoch_ns
-        calibration = settings.preprocess.calibration
-        self.view = load_calibration(calibration).view if calibration else self.bag.view()
         self.settings = calibrated(settings)
         self.trays = trays_of(self.settings)
-        self.stage = Preprocessor(self.settings, self.trays, self.bag.where, self.view)
+        self.stage = Preprocessor(self.settings, self.trays, self.bag.where, self.bag.view())
+        self.view = self.stage.view
         self.frames = 0
         self.refused: FrameError | None = None
         self._notices: list[str] = []
@@ -93,7 +92,7 @@ class BagImages:
         said = [*self.bag.reader.notices, *self._notices]
         if self.refused is not None:
             said.append(str(self.refused))
-        if not self.stage.straightened:
+        if self.view is None:
             said.append(
                 f'{self.bag.where}: no camera_info and no calibration file; the picture is taken '
                 'as straight'

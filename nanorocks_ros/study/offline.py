@@ -170,7 +170,7 @@ def _remarks(pipeline: Pipeline, where: str) -> list[str]:
     """What the user should know of the frames as a whole."""
     stage = pipeline.preprocessor
     remarks = []
-    if not stage.straightened:
+    if stage.view is None:
         remarks.append(
             f'{where}: no camera_info and no calibration file; the picture is taken as straight'
         )

@@ -94,3 +94,9 @@ def test_a_file_that_is_not_there_is_told(tmp_path):
         load_calibration(tmp_path / 'none.yaml')
     with pytest.raises(ConfigurationError, match='write elsewhere'):
         write_calibration(calibration(), tmp_path / 'none' / 'mine.yaml', 'test')
+
+
+def test_an_entry_that_stands_twice_is_refused(path):
+    path.write_text(path.read_text() + 'pixels_per_metre: 3000.0\n')
+    with pytest.raises(ConfigurationError, match="'pixels_per_metre' stands twice; remove one"):
+        load_calibration(path)

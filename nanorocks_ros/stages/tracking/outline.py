@@ -233,17 +233,6 @@ def _add_edges(
 
 
 @compiled
-def _has_neighbour(discs: NDArray[np.float64], own: int) -> bool:
-    for k in range(discs.shape[0]):
-        if k != own:
-            reach = discs[k, 2] + discs[own, 2] + _NEAR_PX
-            dx, dy = discs[k, 0] - discs[own, 0], discs[k, 1] - discs[own, 1]
-            if dx * dx + dy * dy < reach * reach:
-                return True
-    return False
-
-
-@compiled
 def refit(
     picture: Picture,
     hue_sign: float,
@@ -267,7 +256,7 @@ def refit(
     fit = np.zeros(3)
     alone = discs[first : first + count].copy()
     for k in range(count):
-        if not _has_neighbour(discs, first + k):
+        if not _neighbours(discs, first + k, discs.shape[0]).size:
             continue
         before = discs[first + k].copy()
         fit_circle(picture, hue_sign, discs, first + k, discs.shape[0], expected, fit)

@@ -1,0 +1,136 @@
+"""YAML read so that an error names the line: what the files of trays and calibrations share."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from nanorocks_ros.errors import ConfigurationError
+
+
+def composed(name: str, text: str) -> yaml.Node | None:
+    """The nodes of a YAML text, which know their lines; None for an empty one.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for the error.
+    text : str
+
+    Raises
+    ------
+    ConfigurationError
+        When it is not YAML; names the line.
+    """
+    try:
+        return yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, 'problem_mark', None)
+        line = mark.line + 1 if mark else 1
+        what = getattr(error, 'problem', None) or getattr(error, 'reason', 'cannot be read')
+        raise ConfigurationError(
+            f'{name}:{line}', f'not YAML: {what}', 'correct this line'
+        ) from error
+
+
+def read_text(path: Path, wanted: str) -> str:
+    """The text of a file.
+
+    Parameters
+    ----------
+    path : Path
+    wanted : str
+        What to name instead of a file that cannot be read.
+
+    Raises
+    ------
+    ConfigurationError
+        When it cannot be read.
+    """
+    try:
+        return path.read_text(encoding='utf-8')
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, 'strerror', None) or 'is not UTF-8 text'
+        raise ConfigurationError(str(path), reason, f'name {wanted}') from error
+
+
+class YamlLines:
+    """Takes nodes apart; every error names the file and the line.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def error(self, node: yaml.Node | None, what: str, do: str) -> ConfigurationError:
+        """What is wrong with a node, or with the whole file."""
+        return ConfigurationError(self.place(node), what, do)
+
+    def place(self, node: yaml.Node | None) -> str:
+        """File and line of a node."""
+        return self._name if node is None else f'{self._name}:{node.start_mark.line + 1}'
+
+    def pairs(self, node: yaml.Node | None) -> list[tuple[object, yaml.Node]]:
+        """Keys and values, no key twice."""
+        if not isinstance(node, yaml.MappingNode):
+            raise self.error(node, 'expected "name: value" entries', 'correct this line')
+        seen: set[object] = set()
+        pairs = []
+        for key_node, value in node.value:
+            key = self.scalar(key_node)
+            if key in seen:
+                raise self.error(key_node, f'{key!r} stands twice', 'remove one')
+            seen.add(key)
+            pairs.append((key, value))
+        return pairs
+
+    def mapping(
+        self, node: yaml.Node | None, needed: set[str], allowed: set[str]
+    ) -> dict[str, yaml.Node]:
+        """Entries of which some must be there, and no others than these and some more."""
+        entry = {str(key): value for key, value in self.pairs(node)}
+        missing = sorted(needed - set(entry))
+        unknown = sorted(set(entry) - needed - allowed)
+        if missing:
+            raise self.error(node, f'lacks {", ".join(missing)}', 'add it')
+        if unknown:
+            names = ', '.join(sorted(needed | allowed))
+            raise self.error(entry[unknown[0]], f'unknown entry {unknown[0]!r}', f'use {names}')
+        return entry
+
+    def scalar(self, node: yaml.Node) -> Any:
+        """A single value, as YAML reads it."""
+        if not isinstance(node, yaml.ScalarNode):
+            raise self.error(node, 'expected a single value', 'correct this line')
+        try:
+            return yaml.safe_load(node.value) if node.style is None else node.value
+        except (yaml.YAMLError, ValueError) as error:
+            raise self.error(node, f'{node.value!r} cannot be read', 'correct it') from error
+
+    def number(self, node: yaml.Node, what: str = 'finite number') -> float:
+        """A number that is finite."""
+        value = self.scalar(node)
+        usable = isinstance(value, int | float) and not isinstance(value, bool)
+        if not usable or not math.isfinite(value):
+            raise self.error(node, f'{value!r} is no {what}', 'correct this value')
+        return float(value)
+
+    def positive(self, node: yaml.Node) -> float:
+        """A number above 0."""
+        value = self.number(node, 'positive number')
+        if value <= 0.0:
+            raise self.error(
+                node, f'{self.scalar(node)!r} is no positive number', 'correct this value'
+            )
+        return value
+
+    def listed(self, node: yaml.Node) -> list[yaml.Node]:
+        """The items of a list; a single value does for a list of one."""
+        return list(node.value) if isinstance(node, yaml.SequenceNode) else [node]
