@@ -9,7 +9,7 @@ import numpy as np
 
 from nanorocks_ros.records import UNKNOWN, Quality, SpeedEstimate, SpeedMethod, Tracks, TrayImage
 from nanorocks_ros.stages.shaking import NS, CycleFollower
-from nanorocks_ros.stages.tracking.mean_speed import RELIABLE_SHARE, mean_speed
+from nanorocks_ros.stages.tracking.mean_speed import RELIABLE_SHARE, mean_speeds
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 if TYPE_CHECKING:
@@ -94,17 +94,16 @@ class TrackSpeed:
         self.reliable = self.judged and enough and followed
 
     def _speeds(self, shakes: CycleFollower) -> list[SpeedEstimate]:
-        series = list(self._recent)
-        mean = mean_speed(series, least_distance=self._least_distance)
+        mean, *each = mean_speeds(
+            list(self._recent),
+            least_distance=self._least_distance,
+            species=(None, *range(self._counts.size)),
+        )
         if mean is None or not np.isfinite(mean.mean_projected_speed):
             return []
         if self._last_ns is not None and mean.stamp_ns <= self._last_ns:
             return []
         self._last_ns = mean.stamp_ns
-        each = [
-            mean_speed(series, least_distance=self._least_distance, species=number)
-            for number in range(self._counts.size)
-        ]
         species = [
             (one.mean_projected_speed, one.mean_projected_speed_error)
             if one
