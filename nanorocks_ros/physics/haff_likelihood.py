@@ -70,9 +70,7 @@ class Decay:
         """Minus twice the log posterior."""
         return self.generalised(parameters)[0]
 
-    def cost_and_slope(
-        self, parameters: NDArray[np.float64]
-    ) -> tuple[float, NDArray[np.float64]]:
+    def cost_and_slope(self, parameters: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         """The same and its derivatives by the parameters, (4,), by central differences."""
         slope = np.empty(_PARAMETERS)
         return _cost_and_slope(parameters, slope, *self._arrays()), slope

@@ -42,6 +42,8 @@ class TrackSpeed:
         Whether nearly all beads of every species are being followed.
     judged : bool
         Whether enough images were seen to tell.
+    hopeless : bool
+        Whether a species is too crowded to be followed, so that it will never be reliable.
     """
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
@@ -56,8 +58,9 @@ class TrackSpeed:
         self._next_ns: int | None = None
         self._flags = Quality(0)
         self._last_ns: int | None = None
+        self.hopeless = self._tracker.crowded
         self.reliable = False
-        self.judged = False
+        self.judged = self.hopeless
 
     def push(
         self, image: TrayImage, shakes: CycleFollower, shaken: bool
@@ -85,6 +88,8 @@ class TrackSpeed:
     def _judge(self, tracks: Tracks) -> None:
         seen = np.bincount(tracks.species[tracks.seen], minlength=self._counts.size)
         self._shares.append(seen / self._counts)
+        if self.hopeless:
+            return
         # A track is believed after some pictures only: the first ones show none.
         least = float(np.median(self._shares, axis=0).min())
         self.judged = len(self._shares) == _MEMORY_FRAMES

@@ -52,6 +52,11 @@ class Tracker:
         self._last_ns: int | None = None
         self._next_number = 0
 
+    @property
+    def crowded(self) -> bool:
+        """Whether a species has too many grains to be followed."""
+        return self._detector.crowded
+
     def push(self, image: TrayImage) -> tuple[Tracks, ...]:
         """The beads of the next image of the tray.
 
