@@ -8,6 +8,7 @@ from importlib import import_module
 ALL = (
     'offline',
     'live',
+    'live_plate',
     'preprocess',
     'scene',
     'tracking',
@@ -16,7 +17,6 @@ ALL = (
     'cor_coverage',
     'engine',
     'engine_physics',
-    'tracking',
 )
 
 
