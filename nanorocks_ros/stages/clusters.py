@@ -35,9 +35,7 @@ def autocorrelation(gray: NDArray[np.uint8]) -> NDArray[np.float32]:
     deviation -= deviation.mean()
     # Padded, so that at the lags that are wanted, up to half of the size, the image is not
     # compared with its own repetition. Rows that are all zero, or not wanted, are not transformed.
-    down, right = (
-        fft.next_fast_len(size + size // 2 + 1, real=True) for size in (rows, columns)
-    )
+    down, right = (fft.next_fast_len(size + size // 2 + 1, real=True) for size in (rows, columns))
     spectrum = fft.fft(fft.rfft(deviation, n=right, axis=1), n=down, axis=0)
     power = spectrum.real**2 + spectrum.imag**2
     along = fft.ifft(power, axis=0)[_lags(rows)]
