@@ -103,6 +103,7 @@ def _run(bag: Path, transport: str) -> None:
     from rclpy.executors import SingleThreadedExecutor
 
     from nanorocks_ros.nodes._node import NanorocksNode
+    from nanorocks_ros.nodes._shell import message_class, qos_of
     from nanorocks_ros.wire import topics
 
     node = NanorocksNode('benchmark')
@@ -117,10 +118,17 @@ def _run(bag: Path, transport: str) -> None:
     camera = topics.RAW_COMPRESSED if transport == 'compressed' else topics.RAW
     _spin(executor, _SETTLE_S, lambda: node.count_subscribers(camera.absolute()) > 0)
     player = _start(
-        'bag_player', '--ros-args', '-p', f'bag:={bag}', '-p', 'listeners:=1',
+        'bag_player', '--ros-args', '-p', f'bag:={bag}', '-p', 'listeners:=2',
         '-p', f'duration:={_SECONDS}',
     )  # fmt: skip
+    # The player waits for a second listener, which comes when this node hears the truth.
+    _spin(executor, _SETTLE_S, lambda: node.count_publishers(topics.TRUTH.absolute(1)) > 0)
+    _spin(executor, 2.0)
+    gate = node.create_subscription(
+        message_class(camera.type), camera.absolute(), lambda _: None, qos_of(camera)
+    )
     _spin(executor, _SETTLE_S, lambda: bool(tally.sent))
+    node.destroy_subscription(gate)
     before, start = [_cpu(player), _cpu(pipeline)], time.monotonic()
     _spin(executor, _SECONDS - 0.5, lambda: player.poll() is not None)
     used = np.subtract([_cpu(player), _cpu(pipeline)], before) / (time.monotonic() - start)

@@ -13,8 +13,8 @@ import queue
 import threading
 from collections import deque
 
-# Frames that may wait: a fit in every tray at once takes as long as three frames do.
-_MOST_WAITING = 8
+# Frames that may wait: the first takes most of a second, until floor and walls are known.
+_MOST_WAITING = 30
 _FAREWELL_S = 1.0
 
 
@@ -70,7 +70,8 @@ class Background:
                 return
             try:
                 self._done.append((self._work(job), None))
-            except Exception as error:  # noqa: BLE001, raised again in the thread of the node
+            # Raised again in the thread of the node.
+            except Exception as error:
                 self._done.append((None, error))
             self._jobs.task_done()
             self._ready.trigger()

@@ -103,7 +103,7 @@ def _cost_and_slope(
     inner_distance: NDArray[np.float64],
     usual: NDArray[np.float64],
 ) -> float:
-    """See `Decay.cost_and_slope`; everything depends on tau, so there it is done by differences."""
+    """See `Decay.cost_and_slope`; by tau, on which all depends, it is done by differences."""
     data = (time, starts, counts, log_speed, variance, inner_distance, usual)
     near = parameters.copy()
     step = _STEP * max(1.0, abs(parameters[0]))
@@ -197,7 +197,7 @@ def _covariances(
     variance: NDArray[np.float64],
     inner_distance: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Of the gas, of its quick part, (m, m), on and above the diagonal; and of the errors, (m,)."""
+    """Of the gas and its quick part, (m, m), from the diagonal on; and of the errors, (m,)."""
     tau, half = math.exp(parameters[0]), 0.5 * math.exp(parameters[1])
     quick, scale = math.exp(parameters[2]), math.exp(parameters[3])
     n = growth.size
