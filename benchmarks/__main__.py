@@ -12,6 +12,7 @@ ALL = (
     'preprocess',
     'scene',
     'tracking',
+    'plate_cost',
     'speed_trays',
     'speed_accuracy',
     'cor_coverage',
