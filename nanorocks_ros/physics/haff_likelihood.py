@@ -19,6 +19,16 @@ from nanorocks_ros.physics.compiled import compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    _Arrays = tuple[
+        NDArray[np.float64],
+        NDArray[np.intp],
+        NDArray[np.intp],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+    ]
+
 # Spread of the logarithms of the strength q and of the quick part, about what is usual.
 _SPREAD_STRENGTH, _SPREAD_QUICK = 0.5, 1.0
 # Step of the numerical derivative: the third root of the precision.
@@ -79,7 +89,7 @@ class Decay:
         """Variance of ln(1 / (v0 tau)) = -ln v0 - ln tau."""
         return float(np.linalg.inv(self.generalised(parameters)[2]).sum())
 
-    def _arrays(self) -> tuple[NDArray[np.float64] | NDArray[np.intp], ...]:
+    def _arrays(self) -> _Arrays:
         return (
             self.time,
             self.starts,

@@ -174,7 +174,7 @@ def _explain(picture: Picture, kind: int, disc: NDArray[np.float64]) -> float:
     """Mark the pixels of a disc as explained; the share of it that show its species."""
     columns, radius = picture.shown.shape[1], disc[2] + _RIM_PX
     bead, own = np.uint8(kind), np.uint8(1 << kind)
-    taken = 0
+    taken = np.int32(0)
     first_row, last_row = _rows(disc, radius, picture.shown.shape[0])
     for i in range(first_row, last_row):
         shown, covered = picture.shown[i], picture.covered[i]
@@ -211,7 +211,7 @@ def _left_to_explain(picture: Picture, kind: int, disc: NDArray[np.float64]) -> 
     """Share of a disc that shows the species, unexplained, less the share that shows floor."""
     columns, radius = picture.shown.shape[1], disc[2]
     own, bead, floor = np.uint8(1 << kind), np.uint8(kind), np.uint8(FLOOR)
-    total = 0
+    total = np.int32(0)
     first_row, last_row = _rows(disc, radius, picture.shown.shape[0])
     for i in range(first_row, last_row):
         shown, covered = picture.shown[i], picture.covered[i]

@@ -216,4 +216,5 @@ def _distances(
     distances, square, variance, place_variance = distances_of(series, pictures, species, jitter)
     if distances.shape[1] < _FEWEST:
         return None
-    return _Distances(*distances, square, variance, place_variance)
+    later, earlier, both = distances
+    return _Distances(later, earlier, both, square, variance, place_variance)
