@@ -38,6 +38,11 @@ class Background:
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
+    @property
+    def waiting(self):
+        """Jobs that nobody has begun."""
+        return self._jobs.qsize()
+
     def put(self, job):
         """Leave a job to the thread; waits while too many are waiting."""
         self._jobs.put(job)

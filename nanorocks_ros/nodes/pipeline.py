@@ -119,6 +119,7 @@ class PipelineNode(NanorocksNode):
             for number in self._pipeline.trays
         }
         self._background.put((self._pipeline.preprocessor.push(frame), wanted))
+        self.state['frames waiting for the trays'] = self._background.waiting
 
     def _follow(self, job):
         records, wanted = job
