@@ -8,9 +8,11 @@ from importlib import import_module
 ALL = (
     'offline',
     'live',
+    'live_plate',
     'preprocess',
     'scene',
     'tracking',
+    'plate_cost',
     'speed_trays',
     'speed_accuracy',
     'area_calibration',

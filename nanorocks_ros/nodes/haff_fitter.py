@@ -7,6 +7,7 @@ from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.records import SpeedEstimate
 from nanorocks_ros.stages.cooling import HaffFitter
 from nanorocks_ros.stages.pipeline import trays_of
+from nanorocks_ros.stages.warm_up import warm_up_fit
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import from_array
 
@@ -24,6 +25,9 @@ class HaffFitterNode(NanorocksNode):
         self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
         for tray in self._settings.trays:
             self.offer((topics.COR,), tray)
+        # Others find the publishers meanwhile.
+        warm_up_fit()
+        for tray in self._settings.trays:
             self.listen(topics.SPEED, lambda message, tray=tray: self._take(message, tray), tray)
 
     def _build(self, settings):

@@ -8,6 +8,8 @@ import numpy as np
 from nanorocks_ros.experiment.settings import PipelineSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import Straight, View
+from nanorocks_ros.physics.haff import haff_speed
+from nanorocks_ros.physics.haff_fit import fit_haff
 from nanorocks_ros.records import Frame, TrayImage
 from nanorocks_ros.stages.preprocess import Preprocessor
 from nanorocks_ros.stages.shaking import CycleFollower
@@ -49,12 +51,23 @@ def warm_up() -> None:
 def warm_up_speed() -> None:
     """Push a few pictures of moving discs through what measures speeds in colour images."""
     settings = PipelineSettings()
-    estimator = SpeedEstimator(settings, load_trays()[3])
-    for number in range(8):
-        color = np.full((80, 160, 3), 150, dtype=np.uint8)
-        for k in range(8):
-            place = 18 + 18 * k
-            cv2.circle(color, (place, 20 + number), 12, (30, 30, 200), -1)
-            cv2.circle(color, (place, 60 - number), 7, (200, 60, 30), -1)
-        gray = np.ascontiguousarray(color[:, :, 0])
-        estimator.push(TrayImage(stamp_ns=number * 33_333_333, tray=3, gray=gray, color=color))
+    # Under chalk beads are looked for in another way.
+    for tray in (load_trays()[3], load_trays()[2]):
+        estimator = SpeedEstimator(settings, tray)
+        for number in range(8):
+            color = np.full((80, 160, 3), 150, dtype=np.uint8)
+            for k in range(8):
+                place = 18 + 18 * k
+                cv2.circle(color, (place, 20 + number), 12, (30, 30, 200), -1)
+                cv2.circle(color, (place, 60 - number), 7, (200, 60, 30), -1)
+            gray = np.ascontiguousarray(color[:, :, 0])
+            stamp_ns = number * 33_333_333
+            image = TrayImage(stamp_ns=stamp_ns, tray=tray.number, gray=gray, color=color)
+            estimator.push(image)
+
+
+def warm_up_fit() -> None:
+    """Fit a decay."""
+    time = np.linspace(0.5, 5.0, 20)
+    speed = haff_speed(time, 5e-3, 2.0) * (1.0 + 0.02 * np.cos(9.0 * time))
+    fit_haff(time, speed, 0.02 * speed, 15)

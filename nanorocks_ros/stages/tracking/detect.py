@@ -120,6 +120,7 @@ class BeadDetector:
         hints : sequence of ndarrays (k, 4), [px]
             For each species where beads should be: column, row, radius and its error.
         """
+        color = np.ascontiguousarray(color)
         if self._ground is None or self._ground.floor.shape != color.shape:
             self._ground = self._first_ground(color)
         picture = self._look(color, self._ground)

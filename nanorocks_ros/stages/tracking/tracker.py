@@ -57,6 +57,11 @@ class Tracker:
         """Of the last image, where beads are looked for: 0 floor, 255 black; None before it."""
         return self._detector.darkness
 
+    @property
+    def crowded(self) -> bool:
+        """Whether a species has too many grains to be followed."""
+        return self._detector.crowded
+
     def push(self, image: TrayImage) -> tuple[Tracks, ...]:
         """The beads of the next image of the tray.
 
