@@ -8,15 +8,20 @@ from importlib import import_module
 ALL = (
     'offline',
     'live',
+    'live_plate',
     'preprocess',
     'scene',
     'tracking',
+    'plate_cost',
     'speed_trays',
     'speed_accuracy',
+    'area_calibration',
+    'deflections',
     'cor_coverage',
+    'cor_recovery',
     'engine',
     'engine_physics',
-    'tracking',
+    'validation',
 )
 
 

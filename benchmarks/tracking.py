@@ -7,7 +7,6 @@ after the other without any. A link is a bead in one picture joined to one in th
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -16,18 +15,10 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from nanorocks_ros.experiment.settings import (
-    PipelineSettings,
-    SceneSettings,
-    SimulationSettings,
-    TrackingSettings,
-    with_values,
-)
+from benchmarks.films import RATE, SCALE, Shot, filmed
+from nanorocks_ros.experiment.settings import PipelineSettings, TrackingSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.experiment.view import View
-from nanorocks_ros.records import BeadsTruth, Frame, Tracks, TrayImage
-from nanorocks_ros.simulation.scene.film import SceneFilm, without_effects
-from nanorocks_ros.stages.preprocess import Preprocessor
+from nanorocks_ros.records import BeadsTruth, Tracks
 from nanorocks_ros.stages.tracking.detect import BeadDetector, Detections
 from nanorocks_ros.stages.tracking.link import Linker
 from nanorocks_ros.stages.tracking.mean_speed import mean_speed
@@ -38,63 +29,20 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-_SCALE = 12500.0
+    from nanorocks_ros.simulation.scene.film import SceneFilm
+
 _TRAYS = (1, 2, 3, 4, 5, 6, 7)
-_RATE = 30.0
 _WARM_UP = 45
 _FRAMES = 150
 _SPEEDS = (0.1e-3, 0.5e-3, 2e-3, 7e-3, 15e-3)
-# Mean speed in the image plane over that in space, of an isotropic gas.
-_PROJECTED = np.pi / 4.0
 # Gray levels added by a reflection, beyond which a place lies in the glare.
 _GLARE_LEVEL = 60.0
-_LEAST_DISTANCE = 1.5 / _SCALE
+_LEAST_DISTANCE = 1.5 / SCALE
 _NS = 1e9
 
 
-@dataclass(frozen=True)
-class _Shot:
-    """One frame: its JPEG, the images of the trays, the truth."""
-
-    jpeg: NDArray[np.uint8]
-    images: dict[int, TrayImage]
-    truth: dict[int, BeadsTruth]
-
-
-def _filmed(
-    speed: float, *, effects: bool, frames: int, trays: tuple[int, ...] = _TRAYS, **values: float
-) -> tuple[list[_Shot], SceneFilm]:
-    scene = with_values(SceneSettings(trays=trays), {'swing_knocks': False}, 'benchmark')
-    scene = scene if effects else without_effects(scene)
-    simulation = SimulationSettings(
-        mean_speed=speed / _PROJECTED, first_shake=0.3, frame_rate=_RATE, **values
-    )
-    film = SceneFilm(simulation, scene)
-    names = {
-        'trays': list(trays),
-        'preprocess.layout': 'plate',
-        'preprocess.pixels_per_metre': _SCALE,
-    }
-    settings = with_values(PipelineSettings(), names, 'benchmark')
-    flown = load_trays()
-    view = View(camera=film.camera.geometry.camera)
-    stage = Preprocessor(settings, {n: flown[n] for n in trays}, 'film', view)
-    shots = []
-    for moment in film.moments(frames):
-        jpeg = cv2.imencode('.jpg', moment.frame.image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
-        image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR) if effects else moment.frame.image
-        frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
-        found = [one for one in stage.push(frame) if isinstance(one, TrayImage)]
-        shots.append(
-            _Shot(jpeg, {one.tray: one for one in found}, {one.tray: one for one in moment.beads})
-        )
-    return shots, film
-
-
-def _tracked(shots: list[_Shot], tray: int) -> Iterator[tuple[Tracks, BeadsTruth]]:
-    settings = with_values(
-        PipelineSettings(), {'preprocess.pixels_per_metre': _SCALE}, 'benchmark'
-    )
+def _tracked(shots: list[Shot], tray: int) -> Iterator[tuple[Tracks, BeadsTruth]]:
+    settings = with_values(PipelineSettings(), {'preprocess.pixels_per_metre': SCALE}, 'benchmark')
     tracker = Tracker(settings, load_trays()[tray])
     for shot in shots:
         if tray in shot.images:
@@ -117,12 +65,12 @@ def _in_glare(film: SceneFilm, tray: int, places: NDArray[np.float64]) -> NDArra
         return np.zeros(len(places), dtype=bool)
     geometry = film.camera.geometry
     region = geometry.regions[tray]
-    points = geometry.camera.distorted(places * _SCALE + (region.x, region.y))
+    points = geometry.camera.distorted(places * SCALE + (region.x, region.y))
     columns, rows = points.astype(np.int64).T
     return levels[rows, columns] > _GLARE_LEVEL
 
 
-def _report_counts(shots: list[_Shot], film: SceneFilm) -> None:
+def _report_counts(shots: list[Shot], film: SceneFilm) -> None:
     """[B19] table 2: tracked over true particles; and what the places are off."""
     print('\nTracked / true beads, all effects, 7 mm/s; "outside" is outside the glare\n')
     print(
@@ -156,7 +104,7 @@ def _count_row(
         followed.append((tracks.species == index).sum())
         right.append(clear[rows].sum())
         error = positions[columns] - places[rows]
-        errors.append(error * _SCALE)
+        errors.append(error * SCALE)
         pulls.append(error / tracks.position_errors[ours][columns, None])
     error, pull = np.concatenate(errors), np.concatenate(pulls)
     if not error.size:
@@ -179,7 +127,7 @@ def _report_links() -> None:
     print('| --- | --- | --- | --- | --- | --- |')
     for number, index, speed in ((1, 0, 7e-3), (3, 0, 15e-3), (3, 1, 7e-3), (5, 0, 15e-3),
                                  (5, 1, 15e-3), (7, 1, 7e-3)):  # fmt: skip
-        shots, _ = _filmed(speed, effects=False, frames=_FRAMES, trays=(number,))
+        shots, _ = filmed(speed, effects=False, frames=_FRAMES, trays=(number,))
         found, beads = _detections(shots, number, index)
         name = f'{number}, {load_trays()[number].species[index].material}, {1e3 * speed:g} mm/s'
         for linker, link in (('ours', _link_ours), *_trackpy_linkers(found, beads, number, index)):
@@ -218,11 +166,11 @@ def _trackpy_linkers(
 
 
 def _detections(
-    shots: list[_Shot], number: int, index: int
+    shots: list[Shot], number: int, index: int
 ) -> tuple[list[Detections], list[NDArray[np.int64]]]:
     """What is seen in each picture, and which bead each of them is; -1 for none."""
     tray = load_trays()[number]
-    detector = BeadDetector(TrackingSettings(), tray, _SCALE)
+    detector = BeadDetector(TrackingSettings(), tray, SCALE)
     found, beads = [], []
     for shot in shots:
         if number not in shot.images:
@@ -232,7 +180,7 @@ def _detections(
         truth = shot.truth[number]
         own = np.flatnonzero(truth.species == index)
         rows, columns = _pairs(
-            truth.positions[own, :2], one.places / _SCALE, 0.6 * float(truth.radii[own].min())
+            truth.positions[own, :2], one.places / SCALE, 0.6 * float(truth.radii[own].min())
         )
         bead = np.full(one.radii.size, -1)
         bead[columns] = own[rows]
@@ -243,20 +191,20 @@ def _detections(
 
 def _link_ours(found: list[Detections], number: int, index: int) -> list[NDArray[np.int64]]:
     tray, settings = load_trays()[number], TrackingSettings()
-    size = (tray.dimensions[0] * _SCALE, tray.dimensions[1] * _SCALE)
+    size = (tray.dimensions[0] * SCALE, tray.dimensions[1] * SCALE)
     linker = Linker(
         tray.species[index].count,
         size,
-        settings.fastest * _SCALE,
+        settings.fastest * SCALE,
         settings.longest_gap,
         settings.window,
         0.0,
     )
     first, numbers = 0, []
     for k, one in enumerate(found):
-        first += linker.push(k / _RATE, one, np.zeros(2), first)
+        first += linker.push(k / RATE, one, np.zeros(2), first)
         places, _ = linker.places()
-        here = linker.last == k / _RATE
+        here = linker.last == k / RATE
         row = np.full(one.radii.size, -1)
         apart = cdist(one.places, places[here])
         nearest = apart.argmin(axis=1)
@@ -274,12 +222,12 @@ def _link_trackpy(
 
     trackpy.quiet()
     tray = load_trays()[number]
-    reach = diameters * tray.species[index].diameter * _SCALE
+    reach = diameters * tray.species[index].diameter * SCALE
     frames = np.repeat(np.arange(len(found)), [one.radii.size for one in found])
     places = np.concatenate([one.places for one in found])
     table = pd.DataFrame({'frame': frames, 'x': places[:, 0], 'y': places[:, 1]})
     predictor = trackpy.predict.NearestVelocityPredict()
-    linked = predictor.link_df(table, search_range=reach, memory=int(_RATE))
+    linked = predictor.link_df(table, search_range=reach, memory=int(RATE))
     numbers = linked.sort_index()['particle'].to_numpy()
     return np.split(numbers, np.cumsum([one.radii.size for one in found])[:-1])
 
@@ -302,7 +250,7 @@ def _judge(
         switches += sum(last_number.get(b, n) != n for b, n in of_bead.items() if n >= 0)
         last_number.update({b: n for b, n in of_bead.items() if n >= 0})
         before = of_bead, of_number
-    minutes = len(last_number) * len(numbers) / _RATE / 60.0
+    minutes = len(last_number) * len(numbers) / RATE / 60.0
     return right / possible, 1.0 - right / max(made, 1), switches / minutes
 
 
@@ -315,7 +263,7 @@ def _report_speeds() -> None:
         cells: dict[str, list[str]] = {}
         for speed in _SPEEDS:
             frames = _FRAMES if speed < 1e-3 else 90
-            shots, _ = _filmed(
+            shots, _ = filmed(
                 speed, effects=effects, frames=frames, restitution=1.0, wall_restitution=1.0
             )
             for number in _TRAYS:
@@ -326,7 +274,7 @@ def _report_speeds() -> None:
             print(f'| {name} | ' + ' | '.join(row) + ' |', flush=True)
 
 
-def _speed_cell(shots: list[_Shot], number: int, index: int) -> str:
+def _speed_cell(shots: list[Shot], number: int, index: int) -> str:
     records = list(_tracked(shots, number))[12:]
     stamps = np.array([one.stamp_ns for one, _ in records])
     true = np.array([one.projected_speeds[one.species == index].mean() for _, one in records])
@@ -344,18 +292,21 @@ def _speed_cell(shots: list[_Shot], number: int, index: int) -> str:
     return f'{np.mean(ratios):.3f} ({np.std(ratios):.3f}){flag}'
 
 
-def _report_cost(shots: list[_Shot]) -> None:
+def _report_cost(shots: list[Shot]) -> None:
     """Processor time of the trackers, beside that of decoding the same frames."""
     start = time.process_time()
+    image = None
     for shot in shots:
-        cv2.imdecode(shot.jpeg, cv2.IMREAD_COLOR)
+        # Held until the next one is there: to get its memory anew takes as long as decoding.
+        image = cv2.imdecode(shot.jpeg, cv2.IMREAD_COLOR)
+    del image
     decoding = (time.process_time() - start) / len(shots)
     print('\n| tray | ms per frame | / decoding the JPEG of the frame |')
     print('| --- | --- | --- |')
     total = 0.0
     for number in _TRAYS:
         settings = with_values(
-            PipelineSettings(), {'preprocess.pixels_per_metre': _SCALE}, 'benchmark'
+            PipelineSettings(), {'preprocess.pixels_per_metre': SCALE}, 'benchmark'
         )
         tracker = Tracker(settings, load_trays()[number])
         images = [shot.images[number] for shot in shots if number in shot.images]
@@ -375,7 +326,7 @@ def report() -> None:
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
-        shots, film = _filmed(7e-3, effects=True, frames=_FRAMES)
+        shots, film = filmed(7e-3, effects=True, frames=_FRAMES)
         _report_counts(shots, film)
         _report_cost(shots)
         _report_links()

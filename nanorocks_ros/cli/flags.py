@@ -32,13 +32,13 @@ def add_flags(
         )
 
 
-def add_bag(parser: argparse.ArgumentParser) -> None:
+def add_bag(parser: argparse.ArgumentParser, skip: set[str] | None = None) -> None:
     """What every command that takes a bag through the stages asks for, settings included."""
     parser.add_argument('bag', help='rosbag2 folder or .mcap file')
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     parser.add_argument('--image-topic', default='', help="the camera topic, if it isn't ours")
     parser.add_argument('--parameters', help='ROS parameter file, as the nodes take it')
-    add_flags(parser, PipelineSettings(), skip=set())
+    add_flags(parser, PipelineSettings(), skip=skip or set())
 
 
 def flag_of(name: str) -> str:

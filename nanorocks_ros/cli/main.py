@@ -21,7 +21,17 @@ EXIT_INTERRUPTED = 130
 
 def build_parser() -> argparse.ArgumentParser:
     """The parser of the whole command; heavy imports wait until a command runs."""
-    from nanorocks_ros.cli import analyse, calibrate, library, simulate, sweep, track
+    from nanorocks_ros.cli import (
+        analyse,
+        calibrate,
+        calibrate_area,
+        library,
+        look,
+        simulate,
+        speeds,
+        sweep,
+        track,
+    )
 
     parser = argparse.ArgumentParser(
         prog='nanorocks',
@@ -31,8 +41,11 @@ def build_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest='command', metavar='COMMAND', required=True)
     analyse.add_parser(commands)
     calibrate.add_parser(commands)
+    calibrate_area.add_parser(commands)
     library.add_parser(commands)
+    look.add_parser(commands)
     simulate.add_parser(commands)
+    speeds.add_parser(commands)
     sweep.add_parser(commands)
     track.add_parser(commands)
     return parser

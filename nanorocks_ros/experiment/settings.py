@@ -129,12 +129,16 @@ class SpeedSettings:
     )
     area_factor: float = _setting(
         1.0,
-        'binarised_area: factor that manual tracks call for (`nanorocks track --compare`)',
+        'binarised_area: factor that manual tracks call for (`nanorocks calibrate-area`)',
         low=1e-3,
         high=1e3,
     )
     area_offset: float = _setting(
-        0.0, 'binarised_area: what manual tracks call for to be added', 'm/s', low=-0.1, high=0.1
+        0.0,
+        'binarised_area: what manual tracks call for to be added to that',
+        'm/s',
+        low=-0.1,
+        high=0.1,
     )
     shake_ratio: float = _setting(
         2.0,

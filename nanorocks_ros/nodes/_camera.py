@@ -39,6 +39,7 @@ class Camera:
         self._info = None
         self._refusal = None
         self._held = []
+        self._last = None
         self._started = False
         self.view = None
         self.topic = node.resolve_topic_name(topic.name)
@@ -95,4 +96,8 @@ class Camera:
     def _hand_on(self, message):
         if self._refusal is not None:
             raise self._refusal
-        self._take(self._read(message, self.topic))
+        frame = self._read(message, self.topic)
+        # The last frame is let go only now that there is the next one: otherwise its 6 MB go back
+        # to the system each time, and to get them again took as long as decoding.
+        self._last = frame
+        self._take(frame)

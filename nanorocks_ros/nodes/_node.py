@@ -22,6 +22,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from nanorocks_ros.errors import ConfigurationError, FrameError, NanorocksError
 from nanorocks_ros.experiment.settings import rows, with_values
+from nanorocks_ros.nodes._now_and_then import NowAndThen
 from nanorocks_ros.nodes._shell import array_message, image_message, message_class, qos_of
 from nanorocks_ros.records import (
     Autocorrelation,
@@ -74,6 +75,7 @@ class NanorocksNode(Node):
         super().__init__(name, namespace=topics.NAMESPACE.strip('/'))
         self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._outputs = {}
+        self._events = NowAndThen()
         self._declared = {}
         self._refused = {}
         self._watched = []
@@ -175,6 +177,7 @@ class NanorocksNode(Node):
                 message_class(topic.type),
                 name,
                 qos_of(topic),
+                callback_group=self._events,
                 qos_overriding_options=_OVERRIDABLE,
             )
         return self._outputs[name]
@@ -300,6 +303,7 @@ class NanorocksNode(Node):
     # Diagnostics
 
     def _report(self):
+        self._events.open()
         now = time.monotonic()
         since, received = self._last_report
         rate = (self.counts['received'] - received) / max(now - since, 1e-9)

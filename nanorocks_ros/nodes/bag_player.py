@@ -26,6 +26,7 @@ class BagPlayerNode(NanorocksNode):
         for notice in self._bag.reader.notices:
             self.get_logger().warning(notice)
         self._loop = settings.loop
+        self._last = None
         self._clock_output = self.create_publisher(Clock, '/clock', QoSProfile(depth=10))
         epoch_ns = self._bag.epoch_ns()
         self.send(topics.EPOCH, time_message(epoch_ns))
@@ -63,4 +64,7 @@ class BagPlayerNode(NanorocksNode):
     def _decoded(self, message):
         content = self._bag.reader.deserialize(message)
         frame = frame_from_compressed(content, message.topic)
-        self.send(topics.RAW, image_message(frame.stamp_ns, 'camera', frame.image))
+        image = image_message(frame.stamp_ns, 'camera', frame.image)
+        self.send(topics.RAW, image)
+        # Let go only when there is the next one, see _camera.py.
+        self._last = frame, image

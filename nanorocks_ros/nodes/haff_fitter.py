@@ -20,12 +20,14 @@ class HaffFitterNode(NanorocksNode):
 
     def __init__(self):
         super().__init__('haff_fitter')
-        warm_up_cooling()
         self._settings = self.declare(PipelineSettings(), fixed=False)
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
         for tray in self._settings.trays:
             self.offer((topics.COR,), tray)
+        # Others find the publishers meanwhile.
+        warm_up_cooling()
+        for tray in self._settings.trays:
             self.listen(topics.SPEED, lambda message, tray=tray: self._take(message, tray), tray)
 
     def _build(self, settings):

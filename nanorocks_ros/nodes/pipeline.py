@@ -6,6 +6,7 @@ from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.experiment import settings as st
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.nodes import _sources
+from nanorocks_ros.nodes._background import Background
 from nanorocks_ros.nodes._camera import Camera
 from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._node import RESULT_TOPICS, NanorocksNode
@@ -18,7 +19,11 @@ from nanorocks_ros.wire import topics
 
 
 class PipelineNode(NanorocksNode):
-    """Composes the stages; records pass between them in memory."""
+    """Composes the stages; records pass between them in memory.
+
+    What follows from the tray images of a frame is worked out in the background, while the next
+    frame is decoded and cut.
+    """
 
     def __init__(self):
         super().__init__('pipeline')
@@ -33,6 +38,7 @@ class PipelineNode(NanorocksNode):
         self._where = self._source
         self._camera, self._view = None, None
         self._offer_everything()
+        self._background = Background(self, self._follow, self._publish)
         # Others find the publishers meanwhile.
         warm_up()
         warm_up_speed()
@@ -57,10 +63,12 @@ class PipelineNode(NanorocksNode):
         return Pipeline(settings, self._where, self._view)
 
     def _adopt(self, settings, pipeline):
+        self._background.drain()
         self._settings, self._pipeline = settings, pipeline
         self._picture = TracksPicture(self, calibrated(settings).preprocess.pixels_per_metre)
 
     def _straighten(self):
+        self._background.drain()
         self._view = self._camera.view
         self._pipeline = self._build(self._settings)
 
@@ -102,12 +110,26 @@ class PipelineNode(NanorocksNode):
         self._epoch.when_known(frame.stamp_ns, self._push, frame)
 
     def _push(self, frame):
+        wanted = {
+            number: (
+                self.wanted(topics.MOTION, number),
+                self._picture.wanted(number),
+                self.wanted(topics.AUTOCORRELATION, number),
+            )
+            for number in self._pipeline.trays
+        }
+        self._background.put((self._pipeline.preprocessor.push(frame), wanted))
+        self.state['frames waiting for the trays'] = self._background.waiting
+
+    def _follow(self, job):
+        records, wanted = job
         for number, tray in self._pipeline.trays.items():
-            tray.speed.emit_mask = self.wanted(topics.MOTION, number)
-            tray.speed.emit_tracks = self._picture.wanted(number)
-            tray.clusters.emit_image = self.wanted(topics.AUTOCORRELATION, number)
+            tray.speed.emit_mask, tray.speed.emit_tracks, tray.clusters.emit_image = wanted[number]
+        return self._pipeline.follow(records)
+
+    def _publish(self, records):
         image = None
-        for record in self._pipeline.push(frame):
+        for record in records:
             if isinstance(record, TrayImage):
                 image = record
             if isinstance(record, Tracks):
@@ -117,9 +139,15 @@ class PipelineNode(NanorocksNode):
                 self.publish_result(record, self._epoch.ns)
 
     def _finish(self):
+        self._background.drain()
         if self._reader is not None:
             for notice in self._reader.notices:
                 self.get_logger().warning(notice)
         for record in self._pipeline.flush():
             self.publish_result(record, self._epoch.ns)
         self.finish()
+
+    def destroy_node(self):
+        """End the thread before what it works for is gone."""
+        self._background.close()
+        super().destroy_node()

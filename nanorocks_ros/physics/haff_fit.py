@@ -26,8 +26,8 @@ import numpy as np
 from scipy import optimize
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.physics.haff import haff_speed
+from nanorocks_ros.physics.haff_likelihood import Decay
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,11 +39,8 @@ _LONGEST_HAFF_TIME = 30.0
 _FEWEST_DEGREES = 3.0
 _LOG_HAFF_TIME = (math.log(1e-3), math.log(1e5))
 # Of q and of the quick part, times the number of beads: what simulated gases in trays 1, 3 and 5
-# have, within the spread of the logarithms, at restitutions from 0.6 to 0.95.
+# have, at restitutions from 0.6 to 0.95; see `haff_likelihood` for their spread.
 _USUAL_TIMES_BEADS = np.array([0.4, 0.1])
-_LOG_SPREAD = np.array([0.5, 1.0])
-# The quick part is forgotten after about one collision of each bead.
-_QUICK_RANGE = 0.1
 _LOG_NOISE = (math.log(1e-12), math.log(10.0))
 # The errors given are trusted in proportion only.
 _LOG_SCALE = (math.log(0.05), math.log(20.0))
@@ -114,11 +111,11 @@ def fit_haff(
     data = _binned(time, speed, error, beads)
     start = np.array([math.log(_start(time, speed)), *data.usual, 0.0])
     best = optimize.minimize(
-        data.cost,
+        data.cost_and_slope,
         start,
         method='L-BFGS-B',
+        jac=True,
         # So far down that speeds rounded to float32 give the same fit to 1e-6.
-        jac='3-point',
         options={'ftol': 1e-15, 'gtol': 1e-9},
         bounds=(_LOG_HAFF_TIME, _LOG_NOISE, _LOG_NOISE, _LOG_SCALE),
     ).x
@@ -142,98 +139,7 @@ def fit_haff(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Data:
-    """Times, and ln v averaged over groups of neighbours with its variance.
-
-    `inner_distance` [s] is the mean time between two members of a group.
-    """
-
-    time: NDArray[np.float64]
-    starts: NDArray[np.intp]
-    counts: NDArray[np.intp]
-    log_speed: NDArray[np.float64]
-    variance: NDArray[np.float64]
-    inner_distance: NDArray[np.float64]
-    usual: NDArray[np.float64]
-
-    @property
-    def _middles(self) -> NDArray[np.intp]:
-        return self.starts + self.counts // 2
-
-    def _grouped(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.add.reduceat(values, self.starts) / self.counts
-
-    def generalised(
-        self, parameters: NDArray[np.float64]
-    ) -> tuple[float, float, NDArray[np.float64]]:
-        """Minus twice the log posterior, the best ln v0, the information on (ln v0, ln tau).
-
-        `parameters` are the logarithms of tau, of the strength q, of the variance of the
-        quick part, and of the scale of errors.
-        """
-        tau, strength, quick, scale = np.exp(parameters)
-        age = self.time / tau
-        s = self._grouped(np.log1p(age))
-        gap = np.abs(s[:, np.newaxis] - s)
-        covariance = np.exp(-gap) - np.exp(-s[:, np.newaxis] - s)
-        # The average over a group varies less than the value in its middle.
-        diagonal = np.diag_indices_from(covariance)
-        covariance[diagonal] -= self.inner_distance / (self.time[self._middles] + tau)
-        covariance *= 0.5 * strength
-        covariance += quick * np.exp(-gap / _QUICK_RANGE)
-        covariance[diagonal] += scale**2 * self.variance
-        columns = (np.ones_like(s), self._grouped(age / (1.0 + age)), self.log_speed + s)
-        whitened = np.column_stack(columns)
-        log_determinant = _whiten(covariance, whitened)
-        information = whitened[:, :2].T @ whitened[:, :2]
-        log_v0 = float(whitened[:, 0] @ whitened[:, 2] / information[0, 0])
-        residual = whitened[:, 2] - log_v0 * whitened[:, 0]
-        cost = float(residual @ residual) + log_determinant
-        cost += float(((parameters[1:3] - self.usual) ** 2 / _LOG_SPREAD**2).sum())
-        # Restricted likelihood: v0 and tau were fitted, which costs degrees of freedom.
-        # In (ln v0, 1 / (v0 tau)), where the model is nearly linear: in ln tau the information
-        # depends on tau itself, and would pull it up.
-        cost += float(np.linalg.slogdet(information)[1]) + 2.0 * (log_v0 + parameters[0])
-        return cost, log_v0, information
-
-    def cost(self, parameters: NDArray[np.float64]) -> float:
-        """Minus twice the log posterior."""
-        return self.generalised(parameters)[0]
-
-    def rate_variance(self, parameters: NDArray[np.float64]) -> float:
-        """Variance of ln(1 / (v0 tau)) = -ln v0 - ln tau."""
-        return float(np.linalg.inv(self.generalised(parameters)[2]).sum())
-
-
-@compiled
-def _whiten(covariance: NDArray[np.float64], columns: NDArray[np.float64]) -> float:
-    """Solve with the Cholesky factor of a covariance, in place; its log determinant.
-
-    Matrices this small are no work for a threaded BLAS: its threads wait for one another, which
-    on a busy machine made a fit take seconds, and their order may change the last digit.
-    """
-    n = covariance.shape[0]
-    log_determinant = 0.0
-    for j in range(n):
-        for k in range(j):
-            factor = covariance[j, k]
-            for i in range(j, n):
-                covariance[i, j] -= covariance[i, k] * factor
-        pivot = math.sqrt(covariance[j, j])
-        log_determinant += 2.0 * math.log(pivot)
-        for i in range(j, n):
-            covariance[i, j] /= pivot
-    for column in range(columns.shape[1]):
-        for i in range(n):
-            rest = columns[i, column]
-            for k in range(i):
-                rest -= covariance[i, k] * columns[k, column]
-            columns[i, column] = rest / covariance[i, i]
-    return log_determinant
-
-
-def _degrees_of_freedom(data: _Data, best: NDArray[np.float64]) -> float:
+def _degrees_of_freedom(data: Decay, best: NDArray[np.float64]) -> float:
     """How well the variance of the decay rate is itself known, after Satterthwaite.
 
     The noise is estimated from one decay, so that a Gaussian interval would be too narrow;
@@ -282,12 +188,12 @@ def _binned(
     speed: NDArray[np.float64],
     error: NDArray[np.float64],
     beads: int,
-) -> _Data:
+) -> Decay:
     group = max(1, math.ceil(time.size / _POINTS))
     starts = np.arange(0, time.size, group)
     counts = np.diff(np.append(starts, time.size))
     ends = starts + counts - 1
-    return _Data(
+    return Decay(
         time=time,
         usual=np.log(_USUAL_TIMES_BEADS / beads),
         inner_distance=(time[ends] - time[starts]) * (counts + 1) / (3.0 * counts),

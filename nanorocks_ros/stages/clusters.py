@@ -33,16 +33,22 @@ def autocorrelation(gray: NDArray[np.uint8]) -> NDArray[np.float32]:
     rows, columns = gray.shape
     deviation = gray.astype(np.float32)
     deviation -= deviation.mean()
-    # Padded to twice the size, so that the image is not compared with its own repetition.
-    shape = (fft.next_fast_len(2 * rows, True), fft.next_fast_len(2 * columns, True))
-    spectrum = fft.rfft2(deviation, s=shape)
-    covariance = fft.irfft2(spectrum.real**2 + spectrum.imag**2, s=shape)
-    if covariance[0, 0] <= 0.0:
+    # Padded, so that at the lags that are wanted, up to half of the size, the image is not
+    # compared with its own repetition. Rows that are all zero, or not wanted, are not transformed.
+    down, right = (fft.next_fast_len(size + size // 2 + 1, real=True) for size in (rows, columns))
+    spectrum = fft.fft(fft.rfft(deviation, n=right, axis=1), n=down, axis=0)
+    power = spectrum.real**2 + spectrum.imag**2
+    along = fft.ifft(power, axis=0)[_lags(rows)]
+    covariance = fft.irfft(along, n=right, axis=1)[:, _lags(columns)]
+    variance = covariance[rows // 2, columns // 2]
+    if variance <= 0.0:
         return np.zeros((rows, columns), dtype=np.float32)
-    down = np.arange(rows) - rows // 2
-    right = np.arange(columns) - columns // 2
-    centred = covariance[np.ix_(down, right)] / covariance[0, 0]
-    return np.ascontiguousarray(centred, dtype=np.float32)
+    return np.ascontiguousarray(covariance / variance, dtype=np.float32)
+
+
+def _lags(size: int) -> NDArray[np.int64]:
+    """Shifts of an image against itself, zero in the middle."""
+    return np.arange(size) - size // 2
 
 
 class ClusterAutocorrelator:

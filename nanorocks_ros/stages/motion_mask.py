@@ -68,6 +68,19 @@ class MotionMasker:
             return (last - first) * self._count / steps / NS
         return (last - first) / NS
 
+    def difference(self) -> NDArray[np.uint8] | NDArray[np.float32]:
+        """How much the two averages differ, pixel by pixel, [gray levels].
+
+        Of running means, times the number of frames averaged: consecutive ones differ by
+        (last - first) / count, which gives the same mask and needs no mean.
+        """
+        images = [image for _, image in self._images]
+        if self._averaging != 'block_mean':
+            return np.asarray(cv2.absdiff(images[-1], images[0]), dtype=np.uint8)
+        later = np.asarray(np.mean(images[self._count :], axis=0, dtype=np.float32))
+        earlier = np.asarray(np.mean(images[: self._count], axis=0, dtype=np.float32))
+        return np.asarray(cv2.absdiff(later, earlier), dtype=np.float32)
+
     def mask(self, noise_power: float) -> NDArray[np.uint8]:
         """Pixels in which the averages differ by more than the threshold: 255, else 0.
 
@@ -76,15 +89,7 @@ class MotionMasker:
         noise_power : float, [gray levels^2]
             Mean squared difference of two single images of a scene at rest.
         """
-        images = [image for _, image in self._images]
-        if self._averaging == 'block_mean':
-            later = np.asarray(np.mean(images[self._count :], axis=0, dtype=np.float32))
-            earlier = np.asarray(np.mean(images[: self._count], axis=0, dtype=np.float32))
-            noise = np.sqrt(noise_power / self._count)
-            difference = cv2.absdiff(later, earlier)
-        else:
-            # Consecutive running means differ by (last - first) / count: same mask, no mean.
-            noise = np.sqrt(noise_power)
-            difference = cv2.absdiff(images[-1], images[0])
-        difference = cv2.medianBlur(difference, _DESPECKLE_PX)
+        count = self._count if self._averaging == 'block_mean' else 1
+        noise = np.sqrt(noise_power / count)
+        difference = cv2.medianBlur(self.difference(), _DESPECKLE_PX)
         return np.where(difference > self._threshold * noise, np.uint8(255), np.uint8(0))

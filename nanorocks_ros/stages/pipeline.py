@@ -23,6 +23,8 @@ from nanorocks_ros.stages.preprocess import Preprocessor
 from nanorocks_ros.stages.speed import SpeedEstimator
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.experiment.view import View
@@ -107,8 +109,12 @@ class Pipeline:
         FrameError
             For an encoding that is not supported or a size that changed.
         """
+        return self.follow(self.preprocessor.push(frame))
+
+    def follow(self, records: Sequence[TrayImage | Notice]) -> tuple[Result, ...]:
+        """The same, of what the preprocessor made of a frame: the rest may be done elsewhere."""
         found: list[Result] = []
-        for record in self.preprocessor.push(frame):
+        for record in records:
             found.append(record)
             if isinstance(record, TrayImage):
                 found += self.trays[record.tray].push(record)

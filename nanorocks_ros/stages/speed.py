@@ -71,12 +71,14 @@ class SpeedEstimator:
         found: list[SpeedEstimate | MotionMask | Tracks] = []
         found += self._area.push(image, self._shakes, shaken)
         method = self._settings.speed.method
-        if method in ('auto', 'tracking') or self.emit_tracks:
+        of_use = method == 'tracking' or (method == 'auto' and not self._tracks.hopeless)
+        if of_use or self.emit_tracks:
             records = self._tracks.push(image, self._shakes, shaken)
             found += [one for one in records if isinstance(one, Tracks) and self.emit_tracks]
             found += self._by_tracks([one for one in records if isinstance(one, SpeedEstimate)])
         if method == 'structure_function' or (method == 'auto' and not self._tracks.reliable):
-            if self._tracks.judged:
+            # Who looks at the tracks must not change what is said of a forced method.
+            if self._tracks.judged and method == 'auto':
                 image = replace(image, quality=image.quality | Quality.FEW_BEADS)
             # After a while without images those from before are of no use.
             speeds = self._structure.push(image, self._shakes, shaken or self._idle)

@@ -9,7 +9,7 @@ import numpy as np
 
 from nanorocks_ros.records import UNKNOWN, Quality, SpeedEstimate, SpeedMethod, Tracks, TrayImage
 from nanorocks_ros.stages.shaking import NS, CycleFollower
-from nanorocks_ros.stages.tracking.mean_speed import RELIABLE_SHARE, mean_speed
+from nanorocks_ros.stages.tracking.mean_speed import RELIABLE_SHARE, mean_speeds
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 if TYPE_CHECKING:
@@ -42,6 +42,8 @@ class TrackSpeed:
         Whether nearly all beads of every species are being followed.
     judged : bool
         Whether enough images were seen to tell.
+    hopeless : bool
+        Whether a species is too crowded to be followed, so that it will never be reliable.
     """
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
@@ -56,8 +58,9 @@ class TrackSpeed:
         self._next_ns: int | None = None
         self._flags = Quality(0)
         self._last_ns: int | None = None
+        self.hopeless = self._tracker.crowded
         self.reliable = False
-        self.judged = False
+        self.judged = self.hopeless
 
     def push(
         self, image: TrayImage, shakes: CycleFollower, shaken: bool
@@ -85,6 +88,8 @@ class TrackSpeed:
     def _judge(self, tracks: Tracks) -> None:
         seen = np.bincount(tracks.species[tracks.seen], minlength=self._counts.size)
         self._shares.append(seen / self._counts)
+        if self.hopeless:
+            return
         # A track is believed after some pictures only: the first ones show none.
         least = float(np.median(self._shares, axis=0).min())
         self.judged = len(self._shares) == _MEMORY_FRAMES
@@ -94,17 +99,16 @@ class TrackSpeed:
         self.reliable = self.judged and enough and followed
 
     def _speeds(self, shakes: CycleFollower) -> list[SpeedEstimate]:
-        series = list(self._recent)
-        mean = mean_speed(series, least_distance=self._least_distance)
+        mean, *each = mean_speeds(
+            list(self._recent),
+            least_distance=self._least_distance,
+            species=(None, *range(self._counts.size)),
+        )
         if mean is None or not np.isfinite(mean.mean_projected_speed):
             return []
         if self._last_ns is not None and mean.stamp_ns <= self._last_ns:
             return []
         self._last_ns = mean.stamp_ns
-        each = [
-            mean_speed(series, least_distance=self._least_distance, species=number)
-            for number in range(self._counts.size)
-        ]
         species = [
             (one.mean_projected_speed, one.mean_projected_speed_error)
             if one

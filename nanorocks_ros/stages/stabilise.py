@@ -192,7 +192,9 @@ class TrayFollower:
         x = region.x - margin + 0.5 + np.arange(columns)
         y = region.y - margin + 0.5 + np.arange(rows)
         grid = np.stack(np.meshgrid(x, y), axis=-1)
-        places = places_of(grid, self._view)
+        # Without the derivatives of `places_of`, which here take five times as long.
+        places = np.zeros((rows, columns, 6))
+        places[..., :2] = self._view.source(grid)
         gray = np.empty(rows * columns)
         sample(image, self._mix, places.reshape(-1, 6), (0.0, 0.0), gray)
         # Chosen where they are no noise, but followed by how steep they are.

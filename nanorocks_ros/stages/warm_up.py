@@ -65,17 +65,22 @@ def warm_up_cooling() -> None:
                 method=SpeedMethod.TRACKING,
             )
         )
+    fitter.flush()
 
 
 def warm_up_speed() -> None:
     """Push a few pictures of moving discs through what measures speeds in colour images."""
     settings = PipelineSettings()
-    estimator = SpeedEstimator(settings, load_trays()[3])
-    for number in range(8):
-        color = np.full((80, 160, 3), 150, dtype=np.uint8)
-        for k in range(8):
-            place = 18 + 18 * k
-            cv2.circle(color, (place, 20 + number), 12, (30, 30, 200), -1)
-            cv2.circle(color, (place, 60 - number), 7, (200, 60, 30), -1)
-        gray = np.ascontiguousarray(color[:, :, 0])
-        estimator.push(TrayImage(stamp_ns=number * 33_333_333, tray=3, gray=gray, color=color))
+    # Under chalk beads are looked for in another way.
+    for tray in (load_trays()[3], load_trays()[2]):
+        estimator = SpeedEstimator(settings, tray)
+        for number in range(8):
+            color = np.full((80, 160, 3), 150, dtype=np.uint8)
+            for k in range(8):
+                place = 18 + 18 * k
+                cv2.circle(color, (place, 20 + number), 12, (30, 30, 200), -1)
+                cv2.circle(color, (place, 60 - number), 7, (200, 60, 30), -1)
+            gray = np.ascontiguousarray(color[:, :, 0])
+            stamp_ns = number * 33_333_333
+            image = TrayImage(stamp_ns=stamp_ns, tray=tray.number, gray=gray, color=color)
+            estimator.push(image)

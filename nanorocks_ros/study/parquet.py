@@ -6,14 +6,19 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.study.output_files import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+# Rows written together, at least, unless there are no more.
+_GROUP_ROWS = 1 << 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,9 +84,31 @@ def write_parquet(
         metadata={'provenance': provenance},
     )
     with whole_file(path) as part, writer_of(part, schema, compression='zstd') as writer:
-        for piece in pieces:
+        for piece in _groups(columns, pieces):
             arrays = [_array(arrow, piece[one.name], kinds[one.kind]) for one in columns]
             writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
+
+
+def _groups(
+    columns: Sequence[Column], pieces: Iterable[Mapping[str, NDArray[Any]]]
+) -> Iterator[dict[str, NDArray[Any]]]:
+    """The pieces, joined until they are worth a group of rows: each group costs a kilobyte."""
+    waiting: list[Mapping[str, NDArray[Any]]] = []
+    rows = 0
+    for piece in pieces:
+        waiting.append(piece)
+        rows += piece[columns[0].name].size
+        if rows >= _GROUP_ROWS:
+            yield _joined(columns, waiting)
+            waiting, rows = [], 0
+    if waiting:
+        yield _joined(columns, waiting)
+
+
+def _joined(
+    columns: Sequence[Column], pieces: Sequence[Mapping[str, NDArray[Any]]]
+) -> dict[str, NDArray[Any]]:
+    return {one.name: np.concatenate([piece[one.name] for piece in pieces]) for one in columns}
 
 
 def _array(arrow: Any, values: NDArray[Any], kind: Any) -> Any:
@@ -97,5 +124,5 @@ def _pyarrow(name: str, path: Path) -> Any:
         raise ConfigurationError(
             str(path),
             'needs pyarrow, which is not installed',
-            "name a .npz file, or run: pip install 'nanorocks_ros[parquet]'",
+            "choose another ending, or run: pip install 'nanorocks_ros[parquet]'",
         ) from error

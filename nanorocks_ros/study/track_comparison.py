@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -185,9 +185,21 @@ class _Count:
         )
 
 
+class TrayPicture(Protocol):
+    """What has to be known of a picture of a tray; `Tracks` are of one."""
+
+    @property
+    def stamp_ns(self) -> int:
+        """Instant of exposure, [ns]."""
+
+    @property
+    def displacement(self) -> NDArray[np.float64]:
+        """Of the tray in the picture, (2,), [m]; 0 where nobody measured it."""
+
+
 def manual_reference(
     manual: ManualTracks,
-    tracks: Sequence[Tracks],
+    tracks: Sequence[TrayPicture],
     numbers: Sequence[int],
     *,
     region: Region,
@@ -201,8 +213,8 @@ def manual_reference(
     ----------
     manual : ManualTracks
         Places in the frames as the camera gave them.
-    tracks : sequence of Tracks
-        Ours of the tray, for stamps and the displacement of the tray.
+    tracks : sequence of Tracks or other TrayPicture
+        Of the tray, for stamps and the displacement of the tray.
     numbers : sequence of int
         Which frame, counted from 0, each of them is of.
     region : Region

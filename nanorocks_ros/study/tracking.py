@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.errors import FrameError, RecordingError
-from nanorocks_ros.experiment.calibration_file import calibrated
-from nanorocks_ros.records import Notice, TrayImage
-from nanorocks_ros.stages.pipeline import trays_of
-from nanorocks_ros.stages.preprocess import Preprocessor
+from nanorocks_ros.errors import FrameError
 from nanorocks_ros.stages.tracking.tracker import Tracker
-from nanorocks_ros.study.bag_frames import BagFrames
+from nanorocks_ros.study.bag_images import BagImages
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,9 +17,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.experiment.view import View
-    from nanorocks_ros.records import Frame, Tracks
-
-NS = 1_000_000_000
+    from nanorocks_ros.records import Tracks, TrayImage
 
 
 @dataclass(slots=True, kw_only=True)
@@ -91,66 +85,34 @@ def track_bag(
     FrameError
         When no frame can be used, or the camera is gray.
     """
-    bag = BagFrames(path, image_topic)
-    epoch_ns = bag.epoch_ns()
-    if epoch_ns is None:
-        raise RecordingError(bag.where, 'holds no frame', 'pass another bag or --image-topic')
-    settings = calibrated(settings)
-    trays = trays_of(settings)
-    stage = Preprocessor(settings, trays, bag.where, bag.view())
-    trackers = {number: Tracker(settings, tray) for number, tray in trays.items()}
+    images = BagImages(path, settings, image_topic)
+    settings = images.settings
+    trackers = {number: Tracker(settings, tray) for number, tray in images.trays.items()}
     found = TrackedBag(
-        epoch_ns=epoch_ns,
+        epoch_ns=images.epoch_ns,
         pixels_per_metre=settings.preprocess.pixels_per_metre,
-        trays=trays,
-        tracks={number: [] for number in trays},
-        numbers={number: [] for number in trays},
-        view=stage.view,
+        trays=images.trays,
+        tracks={number: [] for number in images.trays},
+        numbers={number: [] for number in images.trays},
+        view=images.view,
     )
-    refused: FrameError | None = None
-    for number, frame in enumerate(bag.frames()):
-        found.frames = number + 1
-        try:
-            if isinstance(frame, FrameError):
-                raise frame
-            _push(found, stage, trackers, frame, number)
-        except FrameError as error:
-            refused = refused or error
-        if progress is not None:
-            progress(number + 1, bag.count)
-    found.regions = stage.regions
-    found.notices[:0] = bag.reader.notices
-    if refused is not None:
-        found.notices.append(str(refused))
+    for shot in images.shots(progress):
+        for image in shot.images:
+            found.pictures[image.tray] = image
+            for tracks in trackers[image.tray].push(image):
+                found.tracks[image.tray].append(tracks)
+                found.numbers[image.tray].append(shot.number)
+    found.frames = images.frames
+    found.regions = images.stage.regions
+    found.notices = images.notices
     if not any(found.tracks.values()):
-        raise refused or _without_colour(found, bag.where)
+        raise _without_colour(images.bag.where)
     return found
 
 
-def _push(
-    found: TrackedBag,
-    stage: Preprocessor,
-    trackers: dict[int, Tracker],
-    frame: Frame,
-    number: int,
-) -> None:
-    for record in stage.push(frame):
-        if isinstance(record, Notice):
-            found.notices.append(record.text)
-            continue
-        found.pictures[record.tray] = record
-        for tracks in trackers[record.tray].push(record):
-            found.tracks[record.tray].append(tracks)
-            found.numbers[record.tray].append(number)
-
-
-def _without_colour(found: TrackedBag, where: str) -> FrameError:
-    if found.pictures:
-        return FrameError(
-            where,
-            'the camera is gray; beads are told from the floor and each other by their colour',
-            'record in colour, or use the structure function for speeds',
-        )
+def _without_colour(where: str) -> FrameError:
     return FrameError(
-        where, 'no frame can be used: all are black, white or broken', 'record it again'
+        where,
+        'the camera is gray; beads are told from the floor and each other by their colour',
+        'record in colour, or use the structure function for speeds',
     )

@@ -17,6 +17,7 @@ from nanorocks_ros.records import (
     Quality,
     SpeedEstimate,
     SpeedMethod,
+    Tracks,
     TrayImage,
 )
 from nanorocks_ros.simulation.film import film
@@ -248,6 +249,40 @@ def test_without_colour_the_structure_function_steps_in(run):
     assert all(one.quality & Quality.FEW_BEADS for one in found)
     unflagged = [replace(one, quality=Quality(0)) for one in found]
     assert unflagged == pushed(gray, 'structure_function') != []
+
+
+@pytest.fixture(scope='module')
+def crowd():
+    """Images of a tray with too many grains to follow."""
+    settings = SimulationSettings(
+        tray=6, width_px=210, height_px=210, first_shake=0.2, mean_speed=0.015
+    )
+    stages = with_values(PipelineSettings(), {'trays': (6,)}, 'test')
+    crop = Preprocessor(stages, trays_of(stages), 'test')
+    return [
+        image for frame, _ in film(settings, load_trays()[6], 120) for image in crop.push(frame)
+    ]
+
+
+def from_crowd(images, method, emit_tracks=False):
+    settings = with_values(PipelineSettings(), {'trays': (6,), 'speed.method': method}, 'test')
+    estimator = SpeedEstimator(settings, load_trays()[6])
+    estimator.emit_tracks = emit_tracks
+    return [one for image in images for one in estimator.push(image)]
+
+
+def test_a_tray_too_crowded_to_follow_is_left_to_the_structure_function_at_once(crowd):
+    found = from_crowd(crowd, 'auto')
+    assert all(one.quality & Quality.FEW_BEADS for one in found)
+    unflagged = [replace(one, quality=Quality(0)) for one in found]
+    assert unflagged == from_crowd(crowd, 'structure_function') != []
+
+
+def test_who_wants_the_tracks_of_a_crowded_tray_gets_them_beside_the_same_speeds(crowd):
+    found = from_crowd(crowd, 'auto', emit_tracks=True)
+    tracks = [one for one in found if isinstance(one, Tracks)]
+    assert [one.stamp_ns for one in tracks] == [one.stamp_ns for one in crowd]
+    assert [one for one in found if isinstance(one, SpeedEstimate)] == from_crowd(crowd, 'auto')
 
 
 def test_a_lost_frame_is_no_shaking_event(run):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import sys
 from dataclasses import replace
 
 import cv2
@@ -15,12 +16,14 @@ from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.recordings.messages import image_message, time_message
 from nanorocks_ros.recordings.writer import BagWriter
+from nanorocks_ros.study import parquet as parquet_files
 from nanorocks_ros.study.film_bag import film_into_bag
 from nanorocks_ros.study.overlay import overlay
 from nanorocks_ros.study.results_bag import offered
-from nanorocks_ros.study.tracking import NS, track_bag
+from nanorocks_ros.study.tracking import track_bag
 from nanorocks_ros.study.tracks_files import COLUMNS, write_tracks
 from nanorocks_ros.wire import topics
+from nanorocks_ros.wire.layouts import NS
 
 FRAMES = 40
 
@@ -74,6 +77,31 @@ def test_parquet_and_csv_hold_the_same(found, tmp_path):
     rows = _rows(tmp_path / 'tracks.csv')
     assert [str(one) for one in table['id']] == [one['id'] for one in rows]
     np.testing.assert_allclose(table['radius'], [float(one['radius']) for one in rows], rtol=1e-6)
+    assert table['species'] == [one['species'] for one in rows]
+    # Where CSV leaves a field empty.
+    assert np.isnan(table['vx'][0])
+    # One group of rows for a frame each would make the file many times as large.
+    assert parquet.ParquetFile(tmp_path / 'tracks.parquet').num_row_groups == 1
+
+
+def test_parquet_in_many_groups_of_rows_reads_the_same(found, tmp_path, monkeypatch):
+    parquet = pytest.importorskip('pyarrow.parquet')
+    write_tracks(tmp_path / 'one.parquet', found)
+    monkeypatch.setattr(parquet_files, '_GROUP_ROWS', 100)
+    write_tracks(tmp_path / 'many.parquet', found)
+    # Seven frames of 15 beads are the first 100 rows.
+    assert parquet.ParquetFile(tmp_path / 'many.parquet').num_row_groups == -(-FRAMES // 7)
+    one, many = (parquet.read_table(tmp_path / f'{name}.parquet') for name in ('one', 'many'))
+    assert one['id'].to_pylist() == many['id'].to_pylist()
+    assert one['species'].to_pylist() == many['species'].to_pylist()
+
+
+def test_without_pyarrow_the_command_refuses_before_it_tracks(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'pyarrow', None)
+    assert main(['track', 'no_such_bag', '-o', str(tmp_path / 'tracks.parquet')]) == 2
+    said = capsys.readouterr().err
+    assert said.count('\n') == 1
+    assert "choose another ending, or run: pip install 'nanorocks_ros[parquet]'" in said
 
 
 def test_the_overlay_draws_a_ring_around_each_bead_and_leaves_the_rest(found):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -62,9 +63,8 @@ def cover(
     """
     if search.most == 0:
         return 0
-    balance = balance_of(picture, search)
-    found = _follow_hints(picture, search, hints, discs, fits, balance)
-    gains = first_gains(balance, search)
+    found = _follow_hints(picture, search, hints, discs, fits)
+    gains = first_gains(balance_of(picture, search), search)
     while found < search.most:
         size, row, column = best_disc(gains, search)
         if size < 0:
@@ -89,11 +89,13 @@ def _take(
     guess = np.array([(column + 0.5) * step, (row + 0.5) * step, search.radii[size]])
     discs[own] = guess
     fit_circle(picture, search.hue_sign, discs, own, own + 1, search.expected, fits[own])
-    fits[own, 3] = _explain(picture, search, discs[own], gains.balance)
+    _uncount(picture, search, discs[own], gains.balance)
+    fits[own, 3] = _explain(picture, search.kind, discs[own])
     good = bool(fits[own, 3] >= _FIT_KEEPS * search.least_share)
     if not good:
         # The circle went elsewhere: these pixels are no bead, and not to be tried again.
-        _explain(picture, search, guess, gains.balance)
+        _uncount(picture, search, guess, gains.balance)
+        _explain(picture, search.kind, guess)
     # Whatever happens, the same place is not the best again.
     gains.values[size, row, column] = 0
     reach = int((max(discs[own, 2], guess[2]) + search.radii[-1]) / step) + 2
@@ -114,7 +116,6 @@ def _follow_hints(
     hints: NDArray[np.float64],
     discs: NDArray[np.float64],
     fits: NDArray[np.float64],
-    balance: NDArray[np.int32],
 ) -> int:
     """Find beads where they should be; see `cover`."""
     found = 0
@@ -128,54 +129,94 @@ def _follow_hints(
             continue
         if _left_to_explain(picture, search.kind, discs[found]) < search.least_share:
             continue
-        fits[found, 3] = _explain(picture, search, discs[found], balance)
+        fits[found, 3] = _explain(picture, search.kind, discs[found])
         found += 1
     return found
 
 
 @compiled
-def _explain(
+def _span(
+    disc: NDArray[np.float64], radius: float, row: int, columns: int
+) -> tuple[np.uint64, np.uint64]:
+    """The columns of a row, from the first to before the second, within a radius of a centre."""
+    dy = row + 0.5 - disc[1]
+    left2 = radius * radius - dy * dy
+    if left2 < 0.0:
+        return np.uint64(0), np.uint64(0)
+    half = math.sqrt(left2)
+    first = max(math.ceil(disc[0] - half - 0.5), 0)
+    last = min(math.floor(disc[0] + half - 0.5) + 1, columns)
+    return np.uint64(first), np.uint64(max(first, last))
+
+
+@compiled
+def _rows(disc: NDArray[np.float64], radius: float, rows: int) -> tuple[int, int]:
+    return max(int(disc[1] - radius), 0), min(int(disc[1] + radius) + 1, rows)
+
+
+@compiled
+def _uncount(
     picture: Picture, search: Search, disc: NDArray[np.float64], balance: NDArray[np.int32]
-) -> float:
-    """Take the pixels of a disc out of the balance; the share of it that they are."""
-    kind, shown, covered = search.kind, picture.shown, picture.covered
+) -> None:
+    """Take the pixels that a disc explains out of the balance."""
     radius = disc[2] + _RIM_PX
-    own = np.uint8(1 << kind)
-    # A coloured bead keeps gray ones from its outline.
-    ring = np.uint8(1 << GRAY) if kind != GRAY else np.uint8(0)
-    outer = disc[2] + (_GRAY_RING_PX if kind != GRAY else _RIM_PX)
-    inner = max(disc[2] - _GRAY_RING_PX, 0.0)
-    taken = 0
-    for i in range(max(int(disc[1] - outer), 0), min(int(disc[1] + outer) + 1, shown.shape[0])):
-        for j in range(
-            max(int(disc[0] - outer), 0), min(int(disc[0] + outer) + 1, shown.shape[1])
-        ):
-            dx, dy = j + 0.5 - disc[0], i + 0.5 - disc[1]
-            d2 = dx * dx + dy * dy
-            if d2 <= radius * radius:
-                if shown[i, j] == kind and not covered[i, j] & own:
-                    balance[i // search.step, j // search.step] -= 1
-                    taken += 1
-                covered[i, j] |= own
-            if inner * inner < d2 <= outer * outer:
-                covered[i, j] |= ring
+    own = np.uint8(1 << search.kind)
+    first_row, last_row = _rows(disc, radius, picture.shown.shape[0])
+    for i in range(first_row, last_row):
+        first, last = _span(disc, radius, i, picture.shown.shape[1])
+        for j in range(first, last):
+            if picture.shown[i, j] == search.kind and not picture.covered[i, j] & own:
+                balance[i // search.step, j // search.step] -= 1
+
+
+@compiled
+def _explain(picture: Picture, kind: int, disc: NDArray[np.float64]) -> float:
+    """Mark the pixels of a disc as explained; the share of it that show its species."""
+    columns, radius = picture.shown.shape[1], disc[2] + _RIM_PX
+    bead, own = np.uint8(kind), np.uint8(1 << kind)
+    taken = np.int32(0)
+    first_row, last_row = _rows(disc, radius, picture.shown.shape[0])
+    for i in range(first_row, last_row):
+        shown, covered = picture.shown[i], picture.covered[i]
+        first, last = _span(disc, radius, i, columns)
+        for j in range(first, last):
+            taken += np.int32((shown[j] == bead) & (covered[j] & own == 0))
+            covered[j] |= own
+    if kind != GRAY:
+        _keep_from_outline(picture, disc)
     return float(taken / (np.pi * disc[2] * disc[2]))
+
+
+@compiled
+def _keep_from_outline(picture: Picture, disc: NDArray[np.float64]) -> None:
+    """Keep gray beads from the outline of a coloured one."""
+    columns = picture.shown.shape[1]
+    outer, inner = disc[2] + _GRAY_RING_PX, max(disc[2] - _GRAY_RING_PX, 0.0)
+    gray = np.uint8(1 << GRAY)
+    first_row, last_row = _rows(disc, outer, picture.shown.shape[0])
+    for i in range(first_row, last_row):
+        covered = picture.covered[i]
+        first, last = _span(disc, outer, i, columns)
+        begin, end = _span(disc, inner, i, columns)
+        if begin == end:
+            begin, end = last, last
+        for j in range(first, begin):
+            covered[j] |= gray
+        for j in range(end, last):
+            covered[j] |= gray
 
 
 @compiled
 def _left_to_explain(picture: Picture, kind: int, disc: NDArray[np.float64]) -> float:
     """Share of a disc that shows the species, unexplained, less the share that shows floor."""
-    shown, covered, radius = picture.shown, picture.covered, disc[2]
-    own = np.uint8(1 << kind)
-    total = 0
-    for i in range(max(int(disc[1] - radius), 0), min(int(disc[1] + radius) + 1, shown.shape[0])):
-        for j in range(
-            max(int(disc[0] - radius), 0), min(int(disc[0] + radius) + 1, shown.shape[1])
-        ):
-            dx, dy = j + 0.5 - disc[0], i + 0.5 - disc[1]
-            if dx * dx + dy * dy <= radius * radius:
-                if shown[i, j] == kind:
-                    total += 0 if covered[i, j] & own else 1
-                elif shown[i, j] == FLOOR:
-                    total -= 1
+    columns, radius = picture.shown.shape[1], disc[2]
+    own, bead, floor = np.uint8(1 << kind), np.uint8(kind), np.uint8(FLOOR)
+    total = np.int32(0)
+    first_row, last_row = _rows(disc, radius, picture.shown.shape[0])
+    for i in range(first_row, last_row):
+        shown, covered = picture.shown[i], picture.covered[i]
+        first, last = _span(disc, radius, i, columns)
+        for j in range(first, last):
+            total += np.int32((shown[j] == bead) & (covered[j] & own == 0))
+            total -= np.int32(shown[j] == floor)
     return float(total / (np.pi * radius * radius))

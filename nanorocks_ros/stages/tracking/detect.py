@@ -104,6 +104,11 @@ class BeadDetector:
         """Whether there are too many grains to look for."""
         return any(one.most == 0 for one in self._searches)
 
+    @property
+    def darkness(self) -> NDArray[np.uint8] | None:
+        """Of the last picture, where discs are looked for: 0 floor, 255 black; None before it."""
+        return None if self._ground is None else self._ground.picture.darkness.copy()
+
     def detect(
         self, color: NDArray[np.uint8], hints: Sequence[NDArray[np.float64]] = ()
     ) -> tuple[Detections, ...]:
@@ -115,6 +120,7 @@ class BeadDetector:
         hints : sequence of ndarrays (k, 4), [px]
             For each species where beads should be: column, row, radius and its error.
         """
+        color = np.ascontiguousarray(color)
         if self._ground is None or self._ground.floor.shape != color.shape:
             self._ground = self._first_ground(color)
         picture = self._look(color, self._ground)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from nanorocks_ros.physics.compiled import compiled
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 KEPT = 48
@@ -131,3 +132,15 @@ def extend_flight(
         count = max(count // 2, 2)
         fit_flight(times, places, errors, count, line)
     return count
+
+
+@compiled
+def median_square_speed(lines: NDArray[np.float64], known: NDArray[np.bool_]) -> float:
+    """Median of the squared velocities of some of the lines, (n, 9), at least one."""
+    squares = np.empty(lines.shape[0])
+    n = 0
+    for i in range(lines.shape[0]):
+        if known[i]:
+            squares[n] = lines[i, 3] * lines[i, 3] + lines[i, 4] * lines[i, 4]
+            n += 1
+    return float(np.median(squares[:n]))

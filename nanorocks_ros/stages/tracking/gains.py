@@ -72,21 +72,26 @@ class Gains(NamedTuple):
 @compiled
 def balance_of(picture: Picture, search: Search) -> NDArray[np.int32]:
     """Pixels of the species, not yet explained, less those of the floor, in squares."""
-    shown, step = picture.shown, search.step
-    rows = (shown.shape[0] + step - 1) // step
-    columns = (shown.shape[1] + step - 1) // step
+    height, width = picture.shown.shape
+    step = search.step
+    rows, columns = (height + step - 1) // step, (width + step - 1) // step
     found = np.zeros((rows, columns), dtype=np.int32)
-    own = np.uint8(1 << search.kind)
-    for i in range(shown.shape[0]):
-        row = i // step
+    # The rows of a square are summed first: that goes many columns at once.
+    sums = np.zeros(columns * step, dtype=np.int16)
+    kind, own = np.uint8(search.kind), np.uint8(1 << search.kind)
+    weight, floor = np.int16(search.floor_weight), np.uint8(FLOOR)
+    for row in range(rows):
+        sums[:] = 0
+        for i in range(row * step, min((row + 1) * step, height)):
+            shown, covered = picture.shown[i], picture.covered[i]
+            for j in range(width):
+                bead = np.int16((shown[j] == kind) & (covered[j] & own == 0))
+                sums[j] += bead - weight * np.int16(shown[j] == floor)
         for column in range(columns):
-            total = 0
-            for j in range(column * step, min((column + 1) * step, shown.shape[1])):
-                if shown[i, j] == search.kind:
-                    total += 0 if picture.covered[i, j] & own else 1
-                elif shown[i, j] == FLOOR:
-                    total -= search.floor_weight
-            found[row, column] += total
+            total = np.int32(0)
+            for j in range(column * step, (column + 1) * step):
+                total += sums[j]
+            found[row, column] = total
     return found
 
 

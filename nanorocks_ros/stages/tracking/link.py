@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.stages.tracking.assignment import assign
-from nanorocks_ros.stages.tracking.flight import KEPT
+from nanorocks_ros.stages.tracking.flight import KEPT, median_square_speed
 from nanorocks_ros.stages.tracking.pairs import (
     SIZE_JITTER_PX,
     SLOWEST_PX_S,
@@ -227,8 +227,7 @@ class Linker:
         """A usual component of a velocity: half of the beads are faster."""
         known = (self._counts >= 2) & self.confirmed
         if known.any():
-            velocities = self._lines[known, 3:5]
-            square = float(np.median(np.sum(np.square(velocities), axis=1)))
+            square = median_square_speed(self._lines, known)
             # Of a Maxwellian gas; the median does not heed beads that were confused.
             usual = math.sqrt(square / (2.0 * math.log(2.0)))
             share = 1.0 if usual > self._speed else _SPEED_SHARE

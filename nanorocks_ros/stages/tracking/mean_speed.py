@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.stages.tracking.paths import ALL, Series, distances_of, jitter_of, series_of
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -35,13 +37,8 @@ _PLACE_ERRORS = 3.0
 _SOME = 0.8
 # Fewer beads than this say nothing of a mean.
 _FEWEST = 3
-# Times the usual error of a place, with which a bead is still used.
-_WORST = 5.0
-# Pictures from which the jitter is measured; and by how much their distances in time may differ.
+# Pictures from which the jitter is measured.
 _JITTER_PICTURES = 10
-_UNEVEN = 0.2
-# Of a Gaussian of unit variance, the median of the squares.
-_MEDIAN_SQUARE = 0.4549
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,13 +91,37 @@ def mean_speed(
     MeanSpeed or None
         None while there are fewer than three pictures or beads.
     """
-    last = len(tracks) - 1
-    jitter = _jitter(tracks[-_JITTER_PICTURES:], species)
+    return mean_speeds(tracks, least_distance=least_distance, species=(species,))[0]
+
+
+def mean_speeds(
+    tracks: Sequence[Tracks], *, least_distance: float, species: Sequence[int | None]
+) -> list[MeanSpeed | None]:
+    """The same for several species, or all beads where None, of the same tracks."""
+    if not tracks:
+        return [None for _ in species]
+    series, recent = series_of(tracks), series_of(tracks[-_JITTER_PICTURES:])
+    expected = tracks[-1].expected
+    return [
+        _mean_speed(
+            series,
+            recent,
+            least_distance,
+            ALL if one is None else one,
+            int(expected.sum() if one is None else expected[one]),
+        )
+        for one in species
+    ]
+
+
+def _mean_speed(
+    series: Series, recent: Series, least_distance: float, species: int, expected: int
+) -> MeanSpeed | None:
+    last = series.stamps.size - 1
+    jitter = jitter_of(recent, species)
     lag, distances = 0, None
     for tried in _lags(last // 2):
-        found = _distances(
-            tracks[last], tracks[last - tried], tracks[last - 2 * tried], species, jitter
-        )
+        found = _distances(series, (last, last - tried, last - 2 * tried), species, jitter)
         if found is None:
             break
         lag, distances = tried, found
@@ -108,11 +129,9 @@ def mean_speed(
             break
     if distances is None:
         return None
-    first, middle, end = (tracks[last - k * lag].stamp_ns for k in (2, 1, 0))
+    first, middle, end = (int(series.stamps[last - k * lag]) for k in (2, 1, 0))
     window = (end - first) / _NS
-    counts = tracks[last].expected
-    expected = counts.sum() if species is None else counts[species]
-    share = distances.both.size / max(int(expected), 1)
+    share = distances.both.size / max(expected, 1)
     value, error = distances.speed((end - middle) / _NS, (middle - first) / _NS)
     return MeanSpeed(
         stamp_ns=(first + end) // 2,
@@ -135,23 +154,21 @@ def _lags(longest: int) -> list[int]:
 
 @dataclass(frozen=True, slots=True)
 class _Distances:
-    """Of each bead: in the later half of the window, in the earlier, in both."""
+    """Of each bead: in the later half of the window, in the earlier, in both.
+
+    `square` is the mean square distance in half of the window; see `distances_of`.
+    """
 
     later: NDArray[np.float64]
     earlier: NDArray[np.float64]
     both: NDArray[np.float64]
-    variances: NDArray[np.float64]
+    square: float
+    variance: float
     place_variance: float
 
-    @property
-    def square(self) -> float:
-        """Mean square distance in half of the window."""
-        return float(np.mean(np.square(self.later) + np.square(self.earlier))) / 2.0
-
     def far_enough(self, least: float) -> bool:
-        jitter = float(self.variances.mean())
         enough = max(
-            least * least, _LEAST_ERRORS**2 * jitter, _PLACE_ERRORS**2 * self.place_variance
+            least * least, _LEAST_ERRORS**2 * self.variance, _PLACE_ERRORS**2 * self.place_variance
         )
         return self.square >= enough
 
@@ -161,10 +178,10 @@ class _Distances:
 
     def speed(self, later_time: float, earlier_time: float) -> tuple[float, float]:
         half = 0.5 * (
-            _mean_distance(self.later, self.variances) / later_time
-            + _mean_distance(self.earlier, self.variances) / earlier_time
+            _mean_distance(self.later, self.variance) / later_time
+            + _mean_distance(self.earlier, self.variance) / earlier_time
         )
-        whole = _mean_distance(self.both, self.variances) / (later_time + earlier_time)
+        whole = _mean_distance(self.both, self.variance) / (later_time + earlier_time)
         # Collisions shorten the distance in proportion to the time, to first order.
         shortened = max(half - whole, 0.0)
         jitter = self._jitter_error(0.5 * (later_time + earlier_time) * half)
@@ -176,82 +193,28 @@ class _Distances:
 
     def _jitter_error(self, mean: float) -> float:
         """What jitter leaves open of a mean distance; less of a long one than of none, [m]."""
-        variance = float(self.variances.mean())
-        of_square = 4.0 * variance / math.sqrt(self.both.size)
+        of_square = 4.0 * self.variance / math.sqrt(self.both.size)
         of_none = min(math.sqrt(of_square), 0.5 * of_square / max(mean, 1e-12))
-        return math.hypot(math.sqrt(2.0 * variance / self.both.size), of_none)
+        return math.hypot(math.sqrt(2.0 * self.variance / self.both.size), of_none)
 
 
-def _mean_distance(distances: NDArray[np.float64], variances: NDArray[np.float64]) -> float:
+def _mean_distance(distances: NDArray[np.float64], variance: float) -> float:
     """Mean distance without the jitter of its ends, for places that scatter as Gaussians.
 
     Exact for a Maxwellian gas, where the jitter widens a Gaussian by another.
     """
     square = float(np.mean(np.square(distances)))
-    left = square - 4.0 * float(variances.mean())
+    left = square - 4.0 * variance
     if left <= 0.0:
         return 0.0
     return float(distances.mean()) * math.sqrt(left / square)
 
 
-def _jitter(tracks: Sequence[Tracks], species: int | None) -> float:
-    """Variance of a coordinate from picture to picture, as the places themselves show it, [m^2].
-
-    Half of the beads fly straight through three pictures; a place off the middle of its
-    neighbours has 3/2 of that variance. What all pictures are off by together is no part of it.
-    """
-    found = []
-    for earlier, middle, later in zip(tracks, tracks[1:], tracks[2:], strict=False):
-        before, after = middle.stamp_ns - earlier.stamp_ns, later.stamp_ns - middle.stamp_ns
-        if abs(before - after) > _UNEVEN * before:
-            continue
-        (end, half, start), _ = _common((later, middle, earlier), species)
-        found.append(half - 0.5 * (start + end))
-    off = np.concatenate(found) if found else np.empty((0, 2))
-    return float(np.median(np.square(off))) / (1.5 * _MEDIAN_SQUARE) if off.size else np.inf
-
-
 def _distances(
-    later: Tracks, middle: Tracks, earlier: Tracks, species: int | None, jitter: float
+    series: Series, pictures: tuple[int, int, int], species: int, jitter: float
 ) -> _Distances | None:
-    (end, half, start), variances = _common((later, middle, earlier), species)
-    if variances.size < _FEWEST:
+    distances, square, variance, place_variance = distances_of(series, pictures, species, jitter)
+    if distances.shape[1] < _FEWEST:
         return None
-    return _Distances(
-        later=np.hypot(*(end - half).T),
-        earlier=np.hypot(*(half - start).T),
-        both=np.hypot(*(end - start).T),
-        # Errors that places share from picture to picture move no bead.
-        variances=np.minimum(variances, jitter),
-        place_variance=float(np.median(variances)),
-    )
-
-
-def _common(
-    records: Sequence[Tracks], species: int | None
-) -> tuple[list[NDArray[np.float64]], NDArray[np.float64]]:
-    """Places in each record of the beads that are seen in all, and their mean variance."""
-    ids, places, variances = _shown(records[0], species)
-    for one in records[1:]:
-        other_ids, other_places, other_variances = _shown(one, species)
-        ids, here, there = np.intersect1d(ids, other_ids, assume_unique=True, return_indices=True)
-        places = [*(known[here] for known in places), other_places[0][there]]
-        variances = [*(known[here] for known in variances), other_variances[0][there]]
-    return places, np.asarray(np.mean(variances, axis=0))
-
-
-def _shown(
-    tracks: Tracks, species: int | None
-) -> tuple[NDArray[np.int32], list[NDArray[np.float64]], list[NDArray[np.float64]]]:
-    """Numbers, places and variances of a coordinate of the beads that are seen."""
-    shown = tracks.seen if species is None else tracks.seen & (tracks.species == species)
-    if shown.any():
-        # A bead half hidden is placed badly; who is hidden does not depend on the speed.
-        usual = float(np.median(tracks.position_errors[shown]))
-        shown = shown & (tracks.position_errors <= _WORST * usual)
-    return (
-        tracks.ids[shown],
-        # Past the camera: the tray may swing under the beads.
-        [tracks.positions[shown] + tracks.displacement],
-        [np.square(tracks.position_errors[shown])],
-    )
+    later, earlier, both = distances
+    return _Distances(later, earlier, both, square, variance, place_variance)

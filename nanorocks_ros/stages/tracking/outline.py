@@ -27,8 +27,8 @@ _ROUNDS = 3
 # A smaller outline has fewer pixels than rays: every other ray does.
 _ALL_RAYS_FROM_PX = 8.0
 _MOST_NEIGHBOURS = 24
-# No value of a picture.
-_OUT = -10000.0
+# Of a bead so large, edges are looked for within 3 px, else 2.
+_FAR_FROM_PX = 6.0
 # A step that needs no further one, [px].
 _SETTLED_PX = 0.06
 # An edge off the circle by so many pixels counts half.
@@ -45,12 +45,9 @@ _ENOUGH = 0.35
 
 
 @compiled
-def _at(picture: NDArray[np.integer[Any]], x: float, y: float) -> float:
-    """Value between pixels, whose centres are at halves."""
-    column, row = x - 0.5, y - 0.5
-    j, i = math.floor(column), math.floor(row)
-    if i < 0 or j < 0 or i + 1 >= picture.shape[0] or j + 1 >= picture.shape[1]:
-        return _OUT
+def _at(picture: NDArray[np.integer[Any]], column: float, row: float) -> float:
+    """Value between pixels, from the centre of the first one on; within the picture."""
+    j, i = int(column), int(row)
     u, v = column - j, row - i
     upper = picture[i, j] * (1.0 - u) + picture[i, j + 1] * u
     lower = picture[i + 1, j] * (1.0 - u) + picture[i + 1, j + 1] * u
@@ -67,29 +64,34 @@ def _edge(
     most_outside: float,
 ) -> float:
     """Distance of an edge from the circle along a ray, [px]; NaN where there is none."""
-    reach = 3 if disc[2] >= 6.0 else 2
+    reach = 3 if disc[2] >= _FAR_FROM_PX else 2
     c, s = _COSINES[ray], _SINES[ray]
-    outside = 0.0
-    for t in range(reach - 1, reach + 1):
-        value = _at(picture, disc[0] + (disc[2] + t) * c, disc[1] + (disc[2] + t) * s)
-        outside += 0.5 * sign * value
-        if value == _OUT or sign * value > 2.0 * most_outside:
-            return np.nan
-    if outside > most_outside:
+    # Pixel centres are at halves.
+    x, y = disc[0] + disc[2] * c - 0.5, disc[1] + disc[2] * s - 0.5
+    left, right = x - reach * abs(c), x + reach * abs(c)
+    top, bottom = y - reach * abs(s), y + reach * abs(s)
+    if left < 0.0 or top < 0.0:
         return np.nan
-    inside = 0.0
-    for t in range(reach - 1, reach + 1):
-        inside += (
-            0.5 * sign * _at(picture, disc[0] + (disc[2] - t) * c, disc[1] + (disc[2] - t) * s)
-        )
-    step = inside - outside
+    if right + 1.0 >= picture.shape[1] or bottom + 1.0 >= picture.shape[0]:
+        return np.nan
+    most = 2.0 * most_outside
+    farthest = sign * _at(picture, x + reach * c, y + reach * s)
+    far = sign * _at(picture, x + (reach - 1) * c, y + (reach - 1) * s)
+    outside = 0.5 * (farthest + far)
+    if far > most or farthest > most or outside > most_outside:
+        return np.nan
+    near = sign * _at(picture, x - (reach - 1) * c, y - (reach - 1) * s)
+    nearest = sign * _at(picture, x - reach * c, y - reach * s)
+    step = 0.5 * (near + nearest) - outside
     if step < least:
         return np.nan
     # The outermost samples are 1 and 0 by the choice of the levels.
     total = 1.0 - (reach + 0.5)
-    for t in range(1 - reach, reach):
-        value = _at(picture, disc[0] + (disc[2] + t) * c, disc[1] + (disc[2] + t) * s)
-        total += min(max((sign * value - outside) / step, 0.0), 1.0)
+    total += min(max((near - outside) / step, 0.0), 1.0)
+    total += min(max((far - outside) / step, 0.0), 1.0)
+    for t in range(2 - reach, reach - 1):
+        value = sign * _at(picture, x + t * c, y + t * s)
+        total += min(max((value - outside) / step, 0.0), 1.0)
     return total
 
 
@@ -163,9 +165,9 @@ def fit_circle(
     fit : ndarray (3 or more,)
         Written: error of a coordinate and of the radius [px], share of the outline seen.
     """
-    start = discs[own].copy()
+    start_x, start_y = discs[own, 0], discs[own, 1]
     neighbours = _neighbours(discs, own, count)
-    every = 1 if start[2] >= _ALL_RAYS_FROM_PX else 2
+    every = 1 if discs[own, 2] >= _ALL_RAYS_FROM_PX else 2
     covariance, normal, right = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
     seen, scatter2 = 0, 0.0
     for turn in range(_ROUNDS):
@@ -177,17 +179,22 @@ def fit_circle(
         # What is known of the size and of the place, as further edges of the same scatter.
         size_weight = prior / (expected[1] * expected[1])
         place_weight = prior / (_GUESS_PX * _GUESS_PX)
-        for a in range(2):
-            normal[a, a] += place_weight
-            right[a] += place_weight * (start[a] - discs[own, a])
+        normal[0, 0] += place_weight
+        normal[1, 1] += place_weight
+        right[0] += place_weight * (start_x - discs[own, 0])
+        right[1] += place_weight * (start_y - discs[own, 1])
         normal[2, 2] += size_weight
         right[2] += size_weight * (expected[0] - discs[own, 2])
         _inverse(normal, covariance)
-        step = covariance @ right
+        longest = 0.0
         for a in range(3):
-            discs[own, a] += min(max(step[a], -2.0), 2.0)
+            step = 0.0
+            for b in range(3):
+                step += covariance[a, b] * right[b]
+            longest = max(longest, abs(step))
+            discs[own, a] += min(max(step, -2.0), 2.0)
         discs[own, 2] = max(discs[own, 2], 1.5)
-        if turn > 0 and np.abs(step).max() < _SETTLED_PX:
+        if turn > 0 and longest < _SETTLED_PX:
             break
     spread = _CORRELATED * (scatter2 + _LEAST_SCATTER_PX * _LEAST_SCATTER_PX)
     fit[0] = math.sqrt(0.5 * spread * (covariance[0, 0] + covariance[1, 1]))
@@ -207,10 +214,9 @@ def _add_edges(
     right: NDArray[np.float64],
 ) -> tuple[int, float]:
     """Normal equations of a circle through the edges; how many, and their weighted squares."""
-    normal[:] = 0.0
-    right[:] = 0.0
     seen, total = 0, 0.0
-    row = np.ones(3)
+    xx, xy, yy, xr, yr, rr = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    right[:] = 0.0
     for k in range(0, _RAYS, every):
         if _hidden(disc, neighbours, k):
             continue
@@ -222,13 +228,20 @@ def _add_edges(
             continue
         off = edge / _HALF_WEIGHT_PX
         weight = 1.0 / (1.0 + off * off) if robust else 1.0
+        c, s = _COSINES[k], _SINES[k]
         seen += 1
         total += weight * edge * edge
-        row[0], row[1] = _COSINES[k], _SINES[k]
-        for a in range(3):
-            right[a] += weight * row[a] * edge
-            for b in range(a, 3):
-                normal[a, b] += weight * row[a] * row[b]
+        right[0] += weight * c * edge
+        right[1] += weight * s * edge
+        right[2] += weight * edge
+        xx += weight * c * c
+        xy += weight * c * s
+        yy += weight * s * s
+        xr += weight * c
+        yr += weight * s
+        rr += weight
+    normal[0, 0], normal[0, 1], normal[0, 2] = xx, xy, xr
+    normal[1, 1], normal[1, 2], normal[2, 2] = yy, yr, rr
     return seen, total
 
 

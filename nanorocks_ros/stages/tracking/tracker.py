@@ -52,6 +52,16 @@ class Tracker:
         self._last_ns: int | None = None
         self._next_number = 0
 
+    @property
+    def darkness(self) -> NDArray[np.uint8] | None:
+        """Of the last image, where beads are looked for: 0 floor, 255 black; None before it."""
+        return self._detector.darkness
+
+    @property
+    def crowded(self) -> bool:
+        """Whether a species has too many grains to be followed."""
+        return self._detector.crowded
+
     def push(self, image: TrayImage) -> tuple[Tracks, ...]:
         """The beads of the next image of the tray.
 

@@ -1,0 +1,182 @@
+"""Restitutions from simulated decays against their truth: bias, scatter and coverage.
+
+True mean projected speeds with errors of 2 %, 1.75 to 20 s after a start at a mean speed of
+10 mm/s, of runs that are in no library. "Walls known": the prior gives the restitution of the
+walls, and nothing else is uncertain; an estimate comes from 1 cycle or from 18 together. "Nothing
+known": height, diameter, count, start and floor and lid of each run are drawn from the priors, and
+the walls may have any restitution from 0.8 to 1; that is what the default says of one cycle.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from nanorocks_ros.experiment.settings import PriorSettings, SimulationSettings, with_values
+from nanorocks_ros.experiment.trays import Tray, load_trays
+from nanorocks_ros.inference.decay_library import library_of
+from nanorocks_ros.inference.decay_likelihood import DecayTables, decay_likelihood
+from nanorocks_ros.inference.restitution import posterior_of, tables_of
+from nanorocks_ros.physics.paper import paper_restitution_of_decay
+from nanorocks_ros.simulation.ensemble import cooling_runs
+from nanorocks_ros.study.tasks import Workers, run_tasks
+
+_TRAYS = (1, 3, 5)
+_RUNS = {1: 216, 3: 216, 5: 216}
+_TOGETHER = 18
+_RESTITUTIONS = (0.5, 0.7, 0.8, 0.89, 0.95)
+_WALLS = (0.90, 0.97, 0.99)
+_TIMES = np.arange(1.75, 20.0, 0.25)
+_ERROR = 0.02
+_SPEED = 0.01
+_LEVELS = np.array([0.025, 0.16, 0.5, 0.84, 0.975])
+_EXACT = PriorSettings(
+    floor_lid_spread=0.0,
+    height_error=0.0,
+    diameter_error=0.0,
+    count_error=0.0,
+    anisotropy_spread=0.0,
+    start_spread=0.0,
+    scale_error=0.0,
+    speed_bias=0.0,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Case:
+    """A place in the space of trays and restitutions."""
+
+    tray: int
+    restitution: float
+    wall: float
+
+
+def report() -> None:
+    """Print the tables."""
+    cases = [
+        _Case(tray=tray, restitution=restitution, wall=wall)
+        for tray in _TRAYS
+        for restitution in _RESTITUTIONS
+        for wall in _WALLS
+    ]
+    for title, function in (
+        ('Walls known, nothing else uncertain', _known_walls),
+        ('Nothing known but the priors', _drawn_from_priors),
+    ):
+        print(f'{title}\n')
+        tasks = {str(number): case for number, case in enumerate(cases)}
+        heads, rows = zip(*run_tasks(function, tasks, Workers()), strict=True)
+        print(heads[0])
+        print('| --- ' * (heads[0].count('|') - 1) + '|')
+        print('\n'.join(rows), flush=True)
+        print()
+
+
+def _speeds(case: _Case, tray: Tray, values: dict[str, float | str], runs: range) -> np.ndarray:
+    settings = with_values(
+        SimulationSettings(seed=4242, mean_speed=_SPEED),
+        {'restitution': case.restitution, 'wall_restitution': case.wall, **values},
+        'benchmark',
+    )
+    speed = cooling_runs(settings, tray, _TIMES, runs).mean_projected_speed
+    noise = np.random.default_rng([case.tray, runs.start]).standard_normal(speed.shape)
+    return np.asarray(speed * np.exp(_ERROR * noise))
+
+
+def _known_walls(case: _Case) -> tuple[str, str]:
+    tray = load_trays()[case.tray]
+    library = library_of(tray)
+    tables = tables_of(library, tray, _EXACT)
+    walls = (case.wall, case.wall)
+    singles, together, paper = [], [], []
+    total = None
+    likelihood = partial(_likelihood, tables, (0.0, 0.0))
+    for number, speed in enumerate(_speeds(case, tray, {}, range(_RUNS[case.tray]))):
+        singles.append(posterior_of(tables, likelihood(speed), walls).quantiles(_LEVELS))
+        one = decay_likelihood(tables, _TIMES, speed, _ERROR * speed, (library.misfit, 0.0))
+        total = one if total is None else total + one
+        if number % _TOGETHER == _TOGETHER - 1:
+            found = posterior_of(tables, total.integrated(), walls)
+            together.append(found.quantiles(_LEVELS))
+            total = None
+        paper.append(_paper(tray, speed))
+    head = '| tray | beads | walls | 1 cycle: bias | sd | covered 68 % | 95 % | '
+    head += '18 cycles: bias | sd | covered 68 % | 95 % | paper says |'
+    row = f'| {case.tray} | {case.restitution:g} | {case.wall:g} '
+    for found in (np.array(singles), np.array(together)):
+        row += _judged(found, case.restitution)
+    return head, row + f'| {np.mean(paper):.3f} |'
+
+
+def _drawn_from_priors(case: _Case) -> tuple[str, str]:
+    tray = load_trays()[case.tray]
+    prior = PriorSettings()
+    library = library_of(tray)
+    tables = tables_of(library, tray, prior)
+    camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
+    found, walls = [], []
+    for number in range(_RUNS[case.tray]):
+        varied, values = _varied(case, tray, prior, np.random.default_rng([7, number]))
+        (speed,) = _speeds(case, varied, values, range(number, number + 1))
+        posterior = posterior_of(
+            tables,
+            _likelihood(tables, camera, speed),
+            (prior.wall_low, prior.wall_high),
+        )
+        found.append(posterior.quantiles(_LEVELS))
+        walls.append(posterior.wall_quantiles(_LEVELS))
+    head = '| tray | beads | walls | beads: bias | sd | covered 68 % | 95 % | '
+    head += 'half of a 68 % interval | walls: bias | sd | covered 68 % | 95 % |'
+    row = f'| {case.tray} | {case.restitution:g} | {case.wall:g} '
+    row += _judged(np.array(found), case.restitution)
+    width = np.mean([0.5 * (one[3] - one[1]) for one in found])
+    return head, row + f'| {width:.3f} ' + _judged(np.array(walls), case.wall) + '|'
+
+
+def _varied(
+    case: _Case, tray: Tray, prior: PriorSettings, random: np.random.Generator
+) -> tuple[Tray, dict[str, float | str]]:
+    """A tray and a start as the priors allow."""
+    species = list(tray.species)
+    most = max(range(len(species)), key=lambda k: species[k].count)
+    size = 1.0 + prior.diameter_error * random.standard_normal()
+    count = species[most].count + round(prior.count_error * random.standard_normal())
+    species[most] = replace(
+        species[most],
+        diameter_low=size * species[most].diameter_low,
+        diameter_high=size * species[most].diameter_high,
+        count=count,
+    )
+    length, width, height = tray.dimensions
+    height += prior.height_error * random.standard_normal()
+    loss = (1.0 - case.wall) * math.exp(prior.floor_lid_spread * random.standard_normal())
+    values: dict[str, float | str] = {
+        'vertical_speed_factor': math.exp(prior.anisotropy_spread * random.standard_normal()),
+        'speeds': 'maxwellian' if random.random() < 0.5 else 'uniform',
+        'floor_lid_difference': (1.0 - loss) - case.wall,
+    }
+    return replace(tray, species=tuple(species), dimensions=(length, width, height)), values
+
+
+def _likelihood(tables: DecayTables, camera: tuple[float, float], speed: np.ndarray) -> np.ndarray:
+    return decay_likelihood(tables, _TIMES, speed, _ERROR * speed, camera).integrated()
+
+
+def _judged(found: np.ndarray, truth: float) -> str:
+    middle = found[:, 2]
+    covered = [
+        float(np.mean((found[:, low] <= truth) & (truth <= found[:, high])))
+        for low, high in ((1, 3), (0, 4))
+    ]
+    return (
+        f'| {middle.mean() - truth:+.3f} | {middle.std(ddof=1):.3f} '
+        f'| {covered[0]:.2f} | {covered[1]:.2f} '
+    )
+
+
+def _paper(tray: Tray, speed: np.ndarray) -> float:
+    slope, _ = np.polyfit(_TIMES, 1.0 / speed, 1)
+    return paper_restitution_of_decay(float(slope), tray.diameter, tray.number_density)

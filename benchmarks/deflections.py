@@ -1,0 +1,153 @@
+"""How often beads are deflected on their way: what the gas does, and what tracks show of it.
+
+Elastic gases of 7 mm/s in trays 1, 3 and 5, filmed without effects. A kink is a place that lies
+more than 0.75 px off the middle of its neighbours in time; it is looked for in the true places and
+in those of the tracks alike. The share of the path that is lost is 1 - distance / path, over the
+distance in diameters, after the time in which a bead at the mean speed comes one diameter;
+`stages/structure_function.py` takes 0.25 for all.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks.scene_bag import SCALE, settings
+from nanorocks_ros.experiment.settings import SceneSettings, SimulationSettings, with_values
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.experiment.view import View
+from nanorocks_ros.records import BeadsTruth, Frame, Tracks, TrayImage
+from nanorocks_ros.simulation.scene.film import SceneFilm, without_effects
+from nanorocks_ros.stages.preprocess import Preprocessor
+from nanorocks_ros.stages.tracking.tracker import Tracker
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from nanorocks_ros.experiment.trays import Species
+
+_TRAYS = (1, 3, 5)
+_SPEED = 7e-3
+_RATE = 30.0
+_FRAMES = 360
+_WARM_UP = 45
+# Mean speed in the image plane over that in space, of an isotropic gas.
+_PROJECTED = np.pi / 4.0
+_KINK = 0.75 / SCALE
+# Of the mean speed, a change of the velocity in the image plane that is a collision.
+_CHANGE = 0.02
+
+
+def report() -> None:
+    """Print the table."""
+    shots = _shots()
+    print(
+        '| tray, species | collisions per diameter of path | kinks: true, tracks | '
+        'path lost per diameter: true, tracks |\n| --- | --- | --- | --- |'
+    )
+    trays = load_trays()
+    for number in _TRAYS:
+        truth = [beads for beads, _ in shots[number]]
+        tracks = [one for _, one in shots[number]]
+        for index, species in enumerate(trays[number].species):
+            true_runs, runs = _true_runs(truth, index), _runs(tracks, index)
+            lag = max(1, round(species.diameter / _SPEED * _RATE))
+            d = species.diameter
+            print(
+                f'| {number}, {species.material} | {_collisions(truth, index, species):.2f} | '
+                f'{_kinks(true_runs, d):.2f}, {_kinks(runs, d):.2f} | '
+                f'{_lost(true_runs, lag, d):.2f}, {_lost(runs, lag, d):.2f} |'
+            )
+
+
+def _shots() -> dict[int, list[tuple[BeadsTruth, Tracks]]]:
+    scene = with_values(SceneSettings(trays=_TRAYS), {'swing_knocks': False}, 'benchmark')
+    film = SceneFilm(
+        SimulationSettings(
+            mean_speed=_SPEED / _PROJECTED,
+            first_shake=0.3,
+            frame_rate=_RATE,
+            restitution=1.0,
+            wall_restitution=1.0,
+        ),
+        without_effects(scene),
+    )
+    flown = load_trays()
+    stage = Preprocessor(
+        settings(_TRAYS),
+        {number: flown[number] for number in _TRAYS},
+        'film',
+        View(camera=film.camera.geometry.camera),
+    )
+    trackers = {number: Tracker(settings(_TRAYS), flown[number]) for number in _TRAYS}
+    found: dict[int, list[tuple[BeadsTruth, Tracks]]] = {number: [] for number in _TRAYS}
+    for count, moment in enumerate(film.moments(_FRAMES)):
+        frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=moment.frame.image)
+        truth = {one.tray: one for one in moment.beads}
+        for image in stage.push(frame):
+            if isinstance(image, TrayImage):
+                for tracks in trackers[image.tray].push(image):
+                    if count >= _WARM_UP:
+                        found[image.tray].append((truth[image.tray], tracks))
+    return found
+
+
+def _true_runs(truth: list[BeadsTruth], index: int) -> list[np.ndarray]:
+    """Places of each bead, (n, 2), past the camera."""
+    own = truth[0].species == index
+    places = np.array([one.positions[own, :2] + one.displacement for one in truth])
+    return list(places.transpose(1, 0, 2))
+
+
+def _runs(tracks: list[Tracks], index: int) -> list[np.ndarray]:
+    """The same of each track, as far as the bead is seen in one picture after another."""
+    whole: dict[int, list[tuple[int, np.ndarray]]] = {}
+    for frame, one in enumerate(tracks):
+        shown = one.seen & (one.species == index)
+        for number, place in zip(one.ids[shown].tolist(), one.positions[shown], strict=True):
+            whole.setdefault(number, []).append((frame, place + one.displacement))
+    runs = []
+    for seen in whole.values():
+        frames = np.array([frame for frame, _ in seen])
+        places = np.array([place for _, place in seen])
+        runs += np.split(places, np.flatnonzero(np.diff(frames) > 1) + 1)
+    return runs
+
+
+def _collisions(truth: list[BeadsTruth], index: int, species: Species) -> float:
+    """Changes of the velocity in the image plane, per diameter of path."""
+    own = truth[0].species == index
+    velocities = np.array([one.free_velocities[own, :2] for one in truth])
+    changes = np.hypot(*np.moveaxis(np.diff(velocities, axis=0), 2, 0)) > _CHANGE * _SPEED
+    path = sum(_path(run) for run in _true_runs(truth, index))
+    return float(changes.sum()) / (path / species.diameter)
+
+
+def _path(run: np.ndarray) -> float:
+    return float(np.hypot(*np.diff(run, axis=0).T).sum())
+
+
+def _kinks(runs: Iterable[np.ndarray], diameter: float) -> float:
+    """Kinks per diameter of path. One collision between two pictures may bend both."""
+    kinks, path = 0, 0.0
+    for run in runs:
+        if len(run) < 3:
+            continue
+        bent = np.hypot(*(run[2:] - 2.0 * run[1:-1] + run[:-2]).T) > _KINK
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], bent, [0]])))
+        kinks += int(np.ceil(0.5 * (edges[1::2] - edges[::2])).sum())
+        path += _path(run)
+    return kinks / (path / diameter)
+
+
+def _lost(runs: Iterable[np.ndarray], lag: int, diameter: float) -> float:
+    """Share of the path that is lost, per diameter of the distance."""
+    distances, paths = [np.empty(0)], [np.empty(0)]
+    for run in runs:
+        if len(run) > lag:
+            way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(run, axis=0).T))])
+            distances.append(np.hypot(*(run[lag:] - run[:-lag]).T))
+            paths.append(way[lag:] - way[:-lag])
+    distance = float(np.concatenate(distances).mean())
+    return (1.0 - distance / float(np.concatenate(paths).mean())) * diameter / distance

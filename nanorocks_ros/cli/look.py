@@ -1,0 +1,125 @@
+"""``nanorocks look BAG``: what the preprocessing makes of one frame, step by step."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.settings import PipelineSettings
+
+if TYPE_CHECKING:
+    import argparse
+
+    from nanorocks_ros.study.steps import FrameSteps, TraySteps
+
+_MM, _MM2 = 1e3, 1e6
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    from nanorocks_ros.cli.flags import add_bag
+
+    parser = commands.add_parser(
+        'look', help='show what the preprocessing makes of one frame, step by step'
+    )
+    add_bag(parser)
+    moment = parser.add_mutually_exclusive_group()
+    moment.add_argument(
+        '--frame', type=int, metavar='N', help='frame to show, counted from 0; default: the middle'
+    )
+    moment.add_argument(
+        '--at', type=float, metavar='SECONDS', help='show the first frame so long after the first'
+    )
+    parser.add_argument('-o', '--output', help='picture of the steps to write, .png')
+    parser.add_argument('--force', action='store_true', help='replace a file that exists')
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Follow the bag to the frame, print, draw; the exit code."""
+    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.study.output_files import check_outputs
+    from nanorocks_ros.study.steps import steps_of_bag
+
+    settings = settings_from(options, PipelineSettings(), options.parameters)
+    _check_moment(options)
+    if options.output:
+        check_outputs(
+            {'--output': Path(options.output)}, {'--output': ('.png',)}, force=options.force
+        )
+    try:
+        with Progress('looking') as progress:
+            steps = steps_of_bag(
+                Path(options.bag),
+                settings,
+                number=options.frame,
+                time=options.at,
+                image_topic=options.image_topic,
+                progress=progress.count,
+            )
+    except KeyboardInterrupt as interruption:
+        raise KeyboardInterrupt('nothing was written') from interruption
+    for notice in steps.notices:
+        print(f'nanorocks: {notice}', file=sys.stderr)
+    if options.json:
+        print(json.dumps(_as_json(steps), allow_nan=False))
+    else:
+        _print(steps)
+    if options.output:
+        from nanorocks_ros.study.steps_figure import steps_figure
+
+        steps_figure(Path(options.output), steps, settings.speed)
+        print(f'nanorocks: picture in {options.output}', file=sys.stderr)
+    return 0
+
+
+def _check_moment(options: argparse.Namespace) -> None:
+    for flag, value in (('--frame', options.frame), ('--at', options.at)):
+        if value is not None and not (math.isfinite(value) and value >= 0):
+            raise ConfigurationError(flag, f'{value:g}', 'count from 0')
+
+
+def _as_json(steps: FrameSteps) -> dict[str, Any]:
+    return {
+        'frame': steps.number,
+        'time': steps.time,
+        'trays': {str(number): _tray_as_json(one) for number, one in steps.trays.items()},
+    }
+
+
+def _tray_as_json(steps: TraySteps) -> dict[str, Any]:
+    image, tracks = steps.image, steps.tracks
+    return {
+        'cycle': image.cycle,
+        'displacement': [_known(one) for one in image.displacement],
+        'displacement_error': _known(image.displacement_error),
+        'noise_power': _known(image.noise_power),
+        'glare': _known(image.glare),
+        'quality': image.quality.names(),
+        'moving_area': steps.moving_area,
+        'seen': None if tracks is None else int(tracks.seen.sum()),
+        'expected': steps.tray.count,
+    }
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _print(steps: FrameSteps) -> None:
+    print(f'frame {steps.number} at {steps.time:.3f} s')
+    for number, one in steps.trays.items():
+        flags = ', '.join(one.image.quality.names()) or 'none'
+        print(f'tray {number}: cycle {one.image.cycle}, flags: {flags}')
+        x, y = (_MM * value for value in one.image.displacement)
+        followed = f'{x:+.3f}, {y:+.3f} mm from its place'
+        print(f'  the tray is {followed if math.isfinite(x) else "not followed: no walls seen"}')
+        if one.tracks is not None:
+            print(f'  {int(one.tracks.seen.sum())} of {one.tray.count} beads seen')
+        if one.moving_area is not None:
+            print(f'  {_MM2 * one.moving_area:.1f} mm^2 move')

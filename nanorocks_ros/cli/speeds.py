@@ -1,0 +1,142 @@
+"""``nanorocks speeds BAG``: the speed by every method, beside each other and the truth."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.settings import PipelineSettings
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Iterable
+
+    from nanorocks_ros.study.speeds import BagSpeeds, ComparedSpeeds
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    from nanorocks_ros.cli.flags import add_bag
+
+    parser = commands.add_parser('speeds', help='measure the speed by every method, and compare')
+    add_bag(parser, skip={'speed.method'})
+    parser.add_argument('-o', '--output', help='picture of one cycle to write, .png')
+    parser.add_argument('--table', help='table of all speeds to write, .csv')
+    parser.add_argument(
+        '--cycle', type=int, metavar='N', help='cycle to draw; default: the first after shaking'
+    )
+    parser.add_argument('--force', action='store_true', help='replace files that exist')
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure, print, write; the exit code."""
+    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.study.output_files import check_outputs
+    from nanorocks_ros.study.speeds import compare_speeds
+
+    settings = settings_from(options, PipelineSettings(), options.parameters)
+    named = {'--output': options.output, '--table': options.table}
+    files = {flag: Path(name) for flag, name in named.items() if name}
+    check_outputs(files, {'--output': ('.png',), '--table': ('.csv',)}, force=options.force)
+    try:
+        with Progress('measuring') as progress:
+            found = compare_speeds(
+                Path(options.bag),
+                settings,
+                image_topic=options.image_topic,
+                progress=progress.count,
+            )
+    except KeyboardInterrupt as interruption:
+        raise KeyboardInterrupt('nothing was written') from interruption
+    for notice in found.notices:
+        print(f'nanorocks: {notice}', file=sys.stderr)
+    cycle = _cycle(found, options.cycle)
+    if options.json:
+        print(json.dumps(_as_json(found), allow_nan=False))
+    else:
+        _print(found, cycle)
+    _write(files, found, cycle)
+    return 0
+
+
+def _cycle(found: BagSpeeds, wanted: int | None) -> int:
+    if wanted is None:
+        return found.first_cycle()
+    known = sorted({cycle for one in found.trays.values() for cycle in one.cycles})
+    if wanted not in known:
+        listed = ', '.join(str(one) for one in known) or 'none'
+        raise ConfigurationError(
+            '--cycle', f'{wanted}, and speeds were measured in {listed}', 'choose one of them'
+        )
+    return wanted
+
+
+def _write(files: dict[str, Path], found: BagSpeeds, cycle: int) -> None:
+    if '--table' in files:
+        from nanorocks_ros.study.speeds import write_speeds
+
+        write_speeds(files['--table'], found)
+        print(f'nanorocks: speeds in {files["--table"]}', file=sys.stderr)
+    if '--output' in files:
+        from nanorocks_ros.study.speeds_figure import speeds_figure
+
+        speeds_figure(files['--output'], found, cycle)
+        print(f'nanorocks: picture in {files["--output"]}', file=sys.stderr)
+
+
+def _as_json(found: BagSpeeds) -> dict[str, Any]:
+    return {
+        'frames': found.frames,
+        'trays': {
+            str(number): {
+                'methods': {name: _method_as_json(found, one, name) for name in one.speeds},
+                'chosen': one.chosen(),
+                'cycles': one.cycles,
+            }
+            for number, one in found.trays.items()
+        },
+    }
+
+
+def _method_as_json(found: BagSpeeds, tray: ComparedSpeeds, method: str) -> dict[str, Any]:
+    speeds, ratios = tray.speeds[method], tray.ratios(method)
+    return {
+        'time': [(one.stamp_ns - found.epoch_ns) / 1e9 for one in speeds],
+        'cycle': [one.cycle for one in speeds],
+        'mean_projected_speed': _known(one.mean_projected_speed for one in speeds),
+        'mean_projected_speed_error': _known(one.mean_projected_speed_error for one in speeds),
+        'window': [one.window for one in speeds],
+        'method': [one.method.name.lower() for one in speeds],
+        'quality': [one.quality.names() for one in speeds],
+        'true_mean_projected_speed': _known(tray.true_speeds(speeds).tolist()),
+        'ratio_to_truth': float(ratios.mean()) if ratios.size else None,
+        'ratio_to_truth_scatter': float(ratios.std()) if ratios.size else None,
+    }
+
+
+def _known(values: Iterable[float]) -> list[float | None]:
+    return [value if math.isfinite(value) else None for value in values]
+
+
+def _print(found: BagSpeeds, cycle: int) -> None:
+    print(f'{found.frames} frames')
+    for number, tray in found.trays.items():
+        print(f'tray {number}, cycle {cycle}:')
+        for method, speeds in tray.speeds.items():
+            count = sum(one.cycle == cycle for one in speeds)
+            ratios = tray.ratios(method, cycle)
+            told = (
+                f', estimate / truth {ratios.mean():.3f} (sd {ratios.std():.3f})'
+                if ratios.size
+                else ''
+            )
+            print(f'  {method}: {count} speeds{told}')
+        shares = tray.chosen(cycle).items()
+        taken = ', '.join(f'{name} {100 * share:.0f} %' for name, share in shares if share)
+        print(f'  chosen from the data: {taken or "nothing"}')
