@@ -16,6 +16,7 @@ ALL = (
     'cor_coverage',
     'engine',
     'engine_physics',
+    'closed_forms',
     'tracking',
 )
 
