@@ -1,8 +1,8 @@
 """Closed forms of the cooling against simulation: decay rates, and the restitutions they return.
 
-The simulated gas starts with Maxwell's speeds, even in all directions, a mean of 7 mm/s. Haff's law
-is fitted to the mean over runs of the mean projected speed, ln v, from 2 to 30 s. In brackets the
-standard error, from eight groups of runs.
+The simulated gas starts with Maxwell's speeds, even in all directions, a mean of 7 mm/s. To the
+mean over runs of the mean projected speed Haff's law is fitted, in ln v, from 2 to 30 s. In
+brackets the standard error, from eight groups of runs.
 """
 
 from __future__ import annotations
