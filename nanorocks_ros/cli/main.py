@@ -21,7 +21,7 @@ EXIT_INTERRUPTED = 130
 
 def build_parser() -> argparse.ArgumentParser:
     """The parser of the whole command; heavy imports wait until a command runs."""
-    from nanorocks_ros.cli import analyse, calibrate, simulate, sweep, track
+    from nanorocks_ros.cli import analyse, calibrate, figure, simulate, sweep, track
 
     parser = argparse.ArgumentParser(
         prog='nanorocks',
@@ -31,6 +31,7 @@ def build_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest='command', metavar='COMMAND', required=True)
     analyse.add_parser(commands)
     calibrate.add_parser(commands)
+    figure.add_parser(commands)
     simulate.add_parser(commands)
     sweep.add_parser(commands)
     track.add_parser(commands)

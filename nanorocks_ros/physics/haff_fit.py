@@ -40,10 +40,10 @@ _FEWEST_DEGREES = 3.0
 _LOG_HAFF_TIME = (math.log(1e-3), math.log(1e5))
 # Of q and of the quick part, times the number of beads: what simulated gases in trays 1, 3 and 5
 # have, within the spread of the logarithms, at restitutions from 0.6 to 0.95.
-_USUAL_TIMES_BEADS = np.array([0.4, 0.1])
+USUAL_TIMES_BEADS = np.array([0.4, 0.1])
 _LOG_SPREAD = np.array([0.5, 1.0])
 # The quick part is forgotten after about one collision of each bead.
-_QUICK_RANGE = 0.1
+QUICK_RANGE = 0.1
 _LOG_NOISE = (math.log(1e-12), math.log(10.0))
 # The errors given are trusted in proportion only.
 _LOG_SCALE = (math.log(0.05), math.log(20.0))
@@ -181,7 +181,7 @@ class _Data:
         diagonal = np.diag_indices_from(covariance)
         covariance[diagonal] -= self.inner_distance / (self.time[self._middles] + tau)
         covariance *= 0.5 * strength
-        covariance += quick * np.exp(-gap / _QUICK_RANGE)
+        covariance += quick * np.exp(-gap / QUICK_RANGE)
         covariance[diagonal] += scale**2 * self.variance
         columns = (np.ones_like(s), self._grouped(age / (1.0 + age)), self.log_speed + s)
         whitened = np.column_stack(columns)
@@ -289,7 +289,7 @@ def _binned(
     ends = starts + counts - 1
     return _Data(
         time=time,
-        usual=np.log(_USUAL_TIMES_BEADS / beads),
+        usual=np.log(USUAL_TIMES_BEADS / beads),
         inner_distance=(time[ends] - time[starts]) * (counts + 1) / (3.0 * counts),
         starts=starts,
         counts=counts,

@@ -8,10 +8,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.physics.estimate import Estimate, propagated
 from nanorocks_ros.physics.kinetic import check_positive
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 # The paper takes the speed in Haff's law to be the most probable relative speed of two
 # beads, twice their mean speed ([B19] section 3.1.2).
@@ -235,8 +241,12 @@ def _ellipse(loss: float, diameter: float, number_density: float, side: float) -
 
 
 def paper_instantaneous_restitution(
-    speed: float, next_speed: float, interval: float, diameter: float, number_density: float
-) -> float:
+    speed: NDArray[np.float64],
+    next_speed: NDArray[np.float64],
+    interval: float,
+    diameter: float,
+    number_density: float,
+) -> NDArray[np.float64]:
     """The paper's restitution between two measurements of the mean speed.
 
     exp(ln(v'/v) / (n sigma v dt)): every collision is taken to leave the part e of a bead's
@@ -246,7 +256,7 @@ def paper_instantaneous_restitution(
 
     Parameters
     ----------
-    speed, next_speed : float, [m/s], > 0
+    speed, next_speed : ndarray or float, [m/s]
         Mean speeds, an interval apart.
     interval : float, [s], > 0
     diameter : float, [m], > 0
@@ -254,26 +264,23 @@ def paper_instantaneous_restitution(
 
     Returns
     -------
-    float
-        Above 1 where the speed rises.
+    ndarray
+        Above 1 where the speed rises; NaN where one is not positive.
 
     Raises
     ------
     ConfigurationError
-        When a value is not positive and finite.
+        When the interval, the diameter or the density is not positive and finite.
 
     References
     ----------
     [B19] eq. e:inst_cor, with an interval of 1/30 s.
     """
-    check_positive(
-        speed=speed,
-        next_speed=next_speed,
-        interval=interval,
-        diameter=diameter,
-        number_density=number_density,
-    )
-    collisions = number_density * math.pi * diameter**2 * speed * interval
-    exponent = math.log(next_speed / speed) / collisions
-    # A number that a float can hold: noise at rest has no bound.
-    return math.exp(min(exponent, 700.0))
+    check_positive(interval=interval, diameter=diameter, number_density=number_density)
+    before, after = np.asarray(speed, dtype=np.float64), np.asarray(next_speed, dtype=np.float64)
+    known = (before > 0.0) & (after > 0.0)
+    before, after = np.where(known, before, np.nan), np.where(known, after, np.nan)
+    collisions = number_density * math.pi * diameter**2 * before * interval
+    # At most what a float can hold: noise at rest has no bound.
+    found: NDArray[np.float64] = np.exp(np.minimum(np.log(after / before) / collisions, 700.0))
+    return found

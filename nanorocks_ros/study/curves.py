@@ -40,12 +40,16 @@ class SpeedCurve:
         One standard error; 0 where it is not known.
     point : tuple of float, int, str or bool, or None
         Where on the grid of a sweep the curve was taken from.
+    cycles : int or None
+        How many measured decays it is the mean of; None: it is simulated, or not known, and
+        `error` holds all of its scatter.
     """
 
     times: NDArray[np.float64]
     speed: NDArray[np.float64]
     error: NDArray[np.float64]
     point: tuple[Scalar, ...] | None = None
+    cycles: int | None = None
 
 
 def read_curve(path: Path) -> SpeedCurve:

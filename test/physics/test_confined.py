@@ -147,12 +147,12 @@ def test_the_motion_along_the_height_is_cooled_as_much_as_simulated():
 @pytest.mark.parametrize(
     ('number', 'restitution', 'walls', 'runs'),
     [
-        (1, 0.9, 0.9, 200),
-        (1, 0.9, 0.99, 200),
+        (1, 0.9, 0.9, 400),
+        (1, 0.9, 0.99, 400),
         (1, 0.8, 0.95, 600),
-        (3, 0.9, 0.95, 60),
-        (3, 0.8, 0.9, 60),
-        (5, 0.9, 0.9, 30),
+        (3, 0.9, 0.95, 120),
+        (3, 0.8, 0.9, 200),
+        (5, 0.9, 0.9, 60),
     ],
 )
 def test_simulated_decays_give_the_restitution_within_a_hundredth(

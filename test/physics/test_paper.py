@@ -180,3 +180,11 @@ def test_the_instantaneous_restitution_of_haffs_decay_is_another_one_than_haffs(
 def test_speeds_that_rise_give_more_than_one_and_never_overflow():
     found = paper_instantaneous_restitution(1e-9, 1e-3, 1 / 30, TRAY.diameter, 1e6)
     assert 1.0 < found < math.inf
+
+
+def test_speeds_that_are_not_positive_have_no_instantaneous_restitution():
+    before, after = np.array([1e-3, 0.0, -1e-3, np.nan]), np.array([-1e-3, 1e-3, 1e-3, 1e-3])
+    found = paper_instantaneous_restitution(
+        before, after, 1.0, TRAY.diameter, TRAY.number_density
+    )
+    assert np.isnan(found).all()
