@@ -27,8 +27,8 @@ FIELDS = {
     'mean_projected_speed': 'm/s',
     'mean_projected_speed_error': 'm/s',
 }
-SWEEP = ('--runs', '60', '--times', '0:20:21', '--seed', '7')
-REFERENCE = '0.89,0.99'
+# As many runs at a point as the paper has.
+SWEEP = ('--runs', '178', '--times', '0:30:31', '--seed', '7')
 
 
 def measured_cycles(path, cycles, error, *, tray=1, restitution=0.89, walls=0.99, seed=3):
@@ -55,15 +55,15 @@ def _draw(folder, scratch):
     for kind in ('decay', 'instantaneous'):
         yield ('figure', kind, str(table), '-o', str(folder / f'{kind}.png'), '--force')
     grid = {
-        'walls': ('--restitution', '0.6:0.98:20', '--wall-restitution', '0.9:1:11'),
-        'width': ('--restitution', '0.6:0.98:20', '--restitution-width', '0:0.04:5'),
+        'walls': ('--restitution', '0.7:1:31', '--wall-restitution', '0.95:1:11'),
+        'width': ('--restitution', '0.7:0.9:21', '--restitution-width', '0:0.2:6'),
     }
     for name, axes in grid.items():
         output = str(scratch / f'{name}.npz')
         picture = str(folder / f'sweep_{name}.png')
         yield (
             'sweep', *axes, *SWEEP, '-o', output, '--keep-runs', '--workers', '1',
-            '--figure', picture, '--reference', str(table),
+            '--figure', picture, '--reference', str(table), '--free-speed',
         )  # fmt: skip
 
 

@@ -48,7 +48,8 @@ def run(options: argparse.Namespace) -> int:
     """Read, draw, print; the exit code."""
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.study.cycles import read_cycles, speed_table
-    from nanorocks_ros.study.decay_figures import decay_figure, instantaneous_figure
+    from nanorocks_ros.study.decay_figure import decay_figure
+    from nanorocks_ros.study.instantaneous_figure import instantaneous_figure
     from nanorocks_ros.study.output_files import check_outputs
 
     path = Path(options.output)

@@ -68,13 +68,15 @@ class ConfinedGas:
     beads: BeadClasses
     contacts: Contacts
 
-    def cooling(self, restitution: float, wall_restitution: float) -> Cooling:
+    def cooling(self, restitution: float, wall_restitution: float, width: float = 0.0) -> Cooling:
         """The steady state: all temperatures fall at one rate.
 
         Parameters
         ----------
         restitution, wall_restitution : float, [0, 1]
-            Not both 1 is of interest: the rate is 0 then.
+        width : float, [0, 1]
+            Full width of the even distribution about `restitution` that each collision of two
+            beads draws from.
 
         Raises
         ------
@@ -89,7 +91,7 @@ class ConfinedGas:
 
         def unequal(logs: NDArray[np.float64]) -> NDArray[np.float64]:
             temperature = np.exp(logs).reshape(-1, 3)
-            rates = self._log_rates(temperature, restitution, wall_restitution).ravel()
+            rates = self._log_rates(temperature, restitution, wall_restitution, width).ravel()
             found: NDArray[np.float64] = rates - rates.mean()
             # One of these differences follows from the others; the scale is free.
             found[0] = self.mean_projected_speed(temperature) - 1.0
@@ -104,10 +106,10 @@ class ConfinedGas:
                 'use the decay library',
             )
         temperature = np.exp(solution.x).reshape(-1, 3)
-        rate = -float(self._log_rates(temperature, restitution, wall_restitution).mean())
+        rate = -float(self._log_rates(temperature, restitution, wall_restitution, width).mean())
         return Cooling(decay_rate=0.5 * rate, granular_temperature=temperature)
 
-    def decay_rate(self, restitution: float, wall_restitution: float) -> float:
+    def decay_rate(self, restitution: float, wall_restitution: float, width: float = 0.0) -> float:
         """1 / (v0 tau) [1/m] of the mean projected speed in the steady state.
 
         Raises
@@ -115,15 +117,17 @@ class ConfinedGas:
         ConfigurationError, FitError
             As `cooling`.
         """
-        return self.cooling(restitution, wall_restitution).decay_rate
+        return self.cooling(restitution, wall_restitution, width).decay_rate
 
-    def restitution(self, decay_rate: float, wall_restitution: float) -> float:
+    def restitution(self, decay_rate: float, wall_restitution: float, width: float = 0.0) -> float:
         """Restitution between beads that goes with a decay rate; its range is not checked.
 
         Parameters
         ----------
         decay_rate : float, [1/m], > 0
         wall_restitution : float, [0, 1]
+        width : float, [0, 1]
+            As for `cooling`.
 
         Raises
         ------
@@ -135,7 +139,7 @@ class ConfinedGas:
         check_positive(decay_rate=decay_rate)
 
         def excess(restitution: float) -> float:
-            return self.decay_rate(restitution, wall_restitution) - decay_rate
+            return self.decay_rate(restitution, wall_restitution, width) - decay_rate
 
         if excess(1.0) > 0.0:
             raise FitError(
@@ -237,15 +241,20 @@ class ConfinedGas:
         return spread
 
     def _log_rates(
-        self, temperature: NDArray[np.float64], restitution: float, wall_restitution: float
+        self,
+        temperature: NDArray[np.float64],
+        restitution: float,
+        wall_restitution: float,
+        width: float = 0.0,
     ) -> NDArray[np.float64]:
         """Rates of change of ln T, (n, 3), [1/s]; derived in docs/theory.md."""
         masses = self.beads.masses
-        lever = (masses / (masses[:, np.newaxis] + masses)) * (1.0 + restitution)
+        share = (masses / (masses[:, np.newaxis] + masses))[..., np.newaxis]
+        kick, kick_squared = 1.0 + restitution, (1.0 + restitution) ** 2 + width**2 / 12.0
         spread, squares = self._approach(temperature), self.contacts.squares
-        weighted = self.contacts.pairs * spread * lever[..., np.newaxis]
-        gained = np.einsum('abq,abqi->ai', weighted * spread**2 * lever[..., np.newaxis], squares)
-        lost = 2.0 * np.einsum('abq,abqi->ai', weighted, squares)
+        weighted = self.contacts.pairs * spread * share
+        gained = kick_squared * np.einsum('abq,abqi->ai', weighted * spread**2 * share, squares)
+        lost = 2.0 * kick * np.einsum('abq,abqi->ai', weighted, squares)
         walls = 2.0 * (1.0 - wall_restitution**2) * self.contacts.walls * np.sqrt(temperature)
         rates: NDArray[np.float64] = _MEAN * (gained / temperature - lost - walls)
         return rates

@@ -182,6 +182,21 @@ def mean_cycle(
     )
 
 
+def check_errors(curve: SpeedCurve) -> None:
+    """Refuse speeds whose errors are not known.
+
+    Raises
+    ------
+    RecordingError
+    """
+    if not (curve.error > 0.0).all():
+        raise RecordingError(
+            'mean_projected_speed_error',
+            'is not known for every speed',
+            'name the results of `nanorocks analyse`',
+        )
+
+
 def read_decay(path: Path) -> SpeedCurve:
     """One decay from any file: a curve, or the mean over the cycles of a table of speeds.
 

@@ -184,7 +184,5 @@ def test_speeds_that_rise_give_more_than_one_and_never_overflow():
 
 def test_speeds_that_are_not_positive_have_no_instantaneous_restitution():
     before, after = np.array([1e-3, 0.0, -1e-3, np.nan]), np.array([-1e-3, 1e-3, 1e-3, 1e-3])
-    found = paper_instantaneous_restitution(
-        before, after, 1.0, TRAY.diameter, TRAY.number_density
-    )
+    found = paper_instantaneous_restitution(before, after, 1.0, TRAY.diameter, TRAY.number_density)
     assert np.isnan(found).all()
