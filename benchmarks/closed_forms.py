@@ -8,6 +8,7 @@ brackets the standard error, from eight groups of runs.
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from scipy import optimize
@@ -16,6 +17,7 @@ from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.physics.confined import confined_gas
+from nanorocks_ros.physics.confined_decay import windowed_restitution
 from nanorocks_ros.physics.kinetic import contact_value, kinetic_decay_rate, kinetic_restitution
 from nanorocks_ros.physics.paper import RELATIVE_TO_MEAN_SPEED, paper_restitution_of_decay
 from nanorocks_ros.simulation.ensemble import cooling_runs
@@ -82,16 +84,18 @@ def report():
     trays = load_trays()
     print(
         '| tray | truth ep, ew | simulated 1/m | paper | dilute | one temperature | confined | '
-        'paper returns | dilute returns | one temperature returns | confined returns |'
+        'paper returns | dilute returns | one temperature returns | confined returns | '
+        'confined, followed, returns |'
     )
-    print('|' + ' --- |' * 11)
+    print('|' + ' --- |' * 12)
     for number, runs in RUNS.items():
         tray = trays[number]
         forms = _Forms(tray)
         for restitution in RESTITUTIONS:
             for walls in WALLS:
                 speeds = simulated(tray, restitution, walls, runs)
-                print(forms.row(restitution, walls, *decay_rate(speeds)), flush=True)
+                first = float(speeds[:, 0].mean())
+                print(forms.row(restitution, walls, *decay_rate(speeds), first), flush=True)
 
 
 class _Forms:
@@ -100,13 +104,19 @@ class _Forms:
         self.gas = confined_gas(tray)
         self.beads, self.walls = one_temperature(tray)
 
-    def row(self, restitution, walls, rate, error):
+    def row(self, restitution, walls, rate, error, first_speed):
         tray = self.tray
         section = math.pi * tray.diameter**2 * tray.number_density
         paper = RELATIVE_TO_MEAN_SPEED * section * (1.0 - restitution**2)
         dilute = kinetic_decay_rate(restitution, tray.diameter, tray.number_density)
         lost = self.walls * (1.0 - walls**2)
         single = self.beads * (1.0 - restitution**2) + lost
+        followed = partial(
+            windowed_restitution,
+            self.gas,
+            initial_speed=first_speed,
+            window=(WINDOW, TIMES[-1]),
+        )
         square = 1.0 - (rate - lost) / self.beads
         returned = f'{math.sqrt(square):.3f}' if 0.0 <= square <= 1.0 else '-'
         return (
@@ -115,5 +125,6 @@ class _Forms:
             f'{self.gas.decay_rate(restitution, walls):.2f} | '
             f'{paper_restitution_of_decay(rate, tray.diameter, tray.number_density):.3f} | '
             f'{_or_none(kinetic_restitution, rate, tray.diameter, tray.number_density)} | '
-            f'{returned} | {_or_none(self.gas.restitution, rate, walls)} |'
+            f'{returned} | {_or_none(self.gas.restitution, rate, walls)} | '
+            f'{_or_none(followed, rate, walls)} |'
         )

@@ -6,15 +6,16 @@ are taken for Gaussian and beads for unrelated before they meet; contacts are th
 Nothing is fitted. In the steady state all temperatures fall alike, as Haff's law says.
 
 Against simulation (`python -m benchmarks closed_forms`) the restitution of the beads of trays 1, 3
-and 5 comes out within 0.01 from 0.8 to 0.98, and within 0.03 at 0.7, with walls from 0.9 up. Lower
-ones fail where walls are nearly elastic: the steady state, with 3 to 6 times more energy along z,
-is not reached before the beads have all but come to rest.
+and 5 comes out within 0.01 from 0.9 up, 0.03 at 0.8 and 0.04 at 0.7, with walls from 0.9 up, and
+within 0.01 at all of these where walls are below 0.99. Lower ones fail where walls are nearly
+elastic: the steady state, with 3 to 6 times more energy along z, is reached too late;
+`confined_decay` follows the gas to it.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +23,6 @@ from scipy import integrate, optimize, special
 
 from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.physics.contacts import BeadClasses, Contacts, bead_classes, contacts
-from nanorocks_ros.physics.estimate import Estimate, propagated
 from nanorocks_ros.physics.kinetic import check_positive, check_restitution
 
 if TYPE_CHECKING:
@@ -32,9 +32,6 @@ if TYPE_CHECKING:
 
 # Mean of |x| of a normal law of variance 1; of |x|^3 it is twice that.
 _MEAN = math.sqrt(2.0 / math.pi)
-# Where the theory has been found good, see above.
-LOWEST_RESTITUTION = 0.7
-LOWEST_WALL_RESTITUTION = 0.9
 _LOWEST_TRIED = 0.05
 _PRECISION = 1e-7
 
@@ -276,58 +273,3 @@ def confined_gas(tray: Tray, sizes: int = 3) -> ConfinedGas:
     """
     beads = bead_classes(tray, sizes)
     return ConfinedGas(beads=beads, contacts=contacts(beads, tray.dimensions))
-
-
-def confined_restitution(
-    tray: Tray,
-    decay_rate: Estimate | float,
-    wall_restitution: Estimate | float,
-    height: Estimate | float | None = None,
-) -> Estimate:
-    """Restitution between the beads of a tray, from the decay of their mean projected speed.
-
-    Errors are propagated to first order. What the theory itself is off by, 0.01 to 0.03, is not
-    among them.
-
-    Parameters
-    ----------
-    tray : Tray
-    decay_rate : Estimate or float, [1/m], > 0
-        1 / (v0 tau), v0 being the mean projected speed.
-    wall_restitution : Estimate or float, [0.9, 1]
-    height : Estimate or float, optional, [m]
-        Of the tray, where it is not known exactly.
-
-    Raises
-    ------
-    ConfigurationError
-        When a value cannot be used.
-    FitError
-        When no restitution in the range of the theory, 0.7 to 1, makes this decay.
-    """
-
-    def relation(decay_rate: float, wall_restitution: float, height: float) -> float:
-        dimensions = (*tray.dimensions[:2], height)
-        gas = confined_gas(replace(tray, dimensions=dimensions))
-        return gas.restitution(decay_rate, wall_restitution)
-
-    walls = wall_restitution.value if isinstance(wall_restitution, Estimate) else wall_restitution
-    if walls < LOWEST_WALL_RESTITUTION:
-        raise FitError(
-            'confined theory',
-            f'a restitution of the walls of {walls:g} is outside its range',
-            f'use the decay library below {LOWEST_WALL_RESTITUTION}',
-        )
-    found = propagated(
-        relation,
-        decay_rate=decay_rate,
-        wall_restitution=wall_restitution,
-        height=tray.dimensions[2] if height is None else height,
-    )
-    if found.value < LOWEST_RESTITUTION:
-        raise FitError(
-            'confined theory',
-            f'reads a restitution of {found.value:.2f}, outside its range',
-            f'use the decay library below {LOWEST_RESTITUTION}',
-        )
-    return found

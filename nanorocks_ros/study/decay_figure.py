@@ -9,7 +9,7 @@ import numpy as np
 from scipy import optimize
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.physics.confined import confined_restitution
+from nanorocks_ros.physics.confined_decay import confined_restitution
 from nanorocks_ros.physics.estimate import Estimate
 from nanorocks_ros.physics.haff import granular_energy, haff_speed
 from nanorocks_ros.physics.haff_fit import HaffFit, fit_haff

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import textwrap
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -15,6 +16,7 @@ from nanorocks_ros.study.sweep_contours import contours
 mpl.use('Agg')
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 
 _PICTURES = ('.png', '.pdf', '.svg')
 _MARK = '#ffffff'
+_OUTLINE = [withStroke(linewidth=4.5, foreground='black')]
+_LABEL_WIDTH = 55
 # Below this, two curves are alike; colours are not spent on noise.
 _ALIKE = 0.5
 
@@ -126,7 +130,9 @@ def _mark(axes: Axes, sweep: Sweep, values: NDArray[np.float64], curve: SpeedCur
     axes.set_xlabel(_label(first))
     axes.set_ylabel(_label(second))
     axes.set_title(f'{sweep.runs} runs at each of {values.size} points')
-    axes.legend(loc='upper left', fontsize=9, facecolor='#c8ccd4')
+    # Beside the map, whose corners may hold what matters.
+    figure: Any = axes.figure
+    figure.legend(loc='outside lower center', ncols=3, fontsize=9, facecolor='#c8ccd4')
 
 
 def _draw_contours(axes: Axes, sweep: Sweep, curve: SpeedCurve) -> None:
@@ -137,12 +143,11 @@ def _draw_contours(axes: Axes, sweep: Sweep, curve: SpeedCurve) -> None:
         x, y = (one.restitution, one.other) if first else (one.other, one.restitution)
         seen = (x >= ends[0][0]) & (x <= ends[0][1]) & (y >= ends[1][0]) & (y <= ends[1][1])
         label = one.label if seen.any() else f'{one.label} (outside)'
-        axes.plot(x, y, style, color='black', lw=4.5)
-        axes.plot(x, y, style, color=_MARK, lw=2.2, label=label)
+        axes.plot(x, y, style, color=_MARK, lw=2.2, label=label, path_effects=_OUTLINE)
     axes.set_xlim(*ends[0])
     axes.set_ylim(*ends[1])
 
 
 def _label(axis: Axis) -> str:
     (row,) = (one for one in rows(SimulationSettings()) if one.name == axis.name)
-    return f'{row.doc} [{row.unit}]' if row.unit else row.doc
+    return textwrap.fill(f'{row.doc} [{row.unit}]' if row.unit else row.doc, _LABEL_WIDTH)

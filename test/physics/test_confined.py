@@ -12,7 +12,8 @@ import pytest
 from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.physics.confined import confined_gas, confined_restitution
+from nanorocks_ros.physics.confined import confined_gas
+from nanorocks_ros.physics.confined_decay import confined_restitution
 from nanorocks_ros.physics.contacts import bead_classes, contacts
 from nanorocks_ros.physics.estimate import Estimate
 from nanorocks_ros.physics.haff import haff_speed
@@ -162,6 +163,15 @@ def test_simulated_decays_give_the_restitution_within_a_hundredth(
     rate = simulated_rate(number, restitution, walls, runs)
     found = confined_restitution(TRAYS[number], rate, walls)
     assert found.value == pytest.approx(restitution, abs=0.01)
+
+
+def test_a_width_of_the_restitution_counts_by_its_mean_square():
+    # With one direction of motion the loss is 1 - <e^2> = 1 - m^2 - w^2/12; here nearly so.
+    wide = gas(3).decay_rate(0.85, 1.0, width=0.3)
+    alike = gas(3).decay_rate(math.sqrt(0.85**2 + 0.3**2 / 12.0), 1.0)
+    assert wide == pytest.approx(alike, rel=0.01)
+    assert wide < 0.98 * gas(3).decay_rate(0.85, 1.0)
+    assert gas(3).restitution(wide, 1.0, width=0.3) == pytest.approx(0.85, abs=1e-6)
 
 
 def test_errors_of_decay_walls_and_height_all_count():
