@@ -66,10 +66,10 @@ def contours(sweep: Sweep, curve: SpeedCurve) -> tuple[Contour, ...]:
     asked = json.loads(sweep.question)
     settings = asked['settings']
     names = {axis.name for axis in sweep.axes}
-    (other,) = names - {_BEADS} or {''}
+    other = next(iter(names - {_BEADS}), '')
     smooth = settings['tangential_restitution'] == settings['wall_tangential_restitution'] == -1.0
     free = settings['sticking_speed'] == settings['wall_sticking_speed'] == 0.0
-    if _BEADS not in names or other not in (_WALLS, _WIDTH) or not (smooth and free):
+    if names not in ({_BEADS, _WALLS}, {_BEADS, _WIDTH}) or not (smooth and free):
         return ()
     tray = tray_by_number(load_trays(), settings['tray'])
     try:
