@@ -20,9 +20,13 @@ from nanorocks_ros.physics.confined import confined_gas
 from nanorocks_ros.physics.confined_decay import windowed_restitution
 from nanorocks_ros.physics.kinetic import contact_value, kinetic_decay_rate, kinetic_restitution
 from nanorocks_ros.physics.paper import RELATIVE_TO_MEAN_SPEED, paper_restitution_of_decay
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.ensemble import cooling_runs
+from nanorocks_ros.simulation.initial import resting_beads, rules_of
+from nanorocks_ros.simulation.shaking import after_shaking
 
 RUNS = {1: 400, 3: 120, 5: 64}
+TEMPERATURES = {1: 100, 3: 40, 5: 20, 7: 6}
 RESTITUTIONS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.98)
 WALLS = (0.9, 0.95, 0.99, 1.0)
 TIMES = np.linspace(0.0, 30.0, 121)
@@ -96,6 +100,50 @@ def report():
                 speeds = simulated(tray, restitution, walls, runs)
                 first = float(speeds[:, 0].mean())
                 print(forms.row(restitution, walls, *decay_rate(speeds), first), flush=True)
+    _report_temperatures(trays)
+
+
+def temperatures(tray, restitution, walls, runs, span=(8.0, 25.0)):
+    """Mean squares of velocity of each species along x, y, z over their mean in x and y."""
+    settings = SimulationSettings(
+        tray=tray.number, restitution=restitution, wall_restitution=walls, speeds='maxwellian'
+    )
+    found = []
+    for run in range(runs):
+        rules = rules_of(settings, tray, run)
+        beads = after_shaking(settings, rules, resting_beads(settings, tray, run), run, 0)
+        course = HardSphereGas(beads, rules).follow(span[1], (), np.linspace(*span, 35))
+        squares = course.observations.granular_temperature
+        found.append((squares / squares[:, :, :2].mean(axis=(1, 2), keepdims=True)).mean(axis=0))
+    return np.mean(found, axis=0)
+
+
+def _report_temperatures(trays):
+    print('\n| tray | species | ep, ew | x, y, z simulated | x, y, z confined |')
+    print('|' + ' --- |' * 5)
+    for number, runs in TEMPERATURES.items():
+        gas = confined_gas(trays[number])
+        for restitution, walls in ((0.9, 0.95), (0.8, 0.9)):
+            simulated = temperatures(trays[number], restitution, walls, runs)
+            each = gas.cooling(restitution, walls).granular_temperature
+            species = gas.beads.species
+            theory = np.array(
+                [
+                    np.average(each[species == k], axis=0, weights=gas.beads.counts[species == k])
+                    for k in range(len(simulated))
+                ]
+            )
+            theory /= theory[:, :2].mean()
+            for k, one in enumerate(trays[number].species):
+                print(
+                    f'| {number} | {one.material} | {restitution:g}, {walls:g} | '
+                    f'{_shown(simulated[k])} | {_shown(theory[k])} |',
+                    flush=True,
+                )
+
+
+def _shown(values):
+    return ', '.join(f'{one:.2f}' for one in values)
 
 
 class _Forms:

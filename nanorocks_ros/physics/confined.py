@@ -213,9 +213,16 @@ class ConfinedGas:
         ----------
         granular_temperature : ndarray (n, 3), [m^2/s^2]
         """
-        along, across = granular_temperature[:, 0], granular_temperature[:, 1]
-        means = _MEAN * np.sqrt(along) * special.ellipe(1.0 - across / along)
+        means = _projected(granular_temperature)
         return float(self.beads.counts @ means / self.beads.counts.sum())
+
+    def species_speeds(self, granular_temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same for each species of the tray, (n_species,), [m/s]."""
+        beads = self.beads
+        weights = beads.counts * _projected(granular_temperature)
+        sums = np.bincount(beads.species, weights)
+        speeds: NDArray[np.float64] = sums / np.bincount(beads.species, beads.counts)
+        return speeds
 
     def collision_rates(
         self, granular_temperature: NDArray[np.float64]
@@ -255,6 +262,13 @@ class ConfinedGas:
         walls = 2.0 * (1.0 - wall_restitution**2) * self.contacts.walls * np.sqrt(temperature)
         rates: NDArray[np.float64] = _MEAN * (gained / temperature - lost - walls)
         return rates
+
+
+def _projected(temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean of sqrt(vx^2 + vy^2) for each class; velocities normal, with two variances."""
+    along, across = temperature[:, 0], temperature[:, 1]
+    found: NDArray[np.float64] = _MEAN * np.sqrt(along) * special.ellipe(1.0 - across / along)
+    return found
 
 
 def confined_gas(tray: Tray, sizes: int = 3) -> ConfinedGas:

@@ -145,6 +145,31 @@ def test_the_motion_along_the_height_is_cooled_as_much_as_simulated():
     assert simulated < 0.6
 
 
+def test_light_and_heavy_beads_have_the_energies_that_are_simulated():
+    # Equal energies would give the glass 4 times the mean square velocity of the acrylic beads.
+    settings = SimulationSettings(
+        tray=3, restitution=0.9, wall_restitution=0.95, speeds='maxwellian'
+    )
+    ratios = []
+    for run in range(24):
+        rules = rules_of(settings, TRAYS[3], run)
+        beads = after_shaking(settings, rules, resting_beads(settings, TRAYS[3], run), run, 0)
+        course = HardSphereGas(beads, rules).follow(20.0, (), np.linspace(8.0, 20.0, 25))
+        squares = course.observations.granular_temperature[:, :, :2].mean(axis=(0, 2))
+        ratios.append(squares[1] / squares[0])
+    speeds = gas(3).species_speeds(gas(3).cooling(0.9, 0.95).granular_temperature)
+    # Over a range of sizes the mean of squares is more than the square of means by 5 %.
+    assert (speeds[1] / speeds[0]) ** 2 == pytest.approx(np.exp(np.log(ratios).mean()), rel=0.12)
+    assert np.mean(ratios) > 2.5
+
+
+def test_the_mean_of_the_species_is_that_of_all_beads():
+    temperature = gas(5).cooling(0.85, 0.95).granular_temperature
+    counts = [one.count for one in TRAYS[5].species]
+    mean = np.average(gas(5).species_speeds(temperature), weights=counts)
+    assert mean == pytest.approx(gas(5).mean_projected_speed(temperature))
+
+
 @pytest.mark.parametrize(
     ('number', 'restitution', 'walls', 'runs'),
     [
