@@ -9,9 +9,10 @@ beads thrown into the box at random touch along a direction k with the density
 exactly. The other beads make contacts more frequent, because beads that touch leave more room to
 the rest: to first order in the density by 1 + x_ab, x_ab being the volume from which the pair
 keeps others, less when touching than when apart, averaged over the box. Both are worked out
-numerically, with the walls. Higher orders follow a known fluid at the density at which it has the
-same first order: Carnahan and Starling's spheres for pairs, Henderson's discs for walls (which of
-the two was decided by simulation, docs/theory.md). Where the box is wide this is Enskog's theory.
+numerically, with the walls. Higher orders are those of Carnahan and Starling's spheres at the
+density at which these have the same first order. A wall is met more often because beads next to it
+are pushed there by those they touch: by 1 + the first order times the contact value, as the
+pressure of a fluid is. Where the box is wide all of this is Enskog's theory.
 """
 
 from __future__ import annotations
@@ -34,13 +35,11 @@ if TYPE_CHECKING:
 _POINTS = 4096
 # Directions in an octant, along z and around it.
 _NODES = 12
-# First order of the contact value of spheres in the filling factor, and of the pressure of discs
-# on a wall in the part of the area covered.
+# First order of the contact value of spheres in the filling factor.
 _SPHERES = 2.5
-_DISCS = 2.0
-# Beyond, the series is extrapolated too far to trust.
-_MOST_FILLING = 0.45
-_MOST_COVERED = 0.65
+# Beyond, the first order says too little.
+_MOST_FILLING = 0.4
+_MOST_AT_WALLS = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,21 +127,20 @@ def contacts(beads: BeadClasses, dimensions: tuple[float, float, float]) -> Cont
     overlaps = _overlaps(room, touch)
     crowded = _pair_crowding(beads, room, touch, overlaps)
     walls = _wall_crowding(beads, room, touch, overlaps)
-    filling, covered = crowded / _SPHERES, walls / _DISCS
-    if filling.max() > _MOST_FILLING or covered.max() > _MOST_COVERED:
+    filling = crowded / _SPHERES
+    if filling.max() > _MOST_FILLING or walls.sum(axis=1).max() > _MOST_AT_WALLS:
         raise ConfigurationError(
             'confined theory',
             f'beads are as crowded as in a fluid of filling factor {filling.max():.2f}, and at '
-            f'walls as discs that cover {covered.max():.2f}',
-            f'it is good up to {_MOST_FILLING} and {_MOST_COVERED}: use the decay library',
+            f'walls {walls.sum(axis=1).max():.2f} more frequent to first order',
+            f'it is good up to {_MOST_FILLING} and {_MOST_AT_WALLS}: use the decay library',
         )
     partners = beads.counts - np.eye(beads.counts.size)
     rates, squares = _directions(room, touch)
-    factor = partners * np.vectorize(contact_value)(filling)
-    discs = (1.0 + covered**2 / 8.0) / (1.0 - covered) ** 2
-    return Contacts(
-        pairs=np.maximum(factor, 0.0)[..., np.newaxis] * rates, squares=squares, walls=discs / room
-    )
+    crowding = np.vectorize(contact_value)(filling)
+    pairs = np.maximum(partners * crowding, 0.0)[..., np.newaxis] * rates
+    at_walls = 1.0 + (crowding[..., np.newaxis] * walls).sum(axis=1)
+    return Contacts(pairs=pairs, squares=squares, walls=at_walls / room)
 
 
 def _shared(
@@ -207,9 +205,12 @@ def _wall_crowding(
     touch: NDArray[np.float64],
     overlaps: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """How much more probable contacts with walls are, to first order in the density, (n, 3)."""
+    """How much more probable contacts with walls are, to first order in the density.
+
+    (n, n, 3): of each class, what each class adds, across each axis.
+    """
     places = _ball(_spread(3))
-    found = np.zeros_like(room)
+    found = np.zeros((*touch.shape, 3))
     for a, c in np.ndindex(touch.shape):
         apart = touch[a, c] * places
         shared = _shared(room[a], room[c], apart)
@@ -220,7 +221,7 @@ def _wall_crowding(
             at_wall = (
                 _volume(float(touch[a, c])) * (inside * rest).mean() / (room[c].prod() * area)
             )
-            found[a, axis] += (beads.counts[c] - (a == c)) * (overlaps[a, c] - at_wall)
+            found[a, c, axis] = (beads.counts[c] - (a == c)) * (overlaps[a, c] - at_wall)
     return found
 
 

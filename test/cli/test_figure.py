@@ -13,7 +13,7 @@ import pytest
 from nanorocks_ros.cli.main import main
 
 sys.path.append(str(Path(__file__).parents[1] / 'study'))
-from decays import PERIOD, simulated_table, write_rows
+from decays import simulated_table, write_rows
 
 
 @pytest.fixture(scope='module')
@@ -114,7 +114,13 @@ def test_speeds_that_rise_are_no_decay(tmp_path, capsys):
 
 
 def test_a_tray_too_crowded_for_the_theory_says_what_to_use(tmp_path, capsys):
-    rows = [(0.1 * k, 1, 0.0, 0.01 / (1.0 + 0.05 * k), 1e-5, PERIOD) for k in range(1, 220)]
-    table = write_rows(tmp_path / 'tray_8_speed.csv', rows)
-    assert draw('instantaneous', table, tmp_path / 'a.png') == 2
+    rows = [(0.1 * k, 1, 0.0, 0.01 / (1.0 + 0.05 * k), 1e-5, 0.3) for k in range(1, 220)]
+    table = write_rows(tmp_path / 'tray_1_speed.csv', rows)
+    trays = tmp_path / 'trays.yaml'
+    trays.write_text(
+        'densities_g_cm3: {acrylic: 1.18}\n'
+        'trays: {1: {dimensions_mm: [15, 15, 3], '
+        'species: [{material: acrylic, diameter_mm: 2, count: 60}]}}\n'
+    )
+    assert draw('instantaneous', table, tmp_path / 'a.png', '--trays', str(trays)) == 2
     assert 'use the decay library' in capsys.readouterr().err
