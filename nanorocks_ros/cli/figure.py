@@ -76,7 +76,8 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         shown = {'tray': number, 'cycles': len(cycles), **values}
         print(json.dumps(shown, allow_nan=False))
-    print(f'nanorocks: {len(cycles)} cycles of tray {number} in {path}', file=sys.stderr)
+    many = f'{len(cycles)} cycles' if len(cycles) > 1 else 'a cycle'
+    print(f'nanorocks: {many} of tray {number} in {path}', file=sys.stderr)
     return 0
 
 

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.study.cycles import CycleSpeeds
 
 _MM = 1e3
+# Of a few cycles longer stretches are needed to see a slope.
+_WINDOWS, _MANY = 8, 6
 _MEASURED, _FIT, _BAND = '#30506f', '#c23b22', '#e0a458'
 
 
@@ -71,13 +73,15 @@ def instantaneous_figure(
         confined_gas(tray),
         wall_restitution=wall_restitution,
         cycles=len(cycles),
+        windows=_WINDOWS if len(cycles) >= _MANY else _WINDOWS // 2,
     )
     figure = Figure(figsize=(9.0, 8.0), layout='constrained')
     above, below = figure.subplots(2, 1, sharex=True)
     _draw_paper(above, found)
     _draw_local(below, found, wall_restitution)
     above.set_title(
-        f'Tray {tray.number}, mean over {len(cycles)} cycle{"s" if len(cycles) > 1 else ""}',
+        f'Tray {tray.number}, '
+        + (f'mean over {len(cycles)} cycles' if len(cycles) > 1 else 'one cycle'),
         fontsize=10,
     )
     with whole_file(path) as part:
