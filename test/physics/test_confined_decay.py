@@ -13,7 +13,11 @@ from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.physics.confined import confined_gas
-from nanorocks_ros.physics.confined_decay import windowed_decay_rate, windowed_restitution
+from nanorocks_ros.physics.confined_decay import (
+    confined_restitution,
+    windowed_decay_rate,
+    windowed_restitution,
+)
 from nanorocks_ros.simulation.ensemble import cooling_runs
 
 TRAYS = load_trays()
@@ -63,6 +67,14 @@ def test_with_elastic_walls_the_way_to_the_steady_state_matters():
     found = windowed_restitution(gas(1), rate, 1.0, initial_speed=speed[0], window=window)
     assert found == pytest.approx(0.8, abs=0.015)
     assert gas(1).restitution(rate, 1.0) < 0.78
+
+
+def test_a_crowded_gas_that_cannot_stay_even_gives_no_number():
+    # Simulated tray 8 at 0.8 decays with 349 /m, from which an even gas would read 0.90.
+    with pytest.raises(FitError, match='forms clusters'):
+        confined_restitution(TRAYS[8], 349.0, 0.95)
+    # At 0.98 it stays even: simulated 108 /m.
+    assert confined_restitution(TRAYS[8], 108.0, 0.95).value == pytest.approx(0.98, abs=0.003)
 
 
 def test_a_decay_that_no_restitution_makes_is_an_error():
