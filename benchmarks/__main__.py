@@ -19,6 +19,7 @@ ALL = (
     'deflections',
     'cor_coverage',
     'cor_recovery',
+    'closed_forms',
     'engine',
     'engine_physics',
     'validation',

@@ -25,6 +25,7 @@ def build_parser() -> argparse.ArgumentParser:
         analyse,
         calibrate,
         calibrate_area,
+        figure,
         library,
         look,
         simulate,
@@ -42,6 +43,7 @@ def build_parser() -> argparse.ArgumentParser:
     analyse.add_parser(commands)
     calibrate.add_parser(commands)
     calibrate_area.add_parser(commands)
+    figure.add_parser(commands)
     library.add_parser(commands)
     look.add_parser(commands)
     simulate.add_parser(commands)

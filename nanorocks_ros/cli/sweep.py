@@ -69,7 +69,13 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('--csv', help='write the curves as a table, too')
     parser.add_argument('--figure', help='draw the deviation from --reference over the grid')
     parser.add_argument(
-        '--reference', help='point of the grid (A,B), or .csv or .npz file of a decay'
+        '--reference',
+        help='point of the grid (A,B), .csv or .npz file of a decay, or results of an analysis',
+    )
+    parser.add_argument(
+        '--free-speed',
+        action='store_true',
+        help='the reference may start faster or slower than the sweep, by up to 1.5 times',
     )
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     add_flags(parser, SimulationSettings(), skip=_CAMERA)
@@ -96,7 +102,7 @@ def run(options: argparse.Namespace) -> int:
         units = {row.name: row.unit for row in rows(SimulationSettings())}
         found.write_table(Path(options.csv), units)
     if options.figure:
-        _draw(Path(options.figure), found, reference)
+        _draw(Path(options.figure), found, reference, options.free_speed)
     _print(options, found)
     return 0
 
@@ -192,7 +198,8 @@ def _number(text: str) -> int | float:
 
 def _reference(options: argparse.Namespace, plan: SweepPlan) -> SpeedCurve | list[Scalar] | None:
     """The decay to compare with, or the point of the grid where it will be."""
-    from nanorocks_ros.study.curves import place_of, read_curve
+    from nanorocks_ros.study.curves import place_of
+    from nanorocks_ros.study.cycles import read_decay
 
     if (options.figure is None) != (options.reference is None):
         raise ConfigurationError('--figure', 'goes with --reference', 'give both or neither')
@@ -202,8 +209,8 @@ def _reference(options: argparse.Namespace, plan: SweepPlan) -> SpeedCurve | lis
 
     check_drawable(Path(options.figure), plan.axes)
     path = Path(options.reference)
-    if path.suffix in ('.csv', '.npz') or path.is_file():
-        return read_curve(path)
+    if path.suffix in ('.csv', '.npz') or path.exists():
+        return read_decay(path)
     point = _point(options.reference)
     place_of({axis.name: axis.values for axis in plan.axes}, point)
     return point
@@ -218,13 +225,15 @@ def _point(text: str) -> list[Scalar]:
         ) from error
 
 
-def _draw(path: Path, found: Sweep, reference: SpeedCurve | list[Scalar] | None) -> None:
+def _draw(
+    path: Path, found: Sweep, reference: SpeedCurve | list[Scalar] | None, scaled: bool
+) -> None:
     from nanorocks_ros.study.curves import curve_at
     from nanorocks_ros.study.sweep_figure import chi_square_figure
 
     if reference is not None:
         curve = curve_at(found, reference) if isinstance(reference, list) else reference
-        chi_square_figure(path, found, curve)
+        chi_square_figure(path, found, curve, scaled=scaled)
 
 
 def _print(options: argparse.Namespace, found: Sweep) -> None:

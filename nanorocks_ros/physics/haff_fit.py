@@ -40,7 +40,9 @@ _FEWEST_DEGREES = 3.0
 _LOG_HAFF_TIME = (math.log(1e-3), math.log(1e5))
 # Of q and of the quick part, times the number of beads: what simulated gases in trays 1, 3 and 5
 # have, at restitutions from 0.6 to 0.95; see `haff_likelihood` for their spread.
-_USUAL_TIMES_BEADS = np.array([0.4, 0.1])
+USUAL_TIMES_BEADS = np.array([0.4, 0.1])
+# In ln(1 + t/tau), after which the quick part is forgotten; `haff_likelihood` takes the power 10.
+QUICK_RANGE = 0.1
 _LOG_NOISE = (math.log(1e-12), math.log(10.0))
 # The errors given are trusted in proportion only.
 _LOG_SCALE = (math.log(0.05), math.log(20.0))
@@ -195,7 +197,7 @@ def _binned(
     ends = starts + counts - 1
     return Decay(
         time=time,
-        usual=np.log(_USUAL_TIMES_BEADS / beads),
+        usual=np.log(USUAL_TIMES_BEADS / beads),
         inner_distance=(time[ends] - time[starts]) * (counts + 1) / (3.0 * counts),
         starts=starts,
         counts=counts,

@@ -40,12 +40,16 @@ class SpeedCurve:
         One standard error; 0 where it is not known.
     point : tuple of float, int, str or bool, or None
         Where on the grid of a sweep the curve was taken from.
+    cycles : int or None
+        How many measured decays it is the mean of; None: it is simulated, or not known, and
+        `error` holds all of its scatter.
     """
 
     times: NDArray[np.float64]
     speed: NDArray[np.float64]
     error: NDArray[np.float64]
     point: tuple[Scalar, ...] | None = None
+    cycles: int | None = None
 
 
 def read_curve(path: Path) -> SpeedCurve:
@@ -161,50 +165,3 @@ def _equal(one: Scalar, other: Scalar) -> bool:
     if isinstance(one, int | float) and isinstance(other, int | float):
         return math.isclose(one, other, rel_tol=_EQUAL, abs_tol=_EQUAL)
     return one == other
-
-
-def chi_square(sweep: Sweep, curve: SpeedCurve) -> NDArray[np.float64]:
-    """Mean squared deviation from a curve, in units of the squared standard errors of both.
-
-    The mean runs over the times of the sweep that the curve covers; in between it is
-    interpolated. Near 1 a point cannot be told from the curve. The deviations at different
-    times are not independent, so this is a map for the eye and no likelihood.
-
-    Parameters
-    ----------
-    sweep : Sweep
-    curve : SpeedCurve
-
-    Returns
-    -------
-    ndarray (*grid,)
-        0 at the point of the grid that the curve was taken from.
-
-    Raises
-    ------
-    ConfigurationError
-        When the curve covers fewer than two times of the sweep, or no error is known.
-
-    References
-    ----------
-    Compare [B19] fig. 12, whose deviations are not divided by errors.
-    """
-    times = sweep.times
-    covered = (times >= curve.times[0]) & (times <= curve.times[-1])
-    if covered.sum() < 2:
-        raise ConfigurationError(
-            '--reference',
-            f'covers {covered.sum()} of the times of the sweep',
-            'choose --times between its ends',
-        )
-    speed = np.interp(times[covered], curve.times, curve.speed)
-    error = np.interp(times[covered], curve.times, curve.error)
-    own = np.nan_to_num(sweep.mean_projected_speed_error[..., covered])
-    variance = own**2 + error**2
-    if not (variance > 0.0).all():
-        raise ConfigurationError(
-            '--reference', 'no errors are known', 'sweep with two or more --runs'
-        )
-    deviation = sweep.mean_projected_speed[..., covered] - speed
-    found: NDArray[np.float64] = np.mean(deviation**2 / variance, axis=-1)
-    return found

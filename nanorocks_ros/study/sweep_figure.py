@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import textwrap
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.settings import SimulationSettings, rows
-from nanorocks_ros.study.curves import chi_square
+from nanorocks_ros.study.deviation import chi_square
+from nanorocks_ros.study.sweep_contours import contours
 
 mpl.use('Agg')
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,6 +30,8 @@ if TYPE_CHECKING:
 
 _PICTURES = ('.png', '.pdf', '.svg')
 _MARK = '#ffffff'
+_OUTLINE = [withStroke(linewidth=4.5, foreground='black')]
+_LABEL_WIDTH = 55
 # Below this, two curves are alike; colours are not spent on noise.
 _ALIKE = 0.5
 
@@ -56,8 +61,13 @@ def check_drawable(path: Path, axes: tuple[Axis, ...]) -> None:
         )
 
 
-def chi_square_figure(path: Path, sweep: Sweep, curve: SpeedCurve) -> None:
+def chi_square_figure(
+    path: Path, sweep: Sweep, curve: SpeedCurve, *, scaled: bool = False
+) -> None:
     """Map of the deviation of a sweep over two settings from a decay, as a picture.
+
+    Over restitutions of beads and walls, or the width of their distribution, the lines are drawn
+    along which closed forms give the same decay.
 
     Parameters
     ----------
@@ -65,6 +75,8 @@ def chi_square_figure(path: Path, sweep: Sweep, curve: SpeedCurve) -> None:
     sweep : Sweep
         Over two settings.
     curve : SpeedCurve
+    scaled : bool, optional
+        Whether the initial speed is free, see `chi_square`.
 
     Raises
     ------
@@ -77,7 +89,7 @@ def chi_square_figure(path: Path, sweep: Sweep, curve: SpeedCurve) -> None:
     After [B19] fig. 12.
     """
     check_drawable(path, sweep.axes)
-    values = chi_square(sweep, curve)
+    values = chi_square(sweep, curve, scaled=scaled)
     across, up = (np.array(axis.values, dtype=np.float64) for axis in sweep.axes)
     order = np.ix_(np.argsort(across), np.argsort(up))
     figure = Figure(figsize=(7.5, 6.0), layout='constrained')
@@ -92,6 +104,7 @@ def chi_square_figure(path: Path, sweep: Sweep, curve: SpeedCurve) -> None:
         norm=LogNorm(vmin=_ALIKE, vmax=max(float(shown.max()), 2.0)),
     )
     figure.colorbar(mesh, ax=axes, label=r'mean $\chi^2$ over the times', extend='min')
+    _draw_contours(axes, sweep, curve)
     _mark(axes, sweep, values, curve)
     figure.savefig(path, dpi=110)
 
@@ -117,9 +130,24 @@ def _mark(axes: Axes, sweep: Sweep, values: NDArray[np.float64], curve: SpeedCur
     axes.set_xlabel(_label(first))
     axes.set_ylabel(_label(second))
     axes.set_title(f'{sweep.runs} runs at each of {values.size} points')
-    axes.legend(loc='upper left')
+    # Beside the map, whose corners may hold what matters.
+    figure: Any = axes.figure
+    figure.legend(loc='outside lower center', ncols=3, fontsize=9, facecolor='#c8ccd4')
+
+
+def _draw_contours(axes: Axes, sweep: Sweep, curve: SpeedCurve) -> None:
+    """Lines of one decay rate, within the map."""
+    ends = axes.get_xlim(), axes.get_ylim()
+    for one, style in zip(contours(sweep, curve), ('-', '--'), strict=False):
+        first = sweep.axes[0].name == 'restitution'
+        x, y = (one.restitution, one.other) if first else (one.other, one.restitution)
+        seen = (x >= ends[0][0]) & (x <= ends[0][1]) & (y >= ends[1][0]) & (y <= ends[1][1])
+        label = one.label if seen.any() else f'{one.label} (outside)'
+        axes.plot(x, y, style, color=_MARK, lw=2.2, label=label, path_effects=_OUTLINE)
+    axes.set_xlim(*ends[0])
+    axes.set_ylim(*ends[1])
 
 
 def _label(axis: Axis) -> str:
     (row,) = (one for one in rows(SimulationSettings()) if one.name == axis.name)
-    return f'{row.doc} [{row.unit}]' if row.unit else row.doc
+    return textwrap.fill(f'{row.doc} [{row.unit}]' if row.unit else row.doc, _LABEL_WIDTH)

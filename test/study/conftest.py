@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-# The plate that is drawn for the stages is fitted here.
+# The plate that is drawn for the stages is fitted here; tables of decays lie beside this file.
+sys.path.append(str(Path(__file__).parent))
 sys.path.append(str(Path(__file__).parents[1] / 'stages'))
 
 _PATIENCE = 60.0

@@ -9,7 +9,8 @@ import pytest
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.recordings.results import write_csv
-from nanorocks_ros.study.curves import SpeedCurve, chi_square, curve_at, read_curve
+from nanorocks_ros.study.curves import SpeedCurve, curve_at, read_curve
+from nanorocks_ros.study.deviation import chi_square
 from nanorocks_ros.study.sweep import sweep
 from nanorocks_ros.study.sweep_figure import chi_square_figure
 from nanorocks_ros.study.sweep_plan import sweep_plan

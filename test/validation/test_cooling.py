@@ -4,8 +4,9 @@ import math
 
 import pytest
 
-from benchmarks.hard_sphere_runs import cooling_coefficient, over_runs
-from benchmarks.hard_spheres import haff_coefficient
+from benchmarks.hard_sphere_runs import DIAMETER, cooling_coefficient, over_runs
+from benchmarks.hard_spheres import contact_value, haff_coefficient
+from nanorocks_ros.physics.kinetic import kinetic_restitution
 
 # 2048 beads at 2.6 % filling in a cube of 34 diameters, eight mean free paths: too small for
 # vortices, which at these restitutions need a cube of more than 30 to outgrow the cooling.
@@ -25,3 +26,8 @@ def test_haff_decay_has_the_coefficient_of_kinetic_theory(restitution, runs, haf
     assert found.error / found.mean < 0.004
     assert found.mean == pytest.approx(haff_coefficient(restitution), rel=0.01)
     assert found.mean == pytest.approx(math.sqrt(2.0) / 6.0, rel=0.01)
+    # And so the dilute form reads the restitution back, from the decay of the projected speed.
+    loss = math.pi * DIAMETER**2 * DENSITY / DIAMETER**3 * contact_value(DENSITY)
+    rate = found.mean * 4.0 / math.pi * (1.0 - restitution**2) * loss
+    read = kinetic_restitution(rate, DIAMETER, DENSITY / DIAMETER**3).value
+    assert read == pytest.approx(restitution, abs=0.0006)

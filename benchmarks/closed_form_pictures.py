@@ -1,0 +1,81 @@
+"""Pictures for docs/theory.md and docs/sweeps.md, made by the commands that anybody can give.
+
+``python -m benchmarks.closed_form_pictures FOLDER`` writes them: some minutes of one core. Cycles
+are simulated, without rotation, and their mean speeds have random errors put on them.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from nanorocks_ros.cli.main import main as nanorocks
+from nanorocks_ros.experiment.settings import SimulationSettings
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.recordings.results import write_csv
+from nanorocks_ros.simulation.ensemble import cooling_runs
+
+TIMES = np.arange(0.1, 30.0, 0.1)
+PERIOD = 60.0
+FIELDS = {
+    'time': 's',
+    'cycle': '1',
+    'cycle_start': 's',
+    'mean_projected_speed': 'm/s',
+    'mean_projected_speed_error': 'm/s',
+}
+# As many runs at a point as the paper has.
+SWEEP = ('--runs', '178', '--times', '0:30:31', '--seed', '7')
+
+
+def measured_cycles(path, cycles, error, *, tray=1, restitution=0.89, walls=0.99, seed=3):
+    """A table of speeds as `nanorocks analyse` writes it, from simulated cycles.
+
+    Errors are one number, [m/s], independent from one speed to the next.
+    """
+    settings = SimulationSettings(
+        tray=tray, restitution=restitution, wall_restitution=walls, seed=seed
+    )
+    speeds = cooling_runs(settings, load_trays()[tray], TIMES, range(cycles)).mean_projected_speed
+    noisy = speeds + error * np.random.default_rng(seed).normal(size=speeds.shape)
+    rows = [
+        (k * PERIOD + age, k + 1, k * PERIOD, speed, error)
+        for k in range(cycles)
+        for age, speed in zip(TIMES.tolist(), noisy[k].tolist(), strict=True)
+    ]
+    write_csv(path, list(FIELDS), list(FIELDS.values()), rows)
+
+
+def _draw(folder, scratch):
+    table = scratch / 'tray_1_speed.csv'
+    measured_cycles(table, 18, 3e-4)
+    for kind in ('decay', 'instantaneous'):
+        yield ('figure', kind, str(table), '-o', str(folder / f'{kind}.png'), '--force')
+    grid = {
+        'walls': ('--restitution', '0.7:1:31', '--wall-restitution', '0.95:1:11'),
+        'width': ('--restitution', '0.7:0.9:21', '--restitution-width', '0:0.2:6'),
+    }
+    for name, axes in grid.items():
+        output = str(scratch / f'{name}.npz')
+        picture = str(folder / f'sweep_{name}.png')
+        yield (
+            'sweep', *axes, *SWEEP, '-o', output, '--keep-runs', '--workers', '1',
+            '--figure', picture, '--reference', str(table), '--free-speed',
+        )  # fmt: skip
+
+
+def main(folder):
+    """Write the pictures; the first exit code that is not 0, or 0."""
+    with TemporaryDirectory() as scratch:
+        for arguments in _draw(Path(folder), Path(scratch)):
+            code = nanorocks(arguments)
+            if code:
+                return code
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main(sys.argv[1] if len(sys.argv) > 1 else 'docs'))

@@ -1,0 +1,193 @@
+"""The figure of a measured decay after the paper's figure 7."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+import numpy as np
+from scipy import optimize
+
+from nanorocks_ros.errors import FitError
+from nanorocks_ros.physics.confined_decay import confined_restitution
+from nanorocks_ros.physics.estimate import Estimate
+from nanorocks_ros.physics.haff import granular_energy, haff_speed
+from nanorocks_ros.physics.haff_fit import HaffFit, fit_haff
+from nanorocks_ros.physics.paper import RELATIVE_TO_MEAN_SPEED, paper_restitution
+from nanorocks_ros.study.cycles import check_errors, mean_cycle
+from nanorocks_ros.study.output_files import whole_file
+
+mpl.use('Agg')
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.study.curves import SpeedCurve
+    from nanorocks_ros.study.cycles import CycleSpeeds
+
+_MM, _NANOJOULE = 1e3, 1e9
+_MEASURED, _FIT, _PAPER = '#30506f', '#c23b22', '#e8b93c'
+
+
+def decay_figure(
+    path: Path,
+    tray: Tray,
+    cycles: Sequence[CycleSpeeds],
+    *,
+    wall_restitution: float,
+    span: tuple[float, float],
+) -> dict[str, float | None]:
+    """The energy of each cycle and of their mean, with our fit and the paper's.
+
+    Parameters
+    ----------
+    path : Path
+    tray : Tray
+    cycles : sequence of CycleSpeeds
+    wall_restitution : float, [0, 1]
+        For the confined theory.
+    span : tuple of 2 floats, [s]
+        First and last time since the shaking event that is fitted.
+
+    Returns
+    -------
+    dict
+        What was fitted, in SI; None where a relation has no value.
+
+    Raises
+    ------
+    FitError
+        When the mean speed does not fall.
+    RecordingError
+        When the cycles have too few times in common, or errors are not known.
+
+    References
+    ----------
+    [B19] fig. 7.
+    """
+    curve = mean_cycle(cycles, *span)
+    check_errors(curve)
+    fit = fit_haff(curve.times, curve.speed, curve.error, tray.count * len(cycles))
+    energy, time = _paper_fit(curve, tray.mean_mass)
+    found = _values(tray, fit, (energy, time), wall_restitution)
+    figure = Figure(figsize=(8.0, 5.5), layout='constrained')
+    axes = figure.subplots()
+    _draw_energy(axes, tray, cycles, curve)
+    scale = _relative_energy(1.0, tray.mean_mass) * _NANOJOULE
+    law = haff_speed(curve.times, fit.initial_speed, fit.haff_time)
+    label = f"Haff's law, speeds weighted: {_cor_text('confined theory', found, 'confined')}"
+    axes.plot(curve.times, scale * law**2, color=_FIT, lw=2, zorder=3, label=label)
+    axes.plot(
+        curve.times,
+        _NANOJOULE * energy / (1.0 + curve.times / time) ** 2,
+        color=_PAPER,
+        lw=2,
+        ls='--',
+        zorder=4,
+        label=f'as the paper fits, energies alike: {_cor_text("its COR", found, "paper")}',
+    )
+    axes.set_title(
+        f'Tray {tray.number}, {len(cycles)} cycle{"s" if len(cycles) > 1 else ""}: '
+        f'1/(v0 tau) = {fit.decay_rate:.3g} ± {fit.decay_rate * fit.log_decay_rate_error:.2g} /m',
+        fontsize=10,
+    )
+    axes.legend(frameon=False)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=110)
+    return found
+
+
+def _relative_energy(speed: float, mass: float) -> float:
+    return granular_energy(RELATIVE_TO_MEAN_SPEED * speed, mass)
+
+
+def _paper_fit(curve: SpeedCurve, mass: float) -> tuple[float, float]:
+    """T0 [J] and tau0 [s] of the paper's fit: least squares of the energies, all alike."""
+    scale = _relative_energy(1.0, mass)
+    energies = scale * curve.speed**2
+
+    def residual(logs: NDArray[np.float64]) -> NDArray[np.float64]:
+        law = np.exp(logs[0]) / (1.0 + curve.times * np.exp(-logs[1])) ** 2
+        difference: NDArray[np.float64] = (energies - law) / energies[0]
+        return difference
+
+    start = np.log([energies[0], 0.3 * curve.times[-1] + 1e-9])
+    best = optimize.least_squares(residual, start).x
+    return float(np.exp(best[0])), float(np.exp(best[1]))
+
+
+def _values(
+    tray: Tray, fit: HaffFit, paper: tuple[float, float], walls: float
+) -> dict[str, float | None]:
+    rate = fit.decay_rate
+    error = rate * fit.log_decay_rate_error
+    found: dict[str, float | None] = {
+        'initial_speed': fit.initial_speed,
+        'haff_time': fit.haff_time,
+        'decay_rate': rate,
+        'decay_rate_error': error,
+        'paper_energy': paper[0],
+        'paper_haff_time': paper[1],
+        'paper': None,
+        'confined': None,
+        'confined_error': None,
+        'wall_restitution': walls,
+    }
+    try:
+        found['paper'] = paper_restitution(
+            *paper, tray.mean_mass, tray.diameter, tray.number_density
+        )
+    except FitError:
+        found['paper'] = None
+    try:
+        cor = confined_restitution(tray, Estimate(value=rate, error=error), walls)
+    except FitError:
+        return found
+    return {**found, 'confined': cor.value, 'confined_error': cor.error}
+
+
+def _cor_text(name: str, found: dict[str, float | None], key: str) -> str:
+    value, error = found[key], found.get(f'{key}_error')
+    if value is None:
+        return f'{name} has no value'
+    walls = f', walls {found["wall_restitution"]:g}' if key == 'confined' else ''
+    return f'{name} {value:.3f}' + (f' ± {error:.3f}' if error else '') + walls
+
+
+def _draw_energy(axes: Axes, tray: Tray, cycles: Sequence[CycleSpeeds], curve: SpeedCurve) -> None:
+    scale = _relative_energy(1.0, tray.mean_mass) * _NANOJOULE
+    if len(cycles) > 1:
+        lines = [np.column_stack((one.times, scale * one.speed**2)) for one in cycles]
+        axes.add_collection(
+            LineCollection(
+                lines,
+                colors=_MEASURED,
+                linewidths=0.7,
+                alpha=max(0.06, min(0.5, 4.0 / len(cycles))),
+                label=f'{len(cycles)} cycles',
+            )
+        )
+    axes.errorbar(
+        curve.times,
+        scale * curve.speed**2,
+        yerr=2.0 * scale * curve.speed * curve.error,
+        fmt='o',
+        ms=2.5,
+        lw=0.8,
+        color=_MEASURED,
+        zorder=2,
+        label='at their mean speed' if len(cycles) > 1 else 'measured',
+    )
+    axes.set_yscale('log')
+    # Noise about zero reaches down without end.
+    axes.set_ylim(bottom=0.3 * scale * float(curve.speed.min()) ** 2)
+    axes.set_xlabel('time since the shaking event [s]')
+    axes.set_ylabel(r'energy at the relative speed $\frac{1}{2} m (2\bar{v})^2$ [nJ]')
+    axes.grid(alpha=0.25)
