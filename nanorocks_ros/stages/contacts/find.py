@@ -237,7 +237,11 @@ class ContactFinder:
             after_errors=np.array([_errors(one)[1] for one in kinks]),
             separation=separation,
             separation_error=math.sqrt(
-                variance + its + when.error**2 * float(relative[0] @ relative[0])
+                variance
+                + its
+                + first.shared_error**2
+                + second.shared_error**2
+                + when.error**2 * float(relative[0] @ relative[0])
             ),
             temperatures=np.array(
                 [self._around.temperature(when.time, one.species) for one in kinks]

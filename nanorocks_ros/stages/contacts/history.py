@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -37,6 +38,8 @@ class Kink(NamedTuple):
         Through places past the camera.
     last, first : float, [s]
         Times of the last picture before and of the first after.
+    shared_error : float, [m]
+        Of a coordinate of all places alike, which their scatter does not show.
     """
 
     track: int
@@ -46,6 +49,7 @@ class Kink(NamedTuple):
     after: Line
     last: float
     first: float
+    shared_error: float
 
 
 class TrackHistory:
@@ -152,6 +156,7 @@ class TrackHistory:
             self._line(first, end).scaled(variance),
             float(self._times[first - 1]),
             float(self._times[first]),
+            math.sqrt(max(1.0 - variance, 0.0)) * float(np.mean(self._errors[here])),
         )
 
     def _make_room(self) -> None:

@@ -1,0 +1,308 @@
+"""What single contacts say of the restitution: rebounds of the walls, collisions of the beads.
+
+Both are functions of one restitution alone, on a grid of its values, to be added to the log
+likelihood of the decay. Constants that do not depend on the restitution are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.special import logsumexp, ndtr
+
+from nanorocks_ros.errors import FitError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from nanorocks_ros.records import PairCollision, Rebound
+
+OUTLIERS = 0.05
+"""Share of contacts that were something else: a wrong link, a third bead that nobody saw."""
+
+VERTICAL_RATIOS = (0.2, 0.3, 0.45, 0.65, 0.9, 1.2)
+"""Mean square of the vertical over that of a horizontal velocity component; all alike likely."""
+
+# What errors may be over what was stated, and how likely: even in the logarithm, unless more
+# contacts than a few say otherwise.
+_ERROR_SCALES = (0.7, 1.0, 1.4, 2.0, 2.8)
+# Range of speeds after a contact of the other kind, over the speed before.
+_RANGE = 2.0
+_HEIGHTS = 24
+_SQRT_2_PI = math.sqrt(2.0 * math.pi)
+
+
+def rebound_log_likelihood(
+    rebounds: Sequence[Rebound], wall_restitution: ArrayLike, *, outliers: float = OUTLIERS
+) -> NDArray[np.float64]:
+    """How likely some rebounds are for each of some restitutions of the side walls.
+
+    The speed before is as uncertain as that after, and any speed is as likely; given the speed
+    before, that a rebound was found says nothing of the speed after.
+
+    Parameters
+    ----------
+    rebounds : sequence of Rebound
+    wall_restitution : array_like (n,), 0 to 1
+    outliers : float, 0 to 1
+        Share of rebounds that were something else.
+
+    Returns
+    -------
+    ndarray (n,)
+        Log likelihood but for a constant; 0 without rebounds.
+    """
+    grid = _grid('wall_restitution', wall_restitution)
+    _check_share(outliers)
+    if not rebounds:
+        return np.zeros_like(grid)
+    columns = np.array(
+        [
+            (one.incoming, one.outgoing, one.incoming_error, one.outgoing_error,
+             one.wall_velocity_error)
+            for one in rebounds
+        ]
+    )  # fmt: skip
+    incoming, outgoing, before, after, wall = columns.T[:, :, None]
+    # The speed of the wall is in both speeds, with opposite signs.
+    variance = (grid * before) ** 2 + after**2 + ((1.0 + grid) * wall) ** 2
+    square = (outgoing - grid * incoming) ** 2 / variance
+    other = outliers / (_RANGE * incoming)
+    by_scale = []
+    for scale in _ERROR_SCALES:
+        density = np.exp(-0.5 * square / scale**2) / (_SQRT_2_PI * scale * np.sqrt(variance))
+        by_scale.append(np.log((1.0 - outliers) * density + other).sum(axis=0))
+    return np.asarray(logsumexp(by_scale, axis=0) - math.log(len(_ERROR_SCALES)))
+
+
+def pair_log_likelihood(
+    collisions: Sequence[PairCollision],
+    restitution: ArrayLike,
+    *,
+    vertical_ratios: Sequence[float] = VERTICAL_RATIOS,
+    diameter_errors: Sequence[float] = (0.0,),
+    outliers: float = OUTLIERS,
+) -> NDArray[np.float64]:
+    """How likely some collisions are for each of some restitutions of the beads.
+
+    Parameters
+    ----------
+    collisions : sequence of PairCollision
+    restitution : array_like (n,), 0 to 1
+    vertical_ratios : sequence of float, > 0
+        Mean square of the vertical over that of a horizontal velocity component, one of them,
+        of all collisions; each as likely.
+    diameter_errors : sequence of float
+        Relative errors of all sums of radii, each as likely.
+    outliers : float, 0 to 1
+        Share of collisions that were something else.
+
+    Returns
+    -------
+    ndarray (n,)
+        Log likelihood but for a constant; 0 without collisions.
+    """
+    grid = _grid('restitution', restitution)
+    _check_share(outliers)
+    if not collisions:
+        return np.zeros_like(grid)
+    seen = _Seen.of(collisions)
+    nuisances = [
+        _pairs_given(seen, grid, ratio, error, outliers)
+        for ratio in vertical_ratios
+        for error in diameter_errors
+    ]
+    return np.asarray(logsumexp(nuisances, axis=0) - math.log(len(nuisances)))
+
+
+class _Seen(NamedTuple):
+    """What is seen of collisions, each (m,): along the projected line of centres.
+
+    Parameters
+    ----------
+    approach, parting : ndarray, [m/s]
+        Relative speed before and after.
+    approach_variance, parting_variance, covariance : ndarray, [m^2/s^2]
+    distance, distance_error : ndarray, [m]
+        Projected, of the centres at contact.
+    reach, height : ndarray, [m]
+        Sum of radii, and of the tray.
+    radii : ndarray (m, 2), [m]
+    temperature : ndarray, [m^2/s^2]
+        Sum over both beads.
+    """
+
+    approach: NDArray[np.float64]
+    parting: NDArray[np.float64]
+    approach_variance: NDArray[np.float64]
+    parting_variance: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    distance: NDArray[np.float64]
+    distance_error: NDArray[np.float64]
+    reach: NDArray[np.float64]
+    height: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    temperature: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, collisions: Sequence[PairCollision]) -> _Seen:
+        separation = np.array([one.separation for one in collisions])
+        distance = np.hypot(*separation.T)
+        normal = separation / distance[:, None]
+        before = np.array([one.before[1] - one.before[0] for one in collisions])
+        after = np.array([one.after[1] - one.after[0] for one in collisions])
+        error = np.array([one.separation_error for one in collisions])
+        across = np.column_stack([-normal[:, 1], normal[:, 0]])
+        # A line of centres that is turned by its error mixes in the speed across it.
+        turned = error / distance
+        slip = [np.sum(one * across, axis=1) * turned for one in (before, after)]
+        noise = [
+            np.array([np.sum(getattr(one, name) ** 2) for one in collisions])
+            for name in ('before_errors', 'after_errors')
+        ]
+        return cls(
+            approach=-np.sum(before * normal, axis=1),
+            parting=np.sum(after * normal, axis=1),
+            approach_variance=noise[0] + slip[0] ** 2,
+            parting_variance=noise[1] + slip[1] ** 2,
+            covariance=-slip[0] * slip[1],
+            distance=distance,
+            distance_error=error,
+            reach=np.array([one.radii.sum() for one in collisions]),
+            height=np.array([one.height for one in collisions]),
+            radii=np.array([one.radii for one in collisions]),
+            temperature=np.array([one.temperatures.sum() for one in collisions]),
+        )
+
+
+def _tilts(seen: _Seen, diameter_error: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Vertical parts of the line of centres, (1, h), and how likely they are, (m, h).
+
+    Lines of centres point anywhere alike, as far as the height of the tray lets them; what they
+    leave of the distance in the picture is seen, with its error.
+    """
+    tilt = (np.arange(_HEIGHTS) + 0.5)[None, :] / _HEIGHTS
+    reach = (seen.reach * (1.0 + diameter_error))[:, None]
+    free = seen.height[:, None] - 2.0 * seen.radii
+    above = tilt * reach
+    room = np.minimum(free.min(axis=1)[:, None], 0.5 * free.sum(axis=1)[:, None] - above)
+    square = ((reach * np.sqrt(1.0 - tilt**2) - seen.distance[:, None])
+              / seen.distance_error[:, None]) ** 2  # fmt: skip
+    weight = np.maximum(room, 0.0) * np.exp(-0.5 * (square - square.min(axis=1)[:, None]))
+    return tilt, weight / weight.sum(axis=1)[:, None]
+
+
+def _pairs_given(
+    seen: _Seen, grid: NDArray[np.float64], ratio: float, diameter_error: float, outliers: float
+) -> NDArray[np.float64]:
+    """Log likelihood, (n,), of collisions when vertical speeds and diameters are known.
+
+    The speed w along the line of centres is that seen times its part in the picture, p, and the
+    vertical one, a Gaussian, times the other part; the more often beads meet, the larger w. All
+    is Gaussian but for that factor w, w > 0, which leaves a closed form.
+    """
+    tilt, weight = _tilts(seen, diameter_error)
+    part = np.sqrt(1.0 - tilt**2)[:, :, None]
+    a, c, aa, cc, ac = (
+        one[:, None, None]
+        for one in (seen.approach, seen.parting, seen.approach_variance,
+                    seen.parting_variance, seen.covariance)
+    )  # fmt: skip
+    vertical = tilt[:, :, None] ** 2 * ratio * seen.temperature[:, None, None]
+    gain = (1.0 + grid) * part
+    left = gain * part - 1.0
+    speed, speed_variance = part * a, part**2 * aa + vertical
+    both = part * left * aa + gain * vertical - part * ac
+    variance = left**2 * aa + gain**2 * vertical + cc - 2.0 * left * ac
+    miss = c - (gain * speed - a)
+    given = speed + both / variance * miss
+    given_variance = np.maximum(speed_variance - both**2 / variance, 0.0)
+    density = np.exp(-0.5 * miss**2 / variance) / (_SQRT_2_PI * np.sqrt(variance))
+    flux = _positive_mean(given, given_variance) / _positive_mean(speed, speed_variance)
+    found = np.einsum('mh,mhn->mn', weight, density * flux)
+    other = outliers / (_RANGE * seen.approach[:, None])
+    return np.asarray(np.log((1.0 - outliers) * found + other).sum(axis=0))
+
+
+def _positive_mean(
+    mean: NDArray[np.float64], variance: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Mean of the positive part of a Gaussian."""
+    spread = np.sqrt(variance) + 1e-300
+    ratio = mean / spread
+    return np.asarray(
+        mean * ndtr(ratio) + spread * np.exp(-0.5 * np.minimum(ratio**2, 1e3)) / _SQRT_2_PI
+    )
+
+
+class ContactEstimate(NamedTuple):
+    """A restitution for people, from a log likelihood alone.
+
+    Parameters
+    ----------
+    restitution, restitution_error : float
+        Most likely value of the grid, between its nodes; standard deviation.
+    lower, upper : float
+        Ends of the central interval that holds 68 %.
+    """
+
+    restitution: float
+    restitution_error: float
+    lower: float
+    upper: float
+
+
+def contact_estimate(restitution: ArrayLike, log_likelihood: ArrayLike) -> ContactEstimate:
+    """The restitution that a log likelihood on an even grid prefers; every value alike before.
+
+    Raises
+    ------
+    FitError
+        When the log likelihood prefers nothing, or is not finite.
+    """
+    grid = _grid('restitution', restitution)
+    values = np.asarray(log_likelihood, dtype=np.float64)
+    if values.shape != grid.shape or not np.isfinite(values).all() or np.ptp(values) == 0.0:
+        raise FitError(
+            'contact_estimate',
+            f'a log likelihood of shape {values.shape} that prefers no value of {grid.size}',
+            'give that of at least one contact, on the same grid',
+        )
+    # On a fine grid: a peak may be narrower than the distance of nodes.
+    fine = np.linspace(grid[0], grid[-1], 20 * grid.size)
+    logs = np.interp(fine, grid, values) if grid.size < 4 else _spline(grid, values, fine)
+    weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
+    mean = float(weights @ fine)
+    total = np.cumsum(weights) - 0.5 * weights
+    lower, upper = np.interp((0.16, 0.84), total, fine)
+    return ContactEstimate(
+        restitution=float(fine[np.argmax(logs)]),
+        restitution_error=math.sqrt(float(weights @ (fine - mean) ** 2)),
+        lower=float(lower),
+        upper=float(upper),
+    )
+
+
+def _spline(
+    grid: NDArray[np.float64], values: NDArray[np.float64], fine: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(grid, values)(fine))
+
+
+def _grid(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    grid = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    if grid.ndim != 1 or not grid.size or not ((grid >= 0.0) & (grid <= 1.0)).all():
+        raise FitError(name, f'{values!r} is no list of values in [0, 1]', 'correct the grid')
+    return grid
+
+
+def _check_share(outliers: float) -> None:
+    if not 0.0 < outliers < 1.0:
+        raise FitError('outliers', f'a share of {outliers!r}', 'give one between 0 and 1')
