@@ -14,6 +14,7 @@ ALL = (
     'speed_trays',
     'speed_accuracy',
     'cor_coverage',
+    'contacts',
     'engine',
     'engine_physics',
     'tracking',

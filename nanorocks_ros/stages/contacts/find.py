@@ -99,7 +99,9 @@ class ContactFinder:
         for row, (number, species, error) in enumerate(zip(*columns, strict=True)):
             if not (tracks.seen[row] and self._round[species]):
                 continue
-            history = self._histories.setdefault(number, TrackHistory(number, species))
+            history = self._histories.get(number)
+            if history is None:
+                history = self._histories[number] = TrackHistory(number, species)
             history.radius = self._radius(species, float(tracks.radii[row]))
             kink, flight = history.push(time, places[row], error, self._variances[species], gap)
             if kink is not None:
@@ -122,13 +124,13 @@ class ContactFinder:
 
     def _learn(self, species: int, flight: Line) -> None:
         """Scatter of places over what their errors say; those hold what pictures share, too."""
-        if flight.count < _FEWEST_PLACES:
+        if flight.used < _FEWEST_PLACES:
             return
         way = math.hypot(*flight.velocity) / math.sqrt(flight.velocity_variance)
         if way < _LEAST_WAY:
             return
         known = self._scatter[species]
-        known.append(flight.chi_square / (2 * flight.count - 4))
+        known.append(flight.chi_square / (2 * flight.used - 4))
         if len(known) >= _FEWEST_FLIGHTS:
             self._variances[species] = float(np.median(known))
 
@@ -140,7 +142,7 @@ class ContactFinder:
         if rebound is not None:
             return (rebound,)
         for other, its in self._waiting:
-            pair = self._pair(other, kink) if self._together(when, its) else None
+            pair = self._pair((other, kink)) if self._together(when, its) else None
             if pair is not None:
                 self._waiting = [one for one in self._waiting if one[0] is not other]
                 return (pair,)
@@ -160,44 +162,50 @@ class ContactFinder:
         return self._first_ns + round(time * _NS)
 
     def _rebound(self, kink: Kink, when: Meeting) -> Rebound | None:
-        shift, motion, motion_error = self._around.motion(when.time)
         place, variance = _place(kink, when.time)
-        place = place - shift
         slack = _WALL_SLACK * kink.radius + _FAR * math.sqrt(variance)
-        incoming_error, outgoing_error = _errors(kink)
-        along_error = math.hypot(incoming_error, outgoing_error)
+        place = place - self._around.displacement(when.time)
         for wall in range(4):
             axis, high = divmod(wall, 2)
-            sign = 1.0 if high else -1.0
             room = self._tray.dimensions[axis] - place[axis] if high else place[axis]
-            incoming = sign * float(kink.before.velocity[axis] - motion[axis])
-            outgoing = -sign * float(kink.after.velocity[axis] - motion[axis])
-            along = [float(one.velocity[1 - axis]) for one in (kink.before, kink.after)]
-            if (
-                abs(room - kink.radius) < slack
-                and incoming > _LEAST_SIGNAL * math.hypot(incoming_error, motion_error)
-                and outgoing > 0.0
-                and abs(along[1] - along[0]) < _FAR * along_error
-                and self._alone(when, [kink])
-            ):
-                return Rebound(
-                    stamp_ns=self._stamp_ns(when.time),
-                    tray=self._tray.number,
-                    track=kink.track,
-                    species=kink.species,
-                    wall=wall,
-                    incoming=incoming,
-                    incoming_error=incoming_error,
-                    outgoing=outgoing,
-                    outgoing_error=outgoing_error,
-                    tangential_incoming=along[0],
-                    tangential_outgoing=along[1],
-                    tangential_error=along_error,
-                    wall_velocity=sign * float(motion[axis]),
-                    wall_velocity_error=motion_error,
-                    place=place,
-                )
+            if abs(room - kink.radius) < slack:
+                found = self._rebound_from(wall, kink, when, place)
+                if found is not None and self._alone(when, [kink]):
+                    return found
         return None
+
+    def _rebound_from(
+        self, wall: int, kink: Kink, when: Meeting, place: NDArray[np.float64]
+    ) -> Rebound | None:
+        axis, high = divmod(wall, 2)
+        outward = 1.0 if high else -1.0
+        motion, motion_error = self._around.motion(when.time)
+        incoming_error, outgoing_error = _errors(kink)
+        before, after = kink.before.velocity, kink.after.velocity
+        found = Rebound(
+            stamp_ns=self._stamp_ns(when.time),
+            tray=self._tray.number,
+            track=kink.track,
+            species=kink.species,
+            wall=wall,
+            incoming=outward * float(before[axis] - motion[axis]),
+            incoming_error=incoming_error,
+            outgoing=outward * float(motion[axis] - after[axis]),
+            outgoing_error=outgoing_error,
+            tangential_incoming=float(before[1 - axis]),
+            tangential_outgoing=float(after[1 - axis]),
+            tangential_error=math.hypot(incoming_error, outgoing_error),
+            wall_velocity=outward * float(motion[axis]),
+            wall_velocity_error=motion_error,
+            place=place,
+        )
+        slip = abs(found.tangential_outgoing - found.tangential_incoming)
+        good = (
+            found.incoming > _LEAST_SIGNAL * math.hypot(incoming_error, motion_error)
+            and found.outgoing > 0.0
+            and slip < _FAR * found.tangential_error
+        )
+        return found if good else None
 
     def _alone(self, when: Meeting, kinks: list[Kink]) -> bool:
         beads = [
@@ -211,57 +219,53 @@ class ContactFinder:
         ]
         return self._around.alone(when.time, beads)
 
-    def _pair(self, first: Kink, second: Kink) -> PairCollision | None:
-        kinks = [first, second]
+    def _pair(self, kinks: tuple[Kink, Kink]) -> PairCollision | None:
         when = meeting([(one.before, one.after) for one in kinks])
         if not all(self._between(one, when) for one in kinks):
             return None
+        distance = math.hypot(*(_place(kinks[1], when.time)[0] - _place(kinks[0], when.time)[0]))
+        reach = kinks[0].radius + kinks[1].radius
+        if (
+            not _NEAREST * reach < distance < _FURTHEST * reach
+            or when.chi_square > _FAR**2 + 3.0
+            or not self._alone(when, list(kinks))
+        ):
+            return None
+        found = self._collision(kinks, when)
+        return found if _only_these_two(found) else None
+
+    def _collision(self, kinks: tuple[Kink, Kink], when: Meeting) -> PairCollision:
         (here, variance), (there, its) = (_place(one, when.time) for one in kinks)
-        separation = there - here
-        distance = math.hypot(*separation)
-        turn = sum(float(np.sum((one.after.velocity - one.before.velocity) ** 2)) for one in kinks)
-        relative = [second.before.velocity - first.before.velocity,
-                    second.after.velocity - first.after.velocity]  # fmt: skip
-        reach = first.radius + second.radius
-        shift = self._around.motion(when.time)[0]
-        record = PairCollision(
+        before = np.array([one.before.velocity for one in kinks])
+        approach = before[1] - before[0]
+        shared = sum(one.shared_error**2 for one in kinks)
+        mistimed = when.error**2 * float(approach @ approach)
+        temperatures = [self._around.temperature(when.time, one.species) for one in kinks]
+        errors = np.array([_errors(one) for one in kinks])
+        return PairCollision(
             stamp_ns=self._stamp_ns(when.time),
             tray=self._tray.number,
             tracks=np.array([one.track for one in kinks], dtype=np.int32),
             species=np.array([one.species for one in kinks], dtype=np.int32),
             radii=np.array([one.radius for one in kinks]),
             masses=np.array([self._mass(one) for one in kinks]),
-            before=np.array([one.before.velocity for one in kinks]),
+            before=before,
             after=np.array([one.after.velocity for one in kinks]),
-            before_errors=np.array([_errors(one)[0] for one in kinks]),
-            after_errors=np.array([_errors(one)[1] for one in kinks]),
-            separation=separation,
-            separation_error=math.sqrt(
-                variance
-                + its
-                + first.shared_error**2
-                + second.shared_error**2
-                + when.error**2 * float(relative[0] @ relative[0])
-            ),
-            temperatures=np.array(
-                [self._around.temperature(when.time, one.species) for one in kinks]
-            ),
+            before_errors=errors[:, 0],
+            after_errors=errors[:, 1],
+            separation=there - here,
+            separation_error=math.sqrt(variance + its + shared + mistimed),
+            temperatures=np.array(temperatures),
             height=self._tray.dimensions[2],
-            place=here - shift,
+            place=here - self._around.displacement(when.time),
         )
-        good = (
-            turn > 0.0
-            and _NEAREST * reach < distance < _FURTHEST * reach
-            and when.chi_square < _STRAIGHT**2 + 3.0
-            and math.hypot(*relative[1]) > _MERGED * math.hypot(*relative[0])
-            and _only_these_two(record)
-            and self._alone(when, kinks)
-        )
-        return record if good else None
 
 
 def _only_these_two(pair: PairCollision) -> bool:
-    """Whether they met, exchanged momentum along their line of centres, and with nobody else."""
+    """Whether they met, exchanged momentum along their line of centres, and with nobody else.
+
+    And did not merge, which leaves them at rest to each other.
+    """
     normal = pair.separation / math.hypot(*pair.separation)
     across = np.array([-normal[1], normal[0]])
     errors = np.hypot(pair.before_errors, pair.after_errors)
@@ -274,8 +278,10 @@ def _only_these_two(pair: PairCollision) -> bool:
     # A line of centres that is turned a little makes a slip of the change along it.
     turned = pair.separation_error / math.hypot(*pair.separation)
     slip_error = math.hypot(*errors, turned * float((change[1] - change[0]) @ normal))
+    relative = [float(np.hypot(*(one[1] - one[0]))) for one in (pair.before, pair.after)]
     return bool(
-        approach > _LEAST_SIGNAL * error
+        relative[1] > _MERGED * relative[0]
+        and approach > _LEAST_SIGNAL * error
         and float(lost @ lost) < _FAR**2 * lost_error**2
         and abs(slip) < _FAR * slip_error
     )
@@ -296,7 +302,7 @@ def _errors(kink: Kink) -> tuple[float, float]:
 
 def _straight(kink: Kink) -> bool:
     for line in (kink.before, kink.after):
-        freedom = 2 * line.count - 4
+        freedom = 2 * line.used - 4
         if line.chi_square > freedom + _STRAIGHT * math.sqrt(2.0 * freedom):
             return False
     return True

@@ -24,9 +24,9 @@ class Line(NamedTuple):
     place_variance, velocity_variance : float, [m^2], [m^2/s^2]
         Of a component.
     chi_square : float
-        Of the residuals, with ``2 count - 4`` degrees of freedom.
-    count : int
-        Places used.
+        Of the residuals, with ``2 used - 4`` degrees of freedom.
+    used : int
+        Places it goes through.
     """
 
     time: float
@@ -35,7 +35,7 @@ class Line(NamedTuple):
     place_variance: float
     velocity_variance: float
     chi_square: float
-    count: int
+    used: int
 
     def at(self, time: float) -> NDArray[np.float64]:
         """Place at a time, (2,), [m]."""
@@ -65,7 +65,8 @@ def _chi_square(sums: NDArray[np.float64], first: int, end: int) -> float:
     across = sums[end, 4] - sums[first, 4] - t * x / w
     down = sums[end, 6] - sums[first, 6] - t * y / w
     slope = (across * across + down * down) / spread if spread > 0.0 else 0.0
-    return sums[end, 7] - sums[first, 7] - (x * x + y * y) / w - slope
+    chi_square: float = sums[end, 7] - sums[first, 7] - (x * x + y * y) / w - slope
+    return chi_square
 
 
 @compiled
@@ -131,7 +132,7 @@ def fit_line(
         place_variance=1.0 / total,
         velocity_variance=1.0 / spread,
         chi_square=float(weights @ np.square(residuals).sum(axis=1)),
-        count=times.size,
+        used=times.size,
     )
 
 

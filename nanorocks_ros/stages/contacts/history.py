@@ -142,9 +142,12 @@ class TrackHistory:
             return None
         start = max(self._before, self._first - LONGEST)
         here = slice(start, end)
-        first = start + best_break(
-            self._times[here], self._places[here], self._errors[here], _FEWEST_BREAK
-        )[0]
+        first = (
+            start
+            + best_break(self._times[here], self._places[here], self._errors[here], _FEWEST_BREAK)[
+                0
+            ]
+        )
         self._before = -1
         if min(first - start, end - first) < FEWEST or abs(first - self._first) > _MOVED:
             return None

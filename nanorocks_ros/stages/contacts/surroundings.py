@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 # Pictures on each side from which the motion of a tray that swings is measured, and one at rest.
 _NARROW, _WIDE = 4, 15
 _CUBIC, _STRAIGHT = 3, 1
+_FEWEST = 2 * _NARROW
 # Fourth differences see noise but no swing; their variance is so many times that of the noise.
 _FOURTH = 70.0
 # Times the noise, what may be left of the displacements when a tray is called at rest.
@@ -38,6 +39,9 @@ class Surroundings:
     def __init__(self, pictures: int) -> None:
         self._records: deque[Tracks] = deque(maxlen=pictures)
         self._times: deque[float] = deque(maxlen=pictures)
+        self._displacements: deque[NDArray[np.float64]] = deque(maxlen=pictures)
+        # Of each species: sum of the squares of known velocities, and how many these are.
+        self._squares: deque[NDArray[np.float64]] = deque(maxlen=pictures)
         self.interval = math.inf
 
     def push(self, time: float, tracks: Tracks) -> None:
@@ -47,40 +51,43 @@ class Surroundings:
             self.interval = float(np.median(recent))
         self._times.append(time)
         self._records.append(tracks)
+        self._displacements.append(tracks.displacement)
+        self._squares.append(_squares(tracks))
 
     def _around(self, time: float, pictures: int) -> slice:
         times = np.array(self._times)
         middle = int(np.searchsorted(times, time))
         return slice(max(middle - pictures, 0), middle + pictures)
 
-    def motion(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Displacement of the tray at a time, its velocity, and the error of a component.
+    def motion(self, time: float) -> tuple[NDArray[np.float64], float]:
+        """Velocity of the tray at a time, and the error of a component.
 
         Returns
         -------
-        displacement, velocity : ndarray (2,), [m], [m/s]
+        velocity : ndarray (2,), [m/s]
         error : float, [m/s]
         """
         wide, narrow = self._around(time, _WIDE), self._around(time, _NARROW)
         times = np.array(self._times) - time
-        places = np.array([one.displacement for one in self._records])
-        slow = _polynomial(times[wide], places[wide], _STRAIGHT)
+        places = np.array(self._displacements)
+        if times[wide].size < _FEWEST:
+            return np.zeros(2), math.inf
+        velocity, rest, factor = _slope(times[wide], places[wide], _STRAIGHT)
         noise = float(np.sqrt(np.mean(np.diff(places[wide], 4, axis=0) ** 2) / _FOURTH))
-        if slow[2] <= _AT_REST * noise or times[narrow].size <= _CUBIC + 1:
-            place, velocity, _, factor = slow
-        else:
-            place, velocity, _, factor = _polynomial(times[narrow], places[narrow], _CUBIC)
-        return place, velocity, noise * factor
+        if rest > _AT_REST * noise:
+            velocity, _, factor = _slope(times[narrow], places[narrow], _CUBIC)
+        return velocity, noise * factor
+
+    def displacement(self, time: float) -> NDArray[np.float64]:
+        """Of the tray at a time, (2,), [m]; the jitter of its registration is in it."""
+        times, places = np.array(self._times), np.array(self._displacements)
+        return np.array([np.interp(time, times, one) for one in places.T])
 
     def temperature(self, time: float, species: int) -> float:
         """Mean square of a horizontal component of velocity of a species, [m^2/s^2]."""
-        squares = [
-            np.sum(one.velocities[one.species == species] ** 2, axis=1)
-            for one in list(self._records)[self._around(time, _WARM)]
-        ]
-        known = np.concatenate(squares)
-        known = known[np.isfinite(known)]
-        return 0.5 * float(known.mean()) if known.size else math.nan
+        known = list(self._squares)[self._around(time, _WARM)]
+        sums = np.sum([one[species] for one in known], axis=0)
+        return 0.5 * float(sums[0] / sums[1]) if sums[1] else math.nan
 
     def alone(
         self,
@@ -107,13 +114,24 @@ class Surroundings:
         return True
 
 
-def _polynomial(
+def _slope(
     times: NDArray[np.float64], places: NDArray[np.float64], degree: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float, float]:
-    """Value and slope at 0, scatter of the rest, and the error of the slope per error of a place."""
+) -> tuple[NDArray[np.float64], float, float]:
+    """Slope of a polynomial at 0, scatter of the rest, error of the slope for that of a place."""
     powers = np.vander(times, degree + 1, increasing=True)
     inverse = np.linalg.pinv(powers)
     found = inverse @ places
     freedom = max(times.size - degree - 1, 1)
     rest = float(np.sqrt(np.sum((places - powers @ found) ** 2) / (2 * freedom)))
-    return found[0], found[1], rest, float(np.linalg.norm(inverse[1]))
+    return found[1], rest, float(np.linalg.norm(inverse[1]))
+
+
+def _squares(tracks: Tracks) -> NDArray[np.float64]:
+    """Of each species, sum of the squares of the velocities and their number, (species, 2)."""
+    squares = np.sum(np.square(tracks.velocities), axis=1)
+    known = np.isfinite(squares)
+    sums = [
+        np.bincount(tracks.species[known], weights, minlength=tracks.expected.size)
+        for weights in (squares[known], None)
+    ]
+    return np.column_stack(sums)
