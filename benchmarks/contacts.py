@@ -1,8 +1,9 @@
 """Restitutions of walls and beads from single rebounds and collisions, against the truth.
 
 First from true places at 30 pictures a second with errors like those of tracking (0.05 px of
-jitter, 0.09 px that a bead keeps), then from tracks of films with all effects of the camera. A
-cycle is 58 s after a shaking event at 10 mm/s; "covered" is by the 68 % interval of one cycle.
+jitter, 0.09 px that change from place to place), then from tracks of films with all effects of
+the camera. A cycle is 58 s after a shaking event at 10 mm/s; "covered" is by the 68 % interval
+of one cycle.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ _SECONDS = 58.0
 _SPEED = 0.010
 _METRE_PX = 12500.0
 _JITTER, _SHARED = 0.05 / _METRE_PX, 0.09 / _METRE_PX
+# Over which the error that a bead keeps for a while goes through all its values.
+_WAVE = 20.0 / _METRE_PX
 # So many cycles of each truth that coverage is judged by more than a hundred of each tray.
 _CYCLES = {1: 36, 3: 18}
 _TRUTHS = [(pairs, walls) for pairs in (0.7, 0.89, 0.95) for walls in (0.9, 0.97)]
@@ -69,15 +72,20 @@ def true_tracks(
         np.arange(len(tray.species), dtype=np.int32), [one.count for one in tray.species]
     )
     n = species.size
-    shared = rng.normal(0.0, _SHARED, (n, 2))
+    wave = rng.normal(0.0, 2.0 * np.pi / _WAVE, (2, n, 2))
+    phase = rng.uniform(0.0, 2.0 * np.pi, (2, n))
     for moment in gas.moments(frames):
+        places = moment.positions[:, :2]
+        # Each bead is misplaced by its own amount, another some pixels further on.
+        waves = np.sin(np.einsum('cnk,nk->cn', wave, places) + phase)
+        misplaced = np.sqrt(2.0) * _SHARED * waves.T
         yield Tracks(
             stamp_ns=moment.truth.stamp_ns,
             tray=tray.number,
             ids=np.arange(n, dtype=np.int32),
             species=species,
             displacement=np.zeros(2),
-            positions=moment.positions[:, :2] + shared + rng.normal(0.0, jitter, (n, 2)),
+            positions=places + misplaced + rng.normal(0.0, jitter, (n, 2)),
             position_errors=np.full(n, np.hypot(jitter, _SHARED)),
             velocities=moment.velocities[:, :2],
             velocity_errors=np.full(n, jitter * _RATE),

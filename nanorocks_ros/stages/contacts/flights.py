@@ -27,6 +27,8 @@ class Line(NamedTuple):
         Of the residuals, with ``2 used - 4`` degrees of freedom.
     used : int
         Places it goes through.
+    duration : float, [s]
+        From the first to the last of them.
     """
 
     time: float
@@ -36,6 +38,7 @@ class Line(NamedTuple):
     velocity_variance: float
     chi_square: float
     used: int
+    duration: float
 
     def at(self, time: float) -> NDArray[np.float64]:
         """Place at a time, (2,), [m]."""
@@ -45,11 +48,20 @@ class Line(NamedTuple):
         """Variance of a coordinate of that place, [m^2]."""
         return self.place_variance + self.velocity_variance * (time - self.time) ** 2
 
-    def scaled(self, variance: float) -> Line:
-        """The same, when the variances of the places are so many times what was said."""
+    def with_errors(self, variance: float, drift: float) -> Line:
+        """The same with other errors of its places.
+
+        Parameters
+        ----------
+        variance : float
+            Of what scatters from place to place, over what was said.
+        drift : float, [m]
+            Standard error that is another at the other end of the flight.
+        """
         return self._replace(
             place_variance=variance * self.place_variance,
-            velocity_variance=variance * self.velocity_variance,
+            velocity_variance=variance * self.velocity_variance
+            + 2.0 * (drift / self.duration) ** 2,
             chi_square=self.chi_square / variance,
         )
 
@@ -133,6 +145,7 @@ def fit_line(
         velocity_variance=1.0 / spread,
         chi_square=float(weights @ np.square(residuals).sum(axis=1)),
         used=times.size,
+        duration=float(times[-1] - times[0]),
     )
 
 

@@ -23,6 +23,9 @@ _ROOM = 4 * LONGEST
 _FEWEST_BREAK = 2
 # What a break must gain in chi square: chance reaches 30 once in some ten thousand flights.
 _GAIN = 30.0
+# Scatter that is believed at least, over the stated variance: errors that a bead keeps for some
+# pixels bend its way a little, and would cut it into pieces.
+_LEAST_VARIANCE = 0.25
 # Places that the best break may move when all of the flight behind it is known.
 _MOVED = 2
 
@@ -119,7 +122,7 @@ class TrackHistory:
         first, gain = best_break(
             self._times[here], self._places[here], self._errors[here], _FEWEST_BREAK
         )
-        if gain > _GAIN * variance:
+        if gain > _GAIN * max(variance, _LEAST_VARIANCE):
             end = self._first + first
             flight = self._line(self._first, end)
             kink = self._kink(end, variance)
@@ -151,15 +154,18 @@ class TrackHistory:
         self._before = -1
         if min(first - start, end - first) < FEWEST or abs(first - self._first) > _MOVED:
             return None
+        # What places share for some pixels differs between the ends of a flight.
+        shared = math.sqrt(max(1.0 - variance, 0.0)) * float(np.mean(self._errors[here]))
+        before, after = self._line(start, first), self._line(first, end)
         return Kink(
             self.track,
             self.species,
             self.radius,
-            self._line(start, first).scaled(variance),
-            self._line(first, end).scaled(variance),
+            before.with_errors(variance, shared),
+            after.with_errors(variance, shared),
             float(self._times[first - 1]),
             float(self._times[first]),
-            math.sqrt(max(1.0 - variance, 0.0)) * float(np.mean(self._errors[here])),
+            shared,
         )
 
     def _make_room(self) -> None:
