@@ -4,25 +4,34 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from nanorocks_ros.records import Tracks
 
-# Pictures on each side from which the motion of a tray that swings is measured, and one at rest.
-_NARROW, _WIDE = 4, 15
-_CUBIC, _STRAIGHT = 3, 1
+# Pictures on each side from which the motion of a tray is measured when it swings or rests, and
+# when it does anything else.
+_WIDE, _NARROW = 45, 4
 _FEWEST = 2 * _NARROW
+# Frequencies of a swing that are tried, [1/s].
+_FREQUENCIES = np.geomspace(0.5, 6.0, 40)
+# By how much a swing must lower chi square to be believed: it has eight numbers more.
+_SWINGS = 20.0
 # Fourth differences see noise but no swing; their variance is so many times that of the noise.
 _FOURTH = 70.0
-# Times the noise, what may be left of the displacements when a tray is called at rest.
-_AT_REST = 1.5
+# What a swing may leave of the displacements: a share of their power, or times the noise from
+# picture to picture; errors of the registration that last for some pictures are in it.
+_EXPLAINED = 0.02
+_QUIET = 3.0
+# Errors of a velocity: over that of independent pictures; and as a share of it, since small
+# displacements were registered up to a tenth too small or too large.
+_LASTING = 2.0
+_MISSCALED = 0.08
 # Pictures on each side over which a gas is called equally warm.
 _WARM = 15
 
@@ -72,11 +81,22 @@ class Surroundings:
         places = np.array(self._displacements)
         if times[wide].size < _FEWEST:
             return np.zeros(2), math.inf
-        velocity, rest, factor = _slope(times[wide], places[wide], _STRAIGHT)
         noise = float(np.sqrt(np.mean(np.diff(places[wide], 4, axis=0) ** 2) / _FOURTH))
-        if rest > _AT_REST * noise:
-            velocity, _, factor = _slope(times[narrow], places[narrow], _CUBIC)
-        return velocity, noise * factor
+        rest = _slope(_powers(times[wide], 1), places[wide])
+        swing = min(
+            (_slope(_swing(times[wide], one), places[wide]) for one in _FREQUENCIES),
+            key=lambda one: one.left,
+        )
+        if rest.left - swing.left < _SWINGS * noise**2:
+            # A swing too weak to be seen may still be there.
+            return rest.velocity, noise * math.hypot(rest.factor, 0.5 * swing.factor)
+        quiet = 2 * times[wide].size * (_QUIET * noise) ** 2
+        if swing.left < max(_EXPLAINED * rest.left, quiet):
+            scatter = math.sqrt(swing.left / (2 * times[wide].size))
+            error = _LASTING * max(noise, scatter) * swing.factor
+            return swing.velocity, math.hypot(error, _MISSCALED * math.hypot(*swing.velocity))
+        other = _slope(_powers(times[narrow], 3), places[narrow])
+        return other.velocity, _LASTING * noise * other.factor
 
     def displacement(self, time: float) -> NDArray[np.float64]:
         """Of the tray at a time, (2,), [m]; the jitter of its registration is in it."""
@@ -114,16 +134,42 @@ class Surroundings:
         return True
 
 
-def _slope(
-    times: NDArray[np.float64], places: NDArray[np.float64], degree: int
-) -> tuple[NDArray[np.float64], float, float]:
-    """Slope of a polynomial at 0, scatter of the rest, error of the slope for that of a place."""
-    powers = np.vander(times, degree + 1, increasing=True)
-    inverse = np.linalg.pinv(powers)
+class _Slope(NamedTuple):
+    """Slope at time 0 of what was fitted.
+
+    Parameters
+    ----------
+    velocity : ndarray (2,), [m/s]
+    left : float, [m^2]
+        Sum of the squares that are left.
+    factor : float, [1/s]
+        Error of the slope over that of a place.
+    """
+
+    velocity: NDArray[np.float64]
+    left: float
+    factor: float
+
+
+def _slope(terms: NDArray[np.float64], places: NDArray[np.float64]) -> _Slope:
+    """Fit terms, (pictures, n), of which the second alone has a slope at 0, of 1."""
+    inverse = np.linalg.pinv(terms)
     found = inverse @ places
-    freedom = max(times.size - degree - 1, 1)
-    rest = float(np.sqrt(np.sum((places - powers @ found) ** 2) / (2 * freedom)))
-    return found[1], rest, float(np.linalg.norm(inverse[1]))
+    left = float(np.sum((places - terms @ found) ** 2))
+    return _Slope(found[1], left, float(np.linalg.norm(inverse[1])))
+
+
+def _powers(times: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
+    return np.vander(times, degree + 1, increasing=True)
+
+
+def _swing(times: NDArray[np.float64], frequency: float) -> NDArray[np.float64]:
+    """A swing that dies away about a resting place: the first slope is that of its sine."""
+    omega = 2.0 * math.pi * frequency
+    sine, cosine = np.sin(omega * times), np.cos(omega * times)
+    # Terms in t sin have no slope at 0; that in t cos has one, and is taken off the sine's.
+    decay = times * cosine - sine / omega
+    return np.column_stack([np.ones_like(times), sine / omega, cosine, decay, times * sine])
 
 
 def _squares(tracks: Tracks) -> NDArray[np.float64]:
