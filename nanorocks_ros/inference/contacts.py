@@ -29,10 +29,11 @@ VERTICAL_RATIOS = (0.2, 0.3, 0.45, 0.65, 0.9, 1.2)
 
 # What errors may be over what was stated, and how likely: even in the logarithm, unless more
 # contacts than a few say otherwise.
-_ERROR_SCALES = (0.7, 1.0, 1.4, 2.0, 2.8)
+_ERROR_SCALES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
 # Range of speeds after a contact of the other kind, over the speed before.
 _RANGE = 2.0
 _HEIGHTS = 24
+_TINY = 1e-300
 _SQRT_2_PI = math.sqrt(2.0 * math.pi)
 
 
@@ -85,6 +86,7 @@ def pair_log_likelihood(
     *,
     vertical_ratios: Sequence[float] = VERTICAL_RATIOS,
     diameter_errors: Sequence[float] = (0.0,),
+    sticking_speed: float = 0.0,
     outliers: float = OUTLIERS,
 ) -> NDArray[np.float64]:
     """How likely some collisions are for each of some restitutions of the beads.
@@ -98,6 +100,8 @@ def pair_log_likelihood(
         of all collisions; each as likely.
     diameter_errors : sequence of float
         Relative errors of all sums of radii, each as likely.
+    sticking_speed : float, [m/s]
+        Beads that meet more slowly along the line of centres merge, and are not among these.
     outliers : float, 0 to 1
         Share of collisions that were something else.
 
@@ -112,7 +116,7 @@ def pair_log_likelihood(
         return np.zeros_like(grid)
     seen = _Seen.of(collisions)
     nuisances = [
-        _pairs_given(seen, grid, ratio, error, outliers)
+        _pairs_given(seen, grid, ratio, error, (sticking_speed, outliers))
         for ratio in vertical_ratios
         for error in diameter_errors
     ]
@@ -197,14 +201,19 @@ def _tilts(seen: _Seen, diameter_error: float) -> tuple[NDArray[np.float64], NDA
 
 
 def _pairs_given(
-    seen: _Seen, grid: NDArray[np.float64], ratio: float, diameter_error: float, outliers: float
+    seen: _Seen,
+    grid: NDArray[np.float64],
+    ratio: float,
+    diameter_error: float,
+    limits: tuple[float, float],
 ) -> NDArray[np.float64]:
     """Log likelihood, (n,), of collisions when vertical speeds and diameters are known.
 
     The speed w along the line of centres is that seen times its part in the picture, p, and the
     vertical one, a Gaussian, times the other part; the more often beads meet, the larger w. All
-    is Gaussian but for that factor w, w > 0, which leaves a closed form.
+    is Gaussian but for that factor w, w above the sticking speed, which leaves a closed form.
     """
+    sticking_speed, outliers = limits
     tilt, weight = _tilts(seen, diameter_error)
     part = np.sqrt(1.0 - tilt**2)[:, :, None]
     a, c, aa, cc, ac = (
@@ -222,21 +231,21 @@ def _pairs_given(
     given = speed + both / variance * miss
     given_variance = np.maximum(speed_variance - both**2 / variance, 0.0)
     density = np.exp(-0.5 * miss**2 / variance) / (_SQRT_2_PI * np.sqrt(variance))
-    flux = _positive_mean(given, given_variance) / _positive_mean(speed, speed_variance)
+    flux = _mean_above(sticking_speed, given, given_variance)
+    flux /= _mean_above(sticking_speed, speed, speed_variance)
     found = np.einsum('mh,mhn->mn', weight, density * flux)
     other = outliers / (_RANGE * seen.approach[:, None])
     return np.asarray(np.log((1.0 - outliers) * found + other).sum(axis=0))
 
 
-def _positive_mean(
-    mean: NDArray[np.float64], variance: NDArray[np.float64]
+def _mean_above(
+    least: float, mean: NDArray[np.float64], variance: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Mean of the positive part of a Gaussian."""
-    spread = np.sqrt(variance) + 1e-300
-    ratio = mean / spread
-    return np.asarray(
-        mean * ndtr(ratio) + spread * np.exp(-0.5 * np.minimum(ratio**2, 1e3)) / _SQRT_2_PI
-    )
+    """Integral of x over a Gaussian density of x from the least x up; never quite 0."""
+    spread = np.sqrt(variance) + _TINY
+    ratio = (mean - least) / spread
+    density = np.exp(-0.5 * np.minimum(ratio**2, 1e3)) / _SQRT_2_PI
+    return np.asarray(mean * ndtr(ratio) + spread * density) + _TINY
 
 
 class ContactEstimate(NamedTuple):

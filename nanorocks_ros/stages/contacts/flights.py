@@ -60,8 +60,9 @@ class Line(NamedTuple):
         """
         return self._replace(
             place_variance=variance * self.place_variance,
+            # Slopes feel the ends most: one whole wave along a flight tilts it by nearly this.
             velocity_variance=variance * self.velocity_variance
-            + 2.0 * (drift / self.duration) ** 2,
+            + 4.0 * (drift / self.duration) ** 2,
             chi_square=self.chi_square / variance,
         )
 
