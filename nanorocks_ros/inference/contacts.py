@@ -24,15 +24,18 @@ if TYPE_CHECKING:
 OUTLIERS = 0.05
 """Share of contacts that were something else: a wrong link, a third bead that nobody saw."""
 
-VERTICAL_RATIOS = (0.2, 0.3, 0.45, 0.65, 0.9, 1.2)
+VERTICAL_RATIOS = (0.25, 0.4, 0.6, 0.9, 1.3)
 """Mean square of the vertical over that of a horizontal velocity component; all alike likely."""
 
-# What errors may be over what was stated, and how likely: even in the logarithm, unless more
-# contacts than a few say otherwise.
-_ERROR_SCALES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
+# What errors of rebounds may be over what was stated. Not less: many slow rebounds, whose errors
+# are stated too large, would then lend too much weight to the few fast ones.
+_ERROR_SCALES = (1.2, 1.7, 2.4, 3.4)
+# The same of collisions, which tell errors from vertical speeds too badly to have it free:
+# simulated cycles scatter so much more.
+_PAIR_ERRORS = 1.25
 # Range of speeds after a contact of the other kind, over the speed before.
 _RANGE = 2.0
-_HEIGHTS = 24
+_HEIGHTS = 20
 _TINY = 1e-300
 _SQRT_2_PI = math.sqrt(2.0 * math.pi)
 
@@ -114,7 +117,7 @@ def pair_log_likelihood(
     _check_share(outliers)
     if not collisions:
         return np.zeros_like(grid)
-    seen = _Seen.of(collisions)
+    seen = _Seen.of(collisions).with_errors(_PAIR_ERRORS)
     nuisances = [
         _pairs_given(seen, grid, ratio, error, (sticking_speed, outliers))
         for ratio in vertical_ratios
@@ -180,6 +183,15 @@ class _Seen(NamedTuple):
             height=np.array([one.height for one in collisions]),
             radii=np.array([one.radii for one in collisions]),
             temperature=np.array([one.temperatures.sum() for one in collisions]),
+        )
+
+    def with_errors(self, scale: float) -> _Seen:
+        """The same with so many times the errors."""
+        return self._replace(
+            approach_variance=scale**2 * self.approach_variance,
+            parting_variance=scale**2 * self.parting_variance,
+            covariance=scale**2 * self.covariance,
+            distance_error=scale * self.distance_error,
         )
 
 

@@ -48,7 +48,7 @@ class Line(NamedTuple):
         """Variance of a coordinate of that place, [m^2]."""
         return self.place_variance + self.velocity_variance * (time - self.time) ** 2
 
-    def with_errors(self, variance: float, drift: float) -> Line:
+    def with_errors(self, variance: float, drift: float, length: float) -> Line:
         """The same with other errors of its places.
 
         Parameters
@@ -56,13 +56,18 @@ class Line(NamedTuple):
         variance : float
             Of what scatters from place to place, over what was said.
         drift : float, [m]
-            Standard error that is another at the other end of the flight.
+            Standard error that is another one further on.
+        length : float, [m]
+            How far on; along a shorter way before and after a contact it tilts both lines alike,
+            which their ratio does not feel.
         """
+        square = float(self.velocity @ self.velocity) * self.duration**2
+        apart = square / (square + length**2)
         return self._replace(
             place_variance=variance * self.place_variance,
             # Slopes feel the ends most: one whole wave along a flight tilts it by nearly this.
             velocity_variance=variance * self.velocity_variance
-            + 4.0 * (drift / self.duration) ** 2,
+            + apart * 4.0 * (drift / self.duration) ** 2,
             chi_square=self.chi_square / variance,
         )
 

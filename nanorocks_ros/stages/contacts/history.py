@@ -26,6 +26,8 @@ _GAIN = 30.0
 # Scatter that is believed at least, over the stated variance: errors that a bead keeps for some
 # pixels bend its way a little, and would cut it into pieces.
 _LEAST_VARIANCE = 0.25
+# Way over which light, shadow and outline misplace a bead alike, in radii.
+_SAME = 0.5
 # Places that the best break may move when all of the flight behind it is known.
 _MOVED = 2
 
@@ -161,8 +163,8 @@ class TrackHistory:
             self.track,
             self.species,
             self.radius,
-            before.with_errors(variance, shared),
-            after.with_errors(variance, shared),
+            before.with_errors(variance, shared, _SAME * self.radius),
+            after.with_errors(variance, shared, _SAME * self.radius),
             float(self._times[first - 1]),
             float(self._times[first]),
             shared,
