@@ -124,7 +124,9 @@ class TrackHistory:
         first, gain = best_break(
             self._times[here], self._places[here], self._errors[here], _FEWEST_BREAK
         )
-        if gain > _GAIN * max(variance, _LEAST_VARIANCE):
+        # The first place after a turn alone would take the last one before it along.
+        settled = self._first + first + _FEWEST_BREAK < self._end
+        if settled and gain > _GAIN * max(variance, _LEAST_VARIANCE):
             end = self._first + first
             flight = self._line(self._first, end)
             kink = self._kink(end, variance)
