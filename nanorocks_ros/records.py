@@ -548,6 +548,8 @@ class PairCollision:
     tray : int
     tracks, species : ndarray of int32, (2,)
     radii, masses : ndarray (2,), [m], [kg]
+    radius_errors : ndarray (2,), [m]
+        0 where all beads of the species are alike.
     before, after : ndarray (2, 2), [m/s]
         Projected velocity of each bead.
     before_errors, after_errors : ndarray (2,), [m/s]
@@ -569,6 +571,7 @@ class PairCollision:
     tracks: NDArray[np.int32]
     species: NDArray[np.int32]
     radii: NDArray[np.float64]
+    radius_errors: NDArray[np.float64]
     masses: NDArray[np.float64]
     before: NDArray[np.float64]
     after: NDArray[np.float64]

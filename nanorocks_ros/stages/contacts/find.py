@@ -38,6 +38,8 @@ _LEAST_SIGNAL = 12.0
 # two beads: less is one over the other, whose places are not good then.
 _WALL_SLACK = 0.15
 _NEAREST, _FURTHEST = 0.9, 1.05
+# Error of a measured radius, over it, that outlines leave besides the stated one.
+_OUTLINE = 0.02
 # Beads that go on together have merged.
 _MERGED = 0.1
 # Part of an interval by which the contact may lie outside the pictures around it.
@@ -102,7 +104,7 @@ class ContactFinder:
             history = self._histories.get(number)
             if history is None:
                 history = self._histories[number] = TrackHistory(number, species)
-            history.radius = self._radius(species, float(tracks.radii[row]))
+            self._measure(history, float(tracks.radii[row]), float(tracks.radius_errors[row]))
             kink, flight = history.push(time, places[row], error, self._variances[species], gap)
             if kink is not None:
                 found.append(kink)
@@ -115,9 +117,11 @@ class ContactFinder:
                 found.append(kink)
         return found
 
-    def _radius(self, species: int, measured: float) -> float:
-        one = self._tray.species[species]
-        return 0.5 * one.diameter if one.diameter_low == one.diameter_high else measured
+    def _measure(self, history: TrackHistory, radius: float, error: float) -> None:
+        one = self._tray.species[history.species]
+        history.radius, history.radius_error = radius, math.hypot(error, _OUTLINE * radius)
+        if one.diameter_low == one.diameter_high:
+            history.radius, history.radius_error = 0.5 * one.diameter, 0.0
 
     def _mass(self, kink: Kink) -> float:
         return self._tray.species[kink.species].density * 4.0 / 3.0 * math.pi * kink.radius**3
@@ -248,6 +252,7 @@ class ContactFinder:
             tracks=np.array([one.track for one in kinks], dtype=np.int32),
             species=np.array([one.species for one in kinks], dtype=np.int32),
             radii=np.array([one.radius for one in kinks]),
+            radius_errors=np.array([one.radius_error for one in kinks]),
             masses=np.array([self._mass(one) for one in kinks]),
             before=before,
             after=np.array([one.after.velocity for one in kinks]),

@@ -38,7 +38,7 @@ class Kink(NamedTuple):
     Parameters
     ----------
     track, species : int
-    radius : float, [m]
+    radius, radius_error : float, [m]
     before, after : Line
         Through places past the camera.
     last, first : float, [s]
@@ -50,6 +50,7 @@ class Kink(NamedTuple):
     track: int
     species: int
     radius: float
+    radius_error: float
     before: Line
     after: Line
     last: float
@@ -68,7 +69,7 @@ class TrackHistory:
     def __init__(self, track: int, species: int) -> None:
         self.track = track
         self.species = species
-        self.radius = 0.0
+        self.radius = self.radius_error = 0.0
         self._times = np.empty(_ROOM)
         self._places = np.empty((_ROOM, 2))
         self._errors = np.empty(_ROOM)
@@ -165,6 +166,7 @@ class TrackHistory:
             self.track,
             self.species,
             self.radius,
+            self.radius_error,
             before.with_errors(variance, shared, _SAME * self.radius),
             after.with_errors(variance, shared, _SAME * self.radius),
             float(self._times[first - 1]),
