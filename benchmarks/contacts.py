@@ -21,11 +21,8 @@ from nanorocks_ros.experiment.settings import (
 )
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.experiment.view import View
-from nanorocks_ros.inference.contacts import (
-    contact_estimate,
-    pair_log_likelihood,
-    rebound_log_likelihood,
-)
+from nanorocks_ros.inference.contact_estimate import contact_estimate
+from nanorocks_ros.inference.contacts import pair_log_likelihood, rebound_log_likelihood
 from nanorocks_ros.records import Frame, PairCollision, Rebound, Tracks, TrayImage
 from nanorocks_ros.simulation.scene.film import SceneFilm
 from nanorocks_ros.simulation.shaking import ShakenTray

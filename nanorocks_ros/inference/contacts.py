@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import logsumexp, ndtr
 
 from nanorocks_ros.errors import FitError
+from nanorocks_ros.inference.contact_estimate import checked_grid
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,7 +64,7 @@ def rebound_log_likelihood(
     ndarray (n,)
         Log likelihood but for a constant; 0 without rebounds.
     """
-    grid = _grid('wall_restitution', wall_restitution)
+    grid = checked_grid('wall_restitution', wall_restitution)
     _check_share(outliers)
     if not rebounds:
         return np.zeros_like(grid)
@@ -116,7 +117,7 @@ def pair_log_likelihood(
     ndarray (n,)
         Log likelihood but for a constant; 0 without collisions.
     """
-    grid = _grid('restitution', restitution)
+    grid = checked_grid('restitution', restitution)
     _check_share(outliers)
     if not collisions:
         return np.zeros_like(grid)
@@ -265,70 +266,6 @@ def _mean_above(
     ratio = (mean - least) / spread
     density = np.exp(-0.5 * np.minimum(ratio**2, 1e3)) / _SQRT_2_PI
     return np.asarray(mean * ndtr(ratio) + spread * density) + _TINY
-
-
-class ContactEstimate(NamedTuple):
-    """A restitution for people, from a log likelihood alone.
-
-    Parameters
-    ----------
-    restitution, restitution_error : float
-        Most likely value of the grid, between its nodes; standard deviation.
-    lower, upper : float
-        Ends of the central interval that holds 68 %.
-    """
-
-    restitution: float
-    restitution_error: float
-    lower: float
-    upper: float
-
-
-def contact_estimate(restitution: ArrayLike, log_likelihood: ArrayLike) -> ContactEstimate:
-    """The restitution that a log likelihood on an even grid prefers; every value alike before.
-
-    Raises
-    ------
-    FitError
-        When the log likelihood prefers nothing, or is not finite.
-    """
-    grid = _grid('restitution', restitution)
-    values = np.asarray(log_likelihood, dtype=np.float64)
-    if values.shape != grid.shape or not np.isfinite(values).all() or np.ptp(values) == 0.0:
-        raise FitError(
-            'contact_estimate',
-            f'a log likelihood of shape {values.shape} that prefers no value of {grid.size}',
-            'give that of at least one contact, on the same grid',
-        )
-    # On a fine grid: a peak may be narrower than the distance of nodes.
-    fine = np.linspace(grid[0], grid[-1], 20 * grid.size)
-    logs = np.interp(fine, grid, values) if grid.size < 4 else _spline(grid, values, fine)
-    weights = np.exp(logs - logs.max())
-    weights /= weights.sum()
-    mean = float(weights @ fine)
-    total = np.cumsum(weights) - 0.5 * weights
-    lower, upper = np.interp((0.16, 0.84), total, fine)
-    return ContactEstimate(
-        restitution=float(fine[np.argmax(logs)]),
-        restitution_error=math.sqrt(float(weights @ (fine - mean) ** 2)),
-        lower=float(lower),
-        upper=float(upper),
-    )
-
-
-def _spline(
-    grid: NDArray[np.float64], values: NDArray[np.float64], fine: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    from scipy.interpolate import CubicSpline
-
-    return np.asarray(CubicSpline(grid, values)(fine))
-
-
-def _grid(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    grid = np.atleast_1d(np.asarray(values, dtype=np.float64))
-    if grid.ndim != 1 or not grid.size or not ((grid >= 0.0) & (grid <= 1.0)).all():
-        raise FitError(name, f'{values!r} is no list of values in [0, 1]', 'correct the grid')
-    return grid
 
 
 def _check_share(outliers: float) -> None:

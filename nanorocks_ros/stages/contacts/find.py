@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.records import PairCollision, Rebound
+from nanorocks_ros.stages.contacts.checks import FAR, LEAST_SIGNAL, only_these_two
 from nanorocks_ros.stages.contacts.flights import Line, Meeting, meeting
 from nanorocks_ros.stages.contacts.history import LONGEST, Kink, TrackHistory
 from nanorocks_ros.stages.contacts.surroundings import Surroundings
@@ -30,18 +31,12 @@ _FLIGHTS, _FEWEST_PLACES, _LEAST_WAY = 200, 8, 8.0
 _FEWEST_FLIGHTS = 10
 # Flights used are as straight as chance leaves all but one in a thousand.
 _STRAIGHT = 4.0
-# Standard errors beyond which a contact is no such contact.
-_FAR = 4.0
-# Of the speed at which beads meet, the largest error: below, its own error hardly bends the ratio.
-_LEAST_SIGNAL = 12.0
 # How far off the wall a rebound may be seen, in radii; and in sums of radii, how close or far
 # two beads: less is one over the other, whose places are not good then.
 _WALL_SLACK = 0.15
 _NEAREST, _FURTHEST = 0.9, 1.05
 # Error of a measured radius, over it, that outlines leave besides the stated one.
 _OUTLINE = 0.02
-# Beads that go on together have merged.
-_MERGED = 0.1
 # Part of an interval by which the contact may lie outside the pictures around it.
 _EARLY = 0.3
 
@@ -155,11 +150,11 @@ class ContactFinder:
 
     def _between(self, kink: Kink, when: Meeting) -> bool:
         """Whether the contact was between the pictures before and after it."""
-        slack = _EARLY * self._around.interval + _FAR * when.error
+        slack = _EARLY * self._around.interval + FAR * when.error
         return kink.last - slack < when.time < kink.first + slack
 
     def _together(self, one: Meeting, other: Meeting) -> bool:
-        slack = self._around.interval + _FAR * math.hypot(one.error, other.error)
+        slack = self._around.interval + FAR * math.hypot(one.error, other.error)
         return abs(one.time - other.time) < slack
 
     def _stamp_ns(self, time: float) -> int:
@@ -167,7 +162,7 @@ class ContactFinder:
 
     def _rebound(self, kink: Kink, when: Meeting) -> Rebound | None:
         place, variance = _place(kink, when.time)
-        slack = _WALL_SLACK * kink.radius + _FAR * math.sqrt(variance)
+        slack = _WALL_SLACK * kink.radius + FAR * math.sqrt(variance)
         place = place - self._around.displacement(when.time)
         for wall in range(4):
             axis, high = divmod(wall, 2)
@@ -205,9 +200,9 @@ class ContactFinder:
         )
         slip = abs(found.tangential_outgoing - found.tangential_incoming)
         good = (
-            found.incoming > _LEAST_SIGNAL * math.hypot(incoming_error, motion_error)
+            found.incoming > LEAST_SIGNAL * math.hypot(incoming_error, motion_error)
             and found.outgoing > 0.0
-            and slip < _FAR * found.tangential_error
+            and slip < FAR * found.tangential_error
         )
         return found if good else None
 
@@ -231,12 +226,12 @@ class ContactFinder:
         reach = kinks[0].radius + kinks[1].radius
         if (
             not _NEAREST * reach < distance < _FURTHEST * reach
-            or when.chi_square > _FAR**2 + 3.0
+            or when.chi_square > FAR**2 + 3.0
             or not self._alone(when, list(kinks))
         ):
             return None
         found = self._collision(kinks, when)
-        return found if _only_these_two(found) else None
+        return found if only_these_two(found) else None
 
     def _collision(self, kinks: tuple[Kink, Kink], when: Meeting) -> PairCollision:
         (here, variance), (there, its) = (_place(one, when.time) for one in kinks)
@@ -264,32 +259,6 @@ class ContactFinder:
             height=self._tray.dimensions[2],
             place=here - self._around.displacement(when.time),
         )
-
-
-def _only_these_two(pair: PairCollision) -> bool:
-    """Whether they met, exchanged momentum along their line of centres, and with nobody else.
-
-    And did not merge, which leaves them at rest to each other.
-    """
-    normal = pair.separation / math.hypot(*pair.separation)
-    across = np.array([-normal[1], normal[0]])
-    errors = np.hypot(pair.before_errors, pair.after_errors)
-    change = pair.after - pair.before
-    approach = -float((pair.before[1] - pair.before[0]) @ normal)
-    error = float(np.hypot(*pair.before_errors))
-    lost = pair.masses @ change
-    lost_error = math.hypot(*(pair.masses * errors))
-    slip = float((change[1] - change[0]) @ across)
-    # A line of centres that is turned a little makes a slip of the change along it.
-    turned = pair.separation_error / math.hypot(*pair.separation)
-    slip_error = math.hypot(*errors, turned * float((change[1] - change[0]) @ normal))
-    relative = [float(np.hypot(*(one[1] - one[0]))) for one in (pair.before, pair.after)]
-    return bool(
-        relative[1] > _MERGED * relative[0]
-        and approach > _LEAST_SIGNAL * error
-        and float(lost @ lost) < _FAR**2 * lost_error**2
-        and abs(slip) < _FAR * slip_error
-    )
 
 
 def _place(kink: Kink, time: float) -> tuple[NDArray[np.float64], float]:
