@@ -33,10 +33,10 @@ from nanorocks_ros.stages.tracking.tracker import Tracker
 _RATE = 30.0
 _SECONDS = 58.0
 _SPEED = 0.010
-_METRE_PX = 12500.0
-_JITTER, _SHARED = 0.05 / _METRE_PX, 0.09 / _METRE_PX
+METRE_PX = 12500.0
+_JITTER, _SHARED = 0.05 / METRE_PX, 0.09 / METRE_PX
 # Over which the error that a bead keeps for a while goes through all its values.
-_WAVE = 20.0 / _METRE_PX
+_WAVE = 20.0 / METRE_PX
 # So many cycles of each truth that coverage is judged by more than a hundred in tray 1.
 _CYCLES = {1: 18, 3: 9}
 _TRUTHS = [(pairs, walls) for pairs in (0.7, 0.89, 0.95) for walls in (0.9, 0.97)]
@@ -159,36 +159,37 @@ def _report_true() -> None:
         print(f'\nTray {number}, {kind}: 68 % intervals cover {share:.0%}')
 
 
-def film_tracks(
+def film(
     numbers: tuple[int, ...], pairs: float, walls: float, seconds: float, seed: int
-) -> dict[int, list[Tracks]]:
-    """Tracks of trays from a film of the plate with all effects, JPEG 85."""
-    film = SceneFilm(_settings(pairs, walls, seed), SceneSettings(trays=numbers))
+) -> Iterator[tuple[TrayImage, Tracks]]:
+    """Images and tracks of trays, from a film of the plate with all effects, JPEG 85."""
+    scene = SceneFilm(_settings(pairs, walls, seed), SceneSettings(trays=numbers))
     names = {
         'trays': list(numbers),
         'preprocess.layout': 'plate',
-        'preprocess.pixels_per_metre': _METRE_PX,
+        'preprocess.pixels_per_metre': METRE_PX,
     }
     settings = with_values(PipelineSettings(), names, 'benchmark')
     trays = {number: load_trays()[number] for number in numbers}
-    stage = Preprocessor(settings, trays, 'film', View(camera=film.camera.geometry.camera))
+    stage = Preprocessor(settings, trays, 'film', View(camera=scene.camera.geometry.camera))
     trackers = {number: Tracker(settings, tray) for number, tray in trays.items()}
-    found: dict[int, list[Tracks]] = {number: [] for number in numbers}
-    for moment in film.moments(round(seconds * _RATE)):
+    for moment in scene.moments(round(seconds * _RATE)):
         jpeg = cv2.imencode('.jpg', moment.frame.image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
         image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR)
         frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
         for record in stage.push(frame):
             if isinstance(record, TrayImage):
-                found[record.tray] += trackers[record.tray].push(record)
-    return found
+                for tracks in trackers[record.tray].push(record):
+                    yield record, tracks
 
 
 def _report_filmed() -> None:
     print(f'\nTracks of films with all effects, {_FILM_SECONDS:g} s each, one cycle\n')
     _header('error ± stated')
     for seed, (pairs, walls) in enumerate(_FILMED, 1):
-        films = film_tracks(tuple(_CYCLES), pairs, walls, _FILM_SECONDS, seed)
+        films: dict[int, list[Tracks]] = {number: [] for number in _CYCLES}
+        for _, tracks in film(tuple(_CYCLES), pairs, walls, _FILM_SECONDS, seed):
+            films[tracks.tray].append(tracks)
         for number, tracks in films.items():
             found = contacts_of(load_trays()[number], iter(tracks))
             rebounds = sum(isinstance(one, Rebound) for one in found)
