@@ -84,8 +84,9 @@ def _draw(axes: Axes, frames: Film, contact: Rebound | PairCollision, centre: np
     for track, colour in zip(_tracks(contact), _COLOURS, strict=False):
         _draw_way(axes, shown, track, contact.stamp_ns, colour)
     x, y = centre * METRE_PX
-    axes.set_xlim(max(x - _AROUND, -6.0), x + _AROUND)
-    axes.set_ylim(y + _AROUND, y - _AROUND)
+    rows, columns = strobe.shape[:2]
+    axes.set_xlim(max(x - _AROUND, -4.0), min(x + _AROUND, columns))
+    axes.set_ylim(min(y + _AROUND, rows), max(y - _AROUND, 0.0))
     axes.set_xticks([])
     axes.set_yticks([])
 

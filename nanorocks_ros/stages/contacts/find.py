@@ -21,8 +21,10 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import Tracks
 
 _NS = 1e9
-# Longer than this many intervals between two pictures, anything may have happened.
-_GAP = 1.5
+# Intervals between two pictures: a bead not seen for longer may have done anything; and a contact
+# while it was not seen is not used.
+_GAP = 3.5
+_CONTACT_GAP = 1.5
 # Of grains with corners a collision says nothing of the kind.
 _NOT_ROUND = ('JSC-1',)
 # Flights from which the scatter of places is learnt, their fewest places, and how far they lead
@@ -149,8 +151,10 @@ class ContactFinder:
         return ()
 
     def _between(self, kink: Kink, when: Meeting) -> bool:
-        """Whether the contact was between the pictures before and after it."""
+        """Whether the contact was between two pictures, one right after the other."""
         slack = _EARLY * self._around.interval + FAR * when.error
+        if kink.first - kink.last > _CONTACT_GAP * self._around.interval:
+            return False
         return kink.last - slack < when.time < kink.first + slack
 
     def _together(self, one: Meeting, other: Meeting) -> bool:

@@ -131,6 +131,14 @@ def test_a_bead_that_is_hidden_at_the_wall_gives_no_rebound():
     assert _found(records) == []
 
 
+def test_a_bead_that_is_hidden_on_its_way_still_gives_its_rebound():
+    records = list(tracks_of(bounced(TIMES, 4e-3, 0.9), jitter=0.02 * PIXEL))
+    for hidden in (5, 20):
+        records[hidden] = replace(records[hidden], seen=np.zeros(1, dtype=bool))
+    (found,) = _found(records)
+    assert found.outgoing / found.incoming == pytest.approx(0.9, abs=0.01)
+
+
 def test_a_bead_that_turns_sideways_at_the_wall_met_somebody_unseen():
     assert _found(tracks_of(bounced(TIMES, 4e-3, 0.9, change=2e-3), jitter=0.02 * PIXEL)) == []
 
