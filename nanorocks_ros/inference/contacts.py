@@ -40,6 +40,7 @@ _PAIR_ERRORS = 1.25
 # Range of speeds after a contact of the other kind, over the speed before.
 _RANGE = 2.0
 _HEIGHTS = 20
+_AT_ONCE = 128
 _TINY = 1e-300
 _SQRT_2_PI = math.sqrt(2.0 * math.pi)
 
@@ -122,8 +123,14 @@ def pair_log_likelihood(
     if not collisions:
         return np.zeros_like(grid)
     seen = _Seen.of(collisions).with_errors(_PAIR_ERRORS)
+    # In parts, so that memory does not grow with the number of collisions.
+    parts = [
+        _Seen(*(one[k : k + _AT_ONCE] for one in seen))
+        for k in range(0, len(collisions), _AT_ONCE)
+    ]
+    limits = sticking_speed, outliers
     nuisances = [
-        _pairs_given(seen, grid, ratio, error, (sticking_speed, outliers))
+        np.sum([_pairs_given(one, grid, ratio, error, limits) for one in parts], axis=0)
         for ratio in vertical_ratios
         for error in (radius_errors if seen.measured.any() else (0.0,))
     ]

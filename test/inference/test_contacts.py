@@ -141,9 +141,18 @@ def test_collisions_give_the_restitution_whatever_the_vertical_speeds(restitutio
 
 
 def test_collisions_cover_the_truth_as_often_as_they_say():
-    found = [_pairs(_collisions(seed, 40, 0.8, ratio=0.6)) for seed in range(60)]
+    found = [_pairs(_collisions(seed, 30, 0.8, ratio=0.6)) for seed in range(50)]
     covered = np.mean([one.lower <= 0.8 <= one.upper for one in found])
     assert 0.55 < covered < 0.9
+
+
+def test_many_collisions_are_as_likely_as_their_parts_together():
+    collisions = _collisions(8, 150, 0.8)
+    values = {'vertical_ratios': (0.5,)}
+    parts = [
+        pair_log_likelihood(one, PAIRS, **values) for one in (collisions[:70], collisions[70:])
+    ]
+    assert pair_log_likelihood(collisions, PAIRS, **values) == pytest.approx(sum(parts))
 
 
 def test_vertical_speeds_that_are_known_tell_more():
@@ -153,7 +162,7 @@ def test_vertical_speeds_that_are_known_tell_more():
 
 
 def test_radii_that_were_measured_too_large_do_no_harm():
-    collisions = _collisions(6, 250, 0.8, radius_error=0.04)
+    collisions = _collisions(6, 150, 0.8, radius_error=0.04)
     believed = _pairs(collisions, radius_errors=(0.0,))
     doubted = _pairs(collisions)
     assert abs(doubted.restitution - 0.8) < 3.0 * doubted.restitution_error
