@@ -20,6 +20,7 @@ ALL = (
     'cor_coverage',
     'cor_recovery',
     'closed_forms',
+    'contacts',
     'engine',
     'engine_physics',
     'validation',

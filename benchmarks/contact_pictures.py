@@ -1,0 +1,145 @@
+"""Draw a rebound and a collision as found: ``python -m benchmarks.contact_pictures [FOLDER]``.
+
+Writes rebounds.png, for the documentation, into docs or the folder given.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+
+from benchmarks.contacts import METRE_PX, contacts_of, film
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.records import PairCollision, Rebound, Tracks, TrayImage
+
+mpl.use('Agg')
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+_PAIRS, _WALLS = 0.89, 0.97
+_SECONDS = 25.0
+# Pictures shown on each side of a contact, and what is drawn around it, [px].
+_SHOWN = 10
+_AROUND = 46
+# How far places may lie off the lines, [px].
+_STRAIGHT = 0.5
+_COLOURS = '#14406b', '#7a1f8a'
+
+Film = list[tuple[TrayImage, Tracks]]
+
+
+def _shown(frames: Film, stamp_ns: int) -> Film:
+    middle = sum(image.stamp_ns < stamp_ns for image, _ in frames)
+    return frames[middle - _SHOWN : middle + _SHOWN]
+
+
+def _flights(
+    frames: Film, track: int, stamp_ns: int
+) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Times since the contact, places [px] past the camera as the tray was then, and lines."""
+    middle = min(frames, key=lambda one: abs(one[0].stamp_ns - stamp_ns))[1]
+    rows = [
+        (one.stamp_ns, *(one.positions[one.ids == track][0] + one.displacement))
+        for _, one in frames
+        if (one.ids == track).any()
+    ]
+    table = np.array(rows)
+    table[:, 1:] = (table[:, 1:] - middle.displacement) * METRE_PX - 0.5
+    parts = []
+    for part in (table[:, 0] < stamp_ns, table[:, 0] >= stamp_ns):
+        times, places = (table[part, 0] - stamp_ns) / 1e9, table[part, 1:]
+        parts.append((times, places, np.polyfit(times, places, 1)))
+    return parts
+
+
+def _bend(frames: Film, tracks: Sequence[int], stamp_ns: int) -> float:
+    """How far off straight lines the places shown lie at most, [px]."""
+    shown = _shown(frames, stamp_ns)
+    return max(
+        float(np.abs(places - np.outer(times, line[0]) - line[1]).max())
+        for track in tracks
+        for times, places, line in _flights(shown, track, stamp_ns)
+    )
+
+
+def _draw_way(axes: Axes, frames: Film, track: int, stamp_ns: int, colour: str) -> None:
+    both = _flights(frames, track, stamp_ns)
+    for (times, places, line), filled in zip(both, (True, False), strict=True):
+        ends = np.array([times.min(), times.max()])
+        ends[np.argmin(np.abs(ends))] = 0.0
+        axes.plot(*(np.outer(ends, line[0]) + line[1]).T, '-', color=colour, lw=1.2)
+        axes.plot(*places.T, 'o', ms=3.5, mfc=colour if filled else 'white', mec=colour, mew=0.9)
+
+
+def _draw(axes: Axes, frames: Film, contact: Rebound | PairCollision, centre: np.ndarray) -> None:
+    shown = _shown(frames, contact.stamp_ns)
+    # The darkest of all pictures: beads where they were.
+    strobe = np.min([image.color for image, _ in shown[::3]], axis=0)[:, :, ::-1]
+    axes.imshow(strobe, alpha=0.75)
+    for track, colour in zip(_tracks(contact), _COLOURS, strict=False):
+        _draw_way(axes, shown, track, contact.stamp_ns, colour)
+    x, y = centre * METRE_PX
+    rows, columns = strobe.shape[:2]
+    axes.set_xlim(max(x - _AROUND, -4.0), min(x + _AROUND, columns))
+    axes.set_ylim(min(y + _AROUND, rows), max(y - _AROUND, 0.0))
+    axes.set_xticks([])
+    axes.set_yticks([])
+
+
+def _tracks(contact: Rebound | PairCollision) -> list[int]:
+    return contact.tracks.tolist() if isinstance(contact, PairCollision) else [contact.track]
+
+
+def _best(found: list, frames: Film) -> tuple[Rebound, PairCollision]:
+    """Fast ones that go straight on for long enough to be looked at."""
+    first, last = frames[_SHOWN][0].stamp_ns, frames[-_SHOWN][0].stamp_ns
+    straight = [
+        one
+        for one in found
+        if first < one.stamp_ns < last and _bend(frames, _tracks(one), one.stamp_ns) < _STRAIGHT
+    ]
+    rebounds = [one for one in straight if isinstance(one, Rebound) and one.wall == 0]
+    pairs = [one for one in straight if isinstance(one, PairCollision)]
+    return (
+        max(rebounds, key=lambda one: one.incoming + abs(one.tangential_incoming)),
+        max(pairs, key=lambda one: float(np.hypot(*(one.before[1] - one.before[0])))),
+    )
+
+
+def write(folder: Path) -> None:
+    """Write the picture."""
+    frames = list(film((1,), _PAIRS, _WALLS, _SECONDS, 1))
+    rebound, pair = _best(list(contacts_of(load_trays()[1], (one for _, one in frames))), frames)
+    figure = Figure(figsize=(9.0, 4.9), layout='constrained')
+    left, right = figure.subplots(1, 2)
+    _draw(left, frames, rebound, rebound.place)
+    left.axvline(-0.5, color='black', lw=1.0)
+    ratio = rebound.outgoing / rebound.incoming
+    error = np.hypot(rebound.outgoing_error, rebound.incoming_error) / rebound.incoming
+    left.set_title(
+        f'A rebound: {1e3 * rebound.incoming:.2f} to the wall, {1e3 * rebound.outgoing:.2f} mm/s '
+        f'from it\nratio {ratio:.3f} ± {error:.3f} (true: {_WALLS})',
+        fontsize=10,
+    )
+    _draw(right, frames, pair, pair.place + 0.5 * pair.separation)
+    here, there = pair.place, pair.place + pair.separation
+    right.plot(*(np.array([here, there]) * METRE_PX - 0.5).T, '-', color='black', lw=1.5)
+    normal = pair.separation / np.hypot(*pair.separation)
+    approach, parting = (
+        1e3 * abs(float((one[1] - one[0]) @ normal)) for one in (pair.before, pair.after)
+    )
+    right.set_title(
+        f'A collision: {approach:.2f} and {parting:.2f} mm/s along the line of centres (black),\n'
+        f'{np.hypot(*pair.separation) / pair.radii.sum():.3f} diameters apart in the picture',
+        fontsize=10,
+    )
+    figure.savefig(folder / 'rebounds.png', dpi=110)
+
+
+if __name__ == '__main__':
+    write(Path(sys.argv[1] if len(sys.argv) > 1 else 'docs'))
