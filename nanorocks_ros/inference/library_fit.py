@@ -173,11 +173,11 @@ def node_of(number: int) -> dict[str, float]:
     for _ in range(64):
         golden = (1.0 + golden) ** (1.0 / (dimensions + 1))
     u = [(0.5 + (number + 1) * golden**-k) % 1.0 for k in range(1, dimensions + 1)]
-    wall = 1.0 - (1.0 - LOWEST_WALL) * u[1]
+    wall = 1.0 - (1.0 - LOWEST_WALL) * u[1] ** 1.5
     return {
-        'restitution': 1.0 - u[0] ** 1.5,
+        'restitution': 1.0 - u[0] ** 2,
         'wall_restitution': wall,
-        'floor_lid_restitution': min(wall + 0.06 * (u[2] - 0.5), 1.0),
+        'floor_lid_restitution': 1.0 - (1.0 - wall) * math.exp(1.6 * (u[2] - 0.5)),
         'height': 0.5e-3 * (u[3] - 0.5),
         'diameter': 0.04 * (u[4] - 0.5),
         'anisotropy': 1.4 * (u[5] - 0.5),

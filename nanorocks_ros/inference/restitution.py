@@ -26,8 +26,10 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.inference.decay_library import DecayLibrary
 
-# Places of the grid along each restitution; the first lie closer towards 1.
+# Places of the grid along each restitution, closer towards 1: evenly spaced in the powers below of
+# 1 - restitution, in which likelihoods are smooth.
 _PLACES, _WALL_PLACES = 35, 15
+_POWER, _WALL_POWER = 1.0 / 1.5, 0.5
 _FINE, _WALL_FINE = 241, 121
 # Less likely places than exp(-this) of the best are not looked at.
 _DEPTH = 18.0
@@ -46,8 +48,8 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
     settings : PriorSettings
         Its spreads.
     """
-    restitution = 1.0 - np.linspace(1.0, 0.0, _PLACES) ** 1.5
-    wall = np.linspace(LOWEST_WALL, 1.0, _WALL_PLACES)
+    restitution = 1.0 - np.linspace(1.0, 0.0, _PLACES) ** (1.0 / _POWER)
+    wall = 1.0 - (1.0 - LOWEST_WALL) * np.linspace(1.0, 0.0, _WALL_PLACES) ** (1.0 / _WALL_POWER)
     beads, walls = (one.ravel() for one in np.meshgrid(restitution, wall, indexing='ij'))
     mean = library.log_speed(beads, walls)
     slopes = [_floor_and_lid(library, beads, walls, settings.floor_lid_spread)]
@@ -206,17 +208,24 @@ def posterior_of(
         )
     shape = (tables.restitution.size, tables.wall_restitution.size)
     values = np.maximum(log_likelihood - log_likelihood.max(), _UNLIKELY).reshape(shape)
-    # Evenly spaced, in which the surface is smooth.
-    even = np.linspace(0.0, 1.0, shape[0])
-    surface = RectBivariateSpline(even, tables.wall_restitution, values)
+    surface = RectBivariateSpline(
+        _even(tables.restitution, 0.0, _POWER),
+        _even(tables.wall_restitution, LOWEST_WALL, _WALL_POWER),
+        values,
+    )
     box = (0.0, 1.0, low, high)
     for _ in range(3):
         beads, wall = _axes(*box)
-        fine = surface(1.0 - (1.0 - beads) ** (1.0 / 1.5), wall)
+        fine = surface(_even(beads, 0.0, _POWER), _even(wall, LOWEST_WALL, _WALL_POWER))
         fine -= fine.max()
         box = _likely(fine, beads, wall)
     weight = np.exp(fine) * _widths(beads)[:, np.newaxis] * _widths(wall)
     return Posterior(restitution=beads, wall_restitution=wall, probability=weight / weight.sum())
+
+
+def _even(restitution: NDArray[np.float64], low: float, power: float) -> NDArray[np.float64]:
+    """Where restitutions lie, from 0 for the lowest to 1, in what the grid is even in."""
+    return np.asarray(1.0 - ((1.0 - restitution) / (1.0 - low)) ** power)
 
 
 def _axes(
