@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.experiment.colours import hue_of
 from nanorocks_ros.records import UNKNOWN, Quality, SpeedEstimate, SpeedMethod, Tracks, TrayImage
 from nanorocks_ros.stages.shaking import NS, CycleFollower
 from nanorocks_ros.stages.tracking.mean_speed import RELIABLE_SHARE, mean_speed
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
 
 # A bead should come so many pixels in half of the window: jitter is far less.
 _LEAST_PATH_PX = 1.5
+# So many where there are grains: as they turn their outlines seem to move, by more than a pixel.
+# Speeds from less than this share of it are flagged.
+_LEAST_GRAIN_PATH_PX = 2.2
+_FAR_ENOUGH = 0.8
 # Tracks are looked back upon for so long; slower beads rest.
 _LOOK_BACK_NS = 3 * NS
 # Share of the beads that must be followed, of each species, to begin and to go on.
@@ -52,7 +57,9 @@ class TrackSpeed:
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._interval_ns = round(settings.speed.interval * NS)
-        self._least_distance = _LEAST_PATH_PX / settings.preprocess.pixels_per_metre
+        self._grains = any(hue_of(one.material) == 0 for one in tray.species)
+        least = _LEAST_GRAIN_PATH_PX if self._grains else _LEAST_PATH_PX
+        self._least_distance = least / settings.preprocess.pixels_per_metre
         self._tray = tray
         self._counts = np.array([one.count for one in tray.species])
         self._tracker = Tracker(settings, tray)
@@ -127,7 +134,9 @@ class TrackSpeed:
         flags, self._flags = self._flags, Quality(0)
         if mean.share < RELIABLE_SHARE:
             flags |= Quality.FEW_BEADS
-        if step > _FURTHEST_STEP:
+        path = 0.5 * mean.window * mean.mean_projected_speed
+        too_short = self._grains and path < _FAR_ENOUGH * self._least_distance
+        if step > _FURTHEST_STEP or too_short:
             flags |= Quality.UNCERTAIN
         return [
             SpeedEstimate(
