@@ -2,8 +2,9 @@
 
 The whole plate is filmed through the lens, with all effects and JPEG 85 or with none, in gases
 that do not cool, so that each speed holds throughout. Each estimate is compared with the true mean
-projected speed of all beads over its own window. In brackets: the error that the estimates give
-for themselves, over the truth; `!`: more than half of the estimates carry a quality flag.
+projected speed of all beads over its own window, and those without a quality flag are averaged;
+`!`: more than half carry one, and the average is over all. In brackets: the error that the
+estimates give for themselves, over the truth.
 """
 
 from __future__ import annotations
@@ -216,17 +217,25 @@ def _ratios(found: list[SpeedEstimate], truth: np.ndarray) -> list[_Compared]:
 
 
 def _cell(found: list[_Compared]) -> str:
-    known = [one for one in found if np.isfinite(one.ratio)]
+    trusted = _trusted(found)
+    known = [one for one in trusted or found if np.isfinite(one.ratio)]
     if not known:
         return 'nothing' if not found else 'unknown!'
-    mark = '' if 2 * sum(one.trusted for one in found) >= len(found) else '!'
+    mark = '' if trusted else '!'
     ratio, error = (np.mean([getattr(one, name) for one in known]) for name in ('ratio', 'error'))
     return f'{ratio:.2f} ({error:.2f}){mark}'
 
 
 def _species_cell(found: list[_Compared], k: int) -> str:
-    known = [one.species[k] for one in found if np.isfinite(one.species[k])]
-    return f'{np.mean(known):.2f}' if known else 'unknown'
+    trusted = _trusted(found)
+    known = [one.species[k] for one in trusted or found if np.isfinite(one.species[k])]
+    return f'{np.mean(known):.2f}{"" if trusted else "!"}' if known else 'unknown'
+
+
+def _trusted(found: list[_Compared]) -> list[_Compared]:
+    """Those without a flag, when they are half of all at least."""
+    trusted = [one for one in found if one.trusted]
+    return trusted if 2 * len(trusted) >= len(found) else []
 
 
 def _choice(found: list[_Compared]) -> str:

@@ -107,8 +107,7 @@ class TrackSpeed:
         enough = least >= (_STILL_ENOUGH if self.reliable else _ENOUGH)
         # Where many beads are lost and found again, others are taken for them.
         followed = bool(self._followed) and float(np.median(self._followed)) >= RELIABLE_SHARE
-        told_apart = bool(self._steps) and float(np.median(self._steps)) <= _FURTHEST_STEP
-        self.reliable = self.judged and enough and followed and told_apart
+        self.reliable = self.judged and enough and followed and self._told_apart()
 
     def _speeds(self, shakes: CycleFollower) -> list[SpeedEstimate]:
         series = list(self._recent)
@@ -129,14 +128,13 @@ class TrackSpeed:
             for one in each
         ]
         self._followed.append(min(one.share if one else 0.0 for one in each))
-        step = self._longest_step(np.array([speed for speed, _ in species]))
-        self._steps.append(step)
+        self._steps.append(self._longest_step(np.array([speed for speed, _ in species])))
         flags, self._flags = self._flags, Quality(0)
         if mean.share < RELIABLE_SHARE:
             flags |= Quality.FEW_BEADS
         path = 0.5 * mean.window * mean.mean_projected_speed
         too_short = self._grains and path < _FAR_ENOUGH * self._least_distance
-        if step > _FURTHEST_STEP or too_short:
+        if too_short or not self._told_apart():
             flags |= Quality.UNCERTAIN
         return [
             SpeedEstimate(
@@ -152,6 +150,10 @@ class TrackSpeed:
                 **SpeedEstimate.by_species(species),
             )
         ]
+
+    def _told_apart(self) -> bool:
+        """Whether beads come less far between two pictures than others are away."""
+        return bool(self._steps) and float(np.median(self._steps)) <= _FURTHEST_STEP
 
     def _longest_step(self, speeds: NDArray[np.float64]) -> float:
         """Way of a bead between two pictures over the distance to others, of the worst species."""

@@ -55,8 +55,8 @@ def filmed(number, mean_speed, frames, noise=2.0):
 
 @pytest.fixture(scope='module')
 def grains():
-    """Tray 7 at 15 mm/s, where a grain comes as far between two pictures as the next one is."""
-    return filmed(7, 15e-3, 150)
+    """Tray 7 at 18 mm/s, where a grain comes as far between two pictures as the next one is."""
+    return filmed(7, 18e-3, 120)
 
 
 @pytest.fixture(scope='module')
@@ -77,14 +77,18 @@ def ratios(estimates, truth):
     return np.array([one.mean_projected_speed for one in moving]) / true, moving
 
 
-def test_speeds_from_tracks_of_crowded_fast_grains_are_flagged(grains):
-    images, truth = grains
-    ratio, found = ratios(pushed(images, 7, 'tracking'), truth)
-    wrong = np.abs(ratio - 1.0) > 0.2
-    assert wrong.any()
-    assert all(
-        one.quality & Quality.UNCERTAIN for one, off in zip(found, wrong, strict=True) if off
-    )
+def test_speeds_from_tracks_of_grains_that_come_as_far_as_the_next_one_are_flagged(grains):
+    images, _ = grains
+    moving = [one for one in pushed(images, 7, 'tracking') if one.stamp_ns > 1.0 * NS]
+    assert moving
+    assert all(one.quality & Quality.UNCERTAIN for one in moving)
+
+
+def test_speeds_from_tracks_of_beads_that_are_well_apart_are_not_flagged(mixture):
+    images, truth = mixture
+    ratio, found = ratios(pushed(images, 3, 'tracking'), truth)
+    assert ratio.mean() == pytest.approx(1.0, abs=0.05)
+    assert not any(one.quality for one in found)
 
 
 def test_the_structure_function_is_chosen_for_crowded_fast_grains_and_is_right(grains):
