@@ -16,8 +16,10 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
 
 
-# Of a speed, an error beyond which it carries a flag.
+# Of a speed, an error beyond which it carries a flag; unless beads are known to be slower than
+# this [m/s], and rest.
 _CERTAIN = 0.2
+_REST = 5e-5
 
 
 class SpeedEstimator:
@@ -122,7 +124,7 @@ def _judged(
     if not isinstance(record, SpeedEstimate):
         return record
     speed, error = record.mean_projected_speed, record.mean_projected_speed_error
-    if error <= _CERTAIN * abs(speed):
+    if error <= _CERTAIN * abs(speed) or abs(speed) + error <= _REST:
         return record
     # Also what is not known at all.
     return replace(record, quality=record.quality | Quality.UNCERTAIN)
