@@ -40,7 +40,7 @@ _TRAYS = (1, 2, 3, 4, 5, 6, 7)
 _SPECIES_OF = (3, 4, 5, 7)
 _SPEEDS = (0.1e-3, 0.5e-3, 2e-3, 7e-3, 15e-3)
 # Slow beads need time to leave their places.
-_SECONDS = (30.0, 20.0, 12.0, 8.0, 8.0)
+_SECONDS = (15.0, 12.0, 12.0, 8.0, 8.0)
 _METHODS = {
     'auto': {},
     'tracking': {'speed.method': 'tracking'},
