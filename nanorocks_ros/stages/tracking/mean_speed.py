@@ -198,7 +198,7 @@ class _Distances:
 
     def _shared_share(self) -> float:
         """Of a distance, what errors that places share for a while may add to it."""
-        more = max(self.place_variance - float(self.variances.mean()), 0.0)
+        more = max(self.place_variance - self.variance, 0.0)
         return 1.0 - math.sqrt(max(1.0 - 4.0 * more / max(self.square, 1e-18), 0.0))
 
     def _jitter_error(self, mean: float) -> float:
