@@ -44,7 +44,10 @@ class CorRelation(IntEnum):
 
 
 class Quality(IntFlag):
-    """What is wrong with the picture of a tray since the last one; 0 when nothing is."""
+    """What is wrong with the picture of a tray since the last one, or with a speed from it.
+
+    0 when nothing is; docs/speed.md says what each flag means.
+    """
 
     SATURATED = 1
     LOW_CONTRAST = 2
@@ -55,6 +58,8 @@ class Quality(IntFlag):
     FROZEN = 64
     HALF_FRAME = 128
     WRONG_SCALE = 256
+    UNCERTAIN = 512
+    UNCALIBRATED = 1024
 
     def names(self) -> list[str]:
         """The flags that are set, in small letters."""
@@ -241,7 +246,7 @@ class SpeedEstimate:
     cycle_start_ns : int or None
         The shaking event that opened the cycle; None before the first.
     quality : Quality
-        What was wrong with the pictures since the last estimate.
+        What was wrong with the pictures since the last estimate, and with the estimate itself.
     first_species_speed, first_species_speed_error : float, [m/s]
     second_species_speed, second_species_speed_error : float, [m/s]
         Mean projected speed of the first two of `Tray.species`; unknown when they were not told

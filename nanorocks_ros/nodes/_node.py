@@ -221,6 +221,8 @@ class NanorocksNode(Node):
         if isinstance(record, SpeedEstimate):
             method = record.method.name.lower().replace('_', ' ')
             speed = f'{1e3 * record.mean_projected_speed:.3f} mm/s by {method}'
+            if record.quality:
+                speed += f' ({", ".join(record.quality.names())})'
             self.state[f'tray {record.tray} speed'] = speed
         if isinstance(record, CorEstimate):
             name = f'tray {record.tray} COR'

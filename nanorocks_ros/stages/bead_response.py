@@ -24,6 +24,8 @@ _GRID_POINTS = 257
 # Displacements at which the response is kept: fine enough for straight lines in between.
 _STEP_PX = 0.25
 _WAVENUMBERS = 600
+# Where the response no longer grows, relative errors grow by so much at most.
+_FLAT = 100.0
 
 
 @cache
@@ -179,7 +181,23 @@ class BeadResponse:
         finite = np.interp(displacement, self._grid, self._scatter)
         noise_sd = noise_power * np.sqrt(2.0 * pixels)
         noise = 0.5 * (self.displacement(power + noise_sd) - self.displacement(power - noise_sd))
-        return np.sqrt(finite**2 + noise**2 + (self._arrangement_error() * displacement) ** 2)
+        arrangement = self._arrangement_error() * self._steepness(displacement) * displacement
+        return np.sqrt(finite**2 + noise**2 + arrangement**2)
+
+    def _steepness(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Relative change of a displacement over that of the power, 1 at least.
+
+        Near the plateau the power hardly grows, and any error of it counts many times.
+        """
+        slope = np.gradient(self._power, self._grid)
+        change = np.divide(
+            self._power,
+            slope * self._grid,
+            where=slope * self._grid > 0.0,
+            out=np.full_like(self._grid, _FLAT),
+        )
+        steepness = np.interp(displacement, self._grid, np.clip(change, 1.0, _FLAT))
+        return np.asarray(steepness)
 
     def _arrangement_error(self) -> float:
         mean = self._sum / self.pairs

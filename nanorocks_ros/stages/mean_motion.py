@@ -35,6 +35,8 @@ class MeanMotion:
         Of all beads.
     species : tuple of (float, float), [px/s]
         Speed and its error for each species.
+    in_range : bool
+        Whether no species went too far between two pictures.
     """
 
     stamp_ns: int
@@ -44,6 +46,7 @@ class MeanMotion:
     speed: float
     error: float
     species: tuple[tuple[float, float], ...]
+    in_range: bool
 
 
 class MeanMotions:
@@ -149,4 +152,8 @@ class MeanMotions:
                 *(share * one for share, (_, one) in zip(shares, species, strict=True))
             ),
             species=tuple(species),
+            in_range=all(
+                part.in_range(one, lag)
+                for part, one, lag in zip(self._parts, samples, lags, strict=True)
+            ),
         )

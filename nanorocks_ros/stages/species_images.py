@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.experiment.colours import COLOURS, hue_of
 from nanorocks_ros.physics.compiled import compiled
 
 if TYPE_CHECKING:
@@ -20,13 +21,6 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
 
-# Blue, green and red of the materials in even light, only to begin with.
-_COLOURS = {
-    'acrylic': (30.0, 30.0, 200.0),
-    'glass': (200.0, 60.0, 30.0),
-    'copper': (51.0, 115.0, 184.0),
-}
-_GRAY = ('JSC-1',)
 # The table has this many steps for each of the three colours.
 _STEPS = 64
 _PER_STEP = 256 // _STEPS
@@ -69,8 +63,9 @@ class SpeciesImages:
     @property
     def possible(self) -> bool:
         """Whether there are several species, all of a colour that is known."""
-        known = all(one in _COLOURS or one in _GRAY for one in self._materials)
-        return known and len(self._materials) > 1 and sum(map(_GRAY.count, self._materials)) < 2
+        known = all(one in COLOURS for one in self._materials)
+        grays = sum(hue_of(one) == 0 for one in self._materials)
+        return known and len(self._materials) > 1 and grays < 2
 
     @property
     def known(self) -> bool:
@@ -88,9 +83,9 @@ class SpeciesImages:
         floor = self._floor(pixels)
         tints = _tint(pixels - floor)
         tints = tints[np.linalg.norm(tints, axis=1) > _COLOURED]
-        coloured = [k for k, name in enumerate(self._materials) if name in _COLOURS]
+        coloured = [k for k, name in enumerate(self._materials) if hue_of(name)]
         hues = _unit(
-            np.array([_tint(np.array(_COLOURS[self._materials[k]]) - floor) for k in coloured])
+            np.array([_tint(np.array(COLOURS[self._materials[k]]) - floor) for k in coloured])
         )
         for _ in range(_ROUNDS):
             nearest = (tints @ hues.T).argmax(axis=1)

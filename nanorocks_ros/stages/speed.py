@@ -16,6 +16,12 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
 
 
+# Of a speed, an error beyond which it carries a flag; unless beads are known to be slower than
+# this [m/s], and rest.
+_CERTAIN = 0.2
+_REST = 5e-5
+
+
 class SpeedEstimator:
     """Measures the mean projected speed of one tray.
 
@@ -86,8 +92,10 @@ class SpeedEstimator:
             if method == 'structure_function' or self._tracks.judged:
                 found += speeds
         else:
+            if method == 'auto':
+                self._structure.watch(image)
             self._idle = True
-        return tuple(one for one in found if self._in_order(one))
+        return tuple(_judged(one) for one in found if self._in_order(one))
 
     def _by_tracks(self, speeds: list[SpeedEstimate]) -> list[SpeedEstimate]:
         """Those to be given out: kept until it is known whether tracks can be relied upon."""
@@ -109,3 +117,16 @@ class SpeedEstimator:
             return False
         self._last_emitted_ns = record.stamp_ns
         return True
+
+
+def _judged(
+    record: SpeedEstimate | MotionMask | Tracks,
+) -> SpeedEstimate | MotionMask | Tracks:
+    """The same, and flagged where it says itself that it may be off by more than 20 %."""
+    if not isinstance(record, SpeedEstimate):
+        return record
+    speed, error = record.mean_projected_speed, record.mean_projected_speed_error
+    if error <= _CERTAIN * abs(speed) or abs(speed) + error <= _REST:
+        return record
+    # Also what is not known at all.
+    return replace(record, quality=record.quality | Quality.UNCERTAIN)

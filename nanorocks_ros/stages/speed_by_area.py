@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.physics.moving_area import mean_displacement
-from nanorocks_ros.records import MotionMask, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.records import MotionMask, Quality, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.stages.motion_mask import MotionMasker
 from nanorocks_ros.stages.shaking import NS, CycleFollower
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 # Standard deviation of a Rayleigh distribution over its mean.
 _RAYLEIGH_SPREAD = math.sqrt(4.0 / math.pi - 1.0)
+# Displacements between the pictures compared that an area can tell: in pixels at least, and in
+# bead diameters at most.
+_LEAST_PX, _MOST_DIAMETERS = 1.0, 1.0
 
 
 class AreaSpeed:
@@ -72,8 +75,9 @@ class AreaSpeed:
     def _speed(self, moving_pixels: int, image: TrayImage, shakes: CycleFollower) -> SpeedEstimate:
         area = moving_pixels / self._scale**2 / self._tray.count
         radius = 0.5 * self._tray.diameter
-        raw = mean_displacement(area, radius, self._settings.geometry) / self._masker.time_step
-        speed = self._settings.area_factor * raw + self._settings.area_offset
+        raw = mean_displacement(area, radius, self._settings.geometry)
+        speed = self._settings.area_factor * raw / self._masker.time_step
+        speed += self._settings.area_offset
         first, last = self._masker.span_ns
         return SpeedEstimate(
             stamp_ns=(first + last) // 2,
@@ -85,5 +89,16 @@ class AreaSpeed:
             mean_projected_speed_error=abs(speed) * _RAYLEIGH_SPREAD / math.sqrt(self._tray.count),
             window=(last - first) / NS,
             method=SpeedMethod.BINARISED_AREA,
-            quality=image.quality,
+            quality=image.quality | self._range(raw),
         )
+
+    def _range(self, displacement: float) -> Quality:
+        """What is to be said of a speed from a displacement, [m]."""
+        quality = Quality(0)
+        if self._settings.area_factor == 1.0 and self._settings.area_offset == 0.0:
+            # No reading of the recipe is right without manual tracks (docs/speed.md).
+            quality |= Quality.UNCALIBRATED
+        most = _MOST_DIAMETERS * self._tray.diameter
+        if not _LEAST_PX / self._scale <= displacement <= most:
+            quality |= Quality.UNCERTAIN
+        return quality

@@ -8,6 +8,7 @@ same recording (:mod:`nanorocks_ros.stages.bead_response`).
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -31,6 +32,13 @@ _PAIRS_NEEDED = 6
 # simulated gases in tray 1; the rates of deflection per diameter in trays 3 and 5 are alike.
 _DEFLECTION_LOSS = 0.25
 _DEFLECTION_SCATTER = 0.75
+# Of that loss, what differs from one gas to another; and of what a tray that swings adds to a
+# displacement, what may be left when it is taken off.
+_DEFLECTION_UNSURE = 0.3
+_SHIFT_UNSURE = 0.5
+# Of the plateau: beyond it a displacement can hardly be read, and a sixth of the simulated
+# estimates were off by more than 20 %.
+_OUT_OF_RANGE = 0.65
 _PAIRS_KEPT = 400
 _KEY_INTERVAL_NS = NS // 4
 _KEYS_KEPT = 48
@@ -204,10 +212,15 @@ class StructureFunction:
         square = away**2 - 0.25 * np.pi * float(sample.shifts_px[lag]) ** 2
         if square > 0.0:
             error *= away / np.sqrt(square)
-        away = float(np.sqrt(max(square, 0.0)))
-        loss = min(0.5, _DEFLECTION_LOSS * away / self._diameter_px)
-        scatter = np.sqrt(_DEFLECTION_SCATTER * loss / self._beads) * away
-        return away / (1.0 - loss), float(np.hypot(error, scatter))
+        left = float(np.sqrt(max(square, 0.0)))
+        loss = min(0.5, _DEFLECTION_LOSS * left / self._diameter_px)
+        scatter = np.sqrt(_DEFLECTION_SCATTER * loss / self._beads) * left
+        unsure = (_DEFLECTION_UNSURE * loss * left, _SHIFT_UNSURE * (away - left))
+        return left / (1.0 - loss), math.hypot(error, scatter, *unsure)
+
+    def in_range(self, sample: Sample, lag: int) -> bool:
+        """Whether the beads have not gone so far over a lag that it can hardly be read."""
+        return bool(sample.powers[lag] <= _OUT_OF_RANGE * self._response.plateau)
 
     def _lag_below_plateau(self, sample: Sample, response: BeadResponse) -> int:
         low_enough = sample.powers <= self._settings.saturation * response.plateau

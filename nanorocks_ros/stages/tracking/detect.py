@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import cv2
 import numpy as np
 
+from nanorocks_ros.experiment.colours import hue_of
 from nanorocks_ros.stages.tracking.cover import cover
 from nanorocks_ros.stages.tracking.floor import first_floor, renew_floor
 from nanorocks_ros.stages.tracking.gains import Search
@@ -29,9 +30,6 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.settings import TrackingSettings
     from nanorocks_ros.experiment.trays import Species, Tray
-
-KINDS = {'acrylic': RED, 'copper': RED, 'glass': BLUE, 'JSC-1': GRAY}
-"""Colour of the species that were flown; others are taken for gray."""
 
 _HUE_SIGN = {RED: 1.0, BLUE: -1.0, GRAY: 0.0}
 # Sizes tried differ by this factor at most.
@@ -225,7 +223,7 @@ class _Ground(NamedTuple):
 
 
 def _kind(species: Species) -> int:
-    return KINDS.get(species.material, GRAY)
+    return {1: RED, -1: BLUE, 0: GRAY}[hue_of(species.material)]
 
 
 def _rounded(floor: NDArray[np.float32]) -> NDArray[np.uint8]:

@@ -151,6 +151,7 @@ class Linker:
         for shaken_now in (False, True):
             pair_costs(
                 *predicted,
+                self._places[:, 0].copy(),
                 waits,
                 self.radii,
                 found.places,

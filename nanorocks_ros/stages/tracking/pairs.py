@@ -25,6 +25,9 @@ _MISPLACED, _MISPLACED_BY = 0.02, 0.4
 # Usual changes of velocity in a collision, squared, that are the limit.
 _REACH2 = 16.0
 _LARGEST_SIZE_COST = 6.0
+# Of the variance of a change of velocity, what is left when the place is looked for half way
+# between where the bead was and where it would be: its velocity is lost, and no more.
+_HALF_WAY = 0.5
 # A pair that is so much less likely than the best, as a logarithm, is none.
 _WORTH = 10.0
 
@@ -33,6 +36,7 @@ _WORTH = 10.0
 def pair_costs(
     predicted: NDArray[np.float64],
     variances: NDArray[np.float64],
+    last: NDArray[np.float64],
     waits: NDArray[np.float64],
     sizes: NDArray[np.float64],
     places: NDArray[np.float64],
@@ -49,6 +53,8 @@ def pair_costs(
     Parameters
     ----------
     predicted, variances : ndarrays (n, 2), (n,), [px], [px^2]
+    last : ndarray (n, 2), [px]
+        Where the beads were seen last.
     waits : ndarray (n,), [s]
         Since each track was seen.
     sizes, radii, radius_errors : ndarrays (n,), (m,), (m,), [px]
@@ -76,14 +82,18 @@ def pair_costs(
             if d2 > far:
                 continue
             free = variances[i] + errors[j] * errors[j]
-            hit = free + (collided * waits[i]) ** 2
+            # The collision may have been at any time since: on average half way.
+            ax = places[j, 0] - 0.5 * (predicted[i, 0] + last[i, 0])
+            ay = places[j, 1] - 0.5 * (predicted[i, 1] + last[i, 1])
+            a2 = ax * ax + ay * ay
+            hit = free + _HALF_WAY * (collided * waits[i]) ** 2
             missed = free + (_MISPLACED_BY * sizes[i]) ** 2
             shaken = free + (0.4 * reach) ** 2
-            near = d2 <= max(_REACH2 * hit, sizes[i] * sizes[i])
+            near = a2 <= _REACH2 * hit or d2 <= sizes[i] * sizes[i]
             if not near and not (shaken_now and d2 <= reach * reach):
                 continue
             likelihood = (1.0 - _COLLIDING) / free * math.exp(-0.5 * d2 / free)
-            likelihood += _COLLIDING / hit * math.exp(-0.5 * d2 / hit)
+            likelihood += _COLLIDING / hit * math.exp(-0.5 * a2 / hit)
             likelihood += _MISPLACED / missed * math.exp(-0.5 * d2 / missed)
             likelihood += _SHAKEN / shaken * math.exp(-0.5 * d2 / shaken)
             off = radii[j] - sizes[i]
