@@ -251,6 +251,9 @@ class SpeedEstimate:
     second_species_speed, second_species_speed_error : float, [m/s]
         Mean projected speed of the first two of `Tray.species`; unknown when they were not told
         apart.
+    tray_speed : float, [m/s]
+        Root of the mean square of the speed of the tray on its springs around that time, less what
+        its errors may add; unknown where the tray was not followed.
     """
 
     stamp_ns: int
@@ -266,6 +269,7 @@ class SpeedEstimate:
     first_species_speed_error: float = UNKNOWN
     second_species_speed: float = UNKNOWN
     second_species_speed_error: float = UNKNOWN
+    tray_speed: float = UNKNOWN
 
     @staticmethod
     def by_species(speeds: Iterable[tuple[float, float]]) -> dict[str, float]:

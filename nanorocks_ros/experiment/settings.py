@@ -203,10 +203,17 @@ class CoolingSettings:
     )
     duration: float = _setting(
         20.0,
-        'time from the shaking event to the last speed used',
+        'time from the first speed used to the last',
         's',
         low=0.5,
         high=3600.0,
+    )
+    calm_share: float = _setting(
+        0.05,
+        'the first speed used is the one from which on the tray, on its springs, is slower than '
+        'this share of the beads',
+        low=0.0,
+        high=10.0,
     )
     update_interval: float = _setting(
         0.5, 'time between two live estimates', 's', low=0.0, high=60.0

@@ -293,6 +293,12 @@ def load_library(name: str, *, packaged: bool) -> DecayLibrary:
 def _arrays(stream: Any) -> dict[str, NDArray[Any]]:
     with np.load(stream, allow_pickle=False) as found:
         arrays = {name: found[name] for name in (*_ARRAYS, 'format', 'tray', 'made_by')}
-    if int(arrays['format']) != _FORMAT:
+    if int(arrays['format']) != _FORMAT or len(arrays['coefficients']) != _terms():
         raise ValueError('of another release')
     return arrays
+
+
+def _terms() -> int:
+    """How many terms there are."""
+    design = design_of(*np.ones((3, 1)), np.zeros((1, len(NUISANCES))))
+    return design.plain.shape[1] + design.weighted.shape[1]

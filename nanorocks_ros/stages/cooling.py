@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.errors import ConfigurationError, FitError
+from nanorocks_ros.errors import FitError
 from nanorocks_ros.records import CorEstimate, CorStatus, Quality, SpeedEstimate
 from nanorocks_ros.stages.readings import Decay, LibraryReading, PaperReading, Reading
 from nanorocks_ros.stages.shaking import NS
@@ -42,13 +42,6 @@ class HaffFitter:
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.cooling
-        if self._settings.delay >= self._settings.duration:
-            raise ConfigurationError(
-                'cooling.delay',
-                f'{self._settings.delay:g} s is not before cooling.duration, '
-                f'{self._settings.duration:g} s',
-                'choose a window that holds speeds',
-            )
         reading = LibraryReading if self._settings.relation == 'library' else PaperReading
         self._make_reading = partial(reading, settings, tray)
         self._restart()
@@ -77,13 +70,21 @@ class HaffFitter:
         if speed.cycle_start_ns is None or self._finished:
             return found
         age = (speed.stamp_ns - speed.cycle_start_ns) / NS
-        if age > self._settings.duration:
+        if not self._samples and self._driven(speed):
+            return found
+        first_ns = self._samples[0].stamp_ns if self._samples else speed.stamp_ns
+        if speed.stamp_ns - first_ns > self._settings.duration * NS:
             return (*found, *self.flush())
         if age >= self._settings.delay and _usable(speed):
             self._samples.append(speed)
             if self._update_due(speed.stamp_ns):
                 found = (*found, *self._estimate(CorStatus.COOLING))
         return found
+
+    def _driven(self, speed: SpeedEstimate) -> bool:
+        """Whether the tray still swings too fast for the gas in it to cool freely."""
+        calm = self._settings.calm_share * speed.mean_projected_speed
+        return speed.tray_speed > calm
 
     def flush(self) -> tuple[CorEstimate, ...]:
         """End the cycle: its final estimate, if it has samples and had none yet."""

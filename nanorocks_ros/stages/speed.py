@@ -10,6 +10,7 @@ from nanorocks_ros.stages.shaking import CycleFollower
 from nanorocks_ros.stages.speed_by_area import AreaSpeed
 from nanorocks_ros.stages.speed_by_structure import StructureSpeed
 from nanorocks_ros.stages.speed_by_tracks import TrackSpeed
+from nanorocks_ros.stages.swing import SwingMeter
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.settings import PipelineSettings
@@ -60,6 +61,7 @@ class SpeedEstimator:
         self._held: list[SpeedEstimate] = []
         self._last_emitted_ns: int | None = None
         self._last_stamp_ns: int | None = None
+        self._swing = SwingMeter()
 
     def push(self, image: TrayImage) -> tuple[SpeedEstimate | MotionMask | Tracks, ...]:
         """Take the next image of the tray.
@@ -72,6 +74,7 @@ class SpeedEstimator:
         if self._last_stamp_ns is not None and image.stamp_ns <= self._last_stamp_ns:
             self._restart()
         self._last_stamp_ns = image.stamp_ns
+        self._swing.push(image)
         shaken = self._shakes.push(image)
         self._area.emit_mask = self.emit_mask
         found: list[SpeedEstimate | MotionMask | Tracks] = []
@@ -95,7 +98,14 @@ class SpeedEstimator:
             if method == 'auto':
                 self._structure.watch(image)
             self._idle = True
-        return tuple(_judged(one) for one in found if self._in_order(one))
+        return tuple(self._finished(one) for one in found if self._in_order(one))
+
+    def _finished(
+        self, record: SpeedEstimate | MotionMask | Tracks
+    ) -> SpeedEstimate | MotionMask | Tracks:
+        if not isinstance(record, SpeedEstimate):
+            return record
+        return replace(_judged(record), tray_speed=self._swing.speed(record))
 
     def _by_tracks(self, speeds: list[SpeedEstimate]) -> list[SpeedEstimate]:
         """Those to be given out: kept until it is known whether tracks can be relied upon."""
@@ -119,12 +129,8 @@ class SpeedEstimator:
         return True
 
 
-def _judged(
-    record: SpeedEstimate | MotionMask | Tracks,
-) -> SpeedEstimate | MotionMask | Tracks:
+def _judged(record: SpeedEstimate) -> SpeedEstimate:
     """The same, and flagged where it says itself that it may be off by more than 20 %."""
-    if not isinstance(record, SpeedEstimate):
-        return record
     speed, error = record.mean_projected_speed, record.mean_projected_speed_error
     if error <= _CERTAIN * abs(speed) or abs(speed) + error <= _REST:
         return record

@@ -77,7 +77,28 @@ def test_both_restitutions_of_a_simulated_gas_lie_in_their_intervals():
     assert final.paper_restitution > 0.95
     assert 0.3 < final.reduced_chi_square < 2.5
     assert final.window_start == pytest.approx(1.8, abs=0.1)
-    assert final.window_end == pytest.approx(20.0, abs=0.11)
+    assert final.window_end == pytest.approx(21.8, abs=0.11)
+
+
+def test_the_window_begins_when_the_tray_has_come_to_rest():
+    speeds = [
+        replace(one, tray_speed=5e-3 * math.exp(-0.3 * one.stamp_ns / NS))
+        for one in simulated_cycle()
+    ]
+    *_, final = all_estimates(fitter(), speeds)
+    by_hand = next(one for one in speeds if one.tray_speed < 0.05 * one.mean_projected_speed)
+    assert final.window_start == pytest.approx(by_hand.stamp_ns / NS)
+    assert final.window_start > 8.0
+    # Afterwards a noisy reading does not end it.
+    jolted = [*speeds[:200], replace(speeds[200], tray_speed=1.0), *speeds[201:]]
+    *_, same = all_estimates(fitter(), jolted)
+    assert same.window_start == final.window_start
+
+
+def test_a_tray_that_swings_to_the_end_gives_no_estimate():
+    stage = fitter()
+    assert all_estimates(stage, [replace(one, tray_speed=0.01) for one in simulated_cycle()]) == []
+    assert stage.flush() == ()
 
 
 def test_walls_that_are_known_leave_the_beads_to_be_found():
