@@ -172,9 +172,9 @@ class ContactFinder:
             axis, high = divmod(wall, 2)
             room = self._tray.dimensions[axis] - place[axis] if high else place[axis]
             if abs(room - kink.radius) < slack:
-                found = self._rebound_from(wall, kink, when, place)
-                if found is not None and self._alone(when, [kink]):
-                    return found
+                change = float(kink.after.velocity[1 - axis] - kink.before.velocity[1 - axis])
+                if abs(change) < FAR * math.hypot(*_errors(kink)) and self._alone(when, [kink]):
+                    return self._rebound_from(wall, kink, when, place)
         return None
 
     def _rebound_from(
@@ -202,13 +202,8 @@ class ContactFinder:
             wall_velocity_error=motion_error,
             place=place,
         )
-        slip = abs(found.tangential_outgoing - found.tangential_incoming)
-        good = (
-            found.incoming > LEAST_SIGNAL * math.hypot(incoming_error, motion_error)
-            and found.outgoing > 0.0
-            and slip < FAR * found.tangential_error
-        )
-        return found if good else None
+        signal = LEAST_SIGNAL * math.hypot(incoming_error, motion_error)
+        return found if found.incoming > signal and found.outgoing > 0.0 else None
 
     def _alone(self, when: Meeting, kinks: list[Kink]) -> bool:
         beads = [
