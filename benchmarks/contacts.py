@@ -115,8 +115,9 @@ def _row(name: str, truth: float, grid: np.ndarray, cycles: Sequence[np.ndarray]
     all_of_them = contact_estimate(grid, np.sum(cycles, axis=0))
     together = f'{all_of_them.restitution - truth:+.4f} ± {all_of_them.restitution_error:.4f}'
     stated = np.median([one.restitution_error for one in each])
+    scatter = f'{values.std(ddof=1):.4f}' if values.size > 1 else ''
     print(
-        f'| {name} | {values.mean() - truth:+.4f} | {values.std():.4f} | {stated:.4f} | '
+        f'| {name} | {values.mean() - truth:+.4f} | {scatter} | {stated:.4f} | '
         f'{covered}/{len(each)} | {together} |',
         flush=True,
     )

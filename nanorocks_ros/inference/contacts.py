@@ -33,7 +33,7 @@ RADIUS_ERRORS = (-0.02, 0.0, 0.02, 0.04, 0.06)
 
 # What errors of rebounds may be over what was stated. Not less: many slow rebounds, whose errors
 # are stated too large, would then lend too much weight to the few fast ones.
-_ERROR_SCALES = (1.2, 1.7, 2.4, 3.4)
+_ERROR_SCALES = (1.0, 1.4, 2.0, 2.8)
 # The same of collisions, which tell errors from vertical speeds too badly to have it free:
 # simulated cycles scatter so much more.
 _PAIR_ERRORS = 1.25

@@ -300,5 +300,6 @@ def _arrays(stream: Any) -> dict[str, NDArray[Any]]:
 
 def _terms() -> int:
     """How many terms there are."""
-    design = design_of(*np.ones((3, 1)), np.zeros((1, len(NUISANCES))))
-    return design.plain.shape[1] + design.weighted.shape[1]
+    one = np.ones(1)
+    design = design_of(one, one, one, np.zeros((1, len(NUISANCES))))
+    return int(design.plain.shape[1] + design.weighted.shape[1])

@@ -64,7 +64,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say_when_the_walls_are_known
     # Of 120 runs, two standard errors are 0.085 and 0.04.
     assert covered[0] == pytest.approx(0.68, abs=0.1)
     assert covered[1] >= 0.89
-    assert abs(np.median(found[:, 2]) - restitution) < 0.3 * found[:, 2].std()
+    assert abs(np.median(found[:, 2]) - restitution) < 0.4 * found[:, 2].std()
 
 
 def test_cycles_add_up(exact):
@@ -104,7 +104,7 @@ def test_what_is_not_known_of_the_tray_does_not_average_out(exact, uncertain):
 
 def test_a_few_speeds_say_next_to_nothing(uncertain):
     speed = decays(0.89, 0.97, 1)[0, :8]
-    one = decay_likelihood(uncertain, TIMES[:8], speed, 0.1 * speed, (0.01, 0.01))
+    one = decay_likelihood(uncertain, TIMES[:8], speed, 0.3 * speed, (0.01, 0.01))
     found = posterior_of(uncertain, one.integrated(), (0.8, 1.0))
     assert found.covariance[0, 0] ** 0.5 > 0.15
 

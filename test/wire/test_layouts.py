@@ -138,7 +138,7 @@ def test_not_known_is_nan_and_never_zero():
 
 def test_an_array_of_another_release_is_refused():
     with pytest.raises(
-        FrameError, match=r'/speed: 3 elements where SpeedEstimate has 12; use the'
+        FrameError, match=r'/speed: 3 elements where SpeedEstimate has 13; use the'
     ):
         from_array(SpeedEstimate, [1.0, 2.0, 3.0], tray=1, epoch_ns=0, where='/speed')
 

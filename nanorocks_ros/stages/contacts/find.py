@@ -36,7 +36,7 @@ _STRAIGHT = 4.0
 # How far off the wall a rebound may be seen, in radii; and in sums of radii, how close or far
 # two beads: less is one over the other, whose places are not good then.
 _WALL_SLACK = 0.15
-_NEAREST, _FURTHEST = 0.9, 1.05
+_NEAREST, _FURTHEST, _ABOUT = 0.9, 1.05, 0.3
 # Error of a measured radius, over it, that outlines leave besides the stated one.
 _OUTLINE = 0.02
 # Part of an interval by which the contact may lie outside the pictures around it.
@@ -143,7 +143,8 @@ class ContactFinder:
         if rebound is not None:
             return (rebound,)
         for other, its in self._waiting:
-            pair = self._pair((other, kink)) if self._together(when, its) else None
+            near = self._together(when, its) and _near(other, kink, when.time)
+            pair = self._pair((other, kink)) if near else None
             if pair is not None:
                 self._waiting = [one for one in self._waiting if one[0] is not other]
                 return (pair,)
@@ -172,9 +173,9 @@ class ContactFinder:
             axis, high = divmod(wall, 2)
             room = self._tray.dimensions[axis] - place[axis] if high else place[axis]
             if abs(room - kink.radius) < slack:
-                found = self._rebound_from(wall, kink, when, place)
-                if found is not None and self._alone(when, [kink]):
-                    return found
+                change = float(kink.after.velocity[1 - axis] - kink.before.velocity[1 - axis])
+                if abs(change) < FAR * math.hypot(*_errors(kink)) and self._alone(when, [kink]):
+                    return self._rebound_from(wall, kink, when, place)
         return None
 
     def _rebound_from(
@@ -202,13 +203,8 @@ class ContactFinder:
             wall_velocity_error=motion_error,
             place=place,
         )
-        slip = abs(found.tangential_outgoing - found.tangential_incoming)
-        good = (
-            found.incoming > LEAST_SIGNAL * math.hypot(incoming_error, motion_error)
-            and found.outgoing > 0.0
-            and slip < FAR * found.tangential_error
-        )
-        return found if good else None
+        signal = LEAST_SIGNAL * math.hypot(incoming_error, motion_error)
+        return found if found.incoming > signal and found.outgoing > 0.0 else None
 
     def _alone(self, when: Meeting, kinks: list[Kink]) -> bool:
         beads = [
@@ -263,6 +259,13 @@ class ContactFinder:
             height=self._tray.dimensions[2],
             place=here - self._around.displacement(when.time),
         )
+
+
+def _near(first: Kink, second: Kink, time: float) -> bool:
+    """Whether two beads were about a diameter apart; a quick look."""
+    apart = second.before.at(time) - first.before.at(time)
+    reach = first.radius + second.radius
+    return (1.0 - _ABOUT) * reach < math.hypot(*apart) < (1.0 + _ABOUT) * reach
 
 
 def _place(kink: Kink, time: float) -> tuple[NDArray[np.float64], float]:

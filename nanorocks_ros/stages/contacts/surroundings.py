@@ -83,10 +83,7 @@ class Surroundings:
             return np.zeros(2), math.inf
         noise = float(np.sqrt(np.mean(np.diff(places[wide], 4, axis=0) ** 2) / _FOURTH))
         rest = _slope(_powers(times[wide], 1), places[wide])
-        swing = min(
-            (_slope(_swing(times[wide], one), places[wide]) for one in _FREQUENCIES),
-            key=lambda one: one.left,
-        )
+        swing = _slope(_swing(times[wide], places[wide]), places[wide])
         if rest.left - swing.left < _SWINGS * noise**2:
             # A swing too weak to be seen may still be there.
             return rest.velocity, noise * math.hypot(rest.factor, 0.5 * swing.factor)
@@ -163,13 +160,22 @@ def _powers(times: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
     return np.vander(times, degree + 1, increasing=True)
 
 
-def _swing(times: NDArray[np.float64], frequency: float) -> NDArray[np.float64]:
-    """A swing that dies away about a resting place: the first slope is that of its sine."""
-    omega = 2.0 * math.pi * frequency
+def _swing(times: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Terms of a swing that dies away about a resting place, of the frequency that fits best.
+
+    The first slope is that of its sine, divided by the angular frequency.
+    """
+    omega = 2.0 * math.pi * _FREQUENCIES[:, None]
     sine, cosine = np.sin(omega * times), np.cos(omega * times)
     # Terms in t sin have no slope at 0; that in t cos has one, and is taken off the sine's.
     decay = times * cosine - sine / omega
-    return np.column_stack([np.ones_like(times), sine / omega, cosine, decay, times * sine])
+    ones = np.ones_like(sine)
+    terms = np.stack([ones, sine / omega, cosine, decay, times * sine], axis=2)
+    turned = terms.transpose(0, 2, 1)
+    projected = turned @ places
+    explained = projected * (np.linalg.pinv(turned @ terms, hermitian=True) @ projected)
+    best: NDArray[np.float64] = terms[np.argmax(explained.sum(axis=(1, 2)))]
+    return best
 
 
 def _squares(tracks: Tracks) -> NDArray[np.float64]:
