@@ -57,14 +57,15 @@ class HaffFitter:
     def push(self, speed: SpeedEstimate) -> tuple[CorEstimate, ...]:
         """Take the next speed; empty between two updates and before the first shake.
 
-        A stamp that goes back starts all afresh, running mean included.
+        A stamp that goes back ends the cycle and starts all afresh, running mean included.
         """
+        found: tuple[CorEstimate, ...] = ()
         if self._last_stamp_ns is not None and speed.stamp_ns <= self._last_stamp_ns:
+            found = self.flush()
             self._restart()
         self._last_stamp_ns = speed.stamp_ns
-        found: tuple[CorEstimate, ...] = ()
         if speed.cycle != self._cycle:
-            found = self.flush()
+            found = (*found, *self.flush())
             self._cycle, self._samples, self._finished = speed.cycle, [], False
             self._last_update_ns = None
         if speed.cycle_start_ns is None or self._finished:

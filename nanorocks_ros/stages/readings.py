@@ -152,7 +152,7 @@ class LibraryReading:
         posterior = posterior_of(self._tables, integrated, self._walls)
         best = int(np.argmax(integrated))
         fields = {
-            **self._speeds(decay, likelihood, best, final=final),
+            **self._speeds(decay, final=final),
             'reduced_chi_square': float(likelihood.deviation[best])
             / max(likelihood.samples - 1, 1),
         }
@@ -183,9 +183,7 @@ class LibraryReading:
         }
         return self._mean_so_far
 
-    def _speeds(
-        self, decay: Decay, likelihood: DecayLikelihood, best: int, *, final: bool
-    ) -> dict[str, float]:
+    def _speeds(self, decay: Decay, *, final: bool) -> dict[str, float]:
         """Speed at the shaking event, and Haff time; with errors once the cycle is over."""
         if final:
             fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
@@ -193,11 +191,13 @@ class LibraryReading:
                 **_haff_fields(fit),
                 'paper_restitution': _by_paper(fit.decay_rate, self._tray),
             }
-        slope, offset = np.polyfit(decay.time, 1.0 / decay.speed, 1)
+        # A straight line through 1/v, as Haff's law is one; a proper fit takes too long.
+        slope, offset = (float(one) for one in np.polyfit(decay.time, 1.0 / decay.speed, 1))
+        falling = slope > 0.0 and offset > 0.0
         return {
-            'initial_speed': math.exp(float(likelihood.log_amplitude[best])),
-            'haff_time': float(offset / slope) if slope > 0.0 < offset else math.nan,
-            'paper_restitution': _by_paper(float(slope), self._tray),
+            'initial_speed': 1.0 / offset if falling else math.nan,
+            'haff_time': offset / slope if falling else math.nan,
+            'paper_restitution': _by_paper(max(slope, 0.0), self._tray),
         }
 
 
