@@ -336,7 +336,7 @@ class CorEstimate:
         Of two beads: median of what is probable, and interval; statistical only for
         ``CorRelation.PAPER``.
     initial_speed, initial_speed_error : float, [m/s]
-        Mean projected speed at the shaking event, from the fit.
+        Mean projected speed at `cooling_start`, from the fit.
     haff_time, haff_time_error : float, [s]
     reduced_chi_square : float
         Of the fit. For ``CorRelation.LIBRARY`` with the fluctuations of the gas and the errors of
@@ -356,6 +356,9 @@ class CorEstimate:
         What was wrong with the pictures behind the speeds.
     window_start, window_end : float, [s]
         First and last speed used, since the shaking event.
+    cooling_start : float, [s]
+        From when on the gas is taken to cool, since the shaking event: 0, or later when the tray
+        swung on.
     """
 
     stamp_ns: int
@@ -382,6 +385,7 @@ class CorEstimate:
     quality: Quality = NOTHING_WRONG
     window_start: float = UNKNOWN
     window_end: float = UNKNOWN
+    cooling_start: float = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 # Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
 _STAMP_ROUNDING_NS = 1_000_000
+# The first speed may come that much later for other reasons than a tray that swings.
+_LATE_NS = 500_000_000
 
 
 class HaffFitter:
@@ -108,7 +110,10 @@ class HaffFitter:
         if len(self._samples) < self._settings.fewest_samples:
             return ()
         last = self._samples[-1]
-        start_ns = last.cycle_start_ns or 0
+        shake_ns = last.cycle_start_ns or 0
+        # A tray that swung on drove the gas until shortly before the window.
+        late_ns = self._samples[0].stamp_ns - shake_ns - round(self._settings.delay * NS)
+        start_ns = shake_ns + (late_ns if late_ns > _LATE_NS else 0)
         decay = Decay(
             time=np.array([(one.stamp_ns - start_ns) / NS for one in self._samples]),
             speed=np.array([one.mean_projected_speed for one in self._samples]),
@@ -133,8 +138,9 @@ class HaffFitter:
                 relation=self._reading.relation,
                 samples=len(self._samples),
                 quality=Quality(quality),
-                window_start=float(decay.time[0]),
-                window_end=float(decay.time[-1]),
+                window_start=(self._samples[0].stamp_ns - shake_ns) / NS,
+                window_end=(last.stamp_ns - shake_ns) / NS,
+                cooling_start=(start_ns - shake_ns) / NS,
                 **fields,
             ),
         )

@@ -103,6 +103,7 @@ def _cycle_as_json(cor: CorEstimate, start: float) -> dict[str, Any]:
         'quality': int(cor.quality),
         'window_start': _known(cor.window_start),
         'window_end': _known(cor.window_end),
+        'cooling_start': _known(cor.cooling_start),
         'relation': cor.relation.name.lower(),
         'status': cor.status.name.lower(),
         'reduced_chi_square': _known(cor.reduced_chi_square),

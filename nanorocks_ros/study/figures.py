@@ -89,8 +89,9 @@ def _draw_energy(
     )
     last = cors[-1]
     if math.isfinite(last.haff_time):
-        line = np.linspace(0.0, max(time), 300)
-        fitted = haff_speed(line, last.initial_speed, last.haff_time)
+        begin = last.cooling_start if math.isfinite(last.cooling_start) else 0.0
+        line = np.linspace(begin, max(time), 300)
+        fitted = haff_speed(line - begin, last.initial_speed, last.haff_time)
         axes.plot(
             line,
             energy(list(fitted)),

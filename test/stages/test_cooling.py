@@ -78,6 +78,7 @@ def test_both_restitutions_of_a_simulated_gas_lie_in_their_intervals():
     assert 0.3 < final.reduced_chi_square < 2.5
     assert final.window_start == pytest.approx(1.8, abs=0.1)
     assert final.window_end == pytest.approx(21.8, abs=0.11)
+    assert final.cooling_start == 0.0
 
 
 def test_the_window_begins_when_the_tray_has_come_to_rest():
@@ -89,6 +90,7 @@ def test_the_window_begins_when_the_tray_has_come_to_rest():
     by_hand = next(one for one in speeds if one.tray_speed < 0.05 * one.mean_projected_speed)
     assert final.window_start == pytest.approx(by_hand.stamp_ns / NS)
     assert final.window_start > 8.0
+    assert final.cooling_start == pytest.approx(final.window_start - 1.75, abs=0.01)
     # Afterwards a noisy reading does not end it.
     jolted = [*speeds[:200], replace(speeds[200], tray_speed=1.0), *speeds[201:]]
     *_, same = all_estimates(fitter(), jolted)
