@@ -39,7 +39,7 @@ def test_every_tray_has_a_library_and_a_node_made_anew_lies_on_it(tray):
     error = runs.std(axis=0, ddof=1) / np.sqrt(made['runs'])
     off = at_node(library, number) - runs.mean(axis=0)
     assert np.abs(off).mean() < 2.0 * error.mean() + library.misfit
-    assert library.misfit < 0.03
+    assert library.misfit < 0.08
 
 
 def test_the_mean_decay_of_a_gas_that_was_not_in_it_is_that_of_the_library():
