@@ -203,7 +203,7 @@ class CoolingSettings:
     )
     duration: float = _setting(
         20.0,
-        'time from the first speed used to the last',
+        'time to the last speed used, from the shaking event or from when the tray came to rest',
         's',
         low=0.5,
         high=3600.0,

@@ -75,8 +75,8 @@ class HaffFitter:
         age = (speed.stamp_ns - speed.cycle_start_ns) / NS
         if not self._samples and self._driven(speed):
             return found
-        first_ns = self._samples[0].stamp_ns if self._samples else speed.stamp_ns
-        if speed.stamp_ns - first_ns > self._settings.duration * NS:
+        first = self._samples[0] if self._samples else speed
+        if speed.stamp_ns - self._start_ns(first) > self._settings.duration * NS:
             return (*found, *self.flush())
         if age >= self._settings.delay and _usable(speed):
             self._samples.append(speed)
@@ -88,6 +88,13 @@ class HaffFitter:
         """Whether the tray still swings too fast for the gas in it to cool freely."""
         calm = self._settings.calm_share * speed.mean_projected_speed
         return speed.tray_speed > calm
+
+    def _start_ns(self, first: SpeedEstimate) -> int:
+        """When the gas began to cool, by the first speed used."""
+        shake_ns = first.cycle_start_ns or 0
+        # A tray that swung on drove the gas until shortly before the window.
+        late_ns = first.stamp_ns - shake_ns - round(self._settings.delay * NS)
+        return shake_ns + (late_ns if late_ns > _LATE_NS else 0)
 
     def flush(self) -> tuple[CorEstimate, ...]:
         """End the cycle: its final estimate, if it has samples and had none yet."""
@@ -110,10 +117,7 @@ class HaffFitter:
         if len(self._samples) < self._settings.fewest_samples:
             return ()
         last = self._samples[-1]
-        shake_ns = last.cycle_start_ns or 0
-        # A tray that swung on drove the gas until shortly before the window.
-        late_ns = self._samples[0].stamp_ns - shake_ns - round(self._settings.delay * NS)
-        start_ns = shake_ns + (late_ns if late_ns > _LATE_NS else 0)
+        shake_ns, start_ns = last.cycle_start_ns or 0, self._start_ns(self._samples[0])
         decay = Decay(
             time=np.array([(one.stamp_ns - start_ns) / NS for one in self._samples]),
             speed=np.array([one.mean_projected_speed for one in self._samples]),

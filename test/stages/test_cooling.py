@@ -77,7 +77,7 @@ def test_both_restitutions_of_a_simulated_gas_lie_in_their_intervals():
     assert final.paper_restitution > 0.95
     assert 0.3 < final.reduced_chi_square < 2.5
     assert final.window_start == pytest.approx(1.8, abs=0.1)
-    assert final.window_end == pytest.approx(21.8, abs=0.11)
+    assert final.window_end == pytest.approx(20.0, abs=0.11)
     assert final.cooling_start == 0.0
 
 
