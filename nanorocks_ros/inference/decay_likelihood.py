@@ -130,14 +130,18 @@ def decay_likelihood(
     ----------
     tables : DecayTables
     time : ndarray (n,), [s], > 0
-        Since the shaking event; rising.
+        Since the shaking event; rising. Of times further apart than the ends of the library are,
+        the first count.
     speed, error : ndarray (n,), [m/s], > 0
         Mean projected speeds and one standard error of each.
     camera : tuple of 2 floats
         Standard deviations of the `CAMERA_NUISANCES`, relative.
     """
     library = tables.library
-    cells, log_time, log_speed, variance = _binned(library.step, time, speed, error)
+    within = time < time[0] * math.exp((library.distances.size - 2) * library.step)
+    cells, log_time, log_speed, variance = _binned(
+        library.step, time[within], speed[within], error[within]
+    )
     places, n_z = tables.mean.shape[0], tables.slopes.shape[1] + len(CAMERA_NUISANCES)
     numbers = np.empty((places, 3))
     gradient = np.empty((places, n_z))

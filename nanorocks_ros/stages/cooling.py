@@ -78,7 +78,7 @@ class HaffFitter:
         first = self._samples[0] if self._samples else speed
         if speed.stamp_ns - self._start_ns(first) > self._settings.duration * NS:
             return (*found, *self.flush())
-        if age >= self._settings.delay and _usable(speed):
+        if age > 0.0 and age >= self._settings.delay and _usable(speed):
             self._samples.append(speed)
             if self._update_due(speed.stamp_ns):
                 found = (*found, *self._estimate(CorStatus.COOLING))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -186,11 +187,13 @@ class LibraryReading:
     def _speeds(self, decay: Decay, *, final: bool) -> dict[str, float]:
         """Speed at the shaking event, and Haff time; with errors once the cycle is over."""
         if final:
-            fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
-            return {
-                **_haff_fields(fit),
-                'paper_restitution': _by_paper(fit.decay_rate, self._tray),
-            }
+            with suppress(FitError):
+                # Next to elastic beads may have no Haff time, but have a restitution.
+                fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
+                return {
+                    **_haff_fields(fit),
+                    'paper_restitution': _by_paper(fit.decay_rate, self._tray),
+                }
         # A straight line through 1/v, as Haff's law is one; a proper fit takes too long.
         slope, offset = (float(one) for one in np.polyfit(decay.time, 1.0 / decay.speed, 1))
         falling = slope > 0.0 and offset > 0.0

@@ -97,6 +97,24 @@ def test_the_window_begins_when_the_tray_has_come_to_rest():
     assert same.window_start == final.window_start
 
 
+def test_next_to_elastic_beads_have_a_restitution_though_no_haff_time():
+    speeds = [speed(t, 6e-3 * (1.0 - 1e-4 * t)) for t in np.arange(0.1, 25.0, 0.1)]
+    *_, final = all_estimates(fitter(), speeds)
+    assert final.status is CorStatus.FINAL
+    assert final.restitution_lower > 0.9
+    assert final.haff_time > 1000.0
+
+
+def test_a_window_from_the_shake_to_the_next_day_is_no_trouble():
+    speeds = [speed(t, 6e-3 / (1.0 + t / 5.0)) for t in np.geomspace(0.01, 900.0, 300)]
+    long = {'cooling.delay': 0.0, 'cooling.duration': 3600.0}
+    stage = fitter(**long)
+    all_estimates(stage, speeds)
+    (final,) = stage.flush()
+    assert final.status is CorStatus.FINAL
+    assert 0.0 < final.restitution_lower < final.restitution < final.restitution_upper <= 1.0
+
+
 def test_a_tray_that_swings_to_the_end_gives_no_estimate():
     stage = fitter()
     assert all_estimates(stage, [replace(one, tray_speed=0.01) for one in simulated_cycle()]) == []
