@@ -34,8 +34,9 @@ def test_nan_and_negative_numbers_are_refused_wherever_a_number_is_wanted(settin
         if isinstance(row.default, int | float) and not isinstance(row.default, bool)
     ]
     for row in numbers:
-        # A tangential restitution is -1 for a smooth bead; nothing else may be below 0.
-        below = -1.5 if 'tangential' in row.name else -1.0
+        # A tangential restitution is -1 for a smooth bead, and a difference may have either sign.
+        signed = 'tangential' in row.name or 'difference' in row.name
+        below = -1.5 if signed else -1.0
         for value in (math.nan, math.inf, below):
             with pytest.raises(ConfigurationError, match=row.name):
                 st.with_values(settings, {row.name: value}, 'test')
