@@ -13,17 +13,25 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import partial
+from time import process_time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.experiment.settings import PriorSettings, SimulationSettings, with_values
+from nanorocks_ros.experiment.settings import (
+    PipelineSettings,
+    PriorSettings,
+    SimulationSettings,
+    with_values,
+)
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.inference.decay_library import library_of
 from nanorocks_ros.inference.decay_likelihood import DecayTables, decay_likelihood
 from nanorocks_ros.inference.restitution import posterior_of, tables_of
+from nanorocks_ros.physics.haff_fit import fit_haff
 from nanorocks_ros.physics.paper import paper_restitution_of_decay
 from nanorocks_ros.simulation.ensemble import cooling_runs
+from nanorocks_ros.stages.readings import Decay, LibraryReading
 from nanorocks_ros.study.tasks import Workers, run_tasks
 
 if TYPE_CHECKING:
@@ -36,6 +44,7 @@ _RESTITUTIONS = (0.5, 0.7, 0.8, 0.89, 0.95)
 _WALLS = (0.90, 0.97, 0.99)
 _TIMES = np.arange(1.75, 20.0, 0.25)
 _ERROR = 0.02
+_REPEATS = 50
 _SPEED = 0.01
 _RANGES = ((0.5, 0.7), (0.7, 0.85), (0.85, 0.95))
 _LEVELS = np.array([0.025, 0.16, 0.5, 0.84, 0.975])
@@ -80,6 +89,7 @@ def report() -> None:
     ranges = [_Range(tray=tray, low=low, high=high) for tray in _TRAYS for low, high in _RANGES]
     _print('Walls known, nothing else uncertain', _known_walls, cases)
     _print('Nothing known but the priors', _drawn_from_priors, ranges)
+    _print_cost()
 
 
 def _print(title: str, function: Callable[[Any], tuple[str, str]], cases: Sequence[Any]) -> None:
@@ -87,6 +97,27 @@ def _print(title: str, function: Callable[[Any], tuple[str, str]], cases: Sequen
     heads, rows = zip(*run_tasks(function, tasks, Workers()), strict=True)
     print(f'{title}\n\n{heads[0]}\n' + '| --- ' * (heads[0].count('|') - 1) + '|')
     print('\n'.join(rows), end='\n\n', flush=True)
+
+
+def _print_cost() -> None:
+    """CPU time of one live update, beside a fit of Haff's law to the same speeds."""
+    tray = load_trays()[1]
+    reading = LibraryReading(PipelineSettings(), tray)
+    (speed,) = _speeds(_Case(tray=1, restitution=0.89, wall=0.97), tray, {}, range(1))
+    decay = Decay(time=_TIMES, speed=speed, error=_ERROR * speed)
+    costs = []
+    for work in (
+        lambda: reading.read(decay, final=False),
+        lambda: fit_haff(_TIMES, speed, _ERROR * speed, tray.count),
+    ):
+        work()
+        begin = process_time()
+        for _ in range(_REPEATS):
+            work()
+        costs.append((process_time() - begin) / _REPEATS)
+    print(
+        f"one update: {1e3 * costs[0]:.1f} ms of CPU, {costs[0] / costs[1]:.1f} fits of Haff's law"
+    )
 
 
 def _speeds(case: _Case, tray: Tray, values: dict[str, float | str], runs: range) -> np.ndarray:
