@@ -293,13 +293,13 @@ def load_library(name: str, *, packaged: bool) -> DecayLibrary:
 def _arrays(stream: Any) -> dict[str, NDArray[Any]]:
     with np.load(stream, allow_pickle=False) as found:
         arrays = {name: found[name] for name in (*_ARRAYS, 'format', 'tray', 'made_by')}
-    if int(arrays['format']) != _FORMAT or len(arrays['coefficients']) != _terms():
+    if int(arrays['format']) != _FORMAT or len(arrays['coefficients']) != term_count():
         raise ValueError('of another release')
     return arrays
 
 
-def _terms() -> int:
-    """How many terms there are."""
+def term_count() -> int:
+    """How many terms the functions of a library have at each distance."""
     one = np.ones(1)
     design = design_of(one, one, one, np.zeros((1, len(NUISANCES))))
     return int(design.plain.shape[1] + design.weighted.shape[1])

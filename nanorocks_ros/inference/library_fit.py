@@ -14,6 +14,7 @@ from nanorocks_ros.inference.decay_library import (
     NUISANCES,
     DecayLibrary,
     design_of,
+    term_count,
     tray_key,
 )
 
@@ -73,7 +74,7 @@ def fit_library(tray: Tray, decays: Decays, made_by: str) -> DecayLibrary:
     Raises
     ------
     FitError
-        With fewer than two runs a node, or fewer nodes than terms.
+        With fewer than two runs a node, or fewer nodes than `fewest_nodes`.
     """
     nodes, runs, _ = decays.log_speed.shape
     design = design_of(
@@ -83,11 +84,11 @@ def fit_library(tray: Tray, decays: Decays, made_by: str) -> DecayLibrary:
         decays.nuisances,
     )
     terms = design.plain.shape[1] + design.weighted.shape[1]
-    if runs < 2 or nodes <= terms:
+    if runs < 2 or nodes < fewest_nodes():
         raise FitError(
             'decay library',
-            f'{nodes} nodes of {runs} runs for {terms} terms',
-            f'give more than {terms} nodes and at least 2 runs',
+            f'{nodes} nodes of {runs} runs',
+            f'give {fewest_nodes()} nodes and 2 runs at least',
         )
     base = rough_rates(tray)
     rate = design.losses @ base
@@ -117,6 +118,11 @@ def fit_library(tray: Tray, decays: Decays, made_by: str) -> DecayLibrary:
         covariance_wall=_COVARIANCE_WALL,
         covariance=_covariances(decays),
     )
+
+
+def fewest_nodes() -> int:
+    """Nodes that a library needs: with fewer, functions go through the noise of the runs."""
+    return 2 * term_count()
 
 
 def rough_rates(tray: Tray) -> NDArray[np.float64]:

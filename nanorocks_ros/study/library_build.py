@@ -14,7 +14,13 @@ from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.settings import SimulationSettings, with_values
 from nanorocks_ros.inference.decay_library import NUISANCES, count_step, tray_key
-from nanorocks_ros.inference.library_fit import Decays, distances, fit_library, node_of
+from nanorocks_ros.inference.library_fit import (
+    Decays,
+    distances,
+    fewest_nodes,
+    fit_library,
+    node_of,
+)
 from nanorocks_ros.study.archive import write_archive
 from nanorocks_ros.study.journal import Journal
 from nanorocks_ros.study.tasks import Workers, as_finished
@@ -115,9 +121,11 @@ def build_library(
     KeyboardInterrupt
         Ctrl-C; its text says what is kept.
     """
-    if plan.runs < 2 or plan.nodes < 2:
+    if plan.runs < 2 or plan.nodes < fewest_nodes():
         raise ConfigurationError(
-            '--nodes, --runs', f'{plan.nodes}, {plan.runs}', 'give 2 or more of each'
+            '--nodes, --runs',
+            f'{plan.nodes}, {plan.runs}',
+            f'give {fewest_nodes()} and 2 or more: with fewer it would be wrong and not know it',
         )
     workers = workers or Workers()
     workers.check()

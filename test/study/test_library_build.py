@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nanorocks_ros.errors import ConfigurationError, FitError, RecordingError
+from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay_library import load_library, tray_key
 from nanorocks_ros.study.library_build import LibraryPlan, build_library
@@ -16,7 +16,7 @@ from nanorocks_ros.study.tasks import Workers
 TRAY = load_trays()[1]
 # Few beads in few runs: quick, and of no use but to see how it is made.
 PLAN = LibraryPlan(
-    tray=replace(TRAY, species=(replace(TRAY.species[0], count=3),)), nodes=140, runs=2
+    tray=replace(TRAY, species=(replace(TRAY.species[0], count=3),)), nodes=256, runs=2
 )
 HERE = Workers(processes=1)
 
@@ -40,8 +40,8 @@ def test_an_interrupted_build_goes_on_and_ends_in_the_same_library(tmp_path):
     assert not path.exists()
     resumed = []
     build_library(PLAN, path, HERE, lambda done, total: resumed.append((done, total)))
-    assert resumed[0] == (10, 35)
-    assert resumed[-1] == (35, 35)
+    assert resumed[0] == (10, 64)
+    assert resumed[-1] == (64, 64)
     one, other = (load_library(str(name), packaged=False) for name in (whole, path))
     np.testing.assert_array_equal(one.coefficients, other.coefficients)
     np.testing.assert_array_equal(one.covariance, other.covariance)
@@ -62,8 +62,8 @@ def test_parts_of_another_library_are_not_mixed_in(tmp_path):
         build_library(replace(PLAN, seed=2), path, HERE)
 
 
-def test_too_few_nodes_are_told(tmp_path):
-    with pytest.raises(FitError, match='20 nodes of 2 runs for 127 terms; give more than 127'):
-        build_library(replace(PLAN, nodes=20), tmp_path / 'mine.npz', HERE)
-    with pytest.raises(ConfigurationError, match='give 2 or more of each'):
-        build_library(replace(PLAN, runs=1), tmp_path / 'mine.npz', HERE)
+def test_too_few_nodes_are_refused_before_any_work(tmp_path):
+    for plan in (replace(PLAN, nodes=253), replace(PLAN, runs=1)):
+        with pytest.raises(ConfigurationError, match='give 254 and 2 or more'):
+            build_library(plan, tmp_path / 'mine.npz', HERE)
+    assert not list(tmp_path.iterdir())
