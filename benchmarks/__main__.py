@@ -19,6 +19,7 @@ ALL = (
     'deflections',
     'cor_coverage',
     'cor_recovery',
+    'valley',
     'closed_forms',
     'contacts',
     'engine',

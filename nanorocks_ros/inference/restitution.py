@@ -178,10 +178,32 @@ def _quantiles(
     return np.asarray(np.interp(probabilities, below / below[-1], edges))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SingleTerm:
+    """What something else says of one of the two restitutions, such as rebounds or collisions.
+
+    Parameters
+    ----------
+    restitution : ndarray (n,)
+        Rising, and close enough that the term is straight from one to the next.
+    log_likelihood : ndarray (n,)
+    """
+
+    restitution: NDArray[np.float64]
+    log_likelihood: NDArray[np.float64]
+
+    def at(self, restitution: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The term at other restitutions, (n,)."""
+        return np.asarray(np.interp(restitution, self.restitution, self.log_likelihood))
+
+
 def posterior_of(
     tables: DecayTables,
     log_likelihood: NDArray[np.float64],
     walls: tuple[float, float],
+    *,
+    of_beads: SingleTerm | None = None,
+    of_walls: SingleTerm | None = None,
 ) -> Posterior:
     """The posterior, with even priors.
 
@@ -193,6 +215,8 @@ def posterior_of(
     walls : tuple of 2 floats
         Lowest and highest restitution that the walls may have, each as likely; equal when it is
         known. That of the beads may be anything from 0 to 1.
+    of_beads, of_walls : SingleTerm, optional
+        Further log likelihoods, of each of the two by itself.
 
     Raises
     ------
@@ -217,6 +241,10 @@ def posterior_of(
     for _ in range(3):
         beads, wall = _axes(*box)
         fine = surface(_even(beads, 0.0, _POWER), _even(wall, LOWEST_WALL, _WALL_POWER))
+        if of_beads is not None:
+            fine += of_beads.at(beads)[:, np.newaxis]
+        if of_walls is not None:
+            fine += of_walls.at(wall)
         fine -= fine.max()
         box = _likely(fine, beads, wall)
     weight = np.exp(fine) * _widths(beads)[:, np.newaxis] * _widths(wall)

@@ -10,7 +10,7 @@ from nanorocks_ros.experiment.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay_library import library_of
 from nanorocks_ros.inference.decay_likelihood import decay_likelihood
-from nanorocks_ros.inference.restitution import posterior_of, tables_of
+from nanorocks_ros.inference.restitution import SingleTerm, posterior_of, tables_of
 from nanorocks_ros.simulation.ensemble import cooling_runs
 
 TRAY = load_trays()[1]
@@ -85,6 +85,21 @@ def test_the_two_restitutions_lie_in_a_valley(exact):
     assert spread[0, 1] / np.sqrt(spread[0, 0] * spread[1, 1]) < -0.7
     known = posterior_of(exact, one.integrated(), (0.95, 0.95))
     assert spread[0, 0] > 4.0 * known.covariance[0, 0]
+
+
+def test_what_else_is_known_of_one_restitution_tells_of_the_other(exact):
+    (one,) = likelihoods(exact, decays(0.89, 0.95, 1))
+    grid = np.linspace(0.0, 1.0, 2001)
+    of_walls = SingleTerm(restitution=grid, log_likelihood=-0.5 * ((grid - 0.95) / 0.002) ** 2)
+    free = posterior_of(exact, one.integrated(), (0.8, 1.0))
+    told = posterior_of(exact, one.integrated(), (0.8, 1.0), of_walls=of_walls)
+    known = posterior_of(exact, one.integrated(), (0.95, 0.95))
+    assert told.covariance[1, 1] ** 0.5 == pytest.approx(0.002, rel=0.1)
+    assert told.covariance[0, 0] < 0.25 * free.covariance[0, 0]
+    assert told.mean[0] == pytest.approx(known.mean[0], abs=0.005)
+    of_beads = SingleTerm(restitution=grid, log_likelihood=-0.5 * ((grid - 0.89) / 0.01) ** 2)
+    both = posterior_of(exact, one.integrated(), (0.8, 1.0), of_beads=of_beads, of_walls=of_walls)
+    assert both.covariance[0, 0] ** 0.5 < 0.01
 
 
 def test_what_is_not_known_of_the_tray_does_not_average_out(exact, uncertain):
