@@ -38,6 +38,10 @@ _FIRST_SPEEDS = 3
 # Nothing is measured better than that, relative.
 _LEAST_ERROR = 2e-3
 _ROUNDING = 1e-9
+# Standard deviations up to which a nuisance may be off.
+_FARTHEST = 4.0
+# One of so many places is looked at to find about the best.
+_EVERY = 4
 # Nuisances of the camera, beside those of the library: scale of lengths, and a relative error of
 # the speeds that grows with their logarithm.
 CAMERA_NUISANCES = ('scale', 'speed_bias')
@@ -113,7 +117,9 @@ class DecayLikelihood:
         prior = np.eye(self.gradient.shape[1])
         matrix = prior + self.information
         shift = np.linalg.solve(matrix, self.gradient[..., np.newaxis])[..., 0]
-        gain = 0.5 * np.einsum('pz,pz->p', self.gradient, shift)
+        # Far out the dependence is not linear, and could explain anything.
+        share = np.minimum(1.0, _FARTHEST / np.maximum(np.abs(shift).max(axis=1), _FARTHEST))
+        gain = (share - 0.5 * share**2) * np.einsum('pz,pz->p', self.gradient, shift)
         return np.asarray(self.log_likelihood + gain - 0.5 * np.linalg.slogdet(matrix)[1])
 
 
@@ -142,18 +148,41 @@ def decay_likelihood(
     cells, log_time, log_speed, variance = _binned(
         library.step, time[within], speed[within], error[within]
     )
-    places, n_z = tables.mean.shape[0], tables.slopes.shape[1] + len(CAMERA_NUISANCES)
-    numbers = np.empty((places, 3))
-    gradient = np.empty((places, n_z))
-    information = np.empty((places, n_z, n_z))
+    data = (log_time, log_speed, variance)
+    # First with the covariance of each place, then at all of them with that of the best one: how
+    # strongly the gas fluctuates is known too roughly to tell restitutions by.
+    some = slice(None, None, _EVERY)
+    rough = _over(tables, data, cells, camera, some, tables.corners[some], tables.shares[some])
+    best = int(np.argmax(rough.log_likelihood)) * _EVERY
+    corners = np.tile(tables.corners[best], (tables.mean.shape[0], 1))
+    shares = np.tile(tables.shares[best], (tables.mean.shape[0], 1))
+    return _over(tables, data, cells, camera, slice(None), corners, shares)
+
+
+def _over(
+    tables: DecayTables,
+    data: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    cells: NDArray[np.int64],
+    camera: tuple[float, float],
+    places: slice,
+    corners: NDArray[np.int64],
+    shares: NDArray[np.float64],
+) -> DecayLikelihood:
+    """The likelihood at some places, with covariances between given corners."""
+    library = tables.library
+    mean = tables.mean[places]
+    n_z = tables.slopes.shape[1] + len(CAMERA_NUISANCES)
+    numbers = np.empty((len(mean), 3))
+    gradient = np.empty((len(mean), n_z))
+    information = np.empty((len(mean), n_z, n_z))
     _evaluate(
-        (log_time, log_speed, variance),
+        data,
         cells,
         library.covariance.reshape(-1, *library.covariance.shape[2:]),
-        tables.corners,
-        tables.shares,
-        tables.mean,
-        tables.slopes,
+        np.ascontiguousarray(corners),
+        np.ascontiguousarray(shares),
+        np.ascontiguousarray(mean),
+        np.ascontiguousarray(tables.slopes[places]),
         np.array(camera),
         math.log(library.distances[0]),
         library.step,
@@ -165,7 +194,7 @@ def decay_likelihood(
         information=information,
         log_amplitude=numbers[:, 1],
         deviation=numbers[:, 2],
-        samples=log_time.size,
+        samples=cells.size,
     )
 
 
@@ -242,6 +271,8 @@ def _evaluate(
         _compare(log_time, log_speed, means[place], first, step, amplitude, columns)
         for i in range(n):
             at = (amplitude + log_time[i] - first) / step
+            # Beyond its ends the library's slopes stay as they are there.
+            at = min(max(at, 0.0), slopes.shape[2] - 1.0)
             for z in range(slopes.shape[1]):
                 columns[2 + z, i] = _between(slopes[place, z], at)[0]
             columns[n_z, i] = camera[0] * (columns[1, i] - 1.0)

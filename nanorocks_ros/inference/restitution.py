@@ -33,7 +33,9 @@ _POWER, _WALL_POWER = 1.0 / 1.5, 0.5
 _FINE, _WALL_FINE = 241, 121
 # Less likely places than exp(-this) of the best are not looked at.
 _DEPTH = 18.0
-_UNLIKELY = -1e6
+# Beyond about so much less, log likelihoods are compressed before they are interpolated: next to
+# steep slopes a spline would swing.
+_COMPRESSION = 200.0
 _NARROWEST = 1e-3
 
 
@@ -231,7 +233,8 @@ def posterior_of(
             f'give a range within {LOWEST_WALL:g} to 1',
         )
     shape = (tables.restitution.size, tables.wall_restitution.size)
-    values = np.maximum(log_likelihood - log_likelihood.max(), _UNLIKELY).reshape(shape)
+    less = (log_likelihood.max() - log_likelihood).reshape(shape)
+    values = -_COMPRESSION * np.log1p(less / _COMPRESSION)
     surface = RectBivariateSpline(
         _even(tables.restitution, 0.0, _POWER),
         _even(tables.wall_restitution, LOWEST_WALL, _WALL_POWER),
@@ -240,7 +243,8 @@ def posterior_of(
     box = (0.0, 1.0, low, high)
     for _ in range(3):
         beads, wall = _axes(*box)
-        fine = surface(_even(beads, 0.0, _POWER), _even(wall, LOWEST_WALL, _WALL_POWER))
+        pressed = surface(_even(beads, 0.0, _POWER), _even(wall, LOWEST_WALL, _WALL_POWER))
+        fine = -_COMPRESSION * np.expm1(-pressed / _COMPRESSION)
         if of_beads is not None:
             fine += of_beads.at(beads)[:, np.newaxis]
         if of_walls is not None:
