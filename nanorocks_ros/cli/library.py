@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
     """Simulate, write, print; the exit code."""
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
-    from nanorocks_ros.study.library_build import LibraryPlan, build_library
+    from nanorocks_ros.study.build_library import LibraryPlan, build_library
     from nanorocks_ros.study.output_files import check_outputs
     from nanorocks_ros.study.tasks import Workers
 

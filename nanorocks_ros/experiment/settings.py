@@ -193,7 +193,7 @@ class CoolingSettings:
         'of the paper, which is wrong and kept for comparison',
         choices=('library', 'paper'),
     )
-    library: str = _setting(
+    decay_library: str = _setting(
         '',
         'file of simulated decays, made by `nanorocks library`; empty: the one for the tray that '
         'comes with the package',

@@ -246,7 +246,7 @@ def library_of(tray: Tray, path: str | Path = '') -> DecayLibrary:
         raise ConfigurationError(
             where,
             f'the decay library is of a tray with other beads or sides than tray {tray.number}',
-            f'make one: {build_command(tray)}, and pass it as cooling.library; or choose '
+            f'make one: {build_command(tray)}, and pass it as cooling.decay_library; or choose '
             'cooling.relation paper',
         )
     return found

@@ -53,7 +53,7 @@ class DecayTables:
 
     Parameters
     ----------
-    library : DecayLibrary
+    decays : DecayLibrary
     restitution : ndarray (n_c,)
     wall_restitution : ndarray (n_w,)
     mean : ndarray (n_c * n_w, n_x)
@@ -66,7 +66,7 @@ class DecayTables:
         Their weights.
     """
 
-    library: DecayLibrary
+    decays: DecayLibrary
     restitution: NDArray[np.float64]
     wall_restitution: NDArray[np.float64]
     mean: NDArray[np.float64]
@@ -143,7 +143,7 @@ def decay_likelihood(
     camera : tuple of 2 floats
         Standard deviations of the `CAMERA_NUISANCES`, relative.
     """
-    library = tables.library
+    library = tables.decays
     within = time < time[0] * math.exp((library.distances.size - 2) * library.step)
     cells, log_time, log_speed, variance = _binned(
         library.step, time[within], speed[within], error[within]
@@ -169,7 +169,7 @@ def _over(
     shares: NDArray[np.float64],
 ) -> DecayLikelihood:
     """The likelihood at some places, with covariances between given corners."""
-    library = tables.library
+    library = tables.decays
     mean = tables.mean[places]
     n_z = tables.slopes.shape[1] + len(CAMERA_NUISANCES)
     numbers = np.empty((len(mean), 3))

@@ -154,7 +154,7 @@ def _covariances(decays: Decays) -> NDArray[np.float64]:
 
 
 def _even(restitution: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The measure in which the nodes lie evenly, 0 for a restitution of 1."""
+    """The measure in which covariances are averaged, 0 for a restitution of 1."""
     return np.asarray((1.0 - restitution) ** (1.0 / 1.5))
 
 

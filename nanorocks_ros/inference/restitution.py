@@ -36,7 +36,6 @@ _DEPTH = 18.0
 # Beyond about so much less, log likelihoods are compressed before they are interpolated: next to
 # steep slopes a spline would swing.
 _COMPRESSION = 200.0
-_NARROWEST = 1e-3
 
 
 @lru_cache(maxsize=16)
@@ -63,7 +62,7 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
         slopes.append(0.5 * (high - low) * spread / UNITS[number])
     corners, shares = _corners(library, beads, walls)
     return DecayTables(
-        library=library,
+        decays=library,
         restitution=restitution,
         wall_restitution=wall,
         mean=mean,
@@ -199,6 +198,22 @@ class SingleTerm:
         return np.asarray(np.interp(restitution, self.restitution, self.log_likelihood))
 
 
+def check_walls(walls: tuple[float, float]) -> None:
+    """Refuse a prior of the walls beyond what a library covers.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    low, high = walls
+    if not LOWEST_WALL <= low <= high <= 1.0:
+        raise ConfigurationError(
+            'prior.wall_low, prior.wall_high',
+            f'{low:g} to {high:g}',
+            f'give a range within {LOWEST_WALL:g} to 1',
+        )
+
+
 def posterior_of(
     tables: DecayTables,
     log_likelihood: NDArray[np.float64],
@@ -225,13 +240,7 @@ def posterior_of(
     ConfigurationError
         For walls outside what the library covers.
     """
-    low, high = walls
-    if not LOWEST_WALL <= low <= high <= 1.0:
-        raise ConfigurationError(
-            'prior.wall_low, prior.wall_high',
-            f'{low:g} to {high:g}',
-            f'give a range within {LOWEST_WALL:g} to 1',
-        )
+    check_walls(walls)
     shape = (tables.restitution.size, tables.wall_restitution.size)
     less = (log_likelihood.max() - log_likelihood).reshape(shape)
     values = -_COMPRESSION * np.log1p(less / _COMPRESSION)
@@ -240,7 +249,7 @@ def posterior_of(
         _even(tables.wall_restitution, LOWEST_WALL, _WALL_POWER),
         values,
     )
-    box = (0.0, 1.0, low, high)
+    box = (0.0, 1.0, *walls)
     for _ in range(3):
         beads, wall = _axes(*box)
         pressed = surface(_even(beads, 0.0, _POWER), _even(wall, LOWEST_WALL, _WALL_POWER))
@@ -251,7 +260,7 @@ def posterior_of(
             fine += of_walls.at(wall)
         fine -= fine.max()
         box = _likely(fine, beads, wall)
-    weight = np.exp(fine) * _widths(beads)[:, np.newaxis] * _widths(wall)
+    weight = np.exp(fine) * _halves(beads.size)[:, np.newaxis] * _halves(wall.size)
     return Posterior(restitution=beads, wall_restitution=wall, probability=weight / weight.sum())
 
 
@@ -264,14 +273,9 @@ def _axes(
     low: float, high: float, wall_low: float, wall_high: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     beads = np.linspace(low, high, _FINE)
-    if wall_high - wall_low < _NARROWEST:
-        return beads, np.array([0.5 * (wall_low + wall_high)])
+    if wall_low == wall_high:
+        return beads, np.array([wall_low])
     return beads, np.linspace(wall_low, wall_high, _WALL_FINE)
-
-
-def _widths(axis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What each entry stands for."""
-    return np.ones(1) if axis.size == 1 else np.gradient(axis) * _halves(axis.size)
 
 
 def _halves(n: int) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from scipy import special
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.decay_library import library_of
 from nanorocks_ros.inference.decay_likelihood import DecayLikelihood, decay_likelihood
-from nanorocks_ros.inference.restitution import Posterior, posterior_of, tables_of
+from nanorocks_ros.inference.restitution import Posterior, check_walls, posterior_of, tables_of
 from nanorocks_ros.physics.haff_fit import HaffFit, fit_haff
 from nanorocks_ros.physics.paper import paper_restitution_of_decay
 from nanorocks_ros.records import CorRelation, CorStatus
@@ -118,7 +118,7 @@ class LibraryReading:
     Raises
     ------
     ConfigurationError
-        When there is no library of such a tray.
+        When there is no library of such a tray, or no walls are as the prior says.
     """
 
     relation = CorRelation.LIBRARY
@@ -126,11 +126,12 @@ class LibraryReading:
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._tray = tray
         known = settings.prior
-        library = library_of(tray, settings.cooling.library)
+        library = library_of(tray, settings.cooling.decay_library)
         self._tables = tables_of(library, tray, known)
         # What the library itself is off by acts as a wrong scale would.
         self._camera = (math.hypot(known.scale_error, library.misfit), known.speed_bias)
         self._walls = (known.wall_low, known.wall_high)
+        check_walls(self._walls)
         half = 0.5 * settings.cooling.probability
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
         self._finished: DecayLikelihood | None = None

@@ -239,3 +239,8 @@ def test_the_asked_probability_widens_the_interval():
     *_, wide = all_estimates(fitter(**{'cooling.probability': 0.95}), cooling_cycle())
     assert narrow.restitution == pytest.approx(wide.restitution)
     assert narrow.restitution_lower > wide.restitution_lower
+
+
+def test_walls_the_wrong_way_round_are_refused_at_once():
+    with pytest.raises(ConfigurationError, match=r'prior.wall_low, prior.wall_high: 0.95 to 0.9'):
+        fitter(**{'prior.wall_low': 0.95, 'prior.wall_high': 0.9})

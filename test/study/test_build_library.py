@@ -10,7 +10,7 @@ import pytest
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay_library import load_library, tray_key
-from nanorocks_ros.study.library_build import LibraryPlan, build_library
+from nanorocks_ros.study.build_library import LibraryPlan, build_library
 from nanorocks_ros.study.tasks import Workers
 
 TRAY = load_trays()[1]

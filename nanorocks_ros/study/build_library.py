@@ -59,8 +59,8 @@ class LibraryPlan:
     """
 
     tray: Tray
-    nodes: int = 1600
-    runs: int = 24
+    nodes: int
+    runs: int
     seed: int = 1
 
     def question(self) -> str:
@@ -102,7 +102,7 @@ def build_library(
     workers : Workers, optional
         By default processes on all cores.
     progress : callable, optional
-        Called with the nodes done and the nodes there are.
+        Called with the parts done and the parts there are, of four nodes each.
     notice : callable, optional
         Called with what the user should know, one line each.
 
