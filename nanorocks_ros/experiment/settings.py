@@ -215,6 +215,12 @@ class CoolingSettings:
         low=0.0,
         high=10.0,
     )
+    rebounds: bool = _setting(
+        True, 'use rebounds from the side walls, seen in the tracks, besides the decay'
+    )
+    collisions: bool = _setting(
+        True, 'use collisions of two beads, seen in the tracks, besides the decay'
+    )
     update_interval: float = _setting(
         0.5, 'time between two live estimates', 's', low=0.0, high=60.0
     )
