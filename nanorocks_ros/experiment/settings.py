@@ -279,6 +279,16 @@ class PriorSettings:
         low=0.0,
         high=0.2,
     )
+    collision_bias: float = _setting(
+        0.008,
+        'standard deviation of what the restitution of the beads by all collisions together may '
+        'be off by',
+        low=0.0,
+        high=0.2,
+    )
+    rebound_bias: float = _setting(
+        0.001, 'the same of that of the walls by rebounds', low=0.0, high=0.2
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

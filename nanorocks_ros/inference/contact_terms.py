@@ -62,16 +62,22 @@ class ContactTerms:
             beads=self.beads + other.beads,
         )
 
-    @property
-    def of_walls(self) -> SingleTerm | None:
-        """What rebounds say; None without any."""
+    def of_walls(self, bias: float = 0.0) -> SingleTerm | None:
+        """What rebounds say; None without any.
+
+        Parameters
+        ----------
+        bias : float
+            Standard deviation of what all of them together may be off by.
+        """
         if not self.rebounds:
             return None
-        return SingleTerm(restitution=_WALLS, log_likelihood=marginal(self.walls))
+        term = SingleTerm(restitution=_WALLS, log_likelihood=marginal(self.walls))
+        return term.off_by(bias)
 
-    @property
-    def of_beads(self) -> SingleTerm | None:
-        """What collisions say; None without any."""
+    def of_beads(self, bias: float = 0.0) -> SingleTerm | None:
+        """What collisions say, as `of_walls`."""
         if not self.collisions:
             return None
-        return SingleTerm(restitution=_BEADS, log_likelihood=marginal(self.beads))
+        term = SingleTerm(restitution=_BEADS, log_likelihood=marginal(self.beads))
+        return term.off_by(bias)

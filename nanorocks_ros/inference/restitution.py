@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicSpline, RectBivariateSpline
+from scipy.special import logsumexp
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.inference.decay_library import LOWEST_WALL, NUISANCES, UNITS, count_step
@@ -36,6 +37,8 @@ _DEPTH = 18.0
 # Beyond about so much less, log likelihoods are compressed before they are interpolated: next to
 # steep slopes a spline would swing.
 _COMPRESSION = 200.0
+# Places, at least, at which a term is evaluated to be smeared.
+_SMEARED = 1000
 
 
 @lru_cache(maxsize=16)
@@ -201,6 +204,17 @@ class SingleTerm:
     def at(self, restitution: NDArray[np.float64]) -> NDArray[np.float64]:
         """The term at other restitutions, (n,)."""
         return np.asarray(CubicSpline(self.restitution, self.log_likelihood)(restitution))
+
+    def off_by(self, spread: float) -> SingleTerm:
+        """The same where all of it may be off by a common amount, a Gaussian of this spread."""
+        if spread == 0.0:
+            return self
+        first, last = self.restitution[[0, -1]]
+        step = min(0.25 * spread, float(last - first) / _SMEARED)
+        fine = np.arange(first, last + step, step)
+        apart = (fine - self.restitution[:, np.newaxis]) / spread
+        smeared = logsumexp(self.at(fine) - 0.5 * apart**2, axis=1)
+        return SingleTerm(restitution=self.restitution, log_likelihood=smeared)
 
 
 def check_walls(walls: tuple[float, float]) -> None:

@@ -132,6 +132,7 @@ class LibraryReading:
         self._tables = tables_of(library, tray, known)
         # What the library itself is off by acts as a wrong scale would.
         self._camera = (math.hypot(known.scale_error, library.misfit), known.speed_bias)
+        self._biases = (known.collision_bias, known.rebound_bias)
         self._walls = (known.wall_low, known.wall_high)
         check_walls(self._walls)
         half = 0.5 * settings.cooling.probability
@@ -182,8 +183,8 @@ class LibraryReading:
             self._tables,
             integrated,
             self._walls,
-            of_beads=contacts.of_beads,
-            of_walls=contacts.of_walls,
+            of_beads=contacts.of_beads(self._biases[0]),
+            of_walls=contacts.of_walls(self._biases[1]),
         )
 
     def _mean(

@@ -40,8 +40,8 @@ def test_its_nodes_are_close_enough_to_give_what_a_fine_grid_gives():
     pairs = [one for one in every if isinstance(one, PairCollision)]
     walls = [one for one in every if isinstance(one, Rebound)]
     for term, exact in (
-        (terms.of_beads, pair_log_likelihood(pairs, FINE)),
-        (terms.of_walls, rebound_log_likelihood(walls, FINE)),
+        (terms.of_beads(), pair_log_likelihood(pairs, FINE)),
+        (terms.of_walls(), rebound_log_likelihood(walls, FINE)),
     ):
         grid = FINE[term.restitution[0] <= FINE]
         found, expected = contact_estimate(grid, term.at(grid)), contact_estimate(FINE, exact)
@@ -52,5 +52,15 @@ def test_its_nodes_are_close_enough_to_give_what_a_fine_grid_gives():
 
 def test_without_contacts_nothing_is_said():
     terms = ContactTerms.of(())
-    assert terms.of_beads is None
-    assert terms.of_walls is None
+    assert terms.of_beads() is None
+    assert terms.of_walls() is None
+
+
+def test_what_all_contacts_may_be_off_by_adds_to_the_error_in_squares():
+    terms = ContactTerms.of(contacts())
+    for term, bias, low in ((terms.of_beads, 0.02, 0.5), (terms.of_walls, 0.01, 0.8)):
+        grid = np.linspace(low, 1.0, 1001)
+        sure, unsure = (contact_estimate(grid, term(value).at(grid)) for value in (0.0, bias))
+        both = np.hypot(sure.restitution_error, bias)
+        assert unsure.restitution_error == pytest.approx(both, rel=0.1)
+        assert unsure.restitution == pytest.approx(sure.restitution, abs=0.3 * bias)
