@@ -359,6 +359,12 @@ class CorEstimate:
     cooling_start : float, [s]
         From when on the gas is taken to cool, since the shaking event: 0, or later when the tray
         swung on.
+    first_species_initial_speed, first_species_initial_speed_error : float, [m/s]
+        As `initial_speed`, of the first of `Tray.species` by itself; of a mixture whose species
+        were told apart, once the cycle is over.
+    first_species_haff_time, first_species_haff_time_error : float, [s]
+    second_species_initial_speed, second_species_initial_speed_error : float, [m/s]
+    second_species_haff_time, second_species_haff_time_error : float, [s]
     """
 
     stamp_ns: int
@@ -386,6 +392,14 @@ class CorEstimate:
     window_start: float = UNKNOWN
     window_end: float = UNKNOWN
     cooling_start: float = UNKNOWN
+    first_species_initial_speed: float = UNKNOWN
+    first_species_initial_speed_error: float = UNKNOWN
+    first_species_haff_time: float = UNKNOWN
+    first_species_haff_time_error: float = UNKNOWN
+    second_species_initial_speed: float = UNKNOWN
+    second_species_initial_speed_error: float = UNKNOWN
+    second_species_haff_time: float = UNKNOWN
+    second_species_haff_time_error: float = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

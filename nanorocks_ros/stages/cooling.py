@@ -13,6 +13,7 @@ from nanorocks_ros.errors import FitError
 from nanorocks_ros.records import CorEstimate, CorStatus, Quality, SpeedEstimate
 from nanorocks_ros.stages.readings import Decay, LibraryReading, PaperReading, Reading
 from nanorocks_ros.stages.shaking import NS
+from nanorocks_ros.stages.species_decays import species_decays
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.settings import PipelineSettings
@@ -44,6 +45,7 @@ class HaffFitter:
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.cooling
+        self._tray = tray
         reading = LibraryReading if self._settings.relation == 'library' else PaperReading
         self._make_reading = partial(reading, settings, tray)
         self._restart()
@@ -133,6 +135,9 @@ class HaffFitter:
                 'restitution_lower': 0.0,
                 'restitution_upper': 1.0,
             }
+        if status is CorStatus.FINAL:
+            few = self._settings.fewest_samples
+            fields.update(species_decays(self._tray, decay.time, self._samples, few))
         quality = reduce(or_, (one.quality for one in self._samples))
         return (
             CorEstimate(
