@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
 from scipy import optimize
 
-from nanorocks_ros.errors import FitError
+from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.physics.confined_decay import confined_restitution
 from nanorocks_ros.physics.estimate import Estimate
-from nanorocks_ros.physics.haff import granular_energy, haff_speed
+from nanorocks_ros.physics.haff import haff_speed
 from nanorocks_ros.physics.haff_fit import HaffFit, fit_haff
-from nanorocks_ros.physics.paper import RELATIVE_TO_MEAN_SPEED, paper_restitution
+from nanorocks_ros.physics.paper import paper_restitution
 from nanorocks_ros.study.cycles import check_errors, mean_cycle
+from nanorocks_ros.study.library_decay import LibraryDecay, library_decay
 from nanorocks_ros.study.output_files import whole_file
+from nanorocks_ros.study.species_energy import (
+    draw_species,
+    relative_energy,
+    species_energies,
+    species_values,
+)
 
 mpl.use('Agg')
 from matplotlib.collections import LineCollection
@@ -32,8 +39,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.study.curves import SpeedCurve
     from nanorocks_ros.study.cycles import CycleSpeeds
 
-_MM, _NANOJOULE = 1e3, 1e9
-_MEASURED, _FIT, _PAPER = '#30506f', '#c23b22', '#e8b93c'
+_NANOJOULE = 1e9
+_MEASURED, _FIT, _PAPER, _LIBRARY = '#30506f', '#c23b22', '#e8b93c', '#000000'
 
 
 def decay_figure(
@@ -43,8 +50,12 @@ def decay_figure(
     *,
     wall_restitution: float,
     span: tuple[float, float],
-) -> dict[str, float | None]:
-    """The energy of each cycle and of their mean, with our fit and the paper's.
+    species: Sequence[Sequence[CycleSpeeds]] = (),
+    start: float = 0.0,
+) -> dict[str, Any]:
+    """The energy of each cycle and of their mean, with our fit, the library's and the paper's.
+
+    Of a mixture the energy of each species is drawn below, with a fit of its own.
 
     Parameters
     ----------
@@ -55,11 +66,15 @@ def decay_figure(
         For the confined theory.
     span : tuple of 2 floats, [s]
         First and last time since the shaking event that is fitted.
+    species : sequence of sequences of CycleSpeeds, optional
+        The cycles of each species of a mixture, in the order of `Tray.species`.
+    start : float, [s], optional
+        From when on the gas cools, since the shaking event, for the library.
 
     Returns
     -------
     dict
-        What was fitted, in SI; None where a relation has no value.
+        What was fitted, in SI; None where a relation has no value, or the tray no library.
 
     Raises
     ------
@@ -76,11 +91,61 @@ def decay_figure(
     check_errors(curve)
     fit = fit_haff(curve.times, curve.speed, curve.error, tray.count * len(cycles))
     energy, time = _paper_fit(curve, tray.mean_mass)
-    found = _values(tray, fit, (energy, time), wall_restitution)
-    figure = Figure(figsize=(8.0, 5.5), layout='constrained')
-    axes = figure.subplots()
-    _draw_energy(axes, tray, cycles, curve)
-    scale = _relative_energy(1.0, tray.mean_mass) * _NANOJOULE
+    found: dict[str, Any] = _values(tray, fit, (energy, time), wall_restitution)
+    library = _library(tray, cycles, curve, start)
+    each = species_energies(tray, species, span)
+    figure = Figure(figsize=(8.0, 9.0 if each else 5.5), layout='constrained')
+    panels = figure.subplots(2 if each else 1, 1, sharex=True, squeeze=False)[:, 0]
+    _draw_energy(panels[0], tray, cycles, curve)
+    _draw_laws(panels[0], tray, curve, (fit, energy, time), found)
+    if library is not None:
+        _draw_library(panels[0], tray, library)
+    panels[0].legend(frameon=False, fontsize=9)
+    for one in panels[1:]:
+        draw_species(one, each)
+    panels[-1].set_xlabel('time since the shaking event [s]')
+    panels[0].set_title(
+        f'Tray {tray.number}, {len(cycles)} cycle{"s" if len(cycles) > 1 else ""}: '
+        f'1/(v0 tau) = {fit.decay_rate:.3g} ± {fit.decay_rate * fit.log_decay_rate_error:.2g} /m',
+        fontsize=10,
+    )
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=110)
+    return {
+        **found,
+        'library': None if library is None else _library_values(library),
+        **species_values(each),
+    }
+
+
+def _library(
+    tray: Tray, cycles: Sequence[CycleSpeeds], curve: SpeedCurve, start: float
+) -> LibraryDecay | None:
+    try:
+        return library_decay(tray, cycles, curve, start)
+    except (ConfigurationError, FitError):
+        # Another tray than those flown; too short a decay.
+        return None
+
+
+def _library_values(library: LibraryDecay) -> dict[str, float]:
+    found = {'initial_speed': library.initial_speed}
+    for name in ('restitution', 'wall_restitution'):
+        value, lower, upper = getattr(library, name)
+        found |= {name: value, f'{name}_lower': lower, f'{name}_upper': upper}
+    return found
+
+
+def _draw_laws(
+    axes: Axes,
+    tray: Tray,
+    curve: SpeedCurve,
+    fits: tuple[HaffFit, float, float],
+    found: dict[str, Any],
+) -> None:
+    """Our fit of Haff's law and the paper's (its energy [J] and time [s])."""
+    fit, energy, time = fits
+    scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
     law = haff_speed(curve.times, fit.initial_speed, fit.haff_time)
     label = f"Haff's law, speeds weighted: {_cor_text('confined theory', found, 'confined')}"
     axes.plot(curve.times, scale * law**2, color=_FIT, lw=2, zorder=3, label=label)
@@ -93,24 +158,30 @@ def decay_figure(
         zorder=4,
         label=f'as the paper fits, energies alike: {_cor_text("its COR", found, "paper")}',
     )
-    axes.set_title(
-        f'Tray {tray.number}, {len(cycles)} cycle{"s" if len(cycles) > 1 else ""}: '
-        f'1/(v0 tau) = {fit.decay_rate:.3g} ± {fit.decay_rate * fit.log_decay_rate_error:.2g} /m',
-        fontsize=10,
+
+
+def _draw_library(axes: Axes, tray: Tray, library: LibraryDecay) -> None:
+    scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
+    axes.plot(
+        library.times,
+        scale * library.speed**2,
+        color=_LIBRARY,
+        lw=1.6,
+        ls=':',
+        zorder=5,
+        label=f'simulated decays: COR {_interval(library.restitution)}, '
+        f'walls {_interval(library.wall_restitution)}',
     )
-    axes.legend(frameon=False)
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=110)
-    return found
 
 
-def _relative_energy(speed: float, mass: float) -> float:
-    return granular_energy(RELATIVE_TO_MEAN_SPEED * speed, mass)
+def _interval(values: tuple[float, float, float]) -> str:
+    value, lower, upper = values
+    return f'{value:.3f} [{lower:.3f}, {upper:.3f}]'
 
 
 def _paper_fit(curve: SpeedCurve, mass: float) -> tuple[float, float]:
     """T0 [J] and tau0 [s] of the paper's fit: least squares of the energies, all alike."""
-    scale = _relative_energy(1.0, mass)
+    scale = relative_energy(1.0, mass)
     energies = scale * curve.speed**2
 
     def residual(logs: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -162,7 +233,7 @@ def _cor_text(name: str, found: dict[str, float | None], key: str) -> str:
 
 
 def _draw_energy(axes: Axes, tray: Tray, cycles: Sequence[CycleSpeeds], curve: SpeedCurve) -> None:
-    scale = _relative_energy(1.0, tray.mean_mass) * _NANOJOULE
+    scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
     if len(cycles) > 1:
         lines = [np.column_stack((one.times, scale * one.speed**2)) for one in cycles]
         axes.add_collection(
@@ -188,6 +259,5 @@ def _draw_energy(axes: Axes, tray: Tray, cycles: Sequence[CycleSpeeds], curve: S
     axes.set_yscale('log')
     # Noise about zero reaches down without end.
     axes.set_ylim(bottom=0.3 * scale * float(curve.speed.min()) ** 2)
-    axes.set_xlabel('time since the shaking event [s]')
     axes.set_ylabel(r'energy at the relative speed $\frac{1}{2} m (2\bar{v})^2$ [nJ]')
     axes.grid(alpha=0.25)
