@@ -26,7 +26,7 @@ from nanorocks_ros.study.sweep_figure import check_drawable, chi_square_figure
 from nanorocks_ros.study.sweep_plan import SweepPlan, sweep_plan
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
     from pathlib import Path
 
     from nanorocks_ros.experiment.trays import Tray
@@ -40,6 +40,7 @@ DECAY, WALLS, WIDTH, SPEED = 'decay.png', 'walls.png', 'width.png', 'cor_against
 # The search leaves its last third to decays that started faster.
 _LONGER = 1.5
 _TIMES = 31
+_ROUNDING = 1e-12
 # Of the mean in three dimensions, that in the picture.
 _PROJECTED = 0.25 * math.pi
 
@@ -200,9 +201,12 @@ def search_plans(search: Search, data: CorData, curve: SpeedCurve) -> dict[str, 
     )
     last = float(f'{_LONGER * (data.span[1] - data.start):.6g}')
     times = [last * k / (_TIMES - 1) for k in range(_TIMES)]
+    walls = {'restitution': search.beads, 'wall_restitution': search.walls}
+    # First, as it checks the restitutions.
+    plans = {'walls': sweep_plan(settings, walls, times, search.runs, keep_runs=True)}
     half = 0.5 * max(search.widths, default=0.0)
     # No single collision may gain energy.
-    narrow = [one for one in search.beads if half <= one <= 1.0 - half + 1e-12]
+    narrow = [one for one in search.beads if half <= one <= 1.0 - half + _ROUNDING]
     if len(narrow) < 2:
         raise ConfigurationError(
             '--widths',
@@ -210,14 +214,8 @@ def search_plans(search: Search, data: CorData, curve: SpeedCurve) -> dict[str, 
             'give narrower widths',
         )
     known = with_values(settings, {'wall_restitution': data.wall_restitution}, 'search')
-    grids: dict[str, tuple[SimulationSettings, dict[str, Sequence[float]]]] = {
-        'walls': (settings, {'restitution': search.beads, 'wall_restitution': search.walls}),
-        'width': (known, {'restitution': narrow, 'restitution_width': search.widths}),
-    }
-    return {
-        name: sweep_plan(own, axes, times, search.runs, keep_runs=True)
-        for name, (own, axes) in grids.items()
-    }
+    widths = {'restitution': narrow, 'restitution_width': search.widths}
+    return {**plans, 'width': sweep_plan(known, widths, times, search.runs, keep_runs=True)}
 
 
 def _initial_speed(data: CorData, curve: SpeedCurve) -> float:

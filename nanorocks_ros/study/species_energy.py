@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 _NANOJOULE, _MM = 1e9, 1e3
 _MOST_GRAY = 255.0
+_UNKNOWN = (90.0, 90.0, 90.0)
+# Of a line over points of its own colour.
+_DARKER = 0.7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,11 +145,9 @@ def species_values(found: Sequence[SpeciesEnergy]) -> dict[str, Any]:
 def draw_species(axes: Axes, found: Sequence[SpeciesEnergy]) -> None:
     """Energies of both species over time, each in its colour with its fit."""
     for one, line in zip(found, ('-', '--'), strict=False):
-        curve, fit = one.curve, one.fit
+        curve, fit, name = one.curve, one.fit, one.species.material
         scale = relative_energy(1.0, one.species.bead_mass) * _NANOJOULE
-        blue, green, red = (
-            part / _MOST_GRAY for part in COLOURS.get(one.species.material, (0,) * 3)
-        )
+        colour = np.array(COLOURS.get(name, _UNKNOWN))[::-1] / _MOST_GRAY
         axes.errorbar(
             curve.times,
             scale * curve.speed**2,
@@ -155,25 +156,31 @@ def draw_species(axes: Axes, found: Sequence[SpeciesEnergy]) -> None:
             ms=2.5,
             lw=0.8,
             alpha=0.5,
-            color=(red, green, blue),
-            label=f'{one.species.material}' + (': no decay' if fit is None else ''),
+            color=tuple(colour),
+            label=f'{name}: the speeds do not fall' if fit is None else None,
         )
-        if fit is not None:
-            law = haff_speed(curve.times, fit.initial_speed, fit.haff_time)
-            axes.plot(
-                curve.times,
-                scale * law**2,
-                line,
-                lw=2,
-                color=tuple(0.7 * part for part in (red, green, blue)),
-                label=f'v0 {fit.initial_speed * _MM:.2f} ± {fit.initial_speed_error * _MM:.2f} '
-                f'mm/s, tau {fit.haff_time:.2f} ± {fit.haff_time_error:.2f} s',
-            )
+        if fit is None:
+            continue
+        axes.plot(
+            curve.times,
+            scale * haff_speed(curve.times, fit.initial_speed, fit.haff_time) ** 2,
+            line,
+            lw=2,
+            color=tuple(_DARKER * colour),
+            label=f'{name}: {_fit_text(fit)}',
+        )
     ratio, error = energy_ratio(found)
-    names = ' / '.join(one.species.material for one in found)
+    names = ' bead over that of one '.join(one.species.material for one in found)
     spread = f' ± {error:.2f}' if math.isfinite(error) else ''
-    axes.set_title(f'Energy of {names}: {ratio:.2f}{spread}', fontsize=10)
+    axes.set_title(f'Energy of one {names} bead: {ratio:.2f}{spread}', fontsize=10)
     axes.set_yscale('log')
     axes.set_ylabel(r'the same of each species, its own $m$ and $\bar{v}$ [nJ]')
     axes.legend(frameon=False, fontsize=9)
     axes.grid(alpha=0.25)
+
+
+def _fit_text(fit: HaffFit) -> str:
+    return (
+        f'v0 {fit.initial_speed * _MM:.2f} ± {fit.initial_speed_error * _MM:.2f} mm/s, '
+        f'tau {fit.haff_time:.2f} ± {fit.haff_time_error:.2f} s'
+    )
