@@ -69,7 +69,8 @@ def decay_figure(
     species : sequence of sequences of CycleSpeeds, optional
         The cycles of each species of a mixture, in the order of `Tray.species`.
     start : float, [s], optional
-        From when on the gas cools, since the shaking event, for the library.
+        From when on the gas cools, since the shaking event: initial speeds are those of then,
+        unless `span` begins before it.
 
     Returns
     -------
@@ -89,20 +90,22 @@ def decay_figure(
     """
     curve = mean_cycle(cycles, *span)
     check_errors(curve)
-    fit = fit_haff(curve.times, curve.speed, curve.error, tray.count * len(cycles))
-    energy, time = _paper_fit(curve, tray.mean_mass)
+    origin = min(start, span[0])
+    age = curve.times - origin
+    fit = fit_haff(age, curve.speed, curve.error, tray.count * len(cycles))
+    energy, time = _paper_fit(age, curve.speed, tray.mean_mass)
     found: dict[str, Any] = _values(tray, fit, (energy, time), wall_restitution)
     library = _library(tray, cycles, curve, start)
-    each = species_energies(tray, species, span)
+    each = species_energies(tray, species, span, origin)
     figure = Figure(figsize=(8.0, 9.0 if each else 5.5), layout='constrained')
     panels = figure.subplots(2 if each else 1, 1, sharex=True, squeeze=False)[:, 0]
     _draw_energy(panels[0], tray, cycles, curve)
-    _draw_laws(panels[0], tray, curve, (fit, energy, time), found)
+    _draw_laws(panels[0], tray, (curve.times, age), (fit, energy, time), found)
     if library is not None:
         _draw_library(panels[0], tray, library)
     panels[0].legend(frameon=False, fontsize=9)
     for one in panels[1:]:
-        draw_species(one, each)
+        draw_species(one, each, origin)
     panels[-1].set_xlabel('time since the shaking event [s]')
     panels[0].set_title(
         f'Tray {tray.number}, {len(cycles)} cycle{"s" if len(cycles) > 1 else ""}: '
@@ -113,6 +116,7 @@ def decay_figure(
         figure.savefig(part, dpi=110)
     return {
         **found,
+        'cooling_start': origin,
         'library': None if library is None else _library_values(library),
         **species_values(each),
     }
@@ -139,19 +143,23 @@ def _library_values(library: LibraryDecay) -> dict[str, float]:
 def _draw_laws(
     axes: Axes,
     tray: Tray,
-    curve: SpeedCurve,
+    times: tuple[NDArray[np.float64], NDArray[np.float64]],
     fits: tuple[HaffFit, float, float],
     found: dict[str, Any],
 ) -> None:
-    """Our fit of Haff's law and the paper's (its energy [J] and time [s])."""
+    """Our fit of Haff's law and the paper's (its energy [J] and time [s]).
+
+    Times are those since the shaking event and since the gas began to cool.
+    """
     fit, energy, time = fits
+    shown, age = times
     scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
-    law = haff_speed(curve.times, fit.initial_speed, fit.haff_time)
+    law = haff_speed(age, fit.initial_speed, fit.haff_time)
     label = f"Haff's law, speeds weighted: {_cor_text('confined theory', found, 'confined')}"
-    axes.plot(curve.times, scale * law**2, color=_FIT, lw=2, zorder=3, label=label)
+    axes.plot(shown, scale * law**2, color=_FIT, lw=2, zorder=3, label=label)
     axes.plot(
-        curve.times,
-        _NANOJOULE * energy / (1.0 + curve.times / time) ** 2,
+        shown,
+        _NANOJOULE * energy / (1.0 + age / time) ** 2,
         color=_PAPER,
         lw=2,
         ls='--',
@@ -179,17 +187,19 @@ def _interval(values: tuple[float, float, float]) -> str:
     return f'{value:.3f} [{lower:.3f}, {upper:.3f}]'
 
 
-def _paper_fit(curve: SpeedCurve, mass: float) -> tuple[float, float]:
+def _paper_fit(
+    times: NDArray[np.float64], speed: NDArray[np.float64], mass: float
+) -> tuple[float, float]:
     """T0 [J] and tau0 [s] of the paper's fit: least squares of the energies, all alike."""
     scale = relative_energy(1.0, mass)
-    energies = scale * curve.speed**2
+    energies = scale * speed**2
 
     def residual(logs: NDArray[np.float64]) -> NDArray[np.float64]:
-        law = np.exp(logs[0]) / (1.0 + curve.times * np.exp(-logs[1])) ** 2
+        law = np.exp(logs[0]) / (1.0 + times * np.exp(-logs[1])) ** 2
         difference: NDArray[np.float64] = (energies - law) / energies[0]
         return difference
 
-    start = np.log([energies[0], 0.3 * curve.times[-1] + 1e-9])
+    start = np.log([energies[0], 0.3 * times[-1] + 1e-9])
     best = optimize.least_squares(residual, start).x
     return float(np.exp(best[0])), float(np.exp(best[1]))
 

@@ -53,7 +53,10 @@ class SpeciesEnergy:
 
 
 def species_energies(
-    tray: Tray, cycles: Sequence[Sequence[CycleSpeeds]], span: tuple[float, float]
+    tray: Tray,
+    cycles: Sequence[Sequence[CycleSpeeds]],
+    span: tuple[float, float],
+    origin: float = 0.0,
 ) -> tuple[SpeciesEnergy, ...]:
     """The decay of each species of a mixture, with a fit of Haff's law of its own.
 
@@ -64,6 +67,8 @@ def species_energies(
         Of each species, in the order of `Tray.species`.
     span : tuple of 2 floats, [s]
         First and last time since the shaking event that is fitted.
+    origin : float, [s], optional
+        From when on the fitted times count, since the shaking event.
 
     Returns
     -------
@@ -79,7 +84,7 @@ def species_energies(
             return ()
         try:
             beads = species.count * len(own)
-            fit: HaffFit | None = fit_haff(curve.times, curve.speed, curve.error, beads)
+            fit: HaffFit | None = fit_haff(curve.times - origin, curve.speed, curve.error, beads)
         except FitError:
             fit = None
         found.append(SpeciesEnergy(species=species, cycles=tuple(own), curve=curve, fit=fit))
@@ -142,7 +147,7 @@ def species_values(found: Sequence[SpeciesEnergy]) -> dict[str, Any]:
     }
 
 
-def draw_species(axes: Axes, found: Sequence[SpeciesEnergy]) -> None:
+def draw_species(axes: Axes, found: Sequence[SpeciesEnergy], origin: float = 0.0) -> None:
     """Energies of both species over time, each in its colour with its fit."""
     for one, line in zip(found, ('-', '--'), strict=False):
         curve, fit, name = one.curve, one.fit, one.species.material
@@ -163,7 +168,7 @@ def draw_species(axes: Axes, found: Sequence[SpeciesEnergy]) -> None:
             continue
         axes.plot(
             curve.times,
-            scale * haff_speed(curve.times, fit.initial_speed, fit.haff_time) ** 2,
+            scale * haff_speed(curve.times - origin, fit.initial_speed, fit.haff_time) ** 2,
             line,
             lw=2,
             color=tuple(_DARKER * colour),
