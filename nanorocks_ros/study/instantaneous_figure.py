@@ -162,6 +162,8 @@ def _draw_local(axes: Axes, found: InstantaneousCor, walls: float) -> None:
     axes.set_xscale('log')
     axes.xaxis.set_major_formatter('{x:g}')
     axes.xaxis.set_minor_formatter('{x:g}')
+    # All numbers on one line.
+    axes.tick_params(axis='x', which='both', length=4, pad=4)
     axes.legend(frameon=False, fontsize=9)
     axes.grid(alpha=0.25)
 
