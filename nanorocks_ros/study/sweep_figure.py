@@ -141,10 +141,10 @@ def _mark(axes: Axes, sweep: Sweep, values: NDArray[np.float64], curve: SpeedCur
 def _held(sweep: Sweep) -> str:
     """Tray and walls, where they do not vary."""
     settings = json.loads(sweep.question)['settings']
+    names = {'tray': 'tray', 'wall_restitution': 'walls'}
     varied = {axis.name for axis in sweep.axes}
-    tray = '' if 'tray' in varied else f'Tray {settings["tray"]}, '
-    walls = settings['wall_restitution']
-    return tray + ('' if 'wall_restitution' in varied else f'walls {walls:g}, ')
+    held = [f'{text} {settings[name]:g}' for name, text in names.items() if name not in varied]
+    return f'{", ".join(held).capitalize()}: ' if held else ''
 
 
 def _draw_contours(axes: Axes, sweep: Sweep, curve: SpeedCurve) -> None:
