@@ -60,6 +60,7 @@ def add_parser(kinds: Any) -> None:
         '--first', type=float, help='[s] since the shaking event; default: as analysed'
     )
     parser.add_argument('--last', type=float, help='[s]; default: as analysed')
+    parser.add_argument('--parameters', help='of the analysis of a bag: a ROS parameter file')
     parser.add_argument('--seed', type=int, default=1, help='of the runs; default 1')
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
     parser.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
@@ -82,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
         if options.tray is None:
             raise ConfigurationError('--tray', 'is needed with a bag', 'name the tray')
         prepare_folder(folder)
-        source = _analysed(source, folder / 'results', options.tray)
+        source = _analysed(options, source, folder / 'results')
     data = _data(options, source)
     prepare_folder(folder)
     bars: dict[str, RunProgress] = {}
@@ -130,14 +131,16 @@ def _is_bag(path: Path) -> bool:
     )
 
 
-def _analysed(bag: Path, folder: Path, tray: int) -> Path:
+def _analysed(options: argparse.Namespace, bag: Path, folder: Path) -> Path:
     """The results of a bag, beside the figures."""
+    from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.experiment.settings import PipelineSettings, with_values
     from nanorocks_ros.study.export import write_results
     from nanorocks_ros.study.offline import analyse
 
-    settings = with_values(PipelineSettings(), {'trays': [tray]}, '--tray')
+    settings = settings_from(options, PipelineSettings(), options.parameters)
+    settings = with_values(settings, {'trays': [options.tray]}, '--tray')
     with Progress('analysing') as progress:
         analysis = analyse(bag, settings, progress=progress.count)
     for notice in analysis.notices:
