@@ -20,6 +20,7 @@ ALL = (
     'cor_coverage',
     'cor_recovery',
     'valley',
+    'species_decays',
     'closed_forms',
     'contacts',
     'engine',

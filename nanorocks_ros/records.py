@@ -366,6 +366,12 @@ class CorEstimate:
         Standard deviations by which decay, rebounds and collisions disagree.
     mean_wall_restitution, mean_wall_restitution_error : float
         As `mean_restitution`.
+    first_species_initial_speed, first_species_initial_speed_error : float, [m/s]
+        As `initial_speed`, of the first of `Tray.species` by itself; of a mixture whose species
+        were told apart, once the cycle is over.
+    first_species_haff_time, first_species_haff_time_error : float, [s]
+    second_species_initial_speed, second_species_initial_speed_error : float, [m/s]
+    second_species_haff_time, second_species_haff_time_error : float, [s]
     """
 
     stamp_ns: int
@@ -398,6 +404,14 @@ class CorEstimate:
     tension: float = UNKNOWN
     mean_wall_restitution: float = UNKNOWN
     mean_wall_restitution_error: float = UNKNOWN
+    first_species_initial_speed: float = UNKNOWN
+    first_species_initial_speed_error: float = UNKNOWN
+    first_species_haff_time: float = UNKNOWN
+    first_species_haff_time_error: float = UNKNOWN
+    second_species_initial_speed: float = UNKNOWN
+    second_species_initial_speed_error: float = UNKNOWN
+    second_species_haff_time: float = UNKNOWN
+    second_species_haff_time_error: float = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,8 +11,6 @@ from nanorocks_ros.errors import ConfigurationError
 
 if TYPE_CHECKING:
     import argparse
-
-    from nanorocks_ros.physics.instantaneous import InstantaneousCor
 
 _PICTURES = ('.png', '.pdf', '.svg')
 _KINDS = {
@@ -24,8 +21,11 @@ _KINDS = {
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
+    from nanorocks_ros.cli import figure_cor
+
     parser = commands.add_parser('figure', help='draw measured decays as the paper does')
     kinds = parser.add_subparsers(dest='kind', metavar='KIND', required=True)
+    figure_cor.add_parser(kinds)
     for kind, text in _KINDS.items():
         one = kinds.add_parser(kind, help=text, description=text)
         one.add_argument('speeds', help='results of `nanorocks analyse`, or their table of speeds')
@@ -47,10 +47,14 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Read, draw, print; the exit code."""
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
-    from nanorocks_ros.study.cycles import read_cycles, speed_table
+    from nanorocks_ros.study.cycles import read_cycles, species_cycles, speed_table
     from nanorocks_ros.study.decay_figure import decay_figure
-    from nanorocks_ros.study.instantaneous_figure import instantaneous_figure
+    from nanorocks_ros.study.instantaneous_figure import (
+        instantaneous_figure,
+        instantaneous_values,
+    )
     from nanorocks_ros.study.output_files import check_outputs
+    from nanorocks_ros.study.windows import cooling_window
 
     path = Path(options.output)
     check_outputs({'--output': path}, {'--output': _PICTURES}, force=options.force)
@@ -70,36 +74,20 @@ def run(options: argparse.Namespace) -> int:
         'span': (options.first, options.last),
     }
     if options.kind == 'decay':
-        values: dict[str, Any] = decay_figure(path, tray, cycles, **given)
+        window = cooling_window(table)
+        values: dict[str, Any] = decay_figure(
+            path,
+            tray,
+            cycles,
+            **given,
+            species=species_cycles(table, tray),
+            start=window.start if window else 0.0,
+        )
     else:
-        values = _as_json(instantaneous_figure(path, tray, cycles, **given))
+        values = instantaneous_values(instantaneous_figure(path, tray, cycles, **given))
     if options.json:
         shown = {'tray': number, 'cycles': len(cycles), **values}
         print(json.dumps(shown, allow_nan=False))
     many = f'{len(cycles)} cycles' if len(cycles) > 1 else 'a cycle'
     print(f'nanorocks: {many} of tray {number} in {path}', file=sys.stderr)
     return 0
-
-
-def _as_json(found: InstantaneousCor) -> dict[str, Any]:
-    local = found.local
-    arrays = {
-        'collision_speed': found.collision_speed,
-        'paper_restitution': found.paper,
-        'noise_95': found.noise[[0, 3]],
-        'noise_and_gas_95': found.noise_and_gas[[0, 3]],
-        'local_speed': local.speed,
-        'local_decay_rate': local.decay_rate,
-        'local_decay_rate_error': local.decay_rate_error,
-        'local_restitution': local.restitution,
-        'local_restitution_lower': local.lower,
-        'local_restitution_upper': local.upper,
-    }
-    return {name: _known(array.tolist()) for name, array in arrays.items()}
-
-
-def _known(value: Any) -> Any:
-    """Numbers as JSON has them: null for NaN."""
-    if isinstance(value, list):
-        return [_known(one) for one in value]
-    return value if math.isfinite(value) else None

@@ -21,6 +21,7 @@ from nanorocks_ros.records import (
 from nanorocks_ros.stages.contacts.of_cycle import ContactsOfCycle
 from nanorocks_ros.stages.readings import Decay, LibraryReading, PaperReading, Reading
 from nanorocks_ros.stages.shaking import NS
+from nanorocks_ros.stages.species_decays import species_decays
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.settings import PipelineSettings
@@ -54,6 +55,7 @@ class HaffFitter:
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.cooling
+        self._tray = tray
         reading = LibraryReading if self._settings.relation == 'library' else PaperReading
         self._make_reading = partial(reading, settings, tray)
         self._contacts = ContactsOfCycle(self._settings)
@@ -154,6 +156,9 @@ class HaffFitter:
                 'restitution_lower': 0.0,
                 'restitution_upper': 1.0,
             }
+        if status is CorStatus.FINAL:
+            few = self._settings.fewest_samples
+            fields.update(species_decays(self._tray, decay.time, self._samples, few))
         quality = reduce(or_, (one.quality for one in self._samples))
         if fields.get('tension', 0.0) > _TENSE:
             quality |= Quality.INCONSISTENT

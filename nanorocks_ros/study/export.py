@@ -109,6 +109,11 @@ def _cycle_as_json(cor: CorEstimate, start: float) -> dict[str, Any]:
         'window_start': _known(cor.window_start),
         'window_end': _known(cor.window_end),
         'cooling_start': _known(cor.cooling_start),
+        **{
+            name: _known(getattr(cor, name))
+            for name in (field.name for field in layout(CorEstimate).fields)
+            if '_species_' in name
+        },
         'relation': cor.relation.name.lower(),
         'status': cor.status.name.lower(),
         'reduced_chi_square': _known(cor.reduced_chi_square),
