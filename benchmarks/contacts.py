@@ -64,7 +64,17 @@ def true_tracks(
 ) -> Iterator[Tracks]:
     """Tracks of a gas as a tracker would give them that never loses a bead."""
     gas = ShakenTray(settings, tray, run)
-    rng = np.random.default_rng([settings.seed, run])
+    return tracks_of(gas, tray, np.random.default_rng([settings.seed, run]), frames, jitter)
+
+
+def tracks_of(
+    gas: ShakenTray,
+    tray: Tray,
+    rng: np.random.Generator,
+    frames: int,
+    jitter: float = _JITTER,
+) -> Iterator[Tracks]:
+    """The same of a gas of one's own, which is where it is drawn each time."""
     species = np.repeat(
         np.arange(len(tray.species), dtype=np.int32), [one.count for one in tray.species]
     )
