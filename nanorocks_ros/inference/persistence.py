@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 _BOX = 8.0 / math.pi
 # Slow pairs are more frequent than a Gaussian says: inelastic neighbours move alike, and mixtures
 # and starts with even speeds are peaked. Measured on gases without sticking.
-_PEAKED = 5.0
+_PEAKED = 7.0
 # Collisions that part two neighbours, with each other and with others, per encounter of a bead
 # and relative way: 2.1 in simulated trays 3; less is on the safe side.
-_DISTURBED = 1.7
+_DISTURBED = 1.3
 # Way of a bead between two shaking events, [m]: 58 s after a shake at 10 mm/s it was 0.03 to 0.12.
 _CYCLE = 0.1
 

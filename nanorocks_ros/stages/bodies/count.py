@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from nanorocks_ros.inference.persistence import (
     chance,
@@ -32,6 +33,10 @@ _LOOK_BACK = 10.0
 # before the first.
 _BELIEVED = 0.1
 _UNSEEN_MERGES = 0.5
+# So many beads make the surroundings of one; they are not taken for colder than this, against
+# the gas, since beads that stick together move alike.
+_NEIGHBOURS = 12
+_COLDEST = 0.1
 # Share of a new mean energy taken over in each picture.
 _ENERGY_SHARE = 0.2
 
@@ -126,7 +131,7 @@ class BodyCounter:
             errors=tracks.position_errors[seen],
             radii=tracks.radii[seen],
             radius_errors=self._radius_errors(tracks)[seen],
-            variances=(self._energies[tracks.species] / _masses(tracks))[seen],
+            variances=self._variances(tracks)[seen],
             height=self._tray.dimensions[2],
         )
 
@@ -154,6 +159,23 @@ class BodyCounter:
                 last = self._energies[species]
                 share = _ENERGY_SHARE if last > 0.0 else 1.0
                 self._energies[species] = last + share * (mean - last)
+
+    def _variances(self, tracks: Tracks) -> NDArray[np.float64]:
+        """Mean square of a component of the velocity that a bead has in this gas, there.
+
+        A gas of inelastic beads is cold where it is dense, and there beads stay together.
+        """
+        own = self._energies[tracks.species]
+        square = 0.5 * np.sum(np.square(tracks.velocities), axis=1)
+        ratio = (square - np.square(tracks.velocity_errors)) * _masses(tracks) / own
+        known = tracks.seen & np.isfinite(ratio)
+        everybody = own / _masses(tracks)
+        if np.count_nonzero(known) <= _NEIGHBOURS:
+            return np.asarray(everybody)
+        tree = cKDTree(tracks.positions[known])
+        near = tree.query(tracks.positions, k=_NEIGHBOURS)[1]
+        around = ratio[known][near].mean(axis=1)
+        return np.asarray(everybody * np.clip(around, _COLDEST, 1.0))
 
     def _keep(
         self, time: float, tracks: Tracks, beads: Beads, ids: NDArray[np.int64]

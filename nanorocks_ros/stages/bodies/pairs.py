@@ -165,11 +165,15 @@ class Pairs:
         now['low'] = np.minimum(now['low'], now['smooth'])
         now['high'] = np.maximum(now['high'], now['smooth'])
         now['tolerance'] = _TOLERANCE * np.hypot(beads.errors[i], beads.errors[j])
-        now['way'] += np.sqrt(beads.variances[i] + beads.variances[j]) * step
+        # Whoever is free flies on as fast as when they met, though all others may stick meanwhile.
+        usual = np.sqrt(beads.variances[i] + beads.variances[j])
+        now['speed'] = np.maximum(now['speed'], usual)
+        now['way'] += now['speed'] * step
         now['last'] = time
         moved = (now['high'] - now['low'] > 2.0 * now['tolerance'][:, None]).any(axis=1)
         again = moved & ~now['bonded']
         _restart(now, again, apart, time)
+        now['speed'][again] = usual[again]
         away = np.abs(now['smooth'] - now['offset']).max(axis=1)
         stays = away < _BROKEN * now['tolerance']
         now['stayed'][stays] = time
@@ -215,6 +219,7 @@ _ROW = np.dtype(
         ('high', np.float64, 2),
         ('offset', np.float64, 2),
         ('tolerance', np.float64),
+        ('speed', np.float64),
         ('way', np.float64),
         ('start', np.float64),
         ('last', np.float64),
@@ -256,6 +261,7 @@ def _new_rows(
     rows['key'] = keys
     rows['tolerance'] = _TOLERANCE * np.hypot(beads.errors[first], beads.errors[second])
     rows['last'] = time
+    rows['speed'] = np.sqrt(beads.variances[first] + beads.variances[second])
     everything = np.ones(keys.size, dtype=np.bool_)
     _restart(rows, everything, beads.places[second] - beads.places[first], time)
     return rows
