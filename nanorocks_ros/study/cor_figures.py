@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from nanorocks_ros.errors import ConfigurationError, FitError, RecordingError
 from nanorocks_ros.experiment.settings import SimulationSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.study.cycles import check_errors, mean_cycle
+from nanorocks_ros.study.cycles import check_errors, counted_from, mean_cycle
 from nanorocks_ros.study.decay_figure import decay_figure
 from nanorocks_ros.study.deviation import chi_square
 from nanorocks_ros.study.instantaneous_figure import instantaneous_figure
@@ -70,6 +70,12 @@ class CorData:
     span: tuple[float, float]
     start: float
     wall_restitution: float
+
+    def cooling(self) -> tuple[tuple[CycleSpeeds, ...], tuple[float, float]]:
+        """Cycles and span, in times since the gas began to cool or since an earlier first one."""
+        origin = min(self.start, self.span[0])
+        span = self.span[0] - origin, self.span[1] - origin
+        return counted_from(self.cycles, origin), span
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,7 +183,8 @@ def cor_figures(
         ),
         'instantaneous': _instantaneous(folder / SPEED, data, reports),
     }
-    cooling = _since(curve, data.start)
+    cycles, span = data.cooling()
+    cooling = mean_cycle(cycles, *span)
     for name, plan in plans.items():
         found[name] = _map(folder, name, plan, cooling, workers, reports)
     return found
@@ -226,25 +233,11 @@ def _initial_speed(data: CorData, curve: SpeedCurve) -> float:
         return float(curve.speed[0])
 
 
-def _since(curve: SpeedCurve, start: float) -> SpeedCurve:
-    """The same with times since the gas began to cool."""
-    later = curve.times >= start
-    return replace(
-        curve,
-        times=curve.times[later] - start,
-        speed=curve.speed[later],
-        error=curve.error[later],
-    )
-
-
 def _instantaneous(path: Path, data: CorData, reports: Reports) -> InstantaneousCor | None:
+    cycles, span = data.cooling()
     try:
         return instantaneous_figure(
-            path,
-            data.tray,
-            data.cycles,
-            wall_restitution=data.wall_restitution,
-            span=data.span,
+            path, data.tray, cycles, wall_restitution=data.wall_restitution, span=span
         )
     except (ConfigurationError, FitError) as error:
         # The other figures do not need it.

@@ -158,6 +158,29 @@ def _rows(path: Path, columns: tuple[str, ...]) -> NDArray[np.float64]:
     return np.array(values, dtype=np.float64).reshape(len(values), len(columns))
 
 
+def counted_from(cycles: Sequence[CycleSpeeds], start: float) -> tuple[CycleSpeeds, ...]:
+    """The same cycles with times since the gas began to cool; speeds before are left out.
+
+    Parameters
+    ----------
+    cycles : sequence of CycleSpeeds
+    start : float, [s]
+        Since the shaking event.
+    """
+    found = []
+    for one in cycles:
+        late = one.times >= start
+        found.append(
+            CycleSpeeds(
+                cycle=one.cycle,
+                times=one.times[late] - start,
+                speed=one.speed[late],
+                error=one.error[late],
+            )
+        )
+    return tuple(found)
+
+
 def mean_cycle(
     cycles: Sequence[CycleSpeeds], first: float = 0.0, last: float = math.inf
 ) -> SpeedCurve:

@@ -15,6 +15,7 @@ from nanorocks_ros.recordings.results import write_csv
 from nanorocks_ros.records import SpeedEstimate, SpeedMethod
 from nanorocks_ros.study.cycles import (
     check_errors,
+    counted_from,
     mean_cycle,
     read_cycles,
     read_decay,
@@ -145,3 +146,11 @@ def test_errors_that_are_not_known_are_refused_where_they_are_needed(tmp_path):
 
 def test_simulated_tables_hold_as_many_cycles_as_asked(tmp_path):
     assert len(read_cycles(simulated_table(tmp_path / 'a.csv', 3))) == 3
+
+
+def test_times_can_count_from_when_the_gas_began_to_cool(tmp_path):
+    cycles = read_cycles(simulated_table(tmp_path / 'a.csv', 2))
+    for one, later in zip(cycles, counted_from(cycles, 3.0), strict=True):
+        assert later.times[0] == pytest.approx(0.0, abs=1e-9)
+        assert later.speed[0] == one.speed[np.searchsorted(one.times, 3.0 - 1e-9)]
+        assert len(later.times) == len(later.speed) == len(later.error) == len(one.times) - 29
