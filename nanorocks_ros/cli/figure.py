@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import argparse
 
 _PICTURES = ('.png', '.pdf', '.svg')
+_SPAN = (0.5, 20.0)
 _KINDS = {
     'decay': "energy of the beads as they cool, with our fit and the paper's (its figure 7)",
     'instantaneous': 'restitution against speed, and what noise alone makes of it (figure 13)',
@@ -35,9 +36,11 @@ def add_parser(commands: Any) -> None:
             '--wall-restitution', type=float, default=0.99, help='taken for known; default 0.99'
         )
         one.add_argument(
-            '--first', type=float, default=0.5, help='[s] since the shaking event; default 0.5'
+            '--first',
+            type=float,
+            help='[s] since the shaking event; default 0.5, as analysed where the tray swung on',
         )
-        one.add_argument('--last', type=float, default=20.0, help='[s]; default 20')
+        one.add_argument('--last', type=float, help='[s]; default 20, or as analysed then')
         one.add_argument('--trays', default='', help='YAML file of trays; default: those flown')
         one.add_argument('--json', action='store_true', help='print one JSON object, SI units')
         one.add_argument('--force', action='store_true', help='replace a picture that exists')
@@ -47,44 +50,47 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Read, draw, print; the exit code."""
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
-    from nanorocks_ros.study.cycles import read_cycles, species_cycles, speed_table
+    from nanorocks_ros.study.cycles import (
+        cooling_part,
+        read_cycles,
+        species_cycles,
+        speed_table,
+    )
     from nanorocks_ros.study.decay_figure import decay_figure
     from nanorocks_ros.study.instantaneous_figure import (
         instantaneous_figure,
         instantaneous_values,
     )
     from nanorocks_ros.study.output_files import check_outputs
-    from nanorocks_ros.study.windows import cooling_window
+    from nanorocks_ros.study.windows import cooling_window, span_of
 
     path = Path(options.output)
     check_outputs({'--output': path}, {'--output': _PICTURES}, force=options.force)
-    if not 0.0 <= options.first < options.last:
-        raise ConfigurationError(
-            '--first, --last',
-            f'{options.first:g} to {options.last:g} s',
-            'give two times, rising, none below 0',
-        )
     table, number = speed_table(Path(options.speeds), options.tray)
     if number is None:
         raise ConfigurationError('--tray', 'is not known from the name', 'name the tray')
     tray = tray_by_number(load_trays(options.trays), number)
     cycles = read_cycles(table)
-    given = {
-        'wall_restitution': options.wall_restitution,
-        'span': (options.first, options.last),
-    }
+    window = cooling_window(table)
+    start = window.start if window else 0.0
+    usual = (window.first, window.last) if window and start > 0.0 else _SPAN
+    span = span_of(options.first, options.last, usual)
+    walls = options.wall_restitution
     if options.kind == 'decay':
-        window = cooling_window(table)
         values: dict[str, Any] = decay_figure(
             path,
             tray,
             cycles,
-            **given,
+            wall_restitution=walls,
+            span=span,
             species=species_cycles(table, tray),
-            start=window.start if window else 0.0,
+            start=start,
         )
     else:
-        values = instantaneous_values(instantaneous_figure(path, tray, cycles, **given))
+        cycles, span = cooling_part(cycles, span, start)
+        values = instantaneous_values(
+            instantaneous_figure(path, tray, cycles, wall_restitution=walls, span=span)
+        )
     if options.json:
         shown = {'tray': number, 'cycles': len(cycles), **values}
         print(json.dumps(shown, allow_nan=False))

@@ -16,7 +16,7 @@ import numpy as np
 from nanorocks_ros.errors import ConfigurationError, FitError, RecordingError
 from nanorocks_ros.experiment.settings import SimulationSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.study.cycles import check_errors, counted_from, mean_cycle
+from nanorocks_ros.study.cycles import check_errors, cooling_part, mean_cycle
 from nanorocks_ros.study.decay_figure import decay_figure
 from nanorocks_ros.study.deviation import chi_square
 from nanorocks_ros.study.instantaneous_figure import instantaneous_figure
@@ -70,12 +70,6 @@ class CorData:
     span: tuple[float, float]
     start: float
     wall_restitution: float
-
-    def cooling(self) -> tuple[tuple[CycleSpeeds, ...], tuple[float, float]]:
-        """Cycles and span, in times since the gas began to cool or since an earlier first one."""
-        origin = min(self.start, self.span[0])
-        span = self.span[0] - origin, self.span[1] - origin
-        return counted_from(self.cycles, origin), span
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,7 +177,7 @@ def cor_figures(
         ),
         'instantaneous': _instantaneous(folder / SPEED, data, reports),
     }
-    cycles, span = data.cooling()
+    cycles, span = cooling_part(data.cycles, data.span, data.start)
     cooling = mean_cycle(cycles, *span)
     for name, plan in plans.items():
         found[name] = _map(folder, name, plan, cooling, workers, reports)
@@ -234,7 +228,7 @@ def _initial_speed(data: CorData, curve: SpeedCurve) -> float:
 
 
 def _instantaneous(path: Path, data: CorData, reports: Reports) -> InstantaneousCor | None:
-    cycles, span = data.cooling()
+    cycles, span = cooling_part(data.cycles, data.span, data.start)
     try:
         return instantaneous_figure(
             path, data.tray, cycles, wall_restitution=data.wall_restitution, span=span
