@@ -12,6 +12,9 @@ from nanorocks_ros.errors import ConfigurationError
 if TYPE_CHECKING:
     import argparse
 
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.study.cycles import CycleSpeeds
+
 _PICTURES = ('.png', '.pdf', '.svg')
 _SPAN = (0.5, 20.0)
 _KINDS = {
@@ -50,19 +53,8 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Read, draw, print; the exit code."""
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
-    from nanorocks_ros.study.cycles import (
-        cooling_part,
-        read_cycles,
-        species_cycles,
-        speed_table,
-    )
-    from nanorocks_ros.study.decay_figure import decay_figure
-    from nanorocks_ros.study.instantaneous_figure import (
-        instantaneous_figure,
-        instantaneous_values,
-    )
+    from nanorocks_ros.study.cycles import read_cycles, speed_table
     from nanorocks_ros.study.output_files import check_outputs
-    from nanorocks_ros.study.windows import cooling_window, span_of
 
     path = Path(options.output)
     check_outputs({'--output': path}, {'--output': _PICTURES}, force=options.force)
@@ -71,29 +63,38 @@ def run(options: argparse.Namespace) -> int:
         raise ConfigurationError('--tray', 'is not known from the name', 'name the tray')
     tray = tray_by_number(load_trays(options.trays), number)
     cycles = read_cycles(table)
-    window = cooling_window(table)
-    start = window.start if window else 0.0
-    usual = (window.first, window.last) if window and start > 0.0 else _SPAN
-    span = span_of(options.first, options.last, usual)
-    walls = options.wall_restitution
-    if options.kind == 'decay':
-        values: dict[str, Any] = decay_figure(
-            path,
-            tray,
-            cycles,
-            wall_restitution=walls,
-            span=span,
-            species=species_cycles(table, tray),
-            start=start,
-        )
-    else:
-        cycles, span = cooling_part(cycles, span, start)
-        values = instantaneous_values(
-            instantaneous_figure(path, tray, cycles, wall_restitution=walls, span=span)
-        )
+    values = _drawn(options, table, tray, cycles)
     if options.json:
         shown = {'tray': number, 'cycles': len(cycles), **values}
         print(json.dumps(shown, allow_nan=False))
     many = f'{len(cycles)} cycles' if len(cycles) > 1 else 'a cycle'
     print(f'nanorocks: {many} of tray {number} in {path}', file=sys.stderr)
     return 0
+
+
+def _drawn(
+    options: argparse.Namespace, table: Path, tray: Tray, cycles: tuple[CycleSpeeds, ...]
+) -> dict[str, Any]:
+    """Draw the picture; its numbers."""
+    from nanorocks_ros.study.cycles import cooling_part, species_cycles
+    from nanorocks_ros.study.decay_figure import decay_figure
+    from nanorocks_ros.study.instantaneous_figure import (
+        instantaneous_figure,
+        instantaneous_values,
+    )
+    from nanorocks_ros.study.windows import cooling_window, span_of
+
+    path, walls = Path(options.output), options.wall_restitution
+    window = cooling_window(table)
+    start = window.start if window else 0.0
+    usual = (window.first, window.last) if window and start > 0.0 else _SPAN
+    span = span_of(options.first, options.last, usual)
+    if options.kind == 'decay':
+        species = species_cycles(table, tray)
+        return decay_figure(
+            path, tray, cycles, wall_restitution=walls, span=span, species=species, start=start
+        )
+    cycles, span = cooling_part(cycles, span, start)
+    return instantaneous_values(
+        instantaneous_figure(path, tray, cycles, wall_restitution=walls, span=span)
+    )
