@@ -104,9 +104,7 @@ def _report_controls() -> None:
     print('| --- | --- | --- |')
     for number in _TRAYS:
         false = [
-            bool(
-                simulated(number, run, 7, restitution=pairs, wall_restitution=walls).merges
-            )
+            bool(simulated(number, run, 7, restitution=pairs, wall_restitution=walls).merges)
             for pairs, walls in _CONTROL_TRUTHS
             for run in range(_CONTROLS)
         ]
@@ -166,9 +164,7 @@ def _report_sizes(courses: dict[tuple[int, float], list[Course]]) -> None:
 def report() -> None:
     """Print the tables."""
     courses = {
-        (number, speed): [
-            simulated(number, run, sticking_speed=speed) for run in range(_CYCLES)
-        ]
+        (number, speed): [simulated(number, run, sticking_speed=speed) for run in range(_CYCLES)]
         for number in _TRAYS
         for speed in _STICKING
     }

@@ -12,7 +12,11 @@ from nanorocks_ros.errors import ConfigurationError
 if TYPE_CHECKING:
     import argparse
 
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.study.cycles import CycleSpeeds
+
 _PICTURES = ('.png', '.pdf', '.svg')
+_SPAN = (0.5, 20.0)
 _KINDS = {
     'decay': "energy of the beads as they cool, with our fit and the paper's (its figure 7)",
     'instantaneous': 'restitution against speed, and what noise alone makes of it (figure 13)',
@@ -35,9 +39,11 @@ def add_parser(commands: Any) -> None:
             '--wall-restitution', type=float, default=0.99, help='taken for known; default 0.99'
         )
         one.add_argument(
-            '--first', type=float, default=0.5, help='[s] since the shaking event; default 0.5'
+            '--first',
+            type=float,
+            help='[s] since the shaking event; default 0.5, as analysed where the tray swung on',
         )
-        one.add_argument('--last', type=float, default=20.0, help='[s]; default 20')
+        one.add_argument('--last', type=float, help='[s]; default 20, or as analysed then')
         one.add_argument('--trays', default='', help='YAML file of trays; default: those flown')
         one.add_argument('--json', action='store_true', help='print one JSON object, SI units')
         one.add_argument('--force', action='store_true', help='replace a picture that exists')
@@ -47,47 +53,48 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Read, draw, print; the exit code."""
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
-    from nanorocks_ros.study.cycles import read_cycles, species_cycles, speed_table
-    from nanorocks_ros.study.decay_figure import decay_figure
-    from nanorocks_ros.study.instantaneous_figure import (
-        instantaneous_figure,
-        instantaneous_values,
-    )
+    from nanorocks_ros.study.cycles import read_cycles, speed_table
     from nanorocks_ros.study.output_files import check_outputs
-    from nanorocks_ros.study.windows import cooling_window
 
     path = Path(options.output)
     check_outputs({'--output': path}, {'--output': _PICTURES}, force=options.force)
-    if not 0.0 <= options.first < options.last:
-        raise ConfigurationError(
-            '--first, --last',
-            f'{options.first:g} to {options.last:g} s',
-            'give two times, rising, none below 0',
-        )
     table, number = speed_table(Path(options.speeds), options.tray)
     if number is None:
         raise ConfigurationError('--tray', 'is not known from the name', 'name the tray')
     tray = tray_by_number(load_trays(options.trays), number)
     cycles = read_cycles(table)
-    given = {
-        'wall_restitution': options.wall_restitution,
-        'span': (options.first, options.last),
-    }
-    if options.kind == 'decay':
-        window = cooling_window(table)
-        values: dict[str, Any] = decay_figure(
-            path,
-            tray,
-            cycles,
-            **given,
-            species=species_cycles(table, tray),
-            start=window.start if window else 0.0,
-        )
-    else:
-        values = instantaneous_values(instantaneous_figure(path, tray, cycles, **given))
+    values = _drawn(options, table, tray, cycles)
     if options.json:
         shown = {'tray': number, 'cycles': len(cycles), **values}
         print(json.dumps(shown, allow_nan=False))
     many = f'{len(cycles)} cycles' if len(cycles) > 1 else 'a cycle'
     print(f'nanorocks: {many} of tray {number} in {path}', file=sys.stderr)
     return 0
+
+
+def _drawn(
+    options: argparse.Namespace, table: Path, tray: Tray, cycles: tuple[CycleSpeeds, ...]
+) -> dict[str, Any]:
+    """Draw the picture; its numbers."""
+    from nanorocks_ros.study.cycles import cooling_part, species_cycles
+    from nanorocks_ros.study.decay_figure import decay_figure
+    from nanorocks_ros.study.instantaneous_figure import (
+        instantaneous_figure,
+        instantaneous_values,
+    )
+    from nanorocks_ros.study.windows import cooling_window, span_of
+
+    path, walls = Path(options.output), options.wall_restitution
+    window = cooling_window(table)
+    start = window.start if window else 0.0
+    usual = (window.first, window.last) if window and start > 0.0 else _SPAN
+    span = span_of(options.first, options.last, usual)
+    if options.kind == 'decay':
+        species = species_cycles(table, tray)
+        return decay_figure(
+            path, tray, cycles, wall_restitution=walls, span=span, species=species, start=start
+        )
+    cycles, span = cooling_part(cycles, span, start)
+    return instantaneous_values(
+        instantaneous_figure(path, tray, cycles, wall_restitution=walls, span=span)
+    )

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     import argparse
 
     from nanorocks_ros.study.cor_figures import CorData, Search
-    from nanorocks_ros.study.windows import CoolingWindow
 
 _TEXT = 'the decay, the search over simulated runs, and restitution against speed (7, 12, 13)'
 _EPILOG = """\
@@ -153,7 +152,7 @@ def _data(options: argparse.Namespace, source: Path) -> CorData:
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.study.cor_figures import CorData
     from nanorocks_ros.study.cycles import read_cycles, species_cycles, speed_table
-    from nanorocks_ros.study.windows import cooling_window
+    from nanorocks_ros.study.windows import cooling_window, span_of
 
     table, number = speed_table(source, options.tray)
     if number is None:
@@ -161,6 +160,7 @@ def _data(options: argparse.Namespace, source: Path) -> CorData:
     tray = tray_by_number(load_trays(), number)
     cycles = read_cycles(table)
     window = cooling_window(table)
+    usual = (window.first, window.last) if window else (_FIRST, _LAST)
     if not 0.0 <= options.wall_restitution <= 1.0:
         raise ConfigurationError(
             '--wall-restitution', f'{options.wall_restitution:g}', 'give a number from 0 to 1'
@@ -169,23 +169,10 @@ def _data(options: argparse.Namespace, source: Path) -> CorData:
         tray=tray,
         cycles=cycles,
         species=species_cycles(table, tray),
-        span=_span(options, window),
+        span=span_of(options.first, options.last, usual),
         start=window.start if window else 0.0,
         wall_restitution=options.wall_restitution,
     )
-
-
-def _span(options: argparse.Namespace, window: CoolingWindow | None) -> tuple[float, float]:
-    usual = (window.first, window.last) if window else (_FIRST, _LAST)
-    first = usual[0] if options.first is None else options.first
-    last = usual[1] if options.last is None else options.last
-    if not 0.0 <= first < last:
-        raise ConfigurationError(
-            '--first, --last',
-            f'{first:g} to {last:g} s',
-            'give two times, rising, none below 0',
-        )
-    return first, last
 
 
 def _as_json(data: CorData, found: dict[str, Any]) -> dict[str, Any]:

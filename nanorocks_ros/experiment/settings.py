@@ -235,6 +235,11 @@ class CoolingSettings:
         low=0.0,
         high=10.0,
     )
+    until_merge: bool = _setting(
+        True,
+        'end with the first merge of the cycle: beads that stick take more energy than those that '
+        'bounce',
+    )
     rebounds: bool = _setting(
         True, 'use rebounds from the side walls, seen in the tracks, besides the decay'
     )

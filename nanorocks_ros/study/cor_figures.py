@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from nanorocks_ros.errors import ConfigurationError, FitError, RecordingError
 from nanorocks_ros.experiment.settings import SimulationSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.study.cycles import check_errors, mean_cycle
+from nanorocks_ros.study.cycles import check_errors, cooling_part, mean_cycle
 from nanorocks_ros.study.decay_figure import decay_figure
 from nanorocks_ros.study.deviation import chi_square
 from nanorocks_ros.study.instantaneous_figure import instantaneous_figure
@@ -177,7 +177,8 @@ def cor_figures(
         ),
         'instantaneous': _instantaneous(folder / SPEED, data, reports),
     }
-    cooling = _since(curve, data.start)
+    cycles, span = cooling_part(data.cycles, data.span, data.start)
+    cooling = mean_cycle(cycles, *span)
     for name, plan in plans.items():
         found[name] = _map(folder, name, plan, cooling, workers, reports)
     return found
@@ -226,25 +227,11 @@ def _initial_speed(data: CorData, curve: SpeedCurve) -> float:
         return float(curve.speed[0])
 
 
-def _since(curve: SpeedCurve, start: float) -> SpeedCurve:
-    """The same with times since the gas began to cool."""
-    later = curve.times >= start
-    return replace(
-        curve,
-        times=curve.times[later] - start,
-        speed=curve.speed[later],
-        error=curve.error[later],
-    )
-
-
 def _instantaneous(path: Path, data: CorData, reports: Reports) -> InstantaneousCor | None:
+    cycles, span = cooling_part(data.cycles, data.span, data.start)
     try:
         return instantaneous_figure(
-            path,
-            data.tray,
-            data.cycles,
-            wall_restitution=data.wall_restitution,
-            span=data.span,
+            path, data.tray, cycles, wall_restitution=data.wall_restitution, span=span
         )
     except (ConfigurationError, FitError) as error:
         # The other figures do not need it.

@@ -158,6 +158,35 @@ def _rows(path: Path, columns: tuple[str, ...]) -> NDArray[np.float64]:
     return np.array(values, dtype=np.float64).reshape(len(values), len(columns))
 
 
+def cooling_part(
+    cycles: Sequence[CycleSpeeds], span: tuple[float, float], start: float
+) -> tuple[tuple[CycleSpeeds, ...], tuple[float, float]]:
+    """Cycles and span in times since the gas began to cool; speeds before that are left out.
+
+    Parameters
+    ----------
+    cycles : sequence of CycleSpeeds
+    span : tuple of 2 floats, [s]
+        First and last time that is used, since the shaking event.
+    start : float, [s]
+        When the gas began to cool, since the shaking event. A span that begins earlier is
+        believed instead.
+    """
+    start = min(start, span[0])
+    found = []
+    for one in cycles:
+        late = one.times >= start
+        found.append(
+            CycleSpeeds(
+                cycle=one.cycle,
+                times=one.times[late] - start,
+                speed=one.speed[late],
+                error=one.error[late],
+            )
+        )
+    return tuple(found), (span[0] - start, span[1] - start)
+
+
 def mean_cycle(
     cycles: Sequence[CycleSpeeds], first: float = 0.0, last: float = math.inf
 ) -> SpeedCurve:

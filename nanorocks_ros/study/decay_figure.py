@@ -101,8 +101,7 @@ def decay_figure(
     panels = figure.subplots(2 if each else 1, 1, sharex=True, squeeze=False)[:, 0]
     _draw_energy(panels[0], tray, cycles, curve)
     _draw_laws(panels[0], tray, (curve.times, age), (fit, energy, time), found)
-    if library is not None:
-        _draw_library(panels[0], tray, library)
+    _draw_library(panels[0], tray, library)
     panels[0].legend(frameon=False, fontsize=9)
     for one in panels[1:]:
         draw_species(one, each, origin)
@@ -168,7 +167,9 @@ def _draw_laws(
     )
 
 
-def _draw_library(axes: Axes, tray: Tray, library: LibraryDecay) -> None:
+def _draw_library(axes: Axes, tray: Tray, library: LibraryDecay | None) -> None:
+    if library is None:
+        return
     scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
     axes.plot(
         library.times,

@@ -188,6 +188,8 @@ def _write_tables(analysis: Analysis, results: TrayResults, folder: Path, number
         'cor': results.cors,
         'rebound': results.rebounds,
         'collision': results.collisions,
+        'bodies': results.bodies,
+        'merge': results.merges,
     }
     for name, records in tables.items():
         if not records:
@@ -220,6 +222,8 @@ def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> No
             (topics.COR, results.cors),
             (topics.REBOUND, results.rebounds),
             (topics.COLLISION, results.collisions),
+            (topics.BODIES, results.bodies),
+            (topics.MERGE, results.merges),
         ):
             name = topic.absolute(number)
             table[name] = offered(topic)

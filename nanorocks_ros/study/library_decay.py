@@ -31,8 +31,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.study.cycles import CycleSpeeds
 
 _HALF = 0.5 * 0.95
-# The first speed of a decay was slower than the gas at its start by no more than that.
-_MOST_LEAD = 4.0
+# ln of the speed at the start over the first one used, at least and at most: a mixture that starts
+# with equal speeds becomes faster at first.
+_LEADS = (-1.0, 4.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,12 +135,15 @@ def _matched(
     def log_speed(log_initial: float) -> NDArray[np.float64]:
         # Lengths of the tray are that much longer in the picture than they are taken for.
         true = log_initial + scale
-        found = np.interp(true + np.log(time), log_distances, mean)
+        at = (true + np.log(time) - log_distances[0]) / tables.decays.step
+        # Straight on beyond the ends, as where the likelihood is worked out.
+        cell = np.clip(np.floor(at).astype(np.int64), 0, mean.size - 2)
+        found = mean[cell] + (at - cell) * (mean[cell + 1] - mean[cell])
         return np.asarray(log_initial + found + tilt)
 
     def misfit(log_initial: float) -> float:
         return float(np.sum((np.log(speed) - log_speed(log_initial)) ** 2))
 
-    low = float(np.log(speed[0]))
-    best = optimize.minimize_scalar(misfit, bounds=(low, low + _MOST_LEAD), method='bounded').x
+    bounds = tuple(float(np.log(speed[0])) + one for one in _LEADS)
+    best = optimize.minimize_scalar(misfit, bounds=bounds, method='bounded').x
     return np.exp(log_speed(float(best))), math.exp(float(best))

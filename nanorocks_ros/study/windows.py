@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.records import CorStatus
 
 if TYPE_CHECKING:
@@ -63,3 +64,23 @@ def cooling_window(speeds: Path) -> CoolingWindow | None:
         return None
     first, last, start = (float(one) for one in np.median(rows[final, 1:], axis=0))
     return CoolingWindow(first=first, last=last, start=start)
+
+
+def span_of(
+    first: float | None, last: float | None, usual: tuple[float, float]
+) -> tuple[float, float]:
+    """First and last time that is used, [s], as asked for with --first and --last or as usual.
+
+    Raises
+    ------
+    ConfigurationError
+        When they do not rise, or begin before the shaking event.
+    """
+    found = usual[0] if first is None else first, usual[1] if last is None else last
+    if not 0.0 <= found[0] < found[1]:
+        raise ConfigurationError(
+            '--first, --last',
+            f'{found[0]:g} to {found[1]:g} s',
+            'give two times, rising, none below 0',
+        )
+    return found

@@ -156,6 +156,30 @@ def test_the_window_is_that_of_the_analysis(table, tmp_path, capsys):
     assert (found['first'], found['last']) == (4.4, 18.0)
 
 
+def test_a_tray_that_swung_on_is_drawn_from_when_it_was_calm(table, tmp_path, capsys):
+    own = tmp_path / 'tray_1_speed.csv'
+    own.write_bytes(table.read_bytes())
+    write_csv(
+        tmp_path / 'tray_1_cor.csv',
+        ('status', 'window_start', 'window_end', 'cooling_start'),
+        ('1', 's', 's', 's'),
+        [(2, 8.0, 20.0, 6.25)],
+    )
+    found = {}
+    for source in (table, own):
+        output = tmp_path / 'a.png'
+        assert main(['figure', 'decay', str(source), '-o', str(output), '--json', '--force']) == 0
+        found[source] = json.loads(capsys.readouterr().out)
+    assert found[table]['cooling_start'] == 0.0
+    assert found[own]['cooling_start'] == 6.25
+    # The speed when the tray came to rest, not that at the shaking event.
+    early = found[table]['initial_speed'] / (1.0 + 6.25 / found[table]['haff_time'])
+    assert found[own]['initial_speed'] == pytest.approx(early, rel=0.15)
+    assert main(['figure', 'instantaneous', str(own), '-o', str(output), '--json', '--force']) == 0
+    speeds = json.loads(capsys.readouterr().out)['collision_speed']
+    assert max(speeds) < 2.2 * found[own]['initial_speed']
+
+
 def test_a_bag_is_analysed_first(tmp_path, capsys):
     folder = tmp_path / 'figures'
     assert draw(SAMPLE, folder, '--tray', '1', '--json') == 0

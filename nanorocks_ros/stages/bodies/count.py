@@ -177,9 +177,7 @@ class BodyCounter:
         around = ratio[known][near].mean(axis=1)
         return np.asarray(everybody * np.clip(around, _COLDEST, 1.0))
 
-    def _keep(
-        self, time: float, tracks: Tracks, beads: Beads, ids: NDArray[np.int64]
-    ) -> None:
+    def _keep(self, time: float, tracks: Tracks, beads: Beads, ids: NDArray[np.int64]) -> None:
         known = frozenset(ids.tolist()) | self._ghosts.hidden
         picture = _Picture(time, tracks.stamp_ns, beads.ids, beads.places, known)
         self._pictures.append(picture)

@@ -121,7 +121,9 @@ class Pairs:
         added = _new_rows(time, beads, keys[fresh], first[fresh], second[fresh])
         rows = np.concatenate([kept, added])
         self._rows = rows[np.argsort(rows['key'], kind='stable')]
-        return self._bonds(time, largest), [_ids(one) for one in rows['key'][self._fall(time, rows)]]
+        return self._bonds(time, largest), [
+            _ids(one) for one in rows['key'][self._fall(time, rows)]
+        ]
 
     def pending(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Pairs that may yet turn out to be bodies, (n, 2), and the chance that free beads do so.
@@ -134,9 +136,7 @@ class Pairs:
         keys = rows['key'][some]
         return np.column_stack([keys >> _SHIFT, keys & ((1 << _SHIFT) - 1)]), chances[some]
 
-    def _alive(
-        self, time: float, keys: NDArray[np.int64], beads: Beads
-    ) -> NDArray[np.bool_]:
+    def _alive(self, time: float, keys: NDArray[np.int64], beads: Beads) -> NDArray[np.bool_]:
         """Which pairs stay: those that touch, those of which one is hidden, and bodies."""
         rows = self._rows
         if not rows.size:
@@ -188,7 +188,9 @@ class Pairs:
 
     def _bonds(self, time: float, largest: float) -> list[Bond]:
         rows = self._rows
-        found = ~rows['bonded'] & (self._chances(rows) < largest) & (time - rows['start'] >= _YOUNGEST)
+        found = (
+            ~rows['bonded'] & (self._chances(rows) < largest) & (time - rows['start'] >= _YOUNGEST)
+        )
         rows['bonded'] |= found
         rows['stayed'][found] = time
         rows['offset'][found] = 0.5 * (rows['low'][found] + rows['high'][found])
