@@ -33,6 +33,7 @@ class Waiting(NamedTuple):
 
     @classmethod
     def of(cls, kink: Kink, when: Meeting) -> Waiting:
+        """A turn that is known now."""
         before = kink.before
         x, y = before.place.tolist()
         u, v = before.velocity.tolist()
