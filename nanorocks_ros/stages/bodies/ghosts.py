@@ -33,9 +33,7 @@ class Ghosts:
         self._species: dict[int, int] = {}
         self._wanted: dict[int, NDArray[np.float64]] = {}
 
-    def named(
-        self, tracks: Tracks, bonds: Mapping[tuple[int, int], Bond]
-    ) -> NDArray[np.int64]:
+    def named(self, tracks: Tracks, bonds: Mapping[tuple[int, int], Bond]) -> NDArray[np.int64]:
         """Numbers of the beads of a picture, (n,).
 
         Parameters

@@ -27,6 +27,8 @@ _SMOOTH, _FOLLOW = 0.1, 2.0
 _YOUNGEST = 0.3
 # Two of which one is not seen are remembered so long, [s].
 _HIDDEN = 1.5
+# And those of a body, so long, [s].
+_FORGOTTEN = 60.0
 _SHIFT = 32
 
 
@@ -121,7 +123,7 @@ class Pairs:
         added = _new_rows(time, beads, keys[fresh], first[fresh], second[fresh])
         rows = np.concatenate([kept, added])
         self._rows = rows[np.argsort(rows['key'], kind='stable')]
-        return self._bonds(time, largest), [_ids(one) for one in rows['key'][self._fall(time, rows)]]
+        return self._bonds(time, largest), [_ids(one) for one in rows['key'][self._fall(time)]]
 
     def pending(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Pairs that may yet turn out to be bodies, (n, 2), and the chance that free beads do so.
@@ -134,9 +136,7 @@ class Pairs:
         keys = rows['key'][some]
         return np.column_stack([keys >> _SHIFT, keys & ((1 << _SHIFT) - 1)]), chances[some]
 
-    def _alive(
-        self, time: float, keys: NDArray[np.int64], beads: Beads
-    ) -> NDArray[np.bool_]:
+    def _alive(self, time: float, keys: NDArray[np.int64], beads: Beads) -> NDArray[np.bool_]:
         """Which pairs stay: those that touch, those of which one is hidden, and bodies."""
         rows = self._rows
         if not rows.size:
@@ -144,7 +144,8 @@ class Pairs:
         both = np.isin(rows['key'] >> _SHIFT, beads.ids)
         both &= np.isin(rows['key'] & ((1 << _SHIFT) - 1), beads.ids)
         hidden = ~both & (time - rows['last'] < _HIDDEN)
-        return np.isin(rows['key'], keys) | hidden | rows['bonded']
+        body = rows['bonded'] & (time - rows['last'] < _FORGOTTEN)
+        return np.asarray(np.isin(rows['key'], keys) | hidden | body)
 
     def _follow_seen(self, time: float, beads: Beads) -> None:
         """Separations of the pairs of which both are seen."""
@@ -188,7 +189,9 @@ class Pairs:
 
     def _bonds(self, time: float, largest: float) -> list[Bond]:
         rows = self._rows
-        found = ~rows['bonded'] & (self._chances(rows) < largest) & (time - rows['start'] >= _YOUNGEST)
+        found = (
+            ~rows['bonded'] & (self._chances(rows) < largest) & (time - rows['start'] >= _YOUNGEST)
+        )
         rows['bonded'] |= found
         rows['stayed'][found] = time
         rows['offset'][found] = 0.5 * (rows['low'][found] + rows['high'][found])
@@ -202,13 +205,13 @@ class Pairs:
             for one in rows[found]
         ]
 
-    def _fall(self, time: float, rows: NDArray[np.void]) -> NDArray[np.bool_]:
+    def _fall(self, time: float) -> NDArray[np.bool_]:
         """Bodies whose beads, both seen, are apart for too long; they are free pairs again."""
         rows = self._rows
         fall = rows['bonded'] & (rows['last'] - rows['stayed'] > _BROKEN_TIME)
         rows['bonded'] &= ~fall
         _restart(rows, fall, rows['smooth'], time)
-        return fall
+        return np.asarray(fall)
 
 
 _ROW = np.dtype(

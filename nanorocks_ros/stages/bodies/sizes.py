@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -69,10 +70,7 @@ def size_fields(
         'clusters': scale * np.count_nonzero(sizes > 1),
     }
     edges = (*(0, *_SIZE_CLASSES), np.inf)
-    counts = [
-        np.count_nonzero((sizes > low) & (sizes <= high))
-        for low, high in zip(edges, edges[1:], strict=False)
-    ]
+    counts = [np.count_nonzero((sizes > low) & (sizes <= high)) for low, high in pairwise(edges)]
     errors = _errors(values, sizes.size, known, beads, merges)
     return values | errors | {'sizes': scale * np.array(counts, dtype=np.float64)}
 
