@@ -65,7 +65,8 @@ def size_fields(
     values = {
         'bodies': scale * sizes.size,
         'mean_size': known / sizes.size,
-        'weighted_size': float(np.sum(sizes**2)) / known,
+        # Beads counted twice make bodies too large; those that are missing, none larger.
+        'weighted_size': float(np.sum(sizes**2)) / known * min(scale, 1.0),
         'clustered_share': 1.0 - share_single,
         'clusters': scale * np.count_nonzero(sizes > 1),
     }

@@ -145,8 +145,8 @@ def test_beads_that_are_never_seen_widen_the_error_and_numbers_are_those_of_all(
 
 def test_a_body_that_comes_apart_is_two_again(sticky):
     counts, merges = _counted([tracks for tracks, _ in sticky])
-    pair = [one.tracks for one in merges if one.joins][0]
-    alone = [one for one in counts if one.clusters == 1.0][0].stamp_ns + 2 * NS
+    pair = next(one.tracks for one in merges if one.joins)
+    alone = next(one for one in counts if one.clusters == 1.0).stamp_ns + 2 * NS
     pictures = []
     for tracks, _ in sticky:
         places = tracks.positions.copy()

@@ -27,3 +27,9 @@ def test_a_merge_that_is_half_probable_makes_its_errors():
     assert found['bodies_error'] == pytest.approx(np.sqrt(0.5**2 + 0.25))
     assert found['weighted_size_error'] == pytest.approx(np.sqrt(0.5) * 2 * 3 / 5)
     assert found['clustered_share_error'] == pytest.approx(np.sqrt(0.5) / 5)
+
+
+def test_beads_counted_twice_do_not_make_bodies_larger_than_there_are_beads():
+    found = size_fields(np.array([12]), 10, [])
+    assert found['weighted_size'] == pytest.approx(10.0)
+    assert found['bodies_error'] > 0.0
