@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -240,17 +241,24 @@ def touching(
     Centres are no further apart in the picture than the radii let them be, and no nearer than
     the height of the tray lets beads be that lie over each other.
     """
-    apart = beads.places[:, None] - beads.places
-    square = np.einsum('ijk,ijk->ij', apart, apart)
-    radii = beads.radii[:, None] + beads.radii
     errors = np.hypot(beads.radius_errors, _OUTLINE * beads.radii * (beads.radius_errors > 0.0))
-    error = np.sqrt(np.add.outer(errors**2 + beads.errors**2, errors**2 + beads.errors**2))
-    most = _REACH * radii + _REACH_ERRORS * error
+    variances = errors**2 + beads.errors**2
+    if beads.ids.size < 2:
+        nothing = np.empty(0, dtype=np.int64)
+        return nothing, nothing, nothing
+    furthest = 2.0 * (_REACH * beads.radii.max() + _REACH_ERRORS * np.sqrt(variances.max()))
+    found = cKDTree(beads.places).query_pairs(furthest, output_type='ndarray')
+    first, second = found.min(axis=1), found.max(axis=1)
+    distance = np.hypot(*(beads.places[second] - beads.places[first]).T)
+    radii = beads.radii[first] + beads.radii[second]
+    slack = _REACH_ERRORS * np.sqrt(variances[first] + variances[second])
     above = np.maximum(beads.height - radii, 0.0)
-    least = np.sqrt(np.maximum(radii**2 - above**2, 0.0)) / _REACH - _REACH_ERRORS * error
-    near = (square < most**2) & (square > np.maximum(least, 0.0) ** 2)
-    first, second = np.nonzero(np.triu(near, 1))
-    return (beads.ids[first] << _SHIFT) | beads.ids[second], first, second
+    least = np.sqrt(np.maximum(radii**2 - above**2, 0.0)) / _REACH - slack
+    near = (distance < _REACH * radii + slack) & (distance > least)
+    first, second = first[near], second[near]
+    keys = (beads.ids[first] << _SHIFT) | beads.ids[second]
+    order = np.argsort(keys)
+    return keys[order], first[order], second[order]
 
 
 def _new_rows(
