@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.filmed_cycles import CYCLES_A_FILM, Cycle, Film, load, make
+from benchmarks.filmed_cycles import Cycle, Film, load, make
 from nanorocks_ros.experiment.settings import PipelineSettings, PriorSettings, with_values
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.inference.contacts import pair_log_likelihood, rebound_log_likelihood
 from nanorocks_ros.inference.decay_library import library_of
 from nanorocks_ros.inference.decay_likelihood import DecayLikelihood, decay_likelihood
 from nanorocks_ros.inference.restitution import Posterior, SingleTerm, posterior_of, tables_of
-from nanorocks_ros.records import CorEstimate, CorStatus, PairCollision, Quality, Rebound
+from nanorocks_ros.records import CorEstimate, CorStatus, PairCollision, Rebound
 from nanorocks_ros.stages.cooling import HaffFitter
 from nanorocks_ros.study.tasks import Workers
 
@@ -155,11 +155,10 @@ _All = dict[tuple[int, float, float], list[_Said]]
 
 
 def _print_speeds(said: _All) -> None:
-    print(
-        '\nMeasured over true speed, and spread of the deviations in stated errors, by the age of the'
-    )
+    print('\nMeasured over true speed, and spread of the deviations in stated errors,')
+    print('by the age of the window\n')
     titles = ' | '.join(f'{low:g} to {high:g} s' for low, high in _PARTS)
-    print(f'window\n\n| tray, beads / walls | window begins | {titles} |')
+    print(f'| tray, beads / walls | window begins | {titles} |')
     print('| --- ' * (2 + len(_PARTS)) + '|')
     for (number, pairs, walls), cycles in said.items():
         if not cycles:
@@ -172,17 +171,19 @@ def _print_speeds(said: _All) -> None:
         )
         for low, high in _PARTS:
             part = (low <= age) & (age < high)
+            if not part.any():
+                row += '| '
+                continue
             deviation = np.sqrt(np.mean(pull[part] ** 2))
-            row += f'| {ratio[part].mean():.3f}, {deviation:.2f} ' if part.any() else '| '
+            row += f'| {ratio[part].mean():.3f}, {deviation:.2f} '
         print(row + '|', flush=True)
 
 
 def _print_table(said: _All, together: int) -> None:
     many = f'{together} cycles together' if together > 1 else 'One cycle'
-    print(
-        f'\n{many}\n\n| tray, truth | from | number | beads: bias | sd | covered 68 % | 95 % | half '
-        '| walls: bias | sd | covered 68 % | 95 % |'
-    )
+    print(f'\n{many}\n')
+    head = '| tray, truth | from | number | beads: bias | sd | covered 68 % | 95 % | half '
+    print(head + '| walls: bias | sd | covered 68 % | 95 % |')
     print('| --- ' * 12 + '|')
     for (number, pairs, walls), cycles in said.items():
         groups = [cycles[k : k + together] for k in range(0, len(cycles) - together + 1, together)]

@@ -46,7 +46,6 @@ _PLACES = {
     1: ((4.0, 5.0), (23.0, 5.0), (42.0, 5.0), (61.0, 5.0)),
     3: ((42.0, 25.0), (42.0, 41.0), (4.0, 60.0), (42.0, 60.0)),
 }
-CYCLES_A_FILM = 4
 _MILLIMETRE = 1e-3
 _RATE = 30.0
 _SPEED = 0.010
@@ -114,7 +113,7 @@ def load(films: list[Film]) -> dict[int, list[Cycle]]:
     for film in films:
         path = folder() / film.name
         if path.exists():
-            for cycle in pickle.loads(path.read_bytes()):  # noqa: S301
+            for cycle in pickle.loads(path.read_bytes()):
                 found[cycle.tray].append(cycle)
     return found
 
