@@ -13,7 +13,7 @@ held against the same fit to the mean decay of all runs.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ import numpy as np
 from scipy import special
 
 from benchmarks.cor_costs import print_costs
+from benchmarks.drawn import varied
 from nanorocks_ros.experiment.settings import (
     PriorSettings,
     SimulationSettings,
@@ -210,8 +211,8 @@ def _drawn_from_priors(case: _Range) -> tuple[str, str]:
             restitution=random.uniform(case.low, case.high),
             wall=random.uniform(prior.wall_low, prior.wall_high),
         )
-        varied, values = _varied(drawn, tray, prior, random)
-        (speed,) = _speeds(drawn, varied, values, range(number, number + 1))
+        there, values = varied(tray, drawn.wall, prior, random)
+        (speed,) = _speeds(drawn, there, values, range(number, number + 1))
         likelihood = _likelihood(tables, camera, speed)
         posterior = posterior_of(tables, likelihood, (prior.wall_low, prior.wall_high))
         beads.append(posterior.quantiles(_LEVELS) - drawn.restitution)
@@ -221,31 +222,6 @@ def _drawn_from_priors(case: _Range) -> tuple[str, str]:
     width = np.mean([0.5 * (one[3] - one[1]) for one in beads])
     row = f'| {case.tray} | {case.low:g} to {case.high:g} ' + _judged(np.array(beads), 0.0)
     return head, row + f'| {width:.3f} ' + _judged(np.array(walls), 0.0) + '|'
-
-
-def _varied(
-    case: _Case, tray: Tray, prior: PriorSettings, random: np.random.Generator
-) -> tuple[Tray, dict[str, float | str]]:
-    """A tray and a start as the priors allow."""
-    species = list(tray.species)
-    most = max(range(len(species)), key=lambda k: species[k].count)
-    size = 1.0 + prior.diameter_error * random.standard_normal()
-    count = species[most].count + round(prior.count_error * random.standard_normal())
-    species[most] = replace(
-        species[most],
-        diameter_low=size * species[most].diameter_low,
-        diameter_high=size * species[most].diameter_high,
-        count=count,
-    )
-    length, width, height = tray.dimensions
-    height += prior.height_error * random.standard_normal()
-    loss = (1.0 - case.wall) * math.exp(prior.floor_lid_spread * random.standard_normal())
-    values: dict[str, float | str] = {
-        'vertical_speed_factor': math.exp(prior.anisotropy_spread * random.standard_normal()),
-        'speeds': 'maxwellian' if random.random() < 0.5 else 'uniform',
-        'floor_lid_difference': (1.0 - loss) - case.wall,
-    }
-    return replace(tray, species=tuple(species), dimensions=(length, width, height)), values
 
 
 def _likelihood(tables: DecayTables, camera: tuple[float, float], speed: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ run again, only the films that are missing are made.
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 import tempfile
@@ -15,8 +16,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from benchmarks.drawn import varied
 from nanorocks_ros.experiment.settings import (
     PipelineSettings,
+    PriorSettings,
     SceneSettings,
     SimulationSettings,
     with_values,
@@ -54,20 +57,30 @@ _SHAKE = 0.5
 _SECONDS = 38.5
 _SCALE = 12500.0
 _QUALITY = 85
+DRAWN_PAIRS = (0.7, 0.95)
+"""Range of the restitutions of beads that are drawn."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Film:
-    """What is to be filmed: restitutions of beads and walls, and a number."""
+    """What is to be filmed.
 
-    pairs: float
-    walls: float
+    Parameters
+    ----------
+    pairs, walls : float
+        Restitutions; NaN: drawn for each tray, with all else that the priors are about.
+    number : int
+    """
+
+    pairs: float = math.nan
+    walls: float = math.nan
     number: int
 
     @property
     def name(self) -> str:
         """Of its file."""
-        return f'{self.pairs:g}_{self.walls:g}_{self.number}.pickle'
+        truth = 'drawn' if math.isnan(self.pairs) else f'{self.pairs:g}_{self.walls:g}'
+        return f'{truth}_{self.number}.pickle'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +97,8 @@ class Cycle:
         Of the frames.
     true_speed : ndarray (n,), [m/s]
         Mean projected speed of all beads relative to their tray.
+    pairs, walls : float
+        True restitutions.
     """
 
     tray: int
@@ -91,6 +106,8 @@ class Cycle:
     contacts: tuple[Rebound | PairCollision, ...]
     time: np.ndarray
     true_speed: np.ndarray
+    pairs: float
+    walls: float
 
 
 def folder() -> Path:
@@ -131,18 +148,34 @@ def _cells() -> tuple[dict[int, Tray], dict[int, int]]:
     return cells, like
 
 
+def _filled(
+    cells: dict[int, Tray], film: Film
+) -> tuple[dict[int, Tray], dict[int, SimulationSettings]]:
+    """What really is in the cells, of which the stages know no more than the cells."""
+    common = SimulationSettings(
+        seed=1000 + film.number, mean_speed=_SPEED, first_shake=_SHAKE, frame_rate=_RATE
+    )
+    if not math.isnan(film.pairs):
+        values = {'restitution': film.pairs, 'wall_restitution': film.walls}
+        return cells, dict.fromkeys(cells, with_values(common, values, 'benchmark'))
+    prior = PriorSettings()
+    there, gases = {}, {}
+    for number, cell in cells.items():
+        random = np.random.default_rng([film.number, number])
+        pairs = random.uniform(*DRAWN_PAIRS)
+        walls = random.uniform(prior.wall_low, prior.wall_high)
+        there[number], values = varied(cell, walls, prior, random)
+        values |= {'restitution': pairs, 'wall_restitution': walls}
+        gases[number] = with_values(common, values, 'benchmark')
+    return there, gases
+
+
 def _make(film: Film) -> None:
     cv2.setNumThreads(1)
     cells, like = _cells()
-    simulation = SimulationSettings(
-        restitution=film.pairs,
-        wall_restitution=film.walls,
-        seed=1000 + film.number,
-        mean_speed=_SPEED,
-        first_shake=_SHAKE,
-        frame_rate=_RATE,
-    )
-    scene = SceneFilm(simulation, SceneSettings(trays=tuple(cells)), cells)
+    there, gases = _filled(cells, film)
+    plate = SceneSettings(trays=tuple(cells))
+    scene = SceneFilm(gases[1], plate, there, gases)
     names = {
         'trays': list(cells),
         'preprocess.layout': 'plate',
@@ -162,9 +195,10 @@ def _make(film: Film) -> None:
         for record in stage.push(frame):
             if isinstance(record, TrayImage):
                 follow[record.tray].push(record)
+    cycles = [one.cycle(like[number], gases[number]) for number, one in follow.items()]
     path = folder() / film.name
     unfinished = path.with_suffix('.part')
-    unfinished.write_bytes(pickle.dumps([one.cycle(like[n]) for n, one in follow.items()]))
+    unfinished.write_bytes(pickle.dumps(cycles))
     unfinished.replace(path)
 
 
@@ -186,7 +220,7 @@ class _Follower:
             elif isinstance(record, SpeedEstimate):
                 self._speeds.append(record)
 
-    def cycle(self, tray: int) -> Cycle:
+    def cycle(self, tray: int, gas: SimulationSettings) -> Cycle:
         time, speed = np.array(self.truth).T
         return Cycle(
             tray=tray,
@@ -194,4 +228,6 @@ class _Follower:
             contacts=(*self._contacts, *self._finder.flush()),
             time=time,
             true_speed=speed,
+            pairs=gas.restitution,
+            walls=gas.wall_restitution,
         )
