@@ -53,8 +53,8 @@ _MILLIMETRE = 1e-3
 _RATE = 30.0
 _SPEED = 0.010
 _SHAKE = 0.5
-# The plate swings on for some 16 s until the window begins, which is 20 s long.
-_SECONDS = 38.5
+# The plate swings on for some 13 s before the window, which ends some 32 s after the shake.
+_SECONDS = 33.5
 _SCALE = 12500.0
 _QUALITY = 85
 DRAWN_PAIRS = (0.7, 0.95)
