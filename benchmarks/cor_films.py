@@ -2,15 +2,15 @@
 
 Trays 1 and 3, filmed with all effects (lens, defocus, noise, uneven and flickering light, shadows,
 glare on the plate, JPEG 85, and a plate that swings on its springs and knocks the beads) for
-38 s after a shaking event that leaves a mean speed of 10 mm/s, by the stages as the pipeline
+33 s after a shaking event that leaves a mean speed of 10 mm/s, by the stages as the pipeline
 composes them. Each truth is filmed as the trays are in the books; "drawn" are films in which
 each cell has restitutions (beads 0.7 to 0.95), floor and lid, height, diameter, count and start of
 its own, from the defaults of `prior.`, of which the stages know nothing: there intervals should
 cover as often as they say. "Nothing known": the defaults of `prior.`. "Tray known": floor and lid,
 height, diameter, count and anisotropy are as in the books, and that is known. "Contacts": with
 the rebounds and collisions of the same tracks. "True speeds": the same windows, but with the true
-mean projected speeds, whose errors are those that were stated. Films are kept (`filmed_cycles`), so
-that a second look takes seconds; NANOROCKS_FILMS names the folder.
+mean projected speeds, whose errors are those that were stated. Films are kept (`filmed_cycles`),
+so that a second look takes seconds; NANOROCKS_FILMS names the folder.
 """
 
 from __future__ import annotations
@@ -167,7 +167,8 @@ class _Judge:
         error = np.array([one.mean_projected_speed_error for one in used])
         true = np.array([_truth(cycle, one.stamp_ns / _NS, one.window) for one in used])
         time = middle - shake - final.cooling_start
-        contacts = [one for one in cycle.contacts if one.stamp_ns / _NS - shake > _FIRST_CONTACT]
+        first, last = shake + _FIRST_CONTACT, shake + final.window_end
+        contacts = [one for one in cycle.contacts if first < one.stamp_ns / _NS < last]
         return _Said(
             cycle=cycle,
             final=final,
