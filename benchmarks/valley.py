@@ -8,18 +8,18 @@ All uncertainties at their defaults, floor and lid among them. "Half": of the 68
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import partial, reduce
+from operator import add
 
 import numpy as np
 
 from benchmarks.contacts import contacts_of, true_tracks
 from nanorocks_ros.experiment.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.contacts import pair_log_likelihood, rebound_log_likelihood
+from nanorocks_ros.inference.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay_library import library_of
 from nanorocks_ros.inference.decay_likelihood import DecayLikelihood, decay_likelihood
-from nanorocks_ros.inference.restitution import Posterior, SingleTerm, posterior_of, tables_of
-from nanorocks_ros.records import PairCollision, Rebound
+from nanorocks_ros.inference.restitution import Posterior, posterior_of, tables_of
 from nanorocks_ros.simulation.ensemble import cooling_runs
 from nanorocks_ros.study.tasks import Workers, run_tasks
 
@@ -29,10 +29,9 @@ _PAIRS, _WALLS = 0.89, 0.97
 _RATE, _FIRST, _LAST = 30.0, 1.75, 20.0
 _ERROR = 0.02
 _LEVELS = np.array([0.16, 0.84])
-_PAIR_GRID, _WALL_GRID = np.linspace(0.4, 1.0, 241), np.linspace(0.78, 1.0, 881)
 _NS = 1e9
 
-_Cycle = tuple[DecayLikelihood, np.ndarray, np.ndarray]
+_Cycle = tuple[DecayLikelihood, ContactTerms]
 
 
 def report() -> None:
@@ -55,7 +54,7 @@ def report() -> None:
 
 
 def _cycle(task: tuple[int, int]) -> _Cycle:
-    """What one cycle says: by its decay, by its collisions, by its rebounds."""
+    """What one cycle says: by its decay, and by its contacts."""
     number, run = task
     tray = load_trays()[number]
     settings = SimulationSettings(
@@ -80,29 +79,20 @@ def _cycle(task: tuple[int, int]) -> _Cycle:
         for one in contacts_of(tray, true_tracks(tray, settings, run, round(_LAST * _RATE)))
         if one.stamp_ns > _FIRST * _NS
     ]
-    return (
-        decay,
-        pair_log_likelihood([one for one in found if isinstance(one, PairCollision)], _PAIR_GRID),
-        rebound_log_likelihood([one for one in found if isinstance(one, Rebound)], _WALL_GRID),
-    )
+    return decay, ContactTerms.of(found)
 
 
 def _posterior(tray: int, cycles: list[_Cycle], *, beads: bool, walls: bool) -> Posterior:
     prior = PriorSettings()
     flown = load_trays()[tray]
     tables = tables_of(library_of(flown), flown, prior)
-    decays, pairs, rebounds = zip(*cycles, strict=True)
-    total = decays[0]
-    for one in decays[1:]:
-        total = total + one
-    of_beads = SingleTerm(restitution=_PAIR_GRID, log_likelihood=np.sum(pairs, axis=0))
-    of_walls = SingleTerm(restitution=_WALL_GRID, log_likelihood=np.sum(rebounds, axis=0))
+    decay, contacts = (reduce(add, each) for each in zip(*cycles, strict=True))
     return posterior_of(
         tables,
-        total.integrated(),
+        decay.integrated(),
         (prior.wall_low, prior.wall_high),
-        of_beads=of_beads if beads else None,
-        of_walls=of_walls if walls else None,
+        of_beads=contacts.of_beads(prior.collision_bias) if beads else None,
+        of_walls=contacts.of_walls(prior.rebound_bias) if walls else None,
     )
 
 

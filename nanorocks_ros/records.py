@@ -60,6 +60,7 @@ class Quality(IntFlag):
     WRONG_SCALE = 256
     UNCERTAIN = 512
     UNCALIBRATED = 1024
+    INCONSISTENT = 2048
 
     def names(self) -> list[str]:
         """The flags that are set, in small letters."""
@@ -359,6 +360,12 @@ class CorEstimate:
     cooling_start : float, [s]
         From when on the gas is taken to cool, since the shaking event: 0, or later when the tray
         swung on.
+    rebounds, collisions : int
+        Single contacts used besides the decay.
+    tension : float
+        Standard deviations by which decay, rebounds and collisions disagree.
+    mean_wall_restitution, mean_wall_restitution_error : float
+        As `mean_restitution`.
     """
 
     stamp_ns: int
@@ -386,6 +393,11 @@ class CorEstimate:
     window_start: float = UNKNOWN
     window_end: float = UNKNOWN
     cooling_start: float = UNKNOWN
+    rebounds: int = 0
+    collisions: int = 0
+    tension: float = UNKNOWN
+    mean_wall_restitution: float = UNKNOWN
+    mean_wall_restitution_error: float = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -539,7 +551,7 @@ class Rebound:
     ----------
     stamp_ns : int
         Of the contact, between two pictures.
-    tray, track, species : int
+    tray, cycle, track, species : int
     wall : int
         0 to 3: low and high along columns, low and high along rows.
     incoming, outgoing : float, [m/s]
@@ -555,6 +567,7 @@ class Rebound:
 
     stamp_ns: int
     tray: int
+    cycle: int = 0
     track: int
     species: int
     wall: int
@@ -581,7 +594,7 @@ class PairCollision:
     ----------
     stamp_ns : int
         Of the contact, between two pictures.
-    tray : int
+    tray, cycle : int
     tracks, species : ndarray of int32, (2,)
     radii, masses : ndarray (2,), [m], [kg]
     radius_errors : ndarray (2,), [m]
@@ -604,6 +617,7 @@ class PairCollision:
 
     stamp_ns: int
     tray: int
+    cycle: int = 0
     tracks: NDArray[np.int32]
     species: NDArray[np.int32]
     radii: NDArray[np.float64]

@@ -215,6 +215,12 @@ class CoolingSettings:
         low=0.0,
         high=10.0,
     )
+    rebounds: bool = _setting(
+        True, 'use rebounds from the side walls, seen in the tracks, besides the decay'
+    )
+    collisions: bool = _setting(
+        True, 'use collisions of two beads, seen in the tracks, besides the decay'
+    )
     update_interval: float = _setting(
         0.5, 'time between two live estimates', 's', low=0.0, high=60.0
     )
@@ -272,6 +278,16 @@ class PriorSettings:
         'standard deviation of a relative error of the speeds for each factor e in speed',
         low=0.0,
         high=0.2,
+    )
+    collision_bias: float = _setting(
+        0.008,
+        'standard deviation of what the restitution of the beads by all collisions together may '
+        'be off by',
+        low=0.0,
+        high=0.2,
+    )
+    rebound_bias: float = _setting(
+        0.001, 'the same of that of the walls by rebounds', low=0.0, high=0.2
     )
 
 

@@ -42,13 +42,36 @@ _RANGE = 2.0
 _HEIGHTS = 20
 _AT_ONCE = 128
 _TINY = 1e-300
+# Vertical parts of the line of centres that are less likely are left out.
+_UNLIKELY = 1e-9
 _SQRT_2_PI = math.sqrt(2.0 * math.pi)
+
+
+def marginal(table: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Log likelihood, (n,), whichever row of a table is true; each as likely.
+
+    Parameters
+    ----------
+    table : ndarray (m, n)
+        One of those below, or a sum of some: what is not known is then the same in all of them.
+    """
+    return np.asarray(logsumexp(table, axis=0) - math.log(len(table)))
 
 
 def rebound_log_likelihood(
     rebounds: Sequence[Rebound], wall_restitution: ArrayLike, *, outliers: float = OUTLIERS
 ) -> NDArray[np.float64]:
     """How likely some rebounds are for each of some restitutions of the side walls.
+
+    See `rebound_table`.
+    """
+    return marginal(rebound_table(rebounds, wall_restitution, outliers=outliers))
+
+
+def rebound_table(
+    rebounds: Sequence[Rebound], wall_restitution: ArrayLike, *, outliers: float = OUTLIERS
+) -> NDArray[np.float64]:
+    """How likely rebounds are for each restitution of the side walls and each scale of errors.
 
     The speed before is as uncertain as that after, and any speed is as likely; given the speed
     before, that a rebound was found says nothing of the speed after.
@@ -62,13 +85,14 @@ def rebound_log_likelihood(
 
     Returns
     -------
-    ndarray (n,)
-        Log likelihood but for a constant; 0 without rebounds.
+    ndarray (m, n)
+        Log likelihood but for a constant; 0 without rebounds. Those of more rebounds are to be
+        added.
     """
     grid = checked_grid('wall_restitution', wall_restitution)
     _check_share(outliers)
     if not rebounds:
-        return np.zeros_like(grid)
+        return np.zeros((len(_ERROR_SCALES), grid.size))
     columns = np.array(
         [
             (one.incoming, one.outgoing, one.incoming_error, one.outgoing_error,
@@ -85,7 +109,7 @@ def rebound_log_likelihood(
     for scale in _ERROR_SCALES:
         density = np.exp(-0.5 * square / scale**2) / (_SQRT_2_PI * scale * np.sqrt(variance))
         by_scale.append(np.log((1.0 - outliers) * density + other).sum(axis=0))
-    return np.asarray(logsumexp(by_scale, axis=0) - math.log(len(_ERROR_SCALES)))
+    return np.array(by_scale)
 
 
 def pair_log_likelihood(
@@ -98,6 +122,31 @@ def pair_log_likelihood(
     outliers: float = OUTLIERS,
 ) -> NDArray[np.float64]:
     """How likely some collisions are for each of some restitutions of the beads.
+
+    See `pair_table`.
+    """
+    return marginal(
+        pair_table(
+            collisions,
+            restitution,
+            vertical_ratios=vertical_ratios,
+            radius_errors=radius_errors,
+            sticking_speed=sticking_speed,
+            outliers=outliers,
+        )
+    )
+
+
+def pair_table(
+    collisions: Sequence[PairCollision],
+    restitution: ArrayLike,
+    *,
+    vertical_ratios: Sequence[float] = VERTICAL_RATIOS,
+    radius_errors: Sequence[float] = RADIUS_ERRORS,
+    sticking_speed: float = 0.0,
+    outliers: float = OUTLIERS,
+) -> NDArray[np.float64]:
+    """How likely collisions are for each restitution, and each pair of what is not known.
 
     Parameters
     ----------
@@ -115,13 +164,14 @@ def pair_log_likelihood(
 
     Returns
     -------
-    ndarray (n,)
-        Log likelihood but for a constant; 0 without collisions.
+    ndarray (m, n)
+        Log likelihood but for a constant; 0 without collisions. Those of more collisions are to
+        be added.
     """
     grid = checked_grid('restitution', restitution)
     _check_share(outliers)
     if not collisions:
-        return np.zeros_like(grid)
+        return np.zeros((len(vertical_ratios) * len(radius_errors), grid.size))
     seen = _Seen.of(collisions).with_errors(_PAIR_ERRORS)
     # In parts, so that memory does not grow with the number of collisions.
     parts = [
@@ -129,12 +179,14 @@ def pair_log_likelihood(
         for k in range(0, len(collisions), _AT_ONCE)
     ]
     limits = sticking_speed, outliers
-    nuisances = [
+    # Where no radius was measured, it does not matter how wrong they are.
+    errors = radius_errors if seen.measured.any() else (0.0,)
+    table = [
         np.sum([_pairs_given(one, grid, ratio, error, limits) for one in parts], axis=0)
         for ratio in vertical_ratios
-        for error in (radius_errors if seen.measured.any() else (0.0,))
+        for error in errors
     ]
-    return np.asarray(logsumexp(nuisances, axis=0) - math.log(len(nuisances)))
+    return np.repeat(table, len(radius_errors) // len(errors), axis=0)
 
 
 class _Seen(NamedTuple):
@@ -242,6 +294,8 @@ def _pairs_given(
     """
     sticking_speed, outliers = limits
     tilt, weight = _tilts(seen, radius_error)
+    likely = weight.max(axis=0) > _UNLIKELY
+    tilt, weight = tilt[:, likely], weight[:, likely]
     part = np.sqrt(1.0 - tilt**2)[:, :, None]
     a, c, aa, cc, ac = (
         one[:, None, None]

@@ -13,7 +13,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
+from scipy.interpolate import CubicSpline, RectBivariateSpline
+from scipy.special import logsumexp
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.inference.decay_library import LOWEST_WALL, NUISANCES, UNITS, count_step
@@ -36,6 +37,8 @@ _DEPTH = 18.0
 # Beyond about so much less, log likelihoods are compressed before they are interpolated: next to
 # steep slopes a spline would swing.
 _COMPRESSION = 200.0
+# Places, at least, at which a term is evaluated to be smeared.
+_SMEARED = 1000
 
 
 @lru_cache(maxsize=16)
@@ -133,11 +136,15 @@ class Posterior:
     wall_restitution : ndarray (n_w,)
     probability : ndarray (n_c, n_w)
         Sums to 1.
+    tension : float
+        Standard deviations by which what went into it disagrees: decay, rebounds and collisions;
+        0 where there was the decay alone.
     """
 
     restitution: NDArray[np.float64]
     wall_restitution: NDArray[np.float64]
     probability: NDArray[np.float64]
+    tension: float = 0.0
 
     @property
     def mean(self) -> tuple[float, float]:
@@ -186,7 +193,8 @@ class SingleTerm:
     Parameters
     ----------
     restitution : ndarray (n,)
-        Rising, and close enough that the term is straight from one to the next.
+        Rising, from end to end of what is possible, and close enough that a cubic spline tells
+        the term between them; 4 or more.
     log_likelihood : ndarray (n,)
     """
 
@@ -195,7 +203,18 @@ class SingleTerm:
 
     def at(self, restitution: NDArray[np.float64]) -> NDArray[np.float64]:
         """The term at other restitutions, (n,)."""
-        return np.asarray(np.interp(restitution, self.restitution, self.log_likelihood))
+        return np.asarray(CubicSpline(self.restitution, self.log_likelihood)(restitution))
+
+    def off_by(self, spread: float) -> SingleTerm:
+        """The same where all of it may be off by a common amount, a Gaussian of this spread."""
+        if spread == 0.0:
+            return self
+        first, last = self.restitution[[0, -1]]
+        step = min(0.25 * spread, float(last - first) / _SMEARED)
+        fine = np.arange(first, last + step, step)
+        apart = (fine - self.restitution[:, np.newaxis]) / spread
+        smeared = logsumexp(self.at(fine) - 0.5 * apart**2, axis=1)
+        return SingleTerm(restitution=self.restitution, log_likelihood=smeared)
 
 
 def check_walls(walls: tuple[float, float]) -> None:
@@ -258,10 +277,18 @@ def posterior_of(
             fine += of_beads.at(beads)[:, np.newaxis]
         if of_walls is not None:
             fine += of_walls.at(wall)
-        fine -= fine.max()
+        best = float(fine.max())
+        fine -= best
         box = _likely(fine, beads, wall)
     weight = np.exp(fine) * _halves(beads.size)[:, np.newaxis] * _halves(wall.size)
-    return Posterior(restitution=beads, wall_restitution=wall, probability=weight / weight.sum())
+    # By itself each of the terms could be as good as its own best.
+    apart = sum(float(one.log_likelihood.max()) for one in (of_beads, of_walls) if one)
+    return Posterior(
+        restitution=beads,
+        wall_restitution=wall,
+        probability=weight / weight.sum(),
+        tension=math.sqrt(2.0 * max(apart - best, 0.0)) if of_beads or of_walls else 0.0,
+    )
 
 
 def _even(restitution: NDArray[np.float64], low: float, power: float) -> NDArray[np.float64]:

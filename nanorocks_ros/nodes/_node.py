@@ -31,6 +31,8 @@ from nanorocks_ros.records import (
     GroundTruth,
     MotionMask,
     Notice,
+    PairCollision,
+    Rebound,
     SpeedEstimate,
     TrayImage,
 )
@@ -40,6 +42,8 @@ _ARRAYS = {
     SpeedEstimate: topics.SPEED,
     ClusterEstimate: topics.CLUSTER,
     CorEstimate: topics.COR,
+    Rebound: topics.REBOUND,
+    PairCollision: topics.COLLISION,
     GroundTruth: topics.TRUTH,
 }
 _IMAGES = {

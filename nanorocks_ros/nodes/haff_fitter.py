@@ -1,10 +1,12 @@
-"""Node: mean projected speeds in, coefficients of restitution with their intervals out."""
+"""Node: speeds and contacts in, coefficients of restitution with their intervals out."""
 
 from __future__ import annotations
 
+from functools import partial
+
 from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.nodes._node import NanorocksNode
-from nanorocks_ros.records import SpeedEstimate
+from nanorocks_ros.records import PairCollision, Rebound, SpeedEstimate
 from nanorocks_ros.stages.cooling import HaffFitter
 from nanorocks_ros.stages.pipeline import trays_of
 from nanorocks_ros.stages.warm_up import warm_up_cooling
@@ -13,8 +15,13 @@ from nanorocks_ros.wire.layouts import from_array
 
 
 class HaffFitterNode(NanorocksNode):
-    """Reads restitutions from the speeds of each tray."""
+    """Reads restitutions from the speeds and contacts of each tray."""
 
+    _INPUTS = (
+        (topics.SPEED, SpeedEstimate),
+        (topics.REBOUND, Rebound),
+        (topics.COLLISION, PairCollision),
+    )
     # Times are only ever compared with one another, so any epoch does.
     _EPOCH_NS = 0
 
@@ -28,7 +35,10 @@ class HaffFitterNode(NanorocksNode):
         # Others find the publishers meanwhile.
         warm_up_cooling()
         for tray in self._settings.trays:
-            self.listen(topics.SPEED, lambda message, tray=tray: self._take(message, tray), tray)
+            for topic, record in self._INPUTS:
+                take = partial(self._take, topic, record, tray)
+                # Without tracks there are speeds, but no contacts.
+                self.listen(topic, take, tray, required=record is SpeedEstimate)
 
     def _build(self, settings):
         return {number: HaffFitter(settings, one) for number, one in trays_of(settings).items()}
@@ -36,10 +46,8 @@ class HaffFitterNode(NanorocksNode):
     def _adopt(self, settings, stages):
         self._settings, self._stages = settings, stages
 
-    def _take(self, message, tray):
-        where = self.resolve_topic_name(topics.SPEED.of(tray))
-        speed = from_array(
-            SpeedEstimate, message.data, tray=tray, epoch_ns=self._EPOCH_NS, where=where
-        )
-        for record in self._stages[tray].push(speed):
+    def _take(self, topic, kind, tray, message):
+        where = self.resolve_topic_name(topic.of(tray))
+        taken = from_array(kind, message.data, tray=tray, epoch_ns=self._EPOCH_NS, where=where)
+        for record in self._stages[tray].push(taken):
             self.publish_result(record, self._EPOCH_NS)

@@ -1,4 +1,4 @@
-"""Node: tray images in, mean projected speeds and motion masks out."""
+"""Node: tray images in, mean projected speeds, contacts and motion masks out."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from nanorocks_ros.wire import topics
 
 
 class SpeedEstimatorNode(TrayStageNode):
-    """Measures the mean projected speed of each tray."""
+    """Measures the mean projected speed of each tray, and finds rebounds and collisions."""
 
     def __init__(self):
         outputs = (topics.SPEED, topics.MOTION, topics.TRACKS)
+        outputs = (*outputs, topics.REBOUND, topics.COLLISION)
         super().__init__('speed_estimator', SpeedEstimator, outputs, in_color=True)
 
     def prepare(self, stage, tray):

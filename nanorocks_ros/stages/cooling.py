@@ -1,4 +1,4 @@
-"""From mean speeds to the coefficient of restitution of the cycle, updated as it cools."""
+"""From speeds and contacts to the coefficient of restitution of the cycle, updated as it cools."""
 
 from __future__ import annotations
 
@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.records import CorEstimate, CorStatus, Quality, SpeedEstimate
+from nanorocks_ros.records import (
+    CorEstimate,
+    CorStatus,
+    PairCollision,
+    Quality,
+    Rebound,
+    SpeedEstimate,
+)
+from nanorocks_ros.stages.contacts.of_cycle import ContactsOfCycle
 from nanorocks_ros.stages.readings import Decay, LibraryReading, PaperReading, Reading
 from nanorocks_ros.stages.shaking import NS
 
@@ -23,10 +31,12 @@ if TYPE_CHECKING:
 _STAMP_ROUNDING_NS = 1_000_000
 # The first speed may come that much later for other reasons than a tray that swings.
 _LATE_NS = 500_000_000
+# Standard deviations by which decay, rebounds and collisions may disagree without a flag.
+_TENSE = 3.0
 
 
 class HaffFitter:
-    """Reads a restitution from the decay of the speeds of each cycle, and of all of them.
+    """Reads restitutions from the speeds and contacts of each cycle, and of all of them.
 
     While a cycle cools it publishes an estimate every `update_interval`; the last one of the
     cycle, at the end of the cooling window or at the next shaking event, is final.
@@ -46,6 +56,7 @@ class HaffFitter:
         self._settings = settings.cooling
         reading = LibraryReading if self._settings.relation == 'library' else PaperReading
         self._make_reading = partial(reading, settings, tray)
+        self._contacts = ContactsOfCycle(self._settings)
         self._restart()
 
     def _restart(self) -> None:
@@ -56,20 +67,28 @@ class HaffFitter:
         self._last_update_ns: int | None = None
         self._reading: Reading = self._make_reading()
 
-    def push(self, speed: SpeedEstimate) -> tuple[CorEstimate, ...]:
-        """Take the next speed; empty between two updates and before the first shake.
+    def push(self, record: SpeedEstimate | Rebound | PairCollision) -> tuple[CorEstimate, ...]:
+        """Take the next speed or contact; empty between two updates and before the first shake.
 
-        A stamp that goes back ends the cycle and starts all afresh, running mean included.
+        A speed whose stamp goes back ends the cycle and starts all afresh, running mean included.
         """
+        if isinstance(record, SpeedEstimate):
+            return self._push_speed(record)
+        self._contacts.push(record)
+        return ()
+
+    def _push_speed(self, speed: SpeedEstimate) -> tuple[CorEstimate, ...]:
         found: tuple[CorEstimate, ...] = ()
         if self._last_stamp_ns is not None and speed.stamp_ns <= self._last_stamp_ns:
             found = self.flush()
             self._restart()
+            self._contacts.restart(speed.stamp_ns)
         self._last_stamp_ns = speed.stamp_ns
         if speed.cycle != self._cycle:
             found = (*found, *self.flush())
             self._cycle, self._samples, self._finished = speed.cycle, [], False
             self._last_update_ns = None
+            self._contacts.next_cycle()
         if speed.cycle_start_ns is None or self._finished:
             return found
         age = (speed.stamp_ns - speed.cycle_start_ns) / NS
@@ -80,6 +99,7 @@ class HaffFitter:
             return (*found, *self.flush())
         if age > 0.0 and age >= self._settings.delay and _usable(speed):
             self._samples.append(speed)
+            self._contacts.count(self._samples[0].stamp_ns, speed.stamp_ns)
             if self._update_due(speed.stamp_ns):
                 found = (*found, *self._estimate(CorStatus.COOLING))
         return found
@@ -124,8 +144,9 @@ class HaffFitter:
             error=np.array([one.mean_projected_speed_error for one in self._samples]),
         )
         fields: dict[str, Any] = {'status': status}
+        final = status is CorStatus.FINAL
         try:
-            fields.update(self._reading.read(decay, final=status is CorStatus.FINAL))
+            fields.update(self._reading.read(decay, self._contacts.terms, final=final))
         except FitError:
             # Nothing is known of the restitution then, and that is what is published.
             fields = {
@@ -134,6 +155,8 @@ class HaffFitter:
                 'restitution_upper': 1.0,
             }
         quality = reduce(or_, (one.quality for one in self._samples))
+        if fields.get('tension', 0.0) > _TENSE:
+            quality |= Quality.INCONSISTENT
         return (
             CorEstimate(
                 stamp_ns=last.stamp_ns,

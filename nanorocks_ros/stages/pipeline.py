@@ -13,6 +13,8 @@ from nanorocks_ros.records import (
     Frame,
     MotionMask,
     Notice,
+    PairCollision,
+    Rebound,
     SpeedEstimate,
     Tracks,
     TrayImage,
@@ -34,6 +36,8 @@ Result = (
     | MotionMask
     | SpeedEstimate
     | Tracks
+    | Rebound
+    | PairCollision
     | ClusterEstimate
     | Autocorrelation
     | CorEstimate
@@ -72,7 +76,7 @@ class TrayStages:
         found: list[Result] = []
         for record in self.speed.push(image):
             found.append(record)
-            if isinstance(record, SpeedEstimate):
+            if isinstance(record, SpeedEstimate | Rebound | PairCollision):
                 found += self.cooling.push(record)
         found += self.clusters.push(image)
         return tuple(found)

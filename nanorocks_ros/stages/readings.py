@@ -11,6 +11,7 @@ import numpy as np
 from scipy import special
 
 from nanorocks_ros.errors import FitError
+from nanorocks_ros.inference.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay_library import library_of
 from nanorocks_ros.inference.decay_likelihood import DecayLikelihood, decay_likelihood
 from nanorocks_ros.inference.restitution import Posterior, check_walls, posterior_of, tables_of
@@ -49,7 +50,7 @@ class Reading(Protocol):
 
     relation: CorRelation
 
-    def read(self, decay: Decay, *, final: bool) -> dict[str, Any]:
+    def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate; raises FitError where there is no decay."""
 
 
@@ -69,14 +70,15 @@ class PaperReading:
         self._tray = tray
         self._finals: list[tuple[float, float]] = []
 
-    def read(self, decay: Decay, *, final: bool) -> dict[str, Any]:
-        """Fields of a CorEstimate.
+    def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
+        """Fields of a CorEstimate; contacts are nothing that the paper uses.
 
         Raises
         ------
         FitError
             When the speeds do not fall.
         """
+        del contacts
         fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
         quantile = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + 0.5 * self._probability))
         spread = math.exp(quantile * fit.log_decay_rate_error)
@@ -130,14 +132,15 @@ class LibraryReading:
         self._tables = tables_of(library, tray, known)
         # What the library itself is off by acts as a wrong scale would.
         self._camera = (math.hypot(known.scale_error, library.misfit), known.speed_bias)
+        self._biases = (known.collision_bias, known.rebound_bias)
         self._walls = (known.wall_low, known.wall_high)
         check_walls(self._walls)
         half = 0.5 * settings.cooling.probability
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
-        self._finished: DecayLikelihood | None = None
+        self._finished: tuple[DecayLikelihood, ContactTerms] | None = None
         self._mean_so_far: dict[str, float] = {}
 
-    def read(self, decay: Decay, *, final: bool) -> dict[str, Any]:
+    def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate.
 
         Raises
@@ -151,9 +154,12 @@ class LibraryReading:
             self._tables, decay.time, decay.speed, decay.error, self._camera
         )
         integrated = likelihood.integrated()
-        posterior = posterior_of(self._tables, integrated, self._walls)
+        posterior = self._posterior(integrated, contacts)
         best = int(np.argmax(integrated))
         fields = {
+            'rebounds': contacts.rebounds,
+            'collisions': contacts.collisions,
+            'tension': posterior.tension,
             **self._speeds(decay, final=final),
             'reduced_chi_square': float(likelihood.deviation[best])
             / max(likelihood.samples - 1, 1),
@@ -164,24 +170,39 @@ class LibraryReading:
                 'status': CorStatus.UNDETERMINED,
                 'restitution_lower': 0.0,
                 'restitution_upper': 1.0,
-                **self._mean(likelihood, final=final),
+                **self._mean(likelihood, contacts, final=final),
             }
         return {
             **fields,
             **_known(posterior, self._ends),
-            **self._mean(likelihood, final=final),
+            **self._mean(likelihood, contacts, final=final),
         }
 
-    def _mean(self, likelihood: DecayLikelihood, *, final: bool) -> dict[str, float]:
+    def _posterior(self, integrated: NDArray[np.float64], contacts: ContactTerms) -> Posterior:
+        return posterior_of(
+            self._tables,
+            integrated,
+            self._walls,
+            of_beads=contacts.of_beads(self._biases[0]),
+            of_walls=contacts.of_walls(self._biases[1]),
+        )
+
+    def _mean(
+        self, likelihood: DecayLikelihood, contacts: ContactTerms, *, final: bool
+    ) -> dict[str, float]:
         """The mean of what all finished cycles together say; a final one is among them."""
         if not final:
             return self._mean_so_far
-        before = self._finished
-        self._finished = likelihood if before is None else before + likelihood
-        posterior = posterior_of(self._tables, self._finished.integrated(), self._walls)
+        if self._finished is not None:
+            likelihood, contacts = self._finished[0] + likelihood, self._finished[1] + contacts
+        self._finished = likelihood, contacts
+        posterior = self._posterior(likelihood.integrated(), contacts)
+        error, wall_error = np.sqrt(np.diag(posterior.covariance)).tolist()
         self._mean_so_far = {
             'mean_restitution': posterior.mean[0],
-            'mean_restitution_error': math.sqrt(posterior.covariance[0, 0]),
+            'mean_restitution_error': error,
+            'mean_wall_restitution': posterior.mean[1],
+            'mean_wall_restitution_error': wall_error,
         }
         return self._mean_so_far
 

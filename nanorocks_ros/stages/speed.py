@@ -5,7 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.records import MotionMask, Quality, SpeedEstimate, Tracks, TrayImage
+from nanorocks_ros.records import (
+    MotionMask,
+    PairCollision,
+    Quality,
+    Rebound,
+    SpeedEstimate,
+    Tracks,
+    TrayImage,
+)
 from nanorocks_ros.stages.shaking import CycleFollower
 from nanorocks_ros.stages.speed_by_area import AreaSpeed
 from nanorocks_ros.stages.speed_by_structure import StructureSpeed
@@ -21,6 +29,8 @@ if TYPE_CHECKING:
 # this [m/s], and rest.
 _CERTAIN = 0.2
 _REST = 5e-5
+
+Measured = SpeedEstimate | MotionMask | Tracks | Rebound | PairCollision
 
 
 class SpeedEstimator:
@@ -63,12 +73,12 @@ class SpeedEstimator:
         self._last_stamp_ns: int | None = None
         self._swing = SwingMeter()
 
-    def push(self, image: TrayImage) -> tuple[SpeedEstimate | MotionMask | Tracks, ...]:
+    def push(self, image: TrayImage) -> tuple[Measured, ...]:
         """Take the next image of the tray.
 
         Returns
         -------
-        tuple of SpeedEstimate, MotionMask or Tracks
+        tuple of SpeedEstimate, MotionMask, Tracks, Rebound or PairCollision
             Empty while a window is filling. A stamp that goes back starts all afresh.
         """
         if self._last_stamp_ns is not None and image.stamp_ns <= self._last_stamp_ns:
@@ -77,7 +87,7 @@ class SpeedEstimator:
         self._swing.push(image)
         shaken = self._shakes.push(image)
         self._area.emit_mask = self.emit_mask
-        found: list[SpeedEstimate | MotionMask | Tracks] = []
+        found: list[Measured] = []
         found += self._area.push(image, self._shakes, shaken)
         method = self._settings.speed.method
         of_use = method == 'tracking' or (method == 'auto' and not self._tracks.hopeless)
@@ -85,6 +95,8 @@ class SpeedEstimator:
             records = self._tracks.push(image, self._shakes, shaken)
             found += [one for one in records if isinstance(one, Tracks) and self.emit_tracks]
             found += self._by_tracks([one for one in records if isinstance(one, SpeedEstimate)])
+            if of_use and (method == 'tracking' or self._tracks.reliable):
+                found += [one for one in records if isinstance(one, Rebound | PairCollision)]
         if method == 'structure_function' or (method == 'auto' and not self._tracks.reliable):
             # Who looks at the tracks must not change what is said of a forced method.
             if self._tracks.judged and method == 'auto':
@@ -100,9 +112,7 @@ class SpeedEstimator:
             self._idle = True
         return tuple(self._finished(one) for one in found if self._in_order(one))
 
-    def _finished(
-        self, record: SpeedEstimate | MotionMask | Tracks
-    ) -> SpeedEstimate | MotionMask | Tracks:
+    def _finished(self, record: Measured) -> Measured:
         if not isinstance(record, SpeedEstimate):
             return record
         return replace(_judged(record), tray_speed=self._swing.speed(record))
@@ -118,7 +128,7 @@ class SpeedEstimator:
         held, self._held = self._held, []
         return held if self._tracks.reliable else []
 
-    def _in_order(self, record: SpeedEstimate | MotionMask | Tracks) -> bool:
+    def _in_order(self, record: Measured) -> bool:
         """Whether a speed is later than the one before it, which another method may have given."""
         if not isinstance(record, SpeedEstimate):
             return True

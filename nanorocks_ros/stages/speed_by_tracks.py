@@ -1,14 +1,25 @@
-"""Mean projected speed from the tracks of the beads, where most of them are tracked."""
+"""Mean projected speed and single contacts from tracks, where most beads are tracked."""
 
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nanorocks_ros.experiment.colours import hue_of
-from nanorocks_ros.records import UNKNOWN, Quality, SpeedEstimate, SpeedMethod, Tracks, TrayImage
+from nanorocks_ros.records import (
+    UNKNOWN,
+    PairCollision,
+    Quality,
+    Rebound,
+    SpeedEstimate,
+    SpeedMethod,
+    Tracks,
+    TrayImage,
+)
+from nanorocks_ros.stages.contacts.find import ContactFinder
 from nanorocks_ros.stages.shaking import NS, CycleFollower
 from nanorocks_ros.stages.tracking.mean_speed import RELIABLE_SHARE, mean_speeds
 from nanorocks_ros.stages.tracking.tracker import Tracker
@@ -40,7 +51,7 @@ _FURTHEST_STEP = 1.0
 
 
 class TrackSpeed:
-    """Measures the speed by tracking every bead that can be seen.
+    """Measures the speed by tracking every bead that can be seen, and finds its contacts.
 
     Parameters
     ----------
@@ -65,6 +76,8 @@ class TrackSpeed:
         self._tray = tray
         self._counts = np.array([one.count for one in tray.species])
         self._tracker = Tracker(settings, tray)
+        wanted = settings.cooling.rebounds or settings.cooling.collisions
+        self._contacts = ContactFinder(tray) if wanted else None
         self._recent: deque[Tracks] = deque()
         self._shares: deque[np.ndarray] = deque(maxlen=_MEMORY_FRAMES)
         self._followed: deque[float] = deque(maxlen=_MEMORY_SPEEDS)
@@ -80,9 +93,9 @@ class TrackSpeed:
 
     def push(
         self, image: TrayImage, shakes: CycleFollower, shaken: bool
-    ) -> tuple[SpeedEstimate | Tracks, ...]:
-        """Take the next image: the tracks, and a speed when one is due."""
-        found: list[SpeedEstimate | Tracks] = []
+    ) -> tuple[SpeedEstimate | Tracks | Rebound | PairCollision, ...]:
+        """Take the next image: the tracks, contacts in them, and a speed when one is due."""
+        found: list[SpeedEstimate | Tracks | Rebound | PairCollision] = []
         if shaken:
             self._recent.clear()
             self._next_ns = None
@@ -96,10 +109,24 @@ class TrackSpeed:
             while tracks.stamp_ns - self._recent[0].stamp_ns > _LOOK_BACK_NS:
                 self._recent.popleft()
             self._judge(tracks)
+            found += self._contacts_in(tracks, shakes)
             if self._next_ns is None or tracks.stamp_ns >= self._next_ns:
                 self._next_ns = tracks.stamp_ns + self._interval_ns
                 found += self._speeds(shakes)
         return tuple(found)
+
+    def _contacts_in(self, tracks: Tracks, shakes: CycleFollower) -> list[Rebound | PairCollision]:
+        if self._contacts is None:
+            return []
+        start = shakes.cycle_start_ns
+        # Those before the shaking event may be known only after it.
+        return [
+            replace(
+                one,
+                cycle=shakes.cycle - int(start is not None and one.stamp_ns < start),
+            )
+            for one in self._contacts.push(tracks)
+        ]
 
     def _judge(self, tracks: Tracks) -> None:
         seen = np.bincount(tracks.species[tracks.seen], minlength=self._counts.size)

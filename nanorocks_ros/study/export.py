@@ -100,6 +100,11 @@ def _cycle_as_json(cor: CorEstimate, start: float) -> dict[str, Any]:
         'paper_restitution': _known(cor.paper_restitution),
         'mean_restitution': _known(cor.mean_restitution),
         'mean_restitution_error': _known(cor.mean_restitution_error),
+        'mean_wall_restitution': _known(cor.mean_wall_restitution),
+        'mean_wall_restitution_error': _known(cor.mean_wall_restitution_error),
+        'rebounds': cor.rebounds,
+        'collisions': cor.collisions,
+        'tension': _known(cor.tension),
         'quality': int(cor.quality),
         'window_start': _known(cor.window_start),
         'window_end': _known(cor.window_end),
@@ -176,6 +181,8 @@ def _write_tables(analysis: Analysis, results: TrayResults, folder: Path, number
         'speed': results.speeds,
         'cluster': results.clusters,
         'cor': results.cors,
+        'rebound': results.rebounds,
+        'collision': results.collisions,
     }
     for name, records in tables.items():
         if not records:
@@ -206,6 +213,8 @@ def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> No
             (topics.SPEED, results.speeds),
             (topics.CLUSTER, results.clusters),
             (topics.COR, results.cors),
+            (topics.REBOUND, results.rebounds),
+            (topics.COLLISION, results.collisions),
         ):
             name = topic.absolute(number)
             table[name] = offered(topic)

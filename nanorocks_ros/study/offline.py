@@ -15,6 +15,8 @@ from nanorocks_ros.records import (
     Frame,
     GroundTruth,
     Notice,
+    PairCollision,
+    Rebound,
     SpeedEstimate,
     TrayImage,
 )
@@ -40,6 +42,8 @@ class TrayResults:
     speeds: list[SpeedEstimate] = field(default_factory=list)
     clusters: list[ClusterEstimate] = field(default_factory=list)
     cors: list[CorEstimate] = field(default_factory=list)
+    rebounds: list[Rebound] = field(default_factory=list)
+    collisions: list[PairCollision] = field(default_factory=list)
     truth: list[GroundTruth] = field(default_factory=list)
 
 
@@ -192,3 +196,7 @@ def _push(result: Analysis, pipeline: Pipeline, frame: Frame) -> None:
             result.trays[record.tray].clusters.append(record)
         elif isinstance(record, CorEstimate):
             result.trays[record.tray].cors.append(record)
+        elif isinstance(record, Rebound):
+            result.trays[record.tray].rebounds.append(record)
+        elif isinstance(record, PairCollision):
+            result.trays[record.tray].collisions.append(record)

@@ -14,6 +14,8 @@ from nanorocks_ros.records import (
     ClusterEstimate,
     CorEstimate,
     GroundTruth,
+    PairCollision,
+    Rebound,
     SpeedEstimate,
     TrayState,
 )
@@ -24,6 +26,15 @@ from nanorocks_ros.wire.layouts import layout
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+_RECORDS = (
+    SpeedEstimate,
+    ClusterEstimate,
+    CorEstimate,
+    Rebound,
+    PairCollision,
+    GroundTruth,
+    TrayState,
+)
 _NOTE = '<!-- Made by `make docs` from the code; change that instead. -->\n\n'
 _GROUPS = (
     (
@@ -87,7 +98,7 @@ def topics_page() -> str:
         '`time` counts from. Read from `msg_defs/nanorocks_msgs/msg/`, which also builds as an '
         'interface package.\n'
     )
-    for record in (SpeedEstimate, ClusterEstimate, CorEstimate, GroundTruth, TrayState):
+    for record in _RECORDS:
         one = layout(record)
         text += f'\n## {one.name}\n\n{one.doc}\n\n'
         text += _table(

@@ -18,7 +18,9 @@ from nanorocks_ros.records import (
     CorRelation,
     CorStatus,
     GroundTruth,
+    PairCollision,
     Quality,
+    Rebound,
     SpeedEstimate,
     SpeedMethod,
     TrayState,
@@ -30,9 +32,24 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 NS = 1_000_000_000
-ArrayRecord = SpeedEstimate | ClusterEstimate | CorEstimate | GroundTruth | TrayState
+ArrayRecord = (
+    SpeedEstimate
+    | ClusterEstimate
+    | CorEstimate
+    | GroundTruth
+    | TrayState
+    | Rebound
+    | PairCollision
+)
 RecordType = TypeVar(
-    'RecordType', SpeedEstimate, ClusterEstimate, CorEstimate, GroundTruth, TrayState
+    'RecordType',
+    SpeedEstimate,
+    ClusterEstimate,
+    CorEstimate,
+    GroundTruth,
+    TrayState,
+    Rebound,
+    PairCollision,
 )
 
 _ENUMERATIONS = {
@@ -41,7 +58,42 @@ _ENUMERATIONS = {
     'status': CorStatus,
     'relation': CorRelation,
 }
-_COUNTS = frozenset({'cycle', 'samples', 'bodies', 'color'})
+_COUNTS = frozenset(
+    ('cycle', 'samples', 'bodies', 'color', 'rebounds', 'collisions', 'track', 'species', 'wall')
+)
+# Of two beads, or of two directions: the array in the record, and the place in it.
+_AXES = {'x': 0, 'y': 1}
+_OF_BEADS = {
+    'track': 'tracks',
+    'species': 'species',
+    'radius': 'radii',
+    'mass': 'masses',
+    'temperature': 'temperatures',
+}
+_PARTS: dict[str, tuple[str, tuple[int, ...]]] = {
+    **{f'{name}_{k + 1}': (many, (k,)) for name, many in _OF_BEADS.items() for k in (0, 1)},
+    **{
+        f'{name}_{k + 1}_error': (many, (k,))
+        for name, many in (
+            ('radius', 'radius_errors'),
+            ('before', 'before_errors'),
+            ('after', 'after_errors'),
+        )
+        for k in (0, 1)
+    },
+    **{
+        f'{name}_{k + 1}_{letter}': (name, (k, axis))
+        for name in ('before', 'after')
+        for k in (0, 1)
+        for letter, axis in _AXES.items()
+    },
+    **{
+        f'{name}_{letter}': (name, (axis,))
+        for name in ('separation', 'place')
+        for letter, axis in _AXES.items()
+    },
+}
+_INTEGERS = frozenset(('tracks', 'species'))
 # Fields of the array that a record keeps as an integer stamp.
 _STAMPS = {'time': 'stamp_ns', 'cycle_start': 'cycle_start_ns'}
 _FIELD = re.compile(r'^float32\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
@@ -105,7 +157,8 @@ def to_array(record: ArrayRecord, epoch_ns: int) -> NDArray[np.float32]:
 
     Parameters
     ----------
-    record : SpeedEstimate, ClusterEstimate, CorEstimate, GroundTruth or TrayState
+    record : SpeedEstimate, ClusterEstimate, CorEstimate, GroundTruth, TrayState, Rebound or
+        PairCollision
     epoch_ns : int, [ns]
         What `time` counts from.
 
@@ -119,6 +172,9 @@ def to_array(record: ArrayRecord, epoch_ns: int) -> NDArray[np.float32]:
 
 
 def _element(record: ArrayRecord, name: str, epoch_ns: int) -> float:
+    if name in _PARTS:
+        whole, place = _PARTS[name]
+        return float(getattr(record, whole)[place])
     value = getattr(record, _STAMPS.get(name, name))
     if value is None:
         return math.nan
@@ -159,8 +215,10 @@ def from_array(
         )
     if not math.isfinite(values[0]):
         raise FrameError(where, f'time is {values[0]}', 'publish the time in element 0')
-    items: dict[str, Any] = {'tray': tray}
+    items: dict[str, Any] = {'tray': tray, **_wholes(fields, values)}
     for field, value in zip(fields, values, strict=True):
+        if field.name in _PARTS:
+            continue
         name = _STAMPS.get(field.name, field.name)
         try:
             items[name] = _value(field.name, float(value), epoch_ns)
@@ -171,6 +229,25 @@ def from_array(
                 'use the same release of nanorocks_ros on both sides',
             ) from error
     return record_type(**items)
+
+
+def _wholes(
+    fields: Sequence[LayoutField], values: Sequence[float] | NDArray[np.float32]
+) -> dict[str, NDArray[Any]]:
+    """The arrays of a record, from their parts."""
+    known = {
+        _PARTS[field.name]: float(value)
+        for field, value in zip(fields, values, strict=True)
+        if field.name in _PARTS
+    }
+    found: dict[str, NDArray[Any]] = {}
+    for (whole, place), value in known.items():
+        shape = (2,) * len(place)
+        found.setdefault(whole, np.full(shape, np.nan))[place] = value
+    return {
+        whole: values.astype(np.int32) if whole in _INTEGERS else values
+        for whole, values in found.items()
+    }
 
 
 def _value(name: str, value: float, epoch_ns: int) -> object:

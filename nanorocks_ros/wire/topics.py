@@ -68,6 +68,12 @@ MOTION = Topic(
     name='tray_{tray}/motion', type=IMAGE, depth=10, doc='motion mask, mono8: 255 where it moves'
 )
 SPEED = Topic(name='tray_{tray}/speed', type=ARRAY, depth=1000, doc='SpeedEstimate')
+REBOUND = Topic(
+    name='tray_{tray}/rebound', type=ARRAY, depth=1000, doc='Rebound: of a bead from a side wall'
+)
+COLLISION = Topic(
+    name='tray_{tray}/collision', type=ARRAY, depth=1000, doc='PairCollision: of two beads'
+)
 TRACKS = Topic(
     name='tray_{tray}/tracks',
     type=IMAGE,
@@ -106,6 +112,8 @@ TOPICS = (
     MOTION,
     SPEED,
     TRACKS,
+    REBOUND,
+    COLLISION,
     CLUSTER,
     AUTOCORRELATION,
     COR,

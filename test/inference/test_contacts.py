@@ -6,42 +6,14 @@ import math
 
 import numpy as np
 import pytest
+from contact_draws import drawn_collisions, drawn_rebound, drawn_rebounds
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.contact_estimate import contact_estimate
 from nanorocks_ros.inference.contacts import pair_log_likelihood, rebound_log_likelihood
-from nanorocks_ros.records import PairCollision, Rebound
 
 WALLS = np.linspace(0.6, 1.0, 161)
 PAIRS = np.linspace(0.4, 1.0, 121)
-RADIUS, HEIGHT = 1e-3, 3e-3
-
-
-def _rebound(incoming, outgoing, error, wall_error=0.0):
-    return Rebound(
-        stamp_ns=0,
-        tray=1,
-        track=0,
-        species=0,
-        wall=0,
-        incoming=incoming,
-        incoming_error=error,
-        outgoing=outgoing,
-        outgoing_error=error,
-        tangential_incoming=0.0,
-        tangential_outgoing=0.0,
-        tangential_error=error,
-        wall_velocity=0.0,
-        wall_velocity_error=wall_error,
-        place=np.zeros(2),
-    )
-
-
-def _rebounds(rng, n, restitution, relative_error=0.05):
-    for speed in rng.uniform(1e-3, 6e-3, n):
-        error = relative_error * 3e-3
-        noise = rng.normal(0.0, error, 2)
-        yield _rebound(speed + noise[0], restitution * speed + noise[1], error)
 
 
 def _walls(rebounds):
@@ -50,7 +22,7 @@ def _walls(rebounds):
 
 def test_rebounds_give_the_restitution_of_the_wall_without_bias():
     rng = np.random.default_rng(1)
-    found = [_walls(_rebounds(rng, 30, 0.85)) for _ in range(60)]
+    found = [_walls(drawn_rebounds(rng, 30, 0.85)) for _ in range(60)]
     values = np.array([one.restitution for one in found])
     assert values.mean() == pytest.approx(0.85, abs=3.5 * values.std() / 60**0.5)
     # Stated errors are not believed altogether.
@@ -60,72 +32,29 @@ def test_rebounds_give_the_restitution_of_the_wall_without_bias():
 
 def test_rebounds_that_were_something_else_hardly_count():
     rng = np.random.default_rng(2)
-    rebounds = list(_rebounds(rng, 40, 0.9, 0.02))
+    rebounds = list(drawn_rebounds(rng, 40, 0.9, 0.02))
     clean = _walls(rebounds)
-    spoilt = _walls([*rebounds, _rebound(3e-3, 0.5e-3, 6e-5), _rebound(2e-3, 4e-3, 6e-5)])
+    spoilt = _walls(
+        [*rebounds, drawn_rebound(3e-3, 0.5e-3, 6e-5), drawn_rebound(2e-3, 4e-3, 6e-5)]
+    )
     assert spoilt.restitution == pytest.approx(
         clean.restitution, abs=0.5 * clean.restitution_error
     )
 
 
 def test_a_wall_whose_own_motion_is_uncertain_says_less():
-    still = _walls([_rebound(3e-3, 2.7e-3, 3e-5)])
-    moving = _walls([_rebound(3e-3, 2.7e-3, 3e-5, wall_error=1e-4)])
+    still = _walls([drawn_rebound(3e-3, 2.7e-3, 3e-5)])
+    moving = _walls([drawn_rebound(3e-3, 2.7e-3, 3e-5, wall_error=1e-4)])
     assert moving.restitution == pytest.approx(still.restitution, abs=0.01)
     assert moving.restitution_error > 1.5 * still.restitution_error
 
 
 def test_two_cycles_add_up():
     rng = np.random.default_rng(3)
-    cycles = [list(_rebounds(rng, 20, 0.9)) for _ in range(2)]
+    cycles = [list(drawn_rebounds(rng, 20, 0.9)) for _ in range(2)]
     logs = [rebound_log_likelihood(one, WALLS) for one in cycles]
     both = contact_estimate(WALLS, sum(logs))
     assert both.restitution_error < min(_walls(one).restitution_error for one in cycles)
-
-
-def _collision(rng, restitution, *, ratio=0.5, radius_error=0.0, sticking_speed=0.0):
-    """A collision as it comes about between two beads in a flat gas; drawn until one does."""
-    reach, spread = 2.0 * RADIUS, 1e-3
-    while True:
-        tilt = rng.uniform(-1.0, 1.0)
-        velocity = rng.normal(0.0, math.sqrt(2.0) * spread, 3) * (1.0, 1.0, math.sqrt(ratio))
-        room = HEIGHT - 2.0 * RADIUS - abs(tilt) * reach
-        part = math.sqrt(1.0 - tilt**2)
-        normal = np.array([part, 0.0, tilt])
-        speed = -float(velocity @ normal)
-        # As often as they meet, and as their heights allow.
-        accepted = rng.uniform() * 8e-3 < speed and rng.uniform() * RADIUS < room
-        slow = speed < sticking_speed or -velocity[0] < 0.3e-3
-        if accepted and not slow and part > 0.9:
-            break
-    after = velocity + (1.0 + restitution) * speed * normal
-    error, place_error = 3e-5, 4e-6
-    noise = rng.normal(0.0, error, (2, 2, 2))
-    mean = rng.normal(0.0, spread, 2)
-    halves = np.array([[-0.5], [0.5]])
-    return PairCollision(
-        stamp_ns=0,
-        tray=1,
-        tracks=np.array([0, 1], dtype=np.int32),
-        species=np.zeros(2, dtype=np.int32),
-        radii=np.full(2, RADIUS * (1.0 + radius_error)),
-        radius_errors=np.full(2, 0.01 * RADIUS if radius_error else 0.0),
-        masses=np.full(2, 5e-6),
-        before=mean + halves * velocity[:2] + noise[0],
-        after=mean + halves * after[:2] + noise[1],
-        before_errors=np.full(2, error),
-        after_errors=np.full(2, error),
-        separation=np.array([part * reach, 0.0]) + rng.normal(0.0, place_error, 2),
-        separation_error=place_error,
-        temperatures=np.full(2, spread**2),
-        height=HEIGHT,
-        place=np.zeros(2),
-    )
-
-
-def _collisions(seed, n, restitution, **values):
-    rng = np.random.default_rng(seed)
-    return [_collision(rng, restitution, **values) for _ in range(n)]
 
 
 def _pairs(collisions, **values):
@@ -135,19 +64,19 @@ def _pairs(collisions, **values):
 @pytest.mark.parametrize('restitution', [0.6, 0.9])
 @pytest.mark.parametrize('ratio', [0.3, 1.0])
 def test_collisions_give_the_restitution_whatever_the_vertical_speeds(restitution, ratio):
-    found = _pairs(_collisions(4, 250, restitution, ratio=ratio))
+    found = _pairs(drawn_collisions(4, 250, restitution, ratio=ratio))
     assert found.restitution_error < 0.02
     assert found.restitution == pytest.approx(restitution, abs=3.0 * found.restitution_error)
 
 
 def test_collisions_cover_the_truth_as_often_as_they_say():
-    found = [_pairs(_collisions(seed, 30, 0.8, ratio=0.6)) for seed in range(50)]
+    found = [_pairs(drawn_collisions(seed, 30, 0.8, ratio=0.6)) for seed in range(50)]
     covered = np.mean([one.lower <= 0.8 <= one.upper for one in found])
     assert 0.55 < covered < 0.9
 
 
 def test_many_collisions_are_as_likely_as_their_parts_together():
-    collisions = _collisions(8, 150, 0.8)
+    collisions = drawn_collisions(8, 150, 0.8)
     values = {'vertical_ratios': (0.5,)}
     parts = [
         pair_log_likelihood(one, PAIRS, **values) for one in (collisions[:70], collisions[70:])
@@ -156,13 +85,13 @@ def test_many_collisions_are_as_likely_as_their_parts_together():
 
 
 def test_vertical_speeds_that_are_known_tell_more():
-    collisions = _collisions(5, 80, 0.8, ratio=0.6)
+    collisions = drawn_collisions(5, 80, 0.8, ratio=0.6)
     known = _pairs(collisions, vertical_ratios=(0.6,))
     assert known.restitution_error <= _pairs(collisions).restitution_error * 1.05
 
 
 def test_radii_that_were_measured_too_large_do_no_harm():
-    collisions = _collisions(6, 150, 0.8, radius_error=0.04)
+    collisions = drawn_collisions(6, 150, 0.8, radius_error=0.04)
     believed = _pairs(collisions, radius_errors=(0.0,))
     doubted = _pairs(collisions)
     assert abs(doubted.restitution - 0.8) < 3.0 * doubted.restitution_error
@@ -170,7 +99,7 @@ def test_radii_that_were_measured_too_large_do_no_harm():
 
 
 def test_collisions_that_merged_are_missing_and_that_is_known():
-    collisions = _collisions(7, 250, 0.8, ratio=1.0, sticking_speed=0.8e-3)
+    collisions = drawn_collisions(7, 250, 0.8, ratio=1.0, sticking_speed=0.8e-3)
     ignored = _pairs(collisions)
     known = _pairs(collisions, sticking_speed=0.8e-3)
     assert known.restitution == pytest.approx(0.8, abs=3.0 * known.restitution_error)

@@ -26,6 +26,8 @@ from nanorocks_ros.records import (
     CorEstimate,
     CorStatus,
     GroundTruth,
+    PairCollision,
+    Rebound,
     SpeedEstimate,
 )
 from nanorocks_ros.study.bag_frames import BagFrames
@@ -34,7 +36,13 @@ from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import from_array, layout, to_array
 
 SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
-ARRAYS = {SpeedEstimate: topics.SPEED, ClusterEstimate: topics.CLUSTER, CorEstimate: topics.COR}
+ARRAYS = {
+    SpeedEstimate: topics.SPEED,
+    ClusterEstimate: topics.CLUSTER,
+    CorEstimate: topics.COR,
+    Rebound: topics.REBOUND,
+    PairCollision: topics.COLLISION,
+}
 STAGES = ('preprocessor', 'speed_estimator', 'cluster_autocorrelator', 'haff_fitter')
 
 
@@ -68,6 +76,8 @@ def offline_arrays():
         SpeedEstimate: results.speeds,
         ClusterEstimate: results.clusters,
         CorEstimate: results.cors,
+        Rebound: results.rebounds,
+        PairCollision: results.collisions,
     }
     return {
         kind: np.array([to_array(one, analysis.epoch_ns) for one in records])

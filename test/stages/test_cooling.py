@@ -13,7 +13,14 @@ from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettin
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.physics.haff import haff_speed
 from nanorocks_ros.physics.paper import paper_restitution_of_decay
-from nanorocks_ros.records import CorRelation, CorStatus, Quality, SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import (
+    CorRelation,
+    CorStatus,
+    Quality,
+    Rebound,
+    SpeedEstimate,
+    SpeedMethod,
+)
 from nanorocks_ros.simulation.ensemble import cooling_runs
 from nanorocks_ros.stages.cooling import HaffFitter
 
@@ -43,6 +50,31 @@ def cooling_cycle(cycle=1, start=0.0, v0=6e-3, tau=5.0, until=25.0, noise=0.01):
     times = np.arange(0.1, until, 0.1)
     values = haff_speed(times, v0, tau) * np.exp(rng.normal(0, noise, times.size))
     return [speed(start + t, v, cycle, start) for t, v in zip(times, values, strict=True)]
+
+
+def rebounds(rng, n, first, last, wall=0.97):
+    """Of beads from a side wall, with errors of 3 % of a fast one."""
+    error = 1e-4
+    for time in np.sort(rng.uniform(first, last, n)):
+        incoming = rng.uniform(1e-3, 4e-3)
+        noise = rng.normal(0.0, error, 2)
+        yield Rebound(
+            stamp_ns=round(time * NS),
+            tray=1,
+            track=0,
+            species=0,
+            wall=0,
+            incoming=incoming + noise[0],
+            incoming_error=error,
+            outgoing=wall * incoming + noise[1],
+            outgoing_error=error,
+            tangential_incoming=0.0,
+            tangential_outgoing=0.0,
+            tangential_error=error,
+            wall_velocity=0.0,
+            wall_velocity_error=0.0,
+            place=np.zeros(2),
+        )
 
 
 def all_estimates(stage, speeds):
@@ -244,3 +276,70 @@ def test_the_asked_probability_widens_the_interval():
 def test_walls_the_wrong_way_round_are_refused_at_once():
     with pytest.raises(ConfigurationError, match=r'prior.wall_low, prior.wall_high: 0.95 to 0.9'):
         fitter(**{'prior.wall_low': 0.95, 'prior.wall_high': 0.9})
+
+
+def half_width(estimate):
+    return 0.5 * (estimate.restitution_upper - estimate.restitution_lower)
+
+
+def test_rebounds_fix_the_walls_and_through_the_valley_the_beads():
+    speeds = simulated_cycle()
+    seen = list(rebounds(np.random.default_rng(1), 80, 2.0, 17.0))
+    *_, without = all_estimates(fitter(), speeds)
+    *_, final = all_estimates(fitter(), by_stamp([*speeds, *seen]))
+    assert (without.rebounds, final.rebounds) == (0, 80)
+    assert final.wall_restitution_lower < 0.97 < final.wall_restitution_upper
+    assert final.wall_restitution_upper - final.wall_restitution_lower < 0.03
+    assert final.restitution_lower < 0.89 < final.restitution_upper
+    assert half_width(final) < 0.7 * half_width(without)
+    assert final.tension < 2.5
+    assert not final.quality & Quality.INCONSISTENT
+    *_, off = all_estimates(fitter(**{'cooling.rebounds': False}), by_stamp([*speeds, *seen]))
+    assert off == without
+
+
+def by_stamp(records):
+    return sorted(records, key=lambda one: one.stamp_ns)
+
+
+def test_it_does_not_matter_when_in_two_seconds_a_contact_comes_in():
+    speeds = simulated_cycle()
+    seen = list(rebounds(np.random.default_rng(1), 40, 1.0, 22.0))
+    late = sorted(
+        [*speeds, *seen],
+        key=lambda one: one.stamp_ns + int(1.9 * NS) * isinstance(one, Rebound),
+    )
+    found = all_estimates(fitter(), by_stamp([*speeds, *seen]))
+    assert all_estimates(fitter(), late) == found
+    *_, final = found
+    first, last = final.window_start * NS, (final.window_end - 2.0) * NS
+    assert final.rebounds == sum(first <= one.stamp_ns <= last for one in seen) < 40
+
+
+def test_rebounds_that_the_decay_cannot_go_with_are_flagged():
+    seen = rebounds(np.random.default_rng(1), 80, 2.0, 17.0, wall=0.8)
+    # With walls of 0.8 no gas could have cooled so slowly.
+    speeds = simulated_cycle(restitution=0.95, wall=1.0)
+    *_, final = all_estimates(fitter(), by_stamp([*speeds, *seen]))
+    assert final.tension > 3.0
+    assert final.quality & Quality.INCONSISTENT
+
+
+def test_contacts_of_all_cycles_count_in_the_mean():
+    rng = np.random.default_rng(3)
+    stage, finals = fitter(), []
+    for cycle in (1, 2, 3, 4):
+        start = 30.0 * cycle
+        records = [
+            *simulated_cycle(cycle, start),
+            *rebounds(rng, 30, start + 2.0, start + 17.0),
+        ]
+        found = all_estimates(stage, by_stamp(records))
+        finals += [one for one in found if one.status is CorStatus.FINAL]
+    assert [one.rebounds for one in finals] == [30] * 4
+    first, last = finals[0], finals[-1]
+    assert last.mean_wall_restitution == pytest.approx(
+        0.97, abs=3.0 * last.mean_wall_restitution_error
+    )
+    ratio = first.mean_wall_restitution_error / last.mean_wall_restitution_error
+    assert ratio == pytest.approx(2.0, abs=0.6)

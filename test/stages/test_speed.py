@@ -14,7 +14,9 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import (
     Frame,
     MotionMask,
+    PairCollision,
     Quality,
+    Rebound,
     SpeedEstimate,
     SpeedMethod,
     Tracks,
@@ -52,8 +54,11 @@ def run():
 
 def pushed(images, method='structure_function', **values):
     settings = with_values(PipelineSettings(), {'speed.method': method, **values}, 'test')
-    estimator = SpeedEstimator(settings, TRAY)
-    return [one for image in images for one in estimator.push(image)]
+    return list(measured(SpeedEstimator(settings, TRAY), images))
+
+
+def measured(estimator, images, kinds=(SpeedEstimate, MotionMask)):
+    return (one for image in images for one in estimator.push(image) if isinstance(one, kinds))
 
 
 def ratios(estimates, truth):
@@ -160,8 +165,22 @@ def test_frames_that_are_missing_do_not_change_the_speed(run, method):
 
 def test_time_that_goes_back_starts_all_afresh(run):
     estimator = SpeedEstimator(PipelineSettings(), TRAY)
-    passes = [[one for image in run[0] for one in estimator.push(image)] for _ in range(2)]
+    passes = [list(measured(estimator, run[0])) for _ in range(2)]
     assert passes[0] == passes[1]
+
+
+def test_contacts_are_found_where_beads_are_tracked_and_belong_to_their_cycle(run):
+    images, _ = run
+    kinds = (Rebound, PairCollision)
+    found = list(measured(SpeedEstimator(PipelineSettings(), TRAY), images, kinds))
+    start_ns = next(one.cycle_start_ns for one in images if one.cycle_start_ns is not None)
+    assert {type(one) for one in found} == set(kinds)
+    assert all(one.cycle == int(one.stamp_ns >= start_ns) for one in found)
+    off = {'cooling.rebounds': False, 'cooling.collisions': False}
+    settings = with_values(PipelineSettings(), off, 'test')
+    assert not list(measured(SpeedEstimator(settings, TRAY), images, kinds))
+    settings = with_values(PipelineSettings(), {'speed.method': 'structure_function'}, 'test')
+    assert not list(measured(SpeedEstimator(settings, TRAY), images, kinds))
 
 
 @pytest.mark.parametrize('averaging', ['none', 'running_mean', 'block_mean'])
@@ -343,7 +362,7 @@ def test_species_are_told_apart(number, tolerance, method):
             image=camera.picture(moment.positions, k),
         )
         for image in crop.push(frame):
-            found += estimator.push(image)
+            found += measured(estimator, [image])
         speeds = np.hypot(*moment.velocities[:, :2].T)
         truth.append((moment.truth.stamp_ns, speeds[first].mean(), speeds[~first].mean()))
     stamps, *true = np.array(truth).T

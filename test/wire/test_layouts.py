@@ -18,7 +18,9 @@ from nanorocks_ros.records import (
     CorRelation,
     CorStatus,
     GroundTruth,
+    PairCollision,
     Quality,
+    Rebound,
     SpeedEstimate,
     SpeedMethod,
     TrayState,
@@ -27,6 +29,18 @@ from nanorocks_ros.wire.layouts import from_array, layout, to_array
 
 DEFINITIONS = Path(__file__).parents[2] / 'msg_defs' / 'nanorocks_msgs' / 'msg'
 EPOCH = 1_700_000_000_000_000_000
+
+# Elements that are part of an array in the record.
+WHOLE = {
+    **{f'{one}_{axis}': one for one in ('place', 'separation') for axis in 'xy'},
+    **{f'{one}_{k}_{axis}': one for one in ('before', 'after') for k in '12' for axis in 'xy'},
+    **{f'{one}_{k}_error': f'{one}_errors' for one in ('before', 'after', 'radius') for k in '12'},
+    **{f'track_{k}': 'tracks' for k in '12'},
+    **{f'species_{k}': 'species' for k in '12'},
+    **{f'radius_{k}': 'radii' for k in '12'},
+    **{f'mass_{k}': 'masses' for k in '12'},
+    **{f'temperature_{k}': 'temperatures' for k in '12'},
+}
 
 RECORDS = (
     SpeedEstimate(
@@ -56,6 +70,43 @@ RECORDS = (
         quality=Quality.SATURATED,
         glare=0.1,
         color=1,
+    ),
+    Rebound(
+        stamp_ns=EPOCH + 3 * 10**9,
+        tray=1,
+        cycle=2,
+        track=7,
+        species=1,
+        wall=3,
+        incoming=4e-3,
+        incoming_error=1e-4,
+        outgoing=3.8e-3,
+        outgoing_error=1.1e-4,
+        tangential_incoming=-1e-3,
+        tangential_outgoing=-1.1e-3,
+        tangential_error=1e-4,
+        wall_velocity=2e-4,
+        wall_velocity_error=1e-5,
+        place=np.array([1e-3, 2e-3]),
+    ),
+    PairCollision(
+        stamp_ns=EPOCH + 4 * 10**9,
+        tray=3,
+        cycle=1,
+        tracks=np.array([3, 9], dtype=np.int32),
+        species=np.array([0, 1], dtype=np.int32),
+        radii=np.array([1e-3, 1.1e-3]),
+        radius_errors=np.array([0.0, 1e-5]),
+        masses=np.array([5e-6, 1e-5]),
+        before=np.array([[1e-3, 2e-3], [-3e-3, 4e-3]]),
+        after=np.array([[-5e-3, 6e-3], [7e-3, -8e-3]]),
+        before_errors=np.array([1e-5, 2e-5]),
+        after_errors=np.array([3e-5, 4e-5]),
+        separation=np.array([1.5e-3, 1.6e-3]),
+        separation_error=1e-5,
+        temperatures=np.array([9e-6, 8e-6]),
+        height=3e-3,
+        place=np.array([4e-3, 5e-3]),
     ),
     ClusterEstimate(stamp_ns=EPOCH + 1, tray=1, cycle=0, level_area=2e-6, correlation_length=8e-4),
     CorEstimate(
@@ -89,7 +140,10 @@ def test_a_record_comes_back_from_its_array_to_float32_rounding(record):
     for field in dataclasses.fields(record):
         before, after = getattr(record, field.name), getattr(back, field.name)
         assert type(after) is type(before)
-        if isinstance(before, float):
+        if isinstance(before, np.ndarray):
+            assert after.dtype == before.dtype
+            np.testing.assert_allclose(after, before, rtol=2**-23)
+        elif isinstance(before, float):
             assert after == pytest.approx(before, rel=2**-23, nan_ok=True)
         elif isinstance(before, Enum):
             assert after == before
@@ -116,7 +170,16 @@ def test_every_array_starts_with_time_and_cycle_and_holds_the_whole_record(recor
     assert names[:2] == ['time', 'cycle']
     expected = {field.name for field in dataclasses.fields(record)} - {'tray'}
     renamed = {'stamp_ns': 'time', 'cycle_start_ns': 'cycle_start'}
-    assert set(names) == {renamed.get(name, name) for name in expected}
+    parts = [
+        name if name in expected or name in renamed.values() else WHOLE[name] for name in names
+    ]
+    assert set(parts) == {renamed.get(name, name) for name in expected}
+    shapes = {
+        name: np.size(value)
+        for name in expected
+        if isinstance(value := getattr(record, name), np.ndarray)
+    }
+    assert {name: parts.count(name) for name in shapes} == shapes
 
 
 @pytest.mark.parametrize(
