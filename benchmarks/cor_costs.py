@@ -9,6 +9,7 @@ import numpy as np
 
 from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.contact_terms import ContactTerms
 from nanorocks_ros.physics.haff_fit import fit_haff
 from nanorocks_ros.simulation.ensemble import cooling_runs
 from nanorocks_ros.stages.readings import Decay, LibraryReading
@@ -66,9 +67,9 @@ def _fits() -> tuple[float, float]:
     )
     (speed,) = cooling_runs(settings, tray, _TIMES, [0]).mean_projected_speed
     decay = Decay(time=_TIMES, speed=speed, error=_ERROR * speed)
-    reading = LibraryReading(PipelineSettings(), tray)
+    reading, none = LibraryReading(PipelineSettings(), tray), ContactTerms.of(())
     return (
-        _cost(lambda: reading.read(decay, final=False), _REPEATS),
+        _cost(lambda: reading.read(decay, none, final=False), _REPEATS),
         _cost(lambda: fit_haff(_TIMES, speed, _ERROR * speed, tray.count), _REPEATS),
     )
 
