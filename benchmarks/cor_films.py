@@ -37,8 +37,8 @@ from nanorocks_ros.study.tasks import Workers
 
 # Films of each: the first truth is what the goals are about.
 _FILMS = {
-    '0.89 / 0.97': [Film(pairs=0.89, walls=0.97, number=number) for number in range(9)],
-    'drawn': [Film(number=number) for number in range(12)],
+    '0.89 / 0.97': [Film(pairs=0.89, walls=0.97, number=number) for number in range(12)],
+    'drawn': [Film(number=number) for number in range(11)],
     '0.7 / 0.9': [Film(pairs=0.7, walls=0.9, number=0)],
     '0.8 / 0.97': [Film(pairs=0.8, walls=0.97, number=0)],
 }
