@@ -20,6 +20,7 @@ ALL = (
     'cor_recovery',
     'cor_films',
     'valley',
+    'species_decays',
     'closed_forms',
     'contacts',
     'engine',

@@ -366,6 +366,12 @@ class CorEstimate:
         Standard deviations by which decay, rebounds and collisions disagree.
     mean_wall_restitution, mean_wall_restitution_error : float
         As `mean_restitution`.
+    first_species_initial_speed, first_species_initial_speed_error : float, [m/s]
+        As `initial_speed`, of the first of `Tray.species` by itself; of a mixture whose species
+        were told apart, once the cycle is over.
+    first_species_haff_time, first_species_haff_time_error : float, [s]
+    second_species_initial_speed, second_species_initial_speed_error : float, [m/s]
+    second_species_haff_time, second_species_haff_time_error : float, [s]
     """
 
     stamp_ns: int
@@ -398,6 +404,14 @@ class CorEstimate:
     tension: float = UNKNOWN
     mean_wall_restitution: float = UNKNOWN
     mean_wall_restitution_error: float = UNKNOWN
+    first_species_initial_speed: float = UNKNOWN
+    first_species_initial_speed_error: float = UNKNOWN
+    first_species_haff_time: float = UNKNOWN
+    first_species_haff_time_error: float = UNKNOWN
+    second_species_initial_speed: float = UNKNOWN
+    second_species_initial_speed_error: float = UNKNOWN
+    second_species_haff_time: float = UNKNOWN
+    second_species_haff_time_error: float = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -635,3 +649,87 @@ class PairCollision:
 
     def __post_init__(self) -> None:
         _freeze_arrays(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Merge:
+    """Two beads that stick to each other from some instant on.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Since when they stay beside each other.
+    known_ns : int
+        The picture that made it improbable enough that they are free.
+    tray, cycle : int
+    tracks : ndarray of int32, (2,)
+    joins : bool
+        Whether it made one body of two; False for two beads of one body.
+    """
+
+    stamp_ns: int
+    known_ns: int
+    tray: int
+    cycle: int
+    tracks: NDArray[np.int32]
+    joins: bool
+
+    def __post_init__(self) -> None:
+        _freeze_arrays(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodyEstimate:
+    """Free bodies of one tray: single beads, and clusters of beads that stick together.
+
+    Errors hold beads that are not seen and pairs of which it is not known yet.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        The instant that is counted, some time before it was published.
+    tray, cycle : int
+    beads : int
+        In the tray.
+    followed : int
+        Of these, known at that instant; numbers of bodies are scaled to all beads.
+    bodies, bodies_error : float
+    mean_size, mean_size_error : float
+        Beads of a body: mean over the bodies.
+    weighted_size, weighted_size_error : float
+        Beads of the body of a bead: mean over the beads.
+    clustered_share, clustered_share_error : float, 0 to 1
+        Of the beads, in bodies of two and more.
+    clusters, clusters_error : float
+        Bodies of two and more beads.
+    sizes : ndarray (5,)
+        Bodies of 1, 2, 3, 4 to 6, and 7 or more beads.
+    first_merge_ns : int or None
+        When the first two beads of the cycle began to stick together; None before.
+    """
+
+    stamp_ns: int
+    tray: int
+    cycle: int
+    beads: int
+    followed: int
+    bodies: float
+    bodies_error: float
+    mean_size: float
+    mean_size_error: float
+    weighted_size: float
+    weighted_size_error: float
+    clustered_share: float
+    clustered_share_error: float
+    clusters: float
+    clusters_error: float
+    sizes: NDArray[np.float64]
+    first_merge_ns: int | None = None
+
+    def __post_init__(self) -> None:
+        _freeze_arrays(self)
+
+    @property
+    def merged(self) -> bool:
+        """Whether any beads stick together in this cycle."""
+        return self.first_merge_ns is not None

@@ -184,6 +184,26 @@ class ClusterSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class BodySettings:
+    """From tracks to the beads that stick together."""
+
+    interval: float = _setting(0.2, 'time between two counts of bodies', 's', low=0.0, high=60.0)
+    delay: float = _setting(
+        1.0,
+        'bodies are counted so long afterwards: whether beads stick takes a while to see',
+        's',
+        low=0.0,
+        high=60.0,
+    )
+    false_alarms: float = _setting(
+        0.01,
+        'share of cycles without sticking in which beads are taken to stick together',
+        low=1e-6,
+        high=0.5,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CoolingSettings:
     """From speeds to the coefficient of restitution."""
 
@@ -214,6 +234,11 @@ class CoolingSettings:
         'this share of the beads',
         low=0.0,
         high=10.0,
+    )
+    until_merge: bool = _setting(
+        True,
+        'end with the first merge of the cycle: beads that stick take more energy than those that '
+        'bounce',
     )
     rebounds: bool = _setting(
         True, 'use rebounds from the side walls, seen in the tracks, besides the decay'
@@ -301,6 +326,7 @@ class PipelineSettings:
     speed: SpeedSettings = field(default_factory=SpeedSettings)
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
     clusters: ClusterSettings = field(default_factory=ClusterSettings)
+    bodies: BodySettings = field(default_factory=BodySettings)
     cooling: CoolingSettings = field(default_factory=CoolingSettings)
     prior: PriorSettings = field(default_factory=PriorSettings)
 

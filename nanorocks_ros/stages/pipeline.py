@@ -8,9 +8,11 @@ from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.records import (
     Autocorrelation,
+    BodyEstimate,
     ClusterEstimate,
     CorEstimate,
     Frame,
+    Merge,
     MotionMask,
     Notice,
     PairCollision,
@@ -38,6 +40,8 @@ Result = (
     | Tracks
     | Rebound
     | PairCollision
+    | BodyEstimate
+    | Merge
     | ClusterEstimate
     | Autocorrelation
     | CorEstimate
@@ -76,7 +80,7 @@ class TrayStages:
         found: list[Result] = []
         for record in self.speed.push(image):
             found.append(record)
-            if isinstance(record, SpeedEstimate | Rebound | PairCollision):
+            if isinstance(record, SpeedEstimate | Rebound | PairCollision | Merge):
                 found += self.cooling.push(record)
         found += self.clusters.push(image)
         return tuple(found)

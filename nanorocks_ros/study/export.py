@@ -109,6 +109,11 @@ def _cycle_as_json(cor: CorEstimate, start: float) -> dict[str, Any]:
         'window_start': _known(cor.window_start),
         'window_end': _known(cor.window_end),
         'cooling_start': _known(cor.cooling_start),
+        **{
+            name: _known(getattr(cor, name))
+            for name in (field.name for field in layout(CorEstimate).fields)
+            if '_species_' in name
+        },
         'relation': cor.relation.name.lower(),
         'status': cor.status.name.lower(),
         'reduced_chi_square': _known(cor.reduced_chi_square),
@@ -183,6 +188,8 @@ def _write_tables(analysis: Analysis, results: TrayResults, folder: Path, number
         'cor': results.cors,
         'rebound': results.rebounds,
         'collision': results.collisions,
+        'bodies': results.bodies,
+        'merge': results.merges,
     }
     for name, records in tables.items():
         if not records:
@@ -215,6 +222,8 @@ def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> No
             (topics.COR, results.cors),
             (topics.REBOUND, results.rebounds),
             (topics.COLLISION, results.collisions),
+            (topics.BODIES, results.bodies),
+            (topics.MERGE, results.merges),
         ):
             name = topic.absolute(number)
             table[name] = offered(topic)
