@@ -69,7 +69,7 @@ class _From:
     name : str
     true_speeds, tray_known, walls_known : bool
     contacts : str
-        Those of the 'window', 'all' since the shaking event, or 'none'.
+        Those of the 'window', 'all' since the shaking was over, or 'none'.
     """
 
     name: str
@@ -84,8 +84,8 @@ _ROWS = (
     _From(name='decay'),
     _From(name='decay, walls known', walls_known=True),
     _From(name='decay, walls and tray known', walls_known=True, tray_known=True),
-    _From(name='all', contacts='window'),
-    _From(name='all, contacts since the shake', contacts='all'),
+    _From(name='all, contacts of the window', contacts='window'),
+    _From(name='all', contacts='all'),
 )
 
 
