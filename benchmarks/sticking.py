@@ -1,7 +1,7 @@
 """Bodies, sizes, first merges and sticking speeds from tracks, against the truth.
 
-True places at 30 pictures a second with errors like those of tracking, 58 s after a shaking
-event at 10 mm/s.
+First true places at 30 pictures a second with errors like those of tracking, 58 s after a
+shaking event at 10 mm/s; then tracks of films with all effects of the camera.
 """
 
 from __future__ import annotations
@@ -11,9 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.contacts import tracks_of
+from benchmarks.contacts import filmed_tracks, tracks_of
 from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import Tray, load_trays
+from nanorocks_ros.inference.sticking import StickingCycle, sticking_cycle, sticking_estimate
+from nanorocks_ros.physics.sticking import slow_contacts
 from nanorocks_ros.records import BodyEstimate, Merge, Tracks
 from nanorocks_ros.simulation.shaking import ShakenTray
 from nanorocks_ros.stages.bodies.count import BodyCounter
@@ -24,8 +26,11 @@ _SPEED = 0.010
 _TRAYS = (1, 3, 5)
 _STICKING = (1e-3, 3e-3, 5e-3, 10.4e-3)
 _CYCLES = 6
-_CONTROLS = 5
+_CONTROLS = 7
 _CONTROL_TRUTHS = [(pairs, walls) for pairs in (0.5, 0.7, 0.89, 0.95) for walls in (0.9, 0.97)]
+_FILM_SECONDS = 26.0
+_FILM_STICKING = (3e-3,)
+_FILM_SEED = 9
 _NS = 1e9
 
 
@@ -61,25 +66,29 @@ class Course:
         return min((one.stamp_ns / _NS for one in self.merges), default=np.nan)
 
 
-def course(
-    tray: Tray, pictures: Iterable[Tracks], gas: ShakenTray, settings: PipelineSettings
-) -> Course:
-    """Count the bodies of a cycle, picture by picture, and what they truly are."""
-    counter = BodyCounter(settings, tray)
+def course(tray: Tray, pictures: Iterable[tuple[Tracks, np.ndarray, float]]) -> Course:
+    """Count the bodies of a cycle.
+
+    Parameters
+    ----------
+    tray : Tray
+    pictures : iterable of (Tracks, bodies, mean projected speed)
+        With the truth: for each bead the number of its body; [m/s].
+    """
+    counter = BodyCounter(PipelineSettings(), tray)
     found: list[BodyEstimate | Merge] = []
     rows = []
-    for tracks in pictures:
+    for tracks, bodies, speed in pictures:
         found += counter.push(tracks, 1)
-        sizes = np.unique(gas.bodies, return_counts=True)[1]
-        speed = np.hypot(*tracks.velocities.T).mean()
+        sizes = np.unique(bodies, return_counts=True)[1]
         rows.append((tracks.stamp_ns / _NS, sizes.size, (sizes**2).sum() / sizes.sum(), speed))
     found += counter.flush()
-    times, bodies, sizes, speeds = np.array(rows).T
+    times, numbers, sizes, speeds = np.array(rows).T
     return Course(
         counts=[one for one in found if isinstance(one, BodyEstimate)],
         merges=[one for one in found if isinstance(one, Merge)],
         times=times,
-        bodies=bodies,
+        bodies=numbers,
         weighted_size=sizes,
         speeds=speeds,
     )
@@ -95,7 +104,9 @@ def simulated(
     gas = ShakenTray(settings, tray, run)
     rng = np.random.default_rng([seed, run])
     pictures = tracks_of(gas, tray, rng, round(seconds * _RATE))
-    return course(tray, pictures, gas, PipelineSettings())
+    return course(
+        tray, ((one, gas.bodies, np.hypot(*one.velocities.T).mean()) for one in pictures)
+    )
 
 
 def _report_controls() -> None:
@@ -161,6 +172,87 @@ def _report_sizes(courses: dict[tuple[int, float], list[Course]]) -> None:
         print(f'| {number}, {1e3 * speed:g} mm/s | {size_row(cycles)} |', flush=True)
 
 
+def _cycle(one: Course, beads: int, merges: list[Merge]) -> StickingCycle:
+    stamps = np.rint(one.times[1:] * _NS).astype(np.int64)
+    return sticking_cycle(beads, merges, stamps, one.speeds[1:], 0)
+
+
+def _true_merges(one: Course) -> list[Merge]:
+    """As if all had been found."""
+    fallen = -np.diff(one.bodies, prepend=one.counts[0].beads)
+    stamps = np.rint(np.repeat(one.times, fallen.astype(np.int64)) * _NS).astype(np.int64)
+    fields = {'tray': 0, 'cycle': 1, 'tracks': np.zeros(2, dtype=np.int32), 'joins': True}
+    return [Merge(stamp_ns=int(at), known_ns=int(at), **fields) for at in stamps]
+
+
+def threshold_row(number: int, speed: float, cycles: list[Course], measure: str) -> str:
+    """Cells of the table of sticking speeds."""
+    tray = load_trays()[number]
+    contacts = slow_contacts(tray)
+    given = [_cycle(one, tray.count, one.merges) for one in cycles]
+    true = [_cycle(one, tray.count, _true_merges(one)) for one in cycles]
+    each = [sticking_estimate([one], contacts, tray.count, measure=measure) for one in given]
+    ratios = np.array([one.sticking_speed for one in each]) / speed
+    covered = sum(one.lower <= speed <= one.upper for one in each)
+    cells = [
+        f'{np.nanmean(ratios):.2f} ({np.nanstd(ratios):.2f}) of {np.isfinite(ratios).sum()}',
+        f'{covered}/{len(each)}',
+    ]
+    for known in (given, true):
+        found = sticking_estimate(known, contacts, tray.count, measure=measure)
+        cells.append(
+            f'{found.sticking_speed / speed:.2f} '
+            f'[{found.lower / speed:.2f}, {found.upper / speed:.2f}]'
+        )
+    return ' | '.join(cells)
+
+
+def _report_thresholds(
+    courses: dict[tuple[int, float], list[Course]], measure: str = 'normal'
+) -> None:
+    print('\nSticking speed, along the line of centres, over the truth, by true speeds\n')
+    print(
+        '| tray, sticking speed | of one cycle: mean (sd) of those measured | '
+        '95 % intervals that hold the truth | of all cycles [95 %] | from the true merges |'
+    )
+    print('| --- |' + ' --- |' * 4)
+    for (number, speed), cycles in courses.items():
+        row = threshold_row(number, speed, cycles, measure)
+        print(f'| {number}, {1e3 * speed:g} mm/s | {row} |', flush=True)
+
+
+def _report_films() -> None:
+    print(f'\nTracks of films with all effects, {_FILM_SECONDS:g} s, one cycle each\n')
+    for number, one in _filmed(0.0, _FILM_SEED).items():
+        print(f'Tray {number}, nothing sticks: {len(one.merges)} false merges\n')
+    courses = {
+        (number, speed): [one]
+        for speed in _FILM_STICKING
+        for number, one in _filmed(speed, _FILM_SEED).items()
+    }
+    print(f'| tray, sticking speed | {SIZE_HEADER}')
+    print('| --- |' + ' --- |' * 7)
+    for (number, speed), cycles in courses.items():
+        print(f'| {number}, {1e3 * speed:g} mm/s | {size_row(cycles)} |', flush=True)
+    _report_thresholds(courses)
+
+
+def _filmed(speed: float, seed: int) -> dict[int, Course]:
+    settings = SimulationSettings(
+        restitution=0.89,
+        wall_restitution=0.97,
+        seed=seed,
+        mean_speed=_SPEED,
+        first_shake=0.0,
+        frame_rate=_RATE,
+        sticking_speed=speed,
+    )
+    pictures: dict[int, list[tuple[Tracks, np.ndarray, float]]] = {n: [] for n in _TRAYS}
+    for image, tracks, truth in filmed_tracks(_TRAYS, settings, _FILM_SECONDS):
+        pictures[image.tray].append((tracks, truth.bodies, truth.projected_speeds.mean()))
+    return {number: course(load_trays()[number], seen) for number, seen in pictures.items()}
+
+
 def report() -> None:
     """Print the tables."""
     courses = {
@@ -169,4 +261,6 @@ def report() -> None:
         for speed in _STICKING
     }
     _report_sizes(courses)
+    _report_thresholds(courses)
     _report_controls()
+    _report_films()

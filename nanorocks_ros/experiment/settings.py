@@ -204,6 +204,22 @@ class BodySettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class StickingSettings:
+    """From merges to the speed below which beads stick."""
+
+    measure: str = _setting(
+        'normal',
+        'which relative speed of two beads decides whether they stick: along the line of centres, '
+        'or all of it',
+        choices=('normal', 'total'),
+    )
+    rate_error: float = _setting(
+        0.1, 'relative standard error of the rates at which bodies meet', low=0.0, high=1.0
+    )
+    probability: float = _setting(0.95, 'probability of the interval', low=0.5, high=0.999)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CoolingSettings:
     """From speeds to the coefficient of restitution."""
 
@@ -327,6 +343,7 @@ class PipelineSettings:
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
     clusters: ClusterSettings = field(default_factory=ClusterSettings)
     bodies: BodySettings = field(default_factory=BodySettings)
+    sticking: StickingSettings = field(default_factory=StickingSettings)
     cooling: CoolingSettings = field(default_factory=CoolingSettings)
     prior: PriorSettings = field(default_factory=PriorSettings)
 

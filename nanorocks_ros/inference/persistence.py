@@ -23,10 +23,11 @@ if TYPE_CHECKING:
 # time T when |u_i| T < 2 x: 16 x^2 / (2 pi W^2), W being the way sigma T of a component.
 _BOX = 8.0 / math.pi
 # Slow pairs are more frequent than a Gaussian says: inelastic neighbours move alike, and mixtures
-# and starts with even speeds are peaked. Measured on gases without sticking.
+# and starts with even speeds are peaked. Together with the next number it is not below what gases
+# without sticking show, restitutions 0.5 to 0.95 (`python -m benchmarks sticking`).
 _PEAKED = 7.0
 # Collisions that part two neighbours, with each other and with others, per encounter of a bead
-# and relative way: 2.1 in simulated trays 3; less is on the safe side.
+# and relative way: 2 in simulated trays 3, 1 in trays 5.
 _DISTURBED = 1.3
 # Way of a bead between two shaking events, [m]: 58 s after a shake at 10 mm/s it was 0.03 to 0.12.
 _CYCLE = 0.1

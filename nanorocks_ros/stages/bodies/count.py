@@ -167,7 +167,11 @@ class BodyCounter:
         """
         own = self._energies[tracks.species]
         square = 0.5 * np.sum(np.square(tracks.velocities), axis=1)
-        ratio = (square - np.square(tracks.velocity_errors)) * _masses(tracks) / own
+        ratio = (
+            (square - np.square(tracks.velocity_errors))
+            * _masses(tracks)
+            / np.where(own > 0.0, own, np.inf)
+        )
         known = tracks.seen & np.isfinite(ratio)
         everybody = own / _masses(tracks)
         if np.count_nonzero(known) <= _NEIGHBOURS:
@@ -267,7 +271,7 @@ class BodyCounter:
         """
         odds = self._odds()
         pairs, chances = self._pairs.pending()
-        found = {}
+        found: dict[tuple[int, int], float] = {}
         for (first, second), one in zip(pairs.tolist(), chances.tolist(), strict=True):
             if first in body and second in body and body[first] != body[second]:
                 key = min(body[first], body[second]), max(body[first], body[second])

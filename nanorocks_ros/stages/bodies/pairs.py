@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,6 +28,8 @@ _SMOOTH, _FOLLOW = 0.1, 2.0
 _YOUNGEST = 0.3
 # Two of which one is not seen are remembered so long, [s].
 _HIDDEN = 1.5
+# And those of a body, so long, [s].
+_FORGOTTEN = 60.0
 _SHIFT = 32
 
 
@@ -121,9 +124,7 @@ class Pairs:
         added = _new_rows(time, beads, keys[fresh], first[fresh], second[fresh])
         rows = np.concatenate([kept, added])
         self._rows = rows[np.argsort(rows['key'], kind='stable')]
-        return self._bonds(time, largest), [
-            _ids(one) for one in rows['key'][self._fall(time, rows)]
-        ]
+        return self._bonds(time, largest), [_ids(one) for one in rows['key'][self._fall(time)]]
 
     def pending(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Pairs that may yet turn out to be bodies, (n, 2), and the chance that free beads do so.
@@ -144,7 +145,8 @@ class Pairs:
         both = np.isin(rows['key'] >> _SHIFT, beads.ids)
         both &= np.isin(rows['key'] & ((1 << _SHIFT) - 1), beads.ids)
         hidden = ~both & (time - rows['last'] < _HIDDEN)
-        return np.isin(rows['key'], keys) | hidden | rows['bonded']
+        body = rows['bonded'] & (time - rows['last'] < _FORGOTTEN)
+        return np.asarray(np.isin(rows['key'], keys) | hidden | body)
 
     def _follow_seen(self, time: float, beads: Beads) -> None:
         """Separations of the pairs of which both are seen."""
@@ -204,13 +206,13 @@ class Pairs:
             for one in rows[found]
         ]
 
-    def _fall(self, time: float, rows: NDArray[np.void]) -> NDArray[np.bool_]:
+    def _fall(self, time: float) -> NDArray[np.bool_]:
         """Bodies whose beads, both seen, are apart for too long; they are free pairs again."""
         rows = self._rows
         fall = rows['bonded'] & (rows['last'] - rows['stayed'] > _BROKEN_TIME)
         rows['bonded'] &= ~fall
         _restart(rows, fall, rows['smooth'], time)
-        return fall
+        return np.asarray(fall)
 
 
 _ROW = np.dtype(
@@ -239,17 +241,24 @@ def touching(
     Centres are no further apart in the picture than the radii let them be, and no nearer than
     the height of the tray lets beads be that lie over each other.
     """
-    apart = beads.places[:, None] - beads.places
-    square = np.einsum('ijk,ijk->ij', apart, apart)
-    radii = beads.radii[:, None] + beads.radii
     errors = np.hypot(beads.radius_errors, _OUTLINE * beads.radii * (beads.radius_errors > 0.0))
-    error = np.sqrt(np.add.outer(errors**2 + beads.errors**2, errors**2 + beads.errors**2))
-    most = _REACH * radii + _REACH_ERRORS * error
+    variances = errors**2 + beads.errors**2
+    if beads.ids.size < 2:
+        nothing = np.empty(0, dtype=np.int64)
+        return nothing, nothing, nothing
+    furthest = 2.0 * (_REACH * beads.radii.max() + _REACH_ERRORS * np.sqrt(variances.max()))
+    found = cKDTree(beads.places).query_pairs(furthest, output_type='ndarray')
+    first, second = found.min(axis=1), found.max(axis=1)
+    distance = np.hypot(*(beads.places[second] - beads.places[first]).T)
+    radii = beads.radii[first] + beads.radii[second]
+    slack = _REACH_ERRORS * np.sqrt(variances[first] + variances[second])
     above = np.maximum(beads.height - radii, 0.0)
-    least = np.sqrt(np.maximum(radii**2 - above**2, 0.0)) / _REACH - _REACH_ERRORS * error
-    near = (square < most**2) & (square > np.maximum(least, 0.0) ** 2)
-    first, second = np.nonzero(np.triu(near, 1))
-    return (beads.ids[first] << _SHIFT) | beads.ids[second], first, second
+    least = np.sqrt(np.maximum(radii**2 - above**2, 0.0)) / _REACH - slack
+    near = (distance < _REACH * radii + slack) & (distance > least)
+    first, second = first[near], second[near]
+    keys = (beads.ids[first] << _SHIFT) | beads.ids[second]
+    order = np.argsort(keys)
+    return keys[order], first[order], second[order]
 
 
 def _new_rows(

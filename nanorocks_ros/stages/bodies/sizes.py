@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -64,15 +65,13 @@ def size_fields(
     values = {
         'bodies': scale * sizes.size,
         'mean_size': known / sizes.size,
-        'weighted_size': float(np.sum(sizes**2)) / known,
+        # Beads counted twice make bodies too large; those that are missing, none larger.
+        'weighted_size': float(np.sum(sizes**2)) / known * min(scale, 1.0),
         'clustered_share': 1.0 - share_single,
         'clusters': scale * np.count_nonzero(sizes > 1),
     }
     edges = (*(0, *_SIZE_CLASSES), np.inf)
-    counts = [
-        np.count_nonzero((sizes > low) & (sizes <= high))
-        for low, high in zip(edges, edges[1:], strict=False)
-    ]
+    counts = [np.count_nonzero((sizes > low) & (sizes <= high)) for low, high in pairwise(edges)]
     errors = _errors(values, sizes.size, known, beads, merges)
     return values | errors | {'sizes': scale * np.array(counts, dtype=np.float64)}
 
