@@ -111,16 +111,23 @@ class HaffFitter:
             return found
         age = (speed.stamp_ns - speed.cycle_start_ns) / NS
         if not self._samples and self._driven(speed):
+            # A tray that swings drives the gas, but does nothing to a single contact.
+            self._count_contacts(speed)
             return found
         first = self._samples[0] if self._samples else speed
         if speed.stamp_ns - self._start_ns(first) > self._settings.duration * NS:
             return (*found, *self.flush())
         if age > 0.0 and age >= self._settings.delay and _usable(speed):
             self._samples.append(speed)
-            self._contacts.count(self._samples[0].stamp_ns, speed.stamp_ns)
+            self._count_contacts(speed)
             if self._update_due(speed.stamp_ns):
                 found = (*found, *self._estimate(CorStatus.COOLING))
         return found
+
+    def _count_contacts(self, speed: SpeedEstimate) -> None:
+        """Count those since the shaking was over, up to shortly before a speed."""
+        shake_ns = speed.cycle_start_ns or 0
+        self._contacts.count(shake_ns + round(self._settings.delay * NS), speed.stamp_ns)
 
     def _driven(self, speed: SpeedEstimate) -> bool:
         """Whether the tray still swings too fast for the gas in it to cool freely."""

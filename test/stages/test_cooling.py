@@ -313,8 +313,21 @@ def test_it_does_not_matter_when_in_two_seconds_a_contact_comes_in():
     found = all_estimates(fitter(), by_stamp([*speeds, *seen]))
     assert all_estimates(fitter(), late) == found
     *_, final = found
-    first, last = final.window_start * NS, (final.window_end - 2.0) * NS
+    first, last = 1.75 * NS, (final.window_end - 2.0) * NS
     assert final.rebounds == sum(first <= one.stamp_ns <= last for one in seen) < 40
+
+
+def test_contacts_in_a_tray_that_swings_count_though_speeds_do_not():
+    swinging = [
+        replace(one, tray_speed=1.0 if one.stamp_ns < 8.0 * NS else 0.0)
+        for one in simulated_cycle()
+    ]
+    seen = list(rebounds(np.random.default_rng(1), 60, 0.5, 20.0))
+    *_, final = all_estimates(fitter(), by_stamp([*swinging, *seen]))
+    assert final.window_start == pytest.approx(8.0, abs=0.11)
+    last = (final.window_end - 2.0) * NS
+    expected = sum(1.75 * NS <= one.stamp_ns <= last for one in seen)
+    assert final.rebounds == expected > sum(one.stamp_ns > 8.0 * NS for one in seen)
 
 
 def test_rebounds_that_the_decay_cannot_go_with_are_flagged():
