@@ -107,16 +107,19 @@ def test_a_merge_that_became_known_too_late_changes_nothing_said_of_before():
 
 def test_the_sticking_speed_is_found_and_cycles_together_tell_more():
     stage = StickingMeter(PipelineSettings(), TRAY)
+    each = []
     for cycle in range(1, 13):
         start = 60.0 * (cycle - 1)
         for record in cooling(cycle, start):
             stage.push(record)
-        last = stage.of_cycle(cycle, ns(start + 39.9))
+        each.append(stage.of_cycle(cycle, ns(start + 39.9)))
         together = stage.of_all(cycle, ns(start + 39.9))
         assert (together is None) == (cycle == 1)
-    assert last.lower < STICKING < last.upper
+    # 95 % intervals, 12 of them.
+    assert sum(one.lower < STICKING < one.upper for one in each) >= 10
     assert together.lower < STICKING < together.upper
-    assert together.upper - together.lower < 0.6 * (last.upper - last.lower)
+    widths = [one.upper - one.lower for one in each]
+    assert together.upper - together.lower < 0.7 * np.mean(widths)
 
 
 def test_without_a_merge_there_is_an_upper_limit():
@@ -140,14 +143,6 @@ def test_where_nobody_counts_bodies_nothing_is_said():
     stage = meter([one for one in cooling() if isinstance(one, SpeedEstimate)])
     assert stage.of_cycle(1, ns(39.0)) is None
     assert stage.bodies(1, ns(39.0)) is None
-
-
-def test_a_tray_too_crowded_for_the_theory_has_an_onset_but_no_sticking_speed():
-    crowded = StickingMeter(PipelineSettings(), load_trays()[8])
-    for record in cooling():
-        crowded.push(record)
-    assert crowded.onset(1, ns(39.0)) is not None
-    assert crowded.of_cycle(1, ns(39.0)) is None
 
 
 def test_time_that_goes_back_starts_afresh():
