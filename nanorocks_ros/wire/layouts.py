@@ -21,6 +21,7 @@ from nanorocks_ros.records import (
     PairCollision,
     Quality,
     Rebound,
+    SizeStatus,
     SpeedEstimate,
     SpeedMethod,
     TrayState,
@@ -57,6 +58,7 @@ _ENUMERATIONS = {
     'quality': Quality,
     'status': CorStatus,
     'relation': CorRelation,
+    'size_status': SizeStatus,
 }
 _COUNTS = frozenset(
     ('cycle', 'samples', 'bodies', 'color', 'rebounds', 'collisions', 'track', 'species', 'wall')
