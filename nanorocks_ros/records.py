@@ -43,6 +43,16 @@ class CorRelation(IntEnum):
     LIBRARY = 2
 
 
+class SizeStatus(IntEnum):
+    """What an autocorrelation says of the cluster size (constants of ``ClusterEstimate.msg``)."""
+
+    MEASURED = 1
+    BEYOND = 2
+    NOTHING = 3
+    INSENSITIVE = 4
+    UNCALIBRATED = 5
+
+
 class Quality(IntFlag):
     """What is wrong with the picture of a tray since the last one, or with a speed from it.
 
@@ -291,9 +301,21 @@ class ClusterEstimate:
     stamp_ns : int
     tray, cycle : int
     level_area : float, [m^2]
-        Area where the normalised autocorrelation exceeds the chosen level.
+        Area around zero lag where the normalised autocorrelation exceeds the chosen level; 0 for a
+        uniform image.
     correlation_length : float, [m]
         Radius of the disc of that area.
+    axes_ratio : float, >= 1
+        Longer over shorter axis of that area.
+    direction : float, [rad], -pi/2 to pi/2
+        From the columns to its longer axis, positive towards the rows (down in the picture).
+    breadth : float, >= 1
+        `level_area` over the area at 0.7; less dependent on the camera than either.
+    cluster_size, cluster_size_error : float, [beads]
+        Number of beads per body, averaged over the beads (weight-averaged): 1 when all are single.
+    cluster_size_lower, cluster_size_upper : float, [beads]
+        One standard error away; of a size that is beyond the calibration, the lower limit.
+    size_status : SizeStatus
     """
 
     stamp_ns: int
@@ -301,6 +323,14 @@ class ClusterEstimate:
     cycle: int
     level_area: float
     correlation_length: float
+    axes_ratio: float = UNKNOWN
+    direction: float = UNKNOWN
+    breadth: float = UNKNOWN
+    cluster_size: float = UNKNOWN
+    cluster_size_error: float = UNKNOWN
+    cluster_size_lower: float = UNKNOWN
+    cluster_size_upper: float = UNKNOWN
+    size_status: SizeStatus = SizeStatus.UNCALIBRATED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

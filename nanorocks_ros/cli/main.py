@@ -25,6 +25,7 @@ def build_parser() -> argparse.ArgumentParser:
         analyse,
         calibrate,
         calibrate_area,
+        cluster_curve,
         figure,
         library,
         look,
@@ -43,6 +44,7 @@ def build_parser() -> argparse.ArgumentParser:
     analyse.add_parser(commands)
     calibrate.add_parser(commands)
     calibrate_area.add_parser(commands)
+    cluster_curve.add_parser(commands)
     figure.add_parser(commands)
     library.add_parser(commands)
     look.add_parser(commands)

@@ -181,6 +181,11 @@ class ClusterSettings:
     level: float = _setting(
         0.5, 'level of the autocorrelation whose area is measured', low=0.05, high=0.95
     )
+    curve: str = _setting(
+        '',
+        'file that tells cluster sizes from level areas, made by `nanorocks cluster-curve`; '
+        'empty: the one for the tray that comes with the package',
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

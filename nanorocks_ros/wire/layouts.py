@@ -23,6 +23,7 @@ from nanorocks_ros.records import (
     PairCollision,
     Quality,
     Rebound,
+    SizeStatus,
     SpeedEstimate,
     SpeedMethod,
     TrayState,
@@ -63,6 +64,7 @@ _ENUMERATIONS = {
     'quality': Quality,
     'status': CorStatus,
     'relation': CorRelation,
+    'size_status': SizeStatus,
 }
 # By the type that a record declares.
 _WHOLE = {'int': int, 'bool': bool}
