@@ -53,6 +53,19 @@ class SizeStatus(IntEnum):
     UNCALIBRATED = 5
 
 
+class StickingStatus(IntEnum):
+    """What is known of a sticking speed (constants of ``ClusterEstimate.msg``).
+
+    The message gives each its name with ``STICKING_`` before it.
+    """
+
+    UNKNOWN = 0
+    MEASURED = 1
+    NO_MERGE = 2
+    STUCK_FROM_THE_START = 3
+    NO_UPPER_LIMIT = 4
+
+
 class Quality(IntFlag):
     """What is wrong with the picture of a tray since the last one, or with a speed from it.
 
@@ -294,7 +307,7 @@ class SpeedEstimate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterEstimate:
-    """Width of the autocorrelation of one tray image, and what it says of clusters.
+    """Width of the autocorrelation of one tray image, and clusters by that and by tracks.
 
     Parameters
     ----------
@@ -316,6 +329,21 @@ class ClusterEstimate:
     cluster_size_lower, cluster_size_upper : float, [beads]
         One standard error away; of a size that is beyond the calibration, the lower limit.
     size_status : SizeStatus
+    bodies, bodies_error : float
+        Free bodies by tracks: single beads and clusters; unknown where beads are not tracked.
+    mean_size, weighted_size, weighted_size_error : float, [beads]
+        By tracks: beads of a body, mean over the bodies and over the beads.
+    clustered_share : float, 0 to 1
+        Of the beads, in bodies of two and more, by tracks.
+    combined_size, combined_size_error : float, [beads]
+        Weight-averaged size by the autocorrelation and by tracks together.
+    onset : float, [s]
+        First merge of the cycle, since the shaking event; unknown before.
+    sticking_status : StickingStatus
+    sticking_speed, sticking_speed_lower, sticking_speed_upper : float, [m/s]
+        Beads that meet more slowly stick: by the merges of this cycle so far, with an interval.
+    mean_sticking_speed, mean_sticking_speed_lower, mean_sticking_speed_upper : float, [m/s]
+        By all cycles before this one.
     """
 
     stamp_ns: int
@@ -331,6 +359,22 @@ class ClusterEstimate:
     cluster_size_lower: float = UNKNOWN
     cluster_size_upper: float = UNKNOWN
     size_status: SizeStatus = SizeStatus.UNCALIBRATED
+    bodies: float = UNKNOWN
+    bodies_error: float = UNKNOWN
+    mean_size: float = UNKNOWN
+    weighted_size: float = UNKNOWN
+    weighted_size_error: float = UNKNOWN
+    clustered_share: float = UNKNOWN
+    combined_size: float = UNKNOWN
+    combined_size_error: float = UNKNOWN
+    onset: float = UNKNOWN
+    sticking_status: StickingStatus = StickingStatus.UNKNOWN
+    sticking_speed: float = UNKNOWN
+    sticking_speed_lower: float = UNKNOWN
+    sticking_speed_upper: float = UNKNOWN
+    mean_sticking_speed: float = UNKNOWN
+    mean_sticking_speed_lower: float = UNKNOWN
+    mean_sticking_speed_upper: float = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

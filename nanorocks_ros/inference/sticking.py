@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +14,7 @@ from scipy.integrate import trapezoid
 from scipy.special import logsumexp
 
 from nanorocks_ros.errors import FitError
+from nanorocks_ros.records import StickingStatus
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,15 +29,6 @@ _NS = 1e9
 _NODES = 600
 # Log of a factor of all rates, in standard deviations: nodes and weights of its normal law.
 _NORMAL_NODES, _NORMAL_WEIGHTS = np.polynomial.hermite_e.hermegauss(9)
-
-
-class StickingStatus(IntEnum):
-    """What is known of a sticking speed."""
-
-    MEASURED = 1
-    NO_MERGE = 2
-    STUCK_FROM_THE_START = 3
-    NO_UPPER_LIMIT = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

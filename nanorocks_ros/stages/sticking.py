@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 _FEWEST_SPEEDS = 4
 # A merge is used in what is said of an instant when it was known that much later at the latest.
 _KNOWN_NS = 1_000_000_000
+# Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
+_ROUNDING_NS = 1_000_000
 
 
 @dataclass(slots=True)
@@ -92,7 +94,8 @@ class StickingMeter:
     def bodies(self, cycle: int, stamp_ns: int) -> BodyEstimate | None:
         """The last count of bodies up to an instant of a cycle."""
         own = self._cycles.get(cycle)
-        found = [one for one in own.bodies if one.stamp_ns <= stamp_ns] if own else []
+        last_ns = stamp_ns + _ROUNDING_NS
+        found = [one for one in own.bodies if one.stamp_ns <= last_ns] if own else []
         return max(found, key=lambda one: one.stamp_ns, default=None)
 
     def onset(self, cycle: int, stamp_ns: int) -> float | None:
@@ -126,10 +129,11 @@ class StickingMeter:
         return self._all[1]
 
     def _known(self, cycle: _Cycle, stamp_ns: int) -> list[Merge]:
+        last_ns = stamp_ns + _ROUNDING_NS
         return [
             one
             for one in cycle.merges
-            if one.stamp_ns <= stamp_ns and one.known_ns <= stamp_ns + _KNOWN_NS
+            if one.stamp_ns <= last_ns and one.known_ns <= last_ns + _KNOWN_NS
         ]
 
     def _seen(self, cycle: int, stamp_ns: int) -> StickingCycle | None:
@@ -137,7 +141,7 @@ class StickingMeter:
         # Without counts of bodies nobody looked for merges.
         if own is None or own.start_ns is None or not own.bodies:
             return None
-        used = int(np.searchsorted(own.stamps_ns, stamp_ns, side='right'))
+        used = int(np.searchsorted(own.stamps_ns, stamp_ns + _ROUNDING_NS))
         if used < _FEWEST_SPEEDS:
             return None
         return sticking_cycle(

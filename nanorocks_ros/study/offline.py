@@ -176,8 +176,8 @@ def analyse(
     if result.refused:
         result.notices.append(f'{bag.where}: {result.refused} frames could not be used')
         result.complete = False
-    for final in pipeline.flush():
-        result.trays[final.tray].cors.append(final)
+    for record in pipeline.flush():
+        getattr(result.trays[record.tray], _LISTS[type(record)]).append(record)
     # Known only after reading: where a damaged bag ends.
     result.notices[:0] = bag.reader.notices
     result.complete = result.complete and bag.reader.complete

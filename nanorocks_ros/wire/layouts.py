@@ -26,6 +26,7 @@ from nanorocks_ros.records import (
     SizeStatus,
     SpeedEstimate,
     SpeedMethod,
+    StickingStatus,
     TrayState,
 )
 
@@ -65,6 +66,7 @@ _ENUMERATIONS = {
     'status': CorStatus,
     'relation': CorRelation,
     'size_status': SizeStatus,
+    'sticking_status': StickingStatus,
 }
 # By the type that a record declares.
 _WHOLE = {'int': int, 'bool': bool}

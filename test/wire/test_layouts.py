@@ -23,8 +23,10 @@ from nanorocks_ros.records import (
     PairCollision,
     Quality,
     Rebound,
+    SizeStatus,
     SpeedEstimate,
     SpeedMethod,
+    StickingStatus,
     TrayState,
 )
 from nanorocks_ros.wire.layouts import from_array, layout, to_array
@@ -224,6 +226,12 @@ def test_every_array_starts_with_time_and_cycle_and_holds_the_whole_record(recor
 def test_the_constants_are_those_of_the_code(record_type, enumerations):
     expected = {one.name: one.value for kind in enumerations for one in kind}
     assert layout(record_type).constants == expected
+
+
+def test_the_constants_of_clusters_are_those_of_the_code():
+    expected = {one.name: one.value for one in SizeStatus}
+    expected |= {f'STICKING_{one.name}': one.value for one in StickingStatus}
+    assert layout(ClusterEstimate).constants == expected
 
 
 def test_not_known_is_nan_and_never_zero():
