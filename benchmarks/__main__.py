@@ -22,6 +22,7 @@ ALL = (
     'valley',
     'closed_forms',
     'contacts',
+    'packing',
     'engine',
     'engine_physics',
     'validation',
