@@ -24,12 +24,13 @@ _KINDS = {
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli import figure_dust, figure_packing
+    from nanorocks_ros.cli import figure_dust, figure_long_term, figure_packing
 
     parser = commands.add_parser('figure', help='draw measured decays as the paper does')
     kinds = parser.add_subparsers(dest='kind', metavar='KIND', required=True)
     figure_packing.add_parser(kinds)
     figure_dust.add_parser(kinds)
+    figure_long_term.add_parser(kinds)
     for kind, text in _KINDS.items():
         one = kinds.add_parser(kind, help=text, description=text)
         one.add_argument('speeds', help='results of `nanorocks analyse`, or their table of speeds')

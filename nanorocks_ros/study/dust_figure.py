@@ -164,7 +164,7 @@ def _draw_published(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
         )
         if not curve.verified:
             # On the curve as well: a legend can be cut off.
-            place = 3e-10
+            place = 1.5e-10
             axes.annotate(
                 f'{curve.name} ({UNVERIFIED})',
                 (_MG * place, _MM * float(curve.threshold(place))),
