@@ -24,6 +24,7 @@ ALL = (
     'closed_forms',
     'contacts',
     'sticking',
+    'packing',
     'engine',
     'engine_physics',
     'validation',

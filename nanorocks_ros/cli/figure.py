@@ -25,11 +25,12 @@ _KINDS = {
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli import figure_cor
+    from nanorocks_ros.cli import figure_cor, figure_dust, figure_long_term, figure_packing
 
-    parser = commands.add_parser('figure', help='draw measured decays as the paper does')
+    parser = commands.add_parser('figure', help='draw what was measured as the paper does')
     kinds = parser.add_subparsers(dest='kind', metavar='KIND', required=True)
-    figure_cor.add_parser(kinds)
+    for module in (figure_cor, figure_packing, figure_dust, figure_long_term):
+        module.add_parser(kinds)
     for kind, text in _KINDS.items():
         one = kinds.add_parser(kind, help=text, description=text)
         one.add_argument('speeds', help='results of `nanorocks analyse`, or their table of speeds')
