@@ -23,6 +23,7 @@ ALL = (
     'species_decays',
     'closed_forms',
     'contacts',
+    'rotation',
     'engine',
     'engine_physics',
     'validation',

@@ -1,13 +1,14 @@
 """Cooling gases of rough beads: temperatures of rotation, and what one reads of their decays.
 
-Restitutions 0.89 (beads) and 0.97 (walls) unless said otherwise, started at 10 mm/s without
-rotation. A roughness is the tangential restitution of beads, and that of walls.
+Restitutions 0.89 (beads) and 0.97 (walls), started at 10 mm/s without rotation.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import partial, reduce
+from itertools import pairwise
 from operator import add
 
 import numpy as np
@@ -21,6 +22,7 @@ from nanorocks_ros.inference.decay_library import library_of
 from nanorocks_ros.inference.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.restitution import posterior_of, tables_of
 from nanorocks_ros.physics.confined import confined_gas
+from nanorocks_ros.physics.haff_fit import fit_haff
 from nanorocks_ros.physics.instantaneous import instantaneous_cor
 from nanorocks_ros.physics.paper import (
     RELATIVE_TO_MEAN_SPEED,
@@ -33,20 +35,54 @@ from nanorocks_ros.simulation.initial import resting_beads, rules_of
 from nanorocks_ros.simulation.shaking import after_shaking
 
 PAIRS, WALLS = 0.89, 0.97
-SMOOTH = (-1.0, -1.0)
-# Walls rough like the beads, and walls that are smooth.
-ROUGH = ((-0.5, -0.5), (0.0, 0.0), (0.5, 0.5), (0.5, -1.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Roughness:
+    """Tangential restitution and coefficient of friction of beads, and whether walls have them."""
+
+    tangential: float = -1.0
+    friction: float = 1e6
+    walls: bool = True
+
+    @property
+    def name(self):
+        """In tables."""
+        if self.tangential <= -1.0:
+            return 'smooth'
+        slides = f', μ {self.friction:g}' if self.friction < 1e6 else ''
+        return f'β {self.tangential:g}{slides}' + ('' if self.walls else ', smooth walls')
+
+    @property
+    def settings(self):
+        """Of a simulation."""
+        return {
+            'tangential_restitution': self.tangential,
+            'wall_tangential_restitution': self.tangential if self.walls else -1.0,
+            'friction': self.friction,
+            'wall_friction': self.friction,
+        }
+
+
+SMOOTH = Roughness()
+# Like glass and acrylic, and twice as rough: Foerster et al. 1994, Phys. Fluids 6, 1108, and
+# Lorenz et al. 1997, Phys. Fluids 9, 2823; from memory.
+BEADS = Roughness(tangential=0.4, friction=0.1)
+RUBBING = Roughness(tangential=0.4, friction=0.25)
+SMOOTH_WALLS = Roughness(tangential=0.4, friction=0.1, walls=False)
+HALF = Roughness(tangential=0.0)
+ROUGH = (
+    Roughness(tangential=0.4, friction=0.03),
+    BEADS,
+    RUBBING,
+    SMOOTH_WALLS,
+    Roughness(tangential=-0.5),
+    HALF,
+    Roughness(tangential=0.5),
+)
 BULK_DENSITY = 0.1
 _FIRST, _LAST, _RATE, _ERROR = 1.75, 20.0, 30.0, 0.02
 _NS = 1e9
-
-
-def named(roughness):
-    """How a table calls it."""
-    beads, walls = roughness
-    if beads <= -1.0:
-        return 'smooth'
-    return f'{beads:g}, walls ' + ('smooth' if walls <= -1.0 else f'{walls:g}')
 
 
 def settings_of(tray, roughness, **values):
@@ -56,8 +92,7 @@ def settings_of(tray, roughness, **values):
             'tray': tray.number,
             'restitution': PAIRS,
             'wall_restitution': WALLS,
-            'tangential_restitution': roughness[0],
-            'wall_tangential_restitution': roughness[1],
+            **roughness.settings,
             'mean_speed': 0.010,
             'seed': 99,
             'first_shake': 0.0,
@@ -67,7 +102,7 @@ def settings_of(tray, roughness, **values):
     )
 
 
-def bulk_course(restitution, tangential, seeds, duration=300.0):
+def bulk_course(restitution, tangential, seeds, duration=600.0):
     """Collisions of each bead, and rotation over translation, in a periodic box, from no spin."""
     rows = []
     for seed in seeds:
@@ -90,7 +125,7 @@ def bulk_course(restitution, tangential, seeds, duration=300.0):
 
 
 def tray_ratios(number, roughness, times, runs, **values):
-    """Rotation over translation of each species in a tray, (n_times, n_species)."""
+    """Rotation over translation of each species in a tray, (n_species, n_times)."""
     tray = load_trays()[number]
     settings = settings_of(tray, roughness, **values)
     rotation, translation = [], []
@@ -105,7 +140,7 @@ def tray_ratios(number, roughness, times, runs, **values):
         mass = resting.masses
         rotation.append([(mass * spins)[:, one].mean(axis=1) for one in own])
         translation.append([(mass * speeds)[:, one].mean(axis=1) for one in own])
-    return (np.mean(rotation, axis=0) / np.mean(translation, axis=0)).T
+    return np.mean(rotation, axis=0) / np.mean(translation, axis=0)
 
 
 def speeds_of(number, roughness, times, runs, **values):
@@ -128,8 +163,8 @@ def paper_values(speeds, step, tray):
     return found, RELATIVE_TO_MEAN_SPEED * speeds.mean(axis=0)[:-lag]
 
 
-def widths(values, speed, edges):
-    """Half widths of the middle 68 % of the estimates about their median, by speed, and those > 1.
+def spread(values, speed, edges):
+    """How the estimates scatter by speed.
 
     Parameters
     ----------
@@ -140,24 +175,54 @@ def widths(values, speed, edges):
 
     Returns
     -------
-    half, above_one, highest : ndarray (n_ranges,)
-        NaN where no speed is in the range; `highest` is the 97.5 % quantile.
+    middle, half, above_one, highest, half_log : ndarray (n_ranges,)
+        Median, half of the range of the middle 68 %, share above 1, quantile 97.5 %, and half
+        of the same range of the logarithm; NaN where no speed is in the range.
     """
     rows = []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         inside = values[:, (speed >= low) & (speed < high)]
         if inside.size:
-            ends = np.nanquantile(inside, (0.16, 0.84, 0.975))
-            rows.append((0.5 * (ends[1] - ends[0]), np.nanmean(inside > 1.0), ends[2]))
+            lower, middle, upper, highest = np.nanquantile(inside, (0.16, 0.5, 0.84, 0.975))
+            above = np.nanmean(inside > 1.0)
+            half, logs = 0.5 * (upper - lower), 0.5 * np.log(upper / lower)
+            rows.append((middle, half, above, highest, logs))
         else:
-            rows.append((math.nan,) * 3)
+            rows.append((math.nan,) * 5)
     return np.array(rows).T
 
 
-def local_values(speeds, times, tray, error):
-    """Our local restitutions of one curve after another, with their errors: (n_curves, 3, n).
+def single_collisions(restitution, roughness, ratio, n=400_000, seed=1):
+    """Relative speed after over before single collisions, (n,), weighted as collisions happen.
 
-    Speed [m/s], restitution, half of its 68 % interval.
+    Parameters
+    ----------
+    restitution : float
+    roughness : Roughness
+    ratio : float
+        Temperature of the rotation over that of the translation.
+    """
+    random = np.random.default_rng(seed)
+    # Along the normal Rayleigh's law, as beads meet the more often the faster; kT = m = r = 1.
+    normal = math.sqrt(2.0) * random.rayleigh(size=n)
+    across = math.sqrt(2.0) * random.normal(size=(n, 2))
+    turning = math.sqrt(2.0 * ratio / SOLID_SPHERE) * random.normal(size=(n, 2))
+    slip = across + turning
+    size = np.hypot(*slip.T)
+    # Per unit of reduced mass, 1/2.
+    mass = SOLID_SPHERE / (1.0 + SOLID_SPHERE)
+    grip = mass * (1.0 + roughness.tangential) * size
+    slide = roughness.friction * (1.0 + restitution) * normal
+    push = np.minimum(grip, slide) / size
+    after = across - push[:, np.newaxis] * slip
+    before = np.sqrt(normal**2 + (across**2).sum(axis=1))
+    return np.sqrt((restitution * normal) ** 2 + (after**2).sum(axis=1)) / before
+
+
+def local_rates(speeds, times, tray, error, cycles):
+    """Our local decay rates of one mean over cycles after another, (n_means, 4, 4).
+
+    Speed [m/s], slope of 1/v with its stated error [1/m], restitution, in four windows.
     """
     gas = confined_gas(tray)
     found = []
@@ -167,9 +232,10 @@ def local_values(speeds, times, tray, error):
             tray,
             gas,
             wall_restitution=WALLS,
+            cycles=cycles,
             windows=4,
         ).local
-        found.append((local.speed, local.restitution, 0.5 * (local.upper - local.lower)))
+        found.append((local.speed, local.decay_rate, local.decay_rate_error, local.restitution))
     return np.array(found)
 
 
@@ -178,8 +244,12 @@ def read_cycles(number, roughness, cycles):
 
     Returns
     -------
-    dict
-        Posterior by 'decay, walls known', 'decay', 'all'; 'rebounds' and 'collisions' in a cycle.
+    posteriors : dict of Posterior
+        'walls known': of the decays alone; 'decay'; 'all': with rebounds and collisions.
+    decay_rate : float, [1/m]
+        Of Haff's law, fitted to the mean decay.
+    counts : tuple of 2 floats
+        Rebounds and collisions found in a cycle.
     """
     tray = load_trays()[number]
     settings = settings_of(tray, roughness)
@@ -188,7 +258,6 @@ def read_cycles(number, roughness, cycles):
     noise = np.random.default_rng([number, cycles]).standard_normal((cycles, times.size))
     speeds = cooling_runs(settings, tray, times, range(cycles)).mean_projected_speed
     speeds = speeds * np.exp(_ERROR * noise)
-    found = {}
     prior = PriorSettings()
     camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
     tables = tables_of(library, tray, prior)
@@ -199,15 +268,18 @@ def read_cycles(number, roughness, cycles):
     )
     read = partial(posterior_of, tables, decay)
     walls = (prior.wall_low, prior.wall_high)
-    found['decay, walls known'] = read((WALLS, WALLS))
-    found['decay'] = read(walls)
-    found['all'] = read(
-        walls,
-        of_beads=contacts.of_beads(prior.collision_bias),
-        of_walls=contacts.of_walls(prior.rebound_bias),
-    )
-    counts = contacts.rebounds / cycles, contacts.collisions / cycles
-    return found, contacts, counts
+    posteriors = {
+        'walls known': read((WALLS, WALLS)),
+        'decay': read(walls),
+        'all': read(
+            walls,
+            of_beads=contacts.of_beads(prior.collision_bias),
+            of_walls=contacts.of_walls(prior.rebound_bias),
+        ),
+    }
+    mean = speeds.mean(axis=0)
+    rate = fit_haff(times, mean, _ERROR * mean, tray.count * cycles).decay_rate
+    return posteriors, rate, (contacts.rebounds / cycles, contacts.collisions / cycles)
 
 
 def _contacts(tray, settings, run):

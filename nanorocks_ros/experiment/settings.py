@@ -381,9 +381,7 @@ class SimulationSettings:
         low=0.0,
         high=1e6,
     )
-    wall_friction: float = _setting(
-        1e6, 'the same of rough beads at the walls', low=0.0, high=1e6
-    )
+    wall_friction: float = _setting(1e6, 'the same of rough beads at the walls', low=0.0, high=1e6)
     speeds: str = _setting(
         'uniform',
         'speeds after a shaking event: even in [0, 2 mean], Maxwellian, or those of a tray whose '
