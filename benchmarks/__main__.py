@@ -25,6 +25,7 @@ ALL = (
     'contacts',
     'sticking',
     'packing',
+    'rotation',
     'engine',
     'engine_physics',
     'validation',

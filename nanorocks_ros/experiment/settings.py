@@ -397,6 +397,13 @@ class SimulationSettings:
     wall_tangential_restitution: float = _setting(
         -1.0, 'tangential restitution at the walls; -1: smooth', low=-1.0, high=1.0
     )
+    friction: float = _setting(
+        1e6,
+        'coefficient of friction of rough beads, above which contacts slide; large: none slides',
+        low=0.0,
+        high=1e6,
+    )
+    wall_friction: float = _setting(1e6, 'the same of rough beads at the walls', low=0.0, high=1e6)
     speeds: str = _setting(
         'uniform',
         'speeds after a shaking event: even in [0, 2 mean], Maxwellian, or those of a tray whose '
