@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from nanorocks_ros.nodes._tray_stage import TrayStageNode
 from nanorocks_ros.stages.clusters import ClusterAutocorrelator
+from nanorocks_ros.stages.warm_up import warm_up_clusters
 from nanorocks_ros.wire import topics
 
 
@@ -12,6 +13,7 @@ class ClusterAutocorrelatorNode(TrayStageNode):
 
     def __init__(self):
         outputs = (topics.CLUSTER, topics.AUTOCORRELATION)
+        warm_up_clusters()
         super().__init__('cluster_autocorrelator', ClusterAutocorrelator, outputs)
 
     def prepare(self, stage, tray):
