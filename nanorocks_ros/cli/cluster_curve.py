@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.inference.cluster_curve import ClusterCurve
 
+_STRONGEST = 2.0
+
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
@@ -24,8 +26,16 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument('-o', '--output', required=True, help='file to write, .npz')
     parser.add_argument('--trays-file', default='', help='YAML file of trays; default: as flown')
-    parser.add_argument('--runs', type=int, default=96, help='films; default 96')
+    parser.add_argument('--runs', type=int, default=128, help='films; default 128')
     parser.add_argument('--level', type=float, default=0.5, help='as clusters.level; default 0.5')
+    parser.add_argument(
+        '--strengths',
+        type=float,
+        nargs=2,
+        default=(0.0, 1.5),
+        metavar=('LOW', 'HIGH'),
+        help='range of the effects of camera, light and dust, relative to flight; default 0 1.5',
+    )
     parser.add_argument('--seed', type=int, default=1, help='of everything random; default 1')
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
     parser.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
@@ -51,12 +61,22 @@ def run(options: argparse.Namespace) -> int:
     with_values(PipelineSettings(), {'clusters.level': options.level}, '--level')
     if options.seed < 0:
         raise ConfigurationError('--seed', f'{options.seed}', 'give 0 or more')
+    weak, strong = options.strengths
+    if not 0.0 <= weak <= strong <= _STRONGEST:
+        raise ConfigurationError(
+            '--strengths', f'{weak:g} {strong:g}', f'give two, rising, from 0 to {_STRONGEST:g}'
+        )
     cells = load_trays(options.trays_file or None)
     numbers = tuple(sorted(set(options.tray or cells)))
     for number in numbers:
         tray_by_number(cells, number)
     plan = ClusterPlan(
-        cells=cells, trays=numbers, runs=options.runs, seed=options.seed, level=options.level
+        cells=cells,
+        trays=numbers,
+        runs=options.runs,
+        seed=options.seed,
+        level=options.level,
+        strengths=(weak, strong),
     )
     workers = Workers(processes=options.workers, scheduler=options.scheduler)
     with Progress('films of clusters') as progress:
@@ -81,7 +101,8 @@ def _values(curve: ClusterCurve) -> dict[str, Any]:
     return {
         'largest': None if math.isnan(curve.largest) else curve.largest,
         'sizes': [math.exp(one) for one in curve.log_size],
-        'breadths': [math.exp(one) for one in curve.log_breadth],
+        'readings': curve.reading.tolist(),
+        'weight': curve.weight,
         'scatter': curve.scatter.tolist(),
         'pictures': len(curve.samples),
     }
@@ -90,8 +111,7 @@ def _values(curve: ClusterCurve) -> dict[str, Any]:
 def _sentence(curve: ClusterCurve) -> str:
     if math.isnan(curve.largest):
         return 'the autocorrelation says nothing of the size of its clusters'
-    widths = math.exp(curve.log_breadth[-1] - curve.log_breadth[0])
     return (
-        f'sizes up to {curve.largest:.1f}, where the breadth is {widths:.2f} times that of '
-        f'single beads; scatter of a picture {100.0 * curve.scatter.mean():.0f} %'
+        f'sizes up to {curve.largest:.1f}; of a picture of so large clusters the size is known to '
+        f'a factor of {curve.worst:.1f}'
     )

@@ -3,13 +3,14 @@
 The area in which the autocorrelation exceeds a level depends on the camera as much as on the
 clusters: shadows and blur alone make it up to half as large again. They widen the peak at every
 level alike, though, so that the *breadth*, the area over the one at a higher level, hardly depends
-on them, and tells clusters as well.
+on them. What is *read* from a picture is ln(breadth) + weight ln(area), with the weight that tells
+sizes best where nothing is known of the camera.
 
 Where two beads touch or lie over each other in the picture they are one object to the
 autocorrelation, whether they stick or not, and where all beads hang together its width is that of
-the tray. So ln(breadth) rises slowly with ln(size), its mean over many simulated pictures is held
+the tray. So the reading rises slowly with ln(size), its mean over many simulated pictures is held
 as a rising curve, and what single pictures scatter about it is the error of a size. A curve ends
-where that error grows beyond a factor of two: there the width says nothing more.
+where that error grows beyond a factor of three: there the width says nothing more.
 """
 
 from __future__ import annotations
@@ -38,11 +39,13 @@ if TYPE_CHECKING:
 # Level of the area that the level area is divided by.
 INNER_LEVEL = 0.7
 # Of what single beads were simulated to show: the least level area and contrast that are beads.
-_SMALL, _FAINT = 0.6, 0.35
-# Standard deviations by which a breadth may be outside those simulated.
-_OUTSIDE = 4.0
-# Of ln(size): a factor of two.
-_WORST = math.log(2.0)
+_SMALL, _FAINT = 0.6, 0.4
+# By which ln(breadth) may be outside those simulated.
+_OUTSIDE = 0.1
+# Of ln(size): a factor of three.
+_WORST = math.log(3.0)
+# Sizes above that part of the largest all look alike: the weight is chosen without them.
+_GROWING = 0.7
 # Of the bins of ln(size), and pictures that a bin needs.
 _BIN = 0.3
 _FEWEST = 8
@@ -79,7 +82,7 @@ class SizeEstimate(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ClusterCurve:
-    """Mean of ln(breadth) of one tray as a rising function of ln(weight-averaged size).
+    """Mean reading of one tray as a rising function of ln(weight-averaged size).
 
     Parameters
     ----------
@@ -90,15 +93,16 @@ class ClusterCurve:
     level : float
         Of the autocorrelation.
     log_size : ndarray (n,)
-        Rising from 0; empty where the breadth says nothing of the size.
-    log_breadth : ndarray (n,)
-        Rising.
+        Rising from 0; empty where the width says nothing of the size.
+    reading : ndarray (n,)
+        ln(breadth) + weight ln(level area / m^2), rising.
     scatter : ndarray (n,)
-        Standard deviation of ln(breadth) of one picture, whatever the camera does.
+        Standard deviation of the reading of one picture, whatever the camera does.
+    weight : float, >= 0
     least : Width
         Less is not of beads, of level area or of contrast.
-    broadest : float
-        ln(breadth) above is not of clusters.
+    breadths : tuple of 2 floats
+        Less or more is not of beads.
     samples : ndarray of float32, (n_samples, 6)
         What it was made from: run, time since the shaking event [s], size, level area and inner
         area [m^2], contrast.
@@ -108,16 +112,24 @@ class ClusterCurve:
     made_by: str
     level: float
     log_size: NDArray[np.float64]
-    log_breadth: NDArray[np.float64]
+    reading: NDArray[np.float64]
     scatter: NDArray[np.float64]
+    weight: float
     least: Width
-    broadest: float
+    breadths: tuple[float, float]
     samples: NDArray[np.float32]
 
     @property
     def largest(self) -> float:
         """Weight-averaged size at which the curve ends, [beads]; NaN when there is none."""
         return math.exp(self.log_size[-1]) if self.log_size.size else UNKNOWN
+
+    @property
+    def worst(self) -> float:
+        """Factor by which the size is uncertain at the end of the curve; NaN without one."""
+        if not self.log_size.size:
+            return UNKNOWN
+        return self.largest / self._inverse(float(self.reading[-1] - self.scatter[-1]))
 
     def size_of(self, width: Width) -> SizeEstimate:
         """The size that goes with a width, never beyond the curve.
@@ -131,16 +143,16 @@ class ClusterCurve:
         if not (
             width.level_area > self.least.level_area
             and width.contrast > self.least.contrast
-            and width.inner_area > 0.0
+            and self.breadths[0] * width.inner_area
+            < width.level_area
+            < self.breadths[1] * width.inner_area
         ):
             return _unknown(SizeStatus.NOTHING)
-        log_breadth = math.log(width.level_area / width.inner_area)
-        narrowest = self.log_breadth[0] - _OUTSIDE * self.scatter[0]
-        if not narrowest < log_breadth < self.broadest:
-            return _unknown(SizeStatus.NOTHING)
-        size = self._inverse(log_breadth)
-        scatter = float(np.interp(log_breadth, self.log_breadth, self.scatter))
-        lower, upper = self._inverse(log_breadth - scatter), self._inverse(log_breadth + scatter)
+        breadth = width.level_area / width.inner_area
+        read = math.log(breadth) + self.weight * math.log(width.level_area)
+        size = self._inverse(read)
+        scatter = float(np.interp(read, self.reading, self.scatter))
+        lower, upper = self._inverse(read - scatter), self._inverse(read + scatter)
         if math.isnan(size):
             lowest = self.largest if math.isnan(lower) else lower
             return SizeEstimate(UNKNOWN, UNKNOWN, lowest, UNKNOWN, SizeStatus.BEYOND)
@@ -148,11 +160,11 @@ class ClusterCurve:
         high = size * size / lower if math.isnan(upper) else upper
         return SizeEstimate(size, 0.5 * (high - lower), lower, upper, SizeStatus.MEASURED)
 
-    def _inverse(self, log_breadth: float) -> float:
-        """Size at a logarithm of the breadth: 1, the smallest there is, below; NaN above."""
-        if log_breadth > self.log_breadth[-1]:
+    def _inverse(self, read: float) -> float:
+        """Size at a reading: 1, the smallest there is, below the curve; NaN above."""
+        if read > self.reading[-1]:
             return UNKNOWN
-        return math.exp(float(np.interp(log_breadth, self.log_breadth, self.log_size)))
+        return math.exp(float(np.interp(read, self.reading, self.log_size)))
 
 
 def _unknown(status: SizeStatus) -> SizeEstimate:
@@ -190,24 +202,30 @@ def fit_curve(
         JSON.
     """
     seen = samples[samples[:, 4] > 0.0].astype(np.float64)
-    log_size, log_breadth = np.log(seen[:, 2]), np.log(seen[:, 3] / seen[:, 4])
+    log_size, log_area = np.log(seen[:, 2]), np.log(seen[:, 3])
+    log_breadth = np.log(seen[:, 3] / seen[:, 4])
     above = np.floor((log_size - math.log(_SINGLE)) / _BIN)
     bins = np.where(seen[:, 2] < _SINGLE, -1, above)
     found = [bins == k for k in np.unique(bins) if (bins == k).sum() >= _FEWEST]
     nodes, means, spreads = np.empty((3, 0))
-    least, broadest = Width(0.0, 0.0, 0.0), math.inf
+    weight, least, breadths = 0.0, Width(0.0, 0.0, 0.0), (0.0, math.inf)
     # Without pictures of single beads there is nothing to start from.
     if found and bins[found[0]][0] < 0:
+        weight = _weight(log_size, log_area, log_breadth)
+        reading = log_breadth + weight * log_area
         nodes, means = _rising(
             np.array([log_size[one].mean() for one in found]),
-            np.array([log_breadth[one].mean() for one in found]),
+            np.array([reading[one].mean() for one in found]),
             np.array([one.sum() for one in found], dtype=np.float64),
         )
         nodes[0] = 0.0
         single = seen[found[0]].min(axis=0)
         least = Width(_SMALL * float(single[3]), 0.0, _FAINT * float(single[5]))
-        spreads = _scatter(log_size, log_breadth, nodes, means)
-        broadest = float(log_breadth.max() + _OUTSIDE * spreads[0])
+        breadths = (
+            math.exp(log_breadth.min() - _OUTSIDE),
+            math.exp(log_breadth.max() + _OUTSIDE),
+        )
+        spreads = _scatter(log_size, reading, nodes, means)
         end = _useful(nodes, means, spreads)
         nodes, means, spreads = nodes[:end], means[:end], spreads[:end]
     return ClusterCurve(
@@ -215,12 +233,30 @@ def fit_curve(
         made_by=made_by,
         level=level,
         log_size=nodes,
-        log_breadth=means,
+        reading=means,
         scatter=spreads,
+        weight=weight,
         least=least,
-        broadest=broadest,
+        breadths=breadths,
         samples=samples,
     )
+
+
+def _weight(
+    log_size: NDArray[np.float64],
+    log_area: NDArray[np.float64],
+    log_breadth: NDArray[np.float64],
+) -> float:
+    """Of ln(area) beside ln(breadth): Fisher's linear discriminant, none of them negative."""
+    growing = log_size <= log_size.max() + math.log(_GROWING)
+    terms = np.polynomial.polynomial.polyvander(log_size[growing], 3)
+    seen = np.column_stack((log_area, log_breadth))[growing]
+    factors = np.linalg.lstsq(terms, seen, rcond=None)[0]
+    noise = np.cov((seen - terms @ factors).T)
+    largest = log_size[growing].max()
+    rise = (largest ** np.arange(1, 4)) @ factors[1:]
+    by_area, by_breadth = np.linalg.lstsq(noise, rise, rcond=None)[0]
+    return float(np.clip(by_area / by_breadth, 0.0, 1.0)) if by_breadth > 0.0 else 0.0
 
 
 def _rising(
@@ -239,27 +275,34 @@ def _rising(
 
 def _scatter(
     log_size: NDArray[np.float64],
-    log_breadth: NDArray[np.float64],
+    reading: NDArray[np.float64],
     nodes: NDArray[np.float64],
     means: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Standard deviation about the curve of the pictures nearest to each node."""
-    squares = (log_breadth - np.interp(log_size, nodes, means)) ** 2
+    squares = (reading - np.interp(log_size, nodes, means)) ** 2
     nearest = np.abs(log_size[:, None] - nodes).argmin(axis=1)
-    return np.array([math.sqrt(squares[nearest == k].mean()) for k in range(nodes.size)])
+    # A node of very few pictures between others may have none that is nearest.
+    return np.array(
+        [
+            math.sqrt(squares[nearest == k].mean() if (nearest == k).any() else squares.mean())
+            for k in range(nodes.size)
+        ]
+    )
 
 
 def _useful(
     nodes: NDArray[np.float64], means: NDArray[np.float64], spreads: NDArray[np.float64]
 ) -> int:
-    """How many nodes there are up to where a size is not known to a factor of two."""
+    """How many nodes there are up to the last whose size is known to a factor of three.
+
+    None when that is below three beads: then hardly more is known than that there are beads.
+    """
     # Downwards, where there is a curve for sure; no size is below 1.
     errors = nodes - np.interp(means - spreads, means, nodes)
-    bad = np.flatnonzero(errors > _WORST)
-    end = int(bad[0]) if bad.size else nodes.size
-    if end < 2 or means[end - 1] - means[0] < spreads[end - 1]:
-        return 0
-    return end
+    good = np.flatnonzero((errors <= _WORST) & (means - means[0] > spreads))
+    end = int(good[-1]) + 1 if good.size else 0
+    return end if end and nodes[end - 1] >= _WORST else 0
 
 
 def curve_of(tray: Tray, path: str | Path = '') -> ClusterCurve:

@@ -7,6 +7,7 @@ from functools import partial
 from nanorocks_ros.nodes._tray_stage import TrayStageNode
 from nanorocks_ros.records import BodyEstimate, Merge, SpeedEstimate
 from nanorocks_ros.stages.cluster_estimator import ClusterEstimator
+from nanorocks_ros.stages.warm_up import warm_up_clusters
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import from_array
 
@@ -22,6 +23,7 @@ class ClusterAutocorrelatorNode(TrayStageNode):
 
     def __init__(self):
         outputs = (topics.CLUSTER, topics.AUTOCORRELATION)
+        warm_up_clusters()
         super().__init__('cluster_autocorrelator', ClusterEstimator, outputs)
         for tray in self._settings.trays:
             for topic, record in self._FROM_TRACKS:

@@ -1,8 +1,8 @@
 """Films of clusters that grow, from which cluster sizes are told from autocorrelations.
 
 Every run has a sticking speed of its own, so that all sizes occur, and a camera, light and dust of
-its own, anything from perfect to half as bad again as in flight: what that does to the width is in its
-scatter.
+its own, anything from perfect to half as bad again as in flight: what that does to the width is in
+its scatter.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ TIMES = (0.4, 0.8, 1.2, 1.7, 2.3, 3.0, 4.0, 5.5, 7.5, 10.0, 14.0, 19.0, 25.0, 32
 # Of the sticking speed, [m/s]: from hardly any cluster to one.
 _SLOWEST, _FASTEST = 1e-4, 2e-2
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-# Effects whose strength is drawn, from none to so much of what it is in flight.
+# Effects whose strength is drawn.
 EFFECTS = (
     'defocus_px',
     'noise',
@@ -54,7 +54,6 @@ EFFECTS = (
     'ovality',
     'irregularity',
 )
-_STRONGEST = 1.5
 # One bead in so many may be missing, or too many.
 _COUNT_SPREAD = 0.05
 _QUALITY = 85
@@ -76,6 +75,11 @@ class ClusterPlan:
     seed : int
     level : float
         Of the autocorrelation.
+    strengths : tuple of 2 floats, >= 0
+        Weakest and strongest that effects of camera, light and dust are, relative to flight. The
+        better a camera is known, the narrower, and the smaller the errors.
+    moments : int
+        How many of `TIMES` are filmed.
     """
 
     cells: Mapping[int, Tray]
@@ -83,6 +87,8 @@ class ClusterPlan:
     runs: int
     seed: int = 1
     level: float = 0.5
+    strengths: tuple[float, float] = (0.0, 1.5)
+    moments: int = len(TIMES)
 
     def question(self) -> str:
         """Everything that the curves depend on, as a JSON object."""
@@ -93,6 +99,8 @@ class ClusterPlan:
                 'runs': self.runs,
                 'seed': self.seed,
                 'level': self.level,
+                'strengths': self.strengths,
+                'moments': self.moments,
                 'trays': keys,
             }
         )
@@ -121,7 +129,7 @@ def drawn_run(plan: ClusterPlan, run: int) -> ClusterRun:
     generator = np.random.default_rng((plan.seed, run))
     # Even steps that never repeat fill the range with any number of runs.
     part = (0.5 + run * _GOLDEN) % 1.0
-    strengths = generator.uniform(0.0, _STRONGEST, len(EFFECTS))
+    strengths = generator.uniform(*plan.strengths, len(EFFECTS))
     counts = generator.uniform(1.0 - _COUNT_SPREAD, 1.0 + _COUNT_SPREAD, len(plan.cells))
     return ClusterRun(
         sticking_speed=_SLOWEST * (_FASTEST / _SLOWEST) ** part,
@@ -142,15 +150,13 @@ def cluster_sizes(bodies: NDArray[np.int32]) -> tuple[float, float]:
     return float((sizes**2).sum() / sizes.sum()), float(sizes.mean())
 
 
-def samples_of_run(plan: ClusterPlan, run: int, moments: int = len(TIMES)) -> NDArray[np.float32]:
+def samples_of_run(plan: ClusterPlan, run: int) -> NDArray[np.float32]:
     """Film a run, and measure the pictures of its trays as the pipeline does.
 
     Parameters
     ----------
     plan : ClusterPlan
     run : int, >= 0
-    moments : int
-        How many of `TIMES`.
 
     Returns
     -------
@@ -179,7 +185,7 @@ def samples_of_run(plan: ClusterPlan, run: int, moments: int = len(TIMES)) -> ND
     view = View(camera=film.camera.geometry.camera)
     preprocessor = Preprocessor(settings, cells, 'cluster film', view)
     rows = []
-    for time in TIMES[:moments]:
+    for time in TIMES[: plan.moments]:
         number = round((_FIRST_SHAKE + time) * simulation.frame_rate)
         moment = film.at(number, round(_NS * number / simulation.frame_rate))
         for tray, size, width in _measured(moment, preprocessor, plan.level, scene):
