@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 _TYPES = {'.png': 'image/png', '.jpg': 'image/jpeg'}
 _STYLE = """\
 :root { color-scheme: light dark; --line: #8884; --soft: #8882; --link: #1f6feb; }
-body { font: 16px/1.55 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
+body { font: 16px/1.55 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto;
+  padding: 0 1rem; }
 h1 { font-size: 1.7rem; } h2 { font-size: 1.25rem; margin-top: 2.5rem; }
 h2, nav { border-top: 1px solid var(--line); padding-top: 1rem; }
 nav ol { columns: 2 18rem; } a { color: var(--link); }
