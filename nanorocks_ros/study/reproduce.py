@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import __version__
+from nanorocks_ros.errors import FitError, RecordingError
 from nanorocks_ros.study.campaign import prepare_campaign, run_campaign
 from nanorocks_ros.study.chapters.clusters import (
     cluster_chapter,
@@ -92,7 +93,13 @@ def reproduce(
             progress=lambda done, name=name: progress(name, done),  # type: ignore[misc]
         )
         progress(name, 0.0)
-        chapters.append(make(context))
+        try:
+            chapters.append(make(context))
+        except (FitError, RecordingError) as error:
+            # Too short a campaign for one chapter is none for the others.
+            notice(f'{name}: {error}')
+            missing = Section(title=name.capitalize(), parts=[f'Could not be made: {error}.'])
+            chapters.append(Chapter(section=missing))
         progress(name, 1.0)
     path = folder / REPORT
     differences = [row for chapter in chapters for row in chapter.differences]
