@@ -226,3 +226,43 @@ def test_fewer_false_alarms_are_paid_for_with_a_later_answer(sticky):
         _, merges = _counted([tracks for tracks, _ in sticky[:200]], settings=settings)
         known.append(merges[0].known_ns)
     assert known[0] > known[1] > known[2]
+
+
+def _doubled(pictures, bead, start, shift):
+    """One bead that is found a second time, beside itself, from some picture on."""
+    for k, (tracks, _) in enumerate(pictures):
+        if k < start:
+            yield tracks
+            continue
+        columns = {
+            name: np.concatenate([getattr(tracks, name), getattr(tracks, name)[bead : bead + 1]])
+            for name in (
+                'species', 'position_errors', 'velocities', 'velocity_errors', 'radii',
+                'radius_errors', 'seen',
+            )
+        }  # fmt: skip
+        places = np.vstack([tracks.positions, tracks.positions[bead] + (shift, 0.0)])
+        ids = np.append(tracks.ids, 99).astype(np.int32)
+        yield replace(tracks, ids=ids, positions=places, **columns)
+
+
+def test_a_bead_that_is_found_twice_is_no_body():
+    free = list(_gas(0.0, 8.0))
+    for shift in (0.5e-3, 1.0e-3, 1.5e-3):
+        _, merges = _counted(_doubled(free, 4, 60, shift))
+        assert not merges
+
+
+def test_where_tracks_break_all_the_time_nothing_is_said(sticky):
+    pictures = [tracks for tracks, _ in sticky]
+    # Every track gets a new number every three seconds.
+    broken = [
+        replace(tracks, ids=(tracks.ids + 100 * ((k + 6 * tracks.ids) // 90)).astype(np.int32))
+        for k, tracks in enumerate(pictures)
+    ]
+    counts, merges = _counted(pictures)
+    assert counts
+    assert merges
+    counts, merges = _counted(broken)
+    assert not [one for one in merges if one.known_ns > 3 * NS]
+    assert not [one for one in counts if one.stamp_ns > 3 * NS]
