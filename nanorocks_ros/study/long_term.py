@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy import stats
 
-from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.inference.campaign import (
     QuietPeriod,
     Trend,
@@ -27,8 +28,9 @@ if TYPE_CHECKING:
 
 # A peak is looked for this long after a shaking event, the end of a cycle is its last part, [s].
 _PEAK, _END = 3.0, 10.0
-# Of the median of normal values, standard error over that of their mean; and of their scatter.
-_MEDIAN, _MAD = 1.2533, 1.4826
+# Of the values there, so many at either end are left out of the mean; counts of pixels have no
+# median worth the name. Of normal values its error is by this factor larger than that of all.
+_TRIMMED, _WORSE = 0.25, 1.09
 _KNOWN = (CorStatus.COOLING, CorStatus.FINAL)
 
 
@@ -139,8 +141,12 @@ def read_campaign(folders: Sequence[Path], false_alarms: float = 0.01) -> Campai
     RecordingError
         When a folder holds no results, or none of them a cycle.
     ConfigurationError
-        For a rate of false alarms that is none.
+        For a rate of false alarms that is none, or a folder that is named twice.
     """
+    places_of = [folder.resolve() for folder in folders]
+    if len(set(places_of)) < len(places_of):
+        again = next(one for one in places_of if places_of.count(one) > 1)
+        raise ConfigurationError(str(again), 'is named twice', 'name each recording once')
     trays = {folder: trays_of(folder, 'speed') for folder in folders}
     measure = _measure(trays)
     cycles: list[CycleSummary] = []
@@ -315,16 +321,17 @@ def _size(
     cycle: float,
     span: tuple[float, float],
 ) -> dict[str, float]:
-    """Median over the end of a cycle, with what it scatters by, or the error that is stated."""
+    """Mean of the middle half of values at the end of a cycle, and its error, or that stated."""
     own = (sizes['cycle'] == cycle) & (sizes['time'] >= span[0]) & (sizes['time'] <= span[1])
     own &= np.isfinite(sizes[measure.column])
     values = sizes[measure.column][own]
     if values.size == 0:
         return {'cluster_size': math.nan, 'cluster_size_error': math.nan}
-    middle = float(np.median(values))
-    scatter = _MAD * float(np.median(np.abs(values - middle)))
-    error = _MEDIAN * scatter / math.sqrt(values.size)
+    middle = float(stats.trim_mean(values, _TRIMMED))
+    error = math.nan
+    if values.size > 1:
+        error = _WORSE * float(np.std(values, ddof=1)) / math.sqrt(values.size)
     if measure.error in sizes:
         # Errors of one count after the other are those of the same bodies: they don't average.
-        error = max(error, float(np.median(sizes[measure.error][own])))
+        error = float(np.fmax(error, np.median(sizes[measure.error][own])))
     return {'cluster_size': middle, 'cluster_size_error': error}
