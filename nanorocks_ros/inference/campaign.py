@@ -144,7 +144,7 @@ def quiet_periods(
         raise ConfigurationError(
             'false alarms',
             f'{false_alarms!r} with {orders} random orders',
-            'give more than 0 and up to 0.5, and as many orders as it needs',
+            f'give {1.0 / (orders + 1):g} to 0.5',
         )
     if shortest < 1:
         raise ConfigurationError('shortest', f'{shortest}', 'give 1 or more cycles')
