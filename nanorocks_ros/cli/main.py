@@ -23,11 +23,14 @@ def build_parser() -> argparse.ArgumentParser:
     """The parser of the whole command; heavy imports wait until a command runs."""
     from nanorocks_ros.cli import (
         analyse,
+        autocorrelation,
         calibrate,
         calibrate_area,
+        cluster_curve,
         figure,
         library,
         look,
+        reproduce,
         simulate,
         speeds,
         sweep,
@@ -41,11 +44,14 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument('--version', action='version', version=f'nanorocks {__version__}')
     commands = parser.add_subparsers(dest='command', metavar='COMMAND', required=True)
     analyse.add_parser(commands)
+    autocorrelation.add_parser(commands)
     calibrate.add_parser(commands)
     calibrate_area.add_parser(commands)
+    cluster_curve.add_parser(commands)
     figure.add_parser(commands)
     library.add_parser(commands)
     look.add_parser(commands)
+    reproduce.add_parser(commands)
     simulate.add_parser(commands)
     speeds.add_parser(commands)
     sweep.add_parser(commands)

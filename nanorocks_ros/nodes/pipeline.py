@@ -14,7 +14,12 @@ from nanorocks_ros.nodes._pacing import Pacer
 from nanorocks_ros.nodes._tracks import TracksPicture
 from nanorocks_ros.records import Tracks, TrayImage
 from nanorocks_ros.stages.pipeline import Pipeline
-from nanorocks_ros.stages.warm_up import warm_up, warm_up_cooling, warm_up_speed
+from nanorocks_ros.stages.warm_up import (
+    warm_up,
+    warm_up_clusters,
+    warm_up_cooling,
+    warm_up_speed,
+)
 from nanorocks_ros.wire import topics
 
 
@@ -42,6 +47,7 @@ class PipelineNode(NanorocksNode):
         # Others find the publishers meanwhile.
         warm_up()
         warm_up_speed()
+        warm_up_clusters()
         warm_up_cooling()
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(st.PipelineSettings(), self._build, self._adopt)

@@ -1,54 +1,72 @@
-"""Width of the autocorrelation of a tray image, which grows when beads cluster."""
+"""Width of the autocorrelation of a tray image, and the size of the clusters it goes with."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-from scipy import fft
-
-from nanorocks_ros.records import Autocorrelation, ClusterEstimate, TrayImage
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.settings import PipelineSettings
+from nanorocks_ros.inference.cluster_curve import INNER_LEVEL, SizeEstimate, Width, curve_of
+from nanorocks_ros.physics.autocorrelation import LevelRegion, autocorrelation, level_region
+from nanorocks_ros.records import (
+    UNKNOWN,
+    Autocorrelation,
+    ClusterEstimate,
+    Notice,
+    SizeStatus,
+    TrayImage,
+)
 from nanorocks_ros.stages.shaking import NS, CycleFollower
+from nanorocks_ros.stages.tray_contrast import tray_contrast
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
-    from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.inference.cluster_curve import ClusterCurve
+
+# From this scale on, two by two pixels show as much of the clusters as one does, in a quarter of
+# the time: then such a pixel is as large as one at half this scale. [px/m]
+_FINE = 9000.0
+_NO_SIZE = SizeEstimate(UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, SizeStatus.UNCALIBRATED)
 
 
-def autocorrelation(gray: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Normalised linear autocorrelation of an image about its mean.
+class Correlated(NamedTuple):
+    """The autocorrelation of what stands out in a tray image.
+
+    `values`: ndarray of float32, 1 at zero lag, in the centre; `side` of its pixels, [m];
+    `contrast`: standard deviation of what stands out, [gray levels].
+    """
+
+    values: NDArray[np.float32]
+    side: float
+    contrast: float
+
+    def region(self, level: float) -> LevelRegion:
+        """Where it exceeds a level."""
+        return level_region(self.values, level)
+
+    def width(self, level_area: float) -> Width:
+        """With a level area that is known, [px^2]."""
+        inner = level_region(self.values, INNER_LEVEL).area
+        return Width(level_area * self.side**2, inner * self.side**2, self.contrast)
+
+
+def correlated(gray: NDArray[np.uint8], pixels_per_metre: float) -> Correlated:
+    """The autocorrelation of what stands out in a tray image.
 
     Parameters
     ----------
     gray : ndarray of uint8, (rows, columns)
-
-    Returns
-    -------
-    ndarray of float32, (rows, columns)
-        1 at zero lag, which lies at (rows // 2, columns // 2); all 0 for a uniform image.
+    pixels_per_metre : float
+        Fine images are taken at half their resolution.
     """
-    rows, columns = gray.shape
-    deviation = gray.astype(np.float32)
-    deviation -= deviation.mean()
-    # Padded, so that at the lags that are wanted, up to half of the size, the image is not
-    # compared with its own repetition. Rows that are all zero, or not wanted, are not transformed.
-    down, right = (fft.next_fast_len(size + size // 2 + 1, real=True) for size in (rows, columns))
-    spectrum = fft.fft(fft.rfft(deviation, n=right, axis=1), n=down, axis=0)
-    power = spectrum.real**2 + spectrum.imag**2
-    along = fft.ifft(power, axis=0)[_lags(rows)]
-    covariance = fft.irfft(along, n=right, axis=1)[:, _lags(columns)]
-    variance = covariance[rows // 2, columns // 2]
-    if variance <= 0.0:
-        return np.zeros((rows, columns), dtype=np.float32)
-    return np.ascontiguousarray(covariance / variance, dtype=np.float32)
-
-
-def _lags(size: int) -> NDArray[np.int64]:
-    """Shifts of an image against itself, zero in the middle."""
-    return np.arange(size) - size // 2
+    halve = pixels_per_metre >= _FINE and min(gray.shape) > 1
+    contrast = tray_contrast(gray, halve=halve)
+    side = (2.0 if halve else 1.0) / pixels_per_metre
+    return Correlated(autocorrelation(contrast), side, float(contrast.std()))
 
 
 class ClusterAutocorrelator:
@@ -63,11 +81,17 @@ class ClusterAutocorrelator:
     ----------
     emit_image : bool
         Also emit each :class:`Autocorrelation`; off by default since few look at it.
+
+    Raises
+    ------
+    ConfigurationError
+        For a calibration file that cannot be read, or has no curve of this tray.
     """
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings
         self._tray = tray
+        self._curve, self._notice = _curve(settings, tray)
         self.emit_image = False
         self._restart()
 
@@ -77,7 +101,7 @@ class ClusterAutocorrelator:
         self._last_stamp_ns: int | None = None
         self._next_ns: int | None = None
 
-    def push(self, image: TrayImage) -> tuple[ClusterEstimate | Autocorrelation, ...]:
+    def push(self, image: TrayImage) -> tuple[ClusterEstimate | Autocorrelation | Notice, ...]:
         """Take the next image of the tray; empty between two intervals."""
         if self._last_stamp_ns is not None and image.stamp_ns <= self._last_stamp_ns:
             self._restart()
@@ -86,20 +110,52 @@ class ClusterAutocorrelator:
         if self._next_ns is not None and image.stamp_ns < self._next_ns:
             return ()
         self._next_ns = image.stamp_ns + round(self._settings.clusters.interval * NS)
-        values = autocorrelation(image.gray)
-        estimate = self._estimate(image.stamp_ns, values)
-        if not self.emit_image:
-            return (estimate,)
-        picture = Autocorrelation(stamp_ns=image.stamp_ns, tray=image.tray, values=values)
-        return (estimate, picture)
+        found: list[ClusterEstimate | Autocorrelation | Notice] = []
+        seen = correlated(image.gray, self._settings.preprocess.pixels_per_metre)
+        found.append(self._estimate(image.stamp_ns, seen))
+        if self.emit_image:
+            picture = Autocorrelation(stamp_ns=image.stamp_ns, tray=image.tray, values=seen.values)
+            found.append(picture)
+        if self._notice:
+            found.append(Notice(stamp_ns=image.stamp_ns, text=self._notice))
+            self._notice = ''
+        return tuple(found)
 
-    def _estimate(self, stamp_ns: int, values: NDArray[np.float32]) -> ClusterEstimate:
-        pixels = np.count_nonzero(values > self._settings.clusters.level)
-        area = float(pixels) / self._settings.preprocess.pixels_per_metre**2
+    def _estimate(self, stamp_ns: int, seen: Correlated) -> ClusterEstimate:
+        region = seen.region(self._settings.clusters.level)
+        width = seen.width(region.area)
+        size = _NO_SIZE if self._curve is None else self._curve.size_of(width)
+        area, inner = width.level_area, width.inner_area
         return ClusterEstimate(
             stamp_ns=stamp_ns,
             tray=self._tray.number,
             cycle=self._shakes.cycle,
             level_area=area,
             correlation_length=math.sqrt(area / math.pi),
+            axes_ratio=region.axes_ratio,
+            direction=region.direction,
+            breadth=area / inner if inner > 0.0 else UNKNOWN,
+            cluster_size=size.size,
+            cluster_size_error=size.error,
+            cluster_size_lower=size.lower,
+            cluster_size_upper=size.upper,
+            size_status=size.status,
         )
+
+
+def _curve(settings: PipelineSettings, tray: Tray) -> tuple[ClusterCurve | None, str]:
+    """The calibration, or None and why there is none."""
+    try:
+        curve = curve_of(tray, settings.clusters.curve)
+    except ConfigurationError as error:
+        # Speeds and restitutions do not need it; a file that was named is another matter.
+        if settings.clusters.curve:
+            raise
+        return None, f'{error}; until then cluster sizes are unknown'
+    level, mix = settings.clusters.level, settings.preprocess.gray_mix
+    if level != curve.level or mix != PipelineSettings().preprocess.gray_mix:
+        return None, (
+            f'tray {tray.number}: cluster sizes are unknown: they are calibrated for '
+            f'clusters.level {curve.level:g} and the default preprocess.gray_mix'
+        )
+    return curve, ''

@@ -9,6 +9,7 @@ from nanorocks_ros.experiment.settings import PipelineSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import Straight, View
 from nanorocks_ros.records import Frame, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.stages.clusters import ClusterAutocorrelator
 from nanorocks_ros.stages.cooling import HaffFitter
 from nanorocks_ros.stages.preprocess import Preprocessor
 from nanorocks_ros.stages.shaking import CycleFollower
@@ -24,6 +25,15 @@ def warm_up_counting() -> None:
     for stamp_ns in (0, 1):
         gray = np.full((16, 16), 100, dtype=np.uint8)
         follower.push(TrayImage(stamp_ns=stamp_ns, tray=1, gray=gray))
+
+
+def warm_up_clusters() -> None:
+    """Correlate a picture with a disc on it."""
+    stage = ClusterAutocorrelator(PipelineSettings(), load_trays()[1])
+    gray = np.full((64, 64), 150, dtype=np.uint8)
+    cv2.circle(gray, (32, 32), 12, 60, -1)
+    gray[:8, :8] = 255
+    stage.push(TrayImage(stamp_ns=0, tray=1, gray=gray))
 
 
 def warm_up() -> None:

@@ -36,9 +36,10 @@ class SizeMeasure(NamedTuple):
     text: str
 
 
-# The first that is there is taken for all recordings.
+# The first that is known in every tray of every recording is taken for all of them.
 SIZE_MEASURES = (
-    SizeMeasure('body', 'weighted_size', 'weighted_size_error', '1', 'beads of a cluster'),
+    SizeMeasure('cluster', 'combined_size', 'combined_size_error', '1', 'beads of a cluster'),
+    SizeMeasure('bodies', 'weighted_size', 'weighted_size_error', '1', 'beads of a cluster'),
     SizeMeasure('cluster', 'cluster_size', 'cluster_size_error', '1', 'beads of a cluster'),
     SizeMeasure('cluster', 'correlation_length', '', 'm', 'correlation length'),
 )
@@ -87,7 +88,8 @@ def size_measure(trays: Mapping[Path, tuple[int, ...]]) -> SizeMeasure:
         path = folder / f'tray_{number}_{one.table}.csv'
         if not path.is_file():
             return False
-        return one.column in read_columns(path, (), (one.column,))
+        values = read_columns(path, (), (one.column,)).get(one.column)
+        return values is not None and bool(np.isfinite(values).any())
 
     for one in SIZE_MEASURES[:-1]:
         if all(has(folder, number, one) for folder, own in trays.items() for number in own):

@@ -40,7 +40,7 @@ def write_recording(folder, trays, cycles, sizes, *, peaks=None, bodies=False, s
             ),
             ('cluster', 'time cycle level_area correlation_length', clusters),
             ('cor', 'cycle status restitution restitution_lower restitution_upper', cors),
-            ('body', 'time cycle weighted_size weighted_size_error', counts if bodies else []),
+            ('bodies', 'time cycle weighted_size weighted_size_error', counts if bodies else []),
         ):
             if rows:
                 names = fields.split()

@@ -81,6 +81,15 @@ def test_beads_of_bodies_are_preferred_where_all_recordings_have_them(tmp_path):
     assert read_campaign([with_bodies, without]).measure.column == 'correlation_length'
 
 
+def test_a_size_that_is_known_in_no_cycle_of_a_tray_is_not_taken(tmp_path):
+    folder = write_recording(tmp_path / 'a', (1, 3), 6, np.full(6, SIZE), bodies=True)
+    table = folder / 'tray_3_bodies.csv'
+    header, *lines = table.read_text().splitlines()
+    lines = [','.join([*line.split(',')[:2], 'nan', 'nan']) for line in lines]
+    table.write_text('\n'.join([header, *lines]) + '\n')
+    assert read_campaign([folder]).measure.column == 'correlation_length'
+
+
 def test_a_tray_that_missed_a_shaking_event_keeps_in_step(tmp_path):
     folder = write_recording(tmp_path / 'r', (1,), 3, np.full(3, SIZE))
     table = folder / 'tray_1_speed.csv'

@@ -1,0 +1,288 @@
+"""Cooling gases of rough beads: temperatures of rotation, and what one reads of their decays.
+
+Restitutions 0.89 (beads) and 0.97 (walls), started at 10 mm/s without rotation.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial, reduce
+from itertools import pairwise
+from operator import add
+
+import numpy as np
+
+from benchmarks.contacts import contacts_of, true_tracks
+from benchmarks.hard_sphere_runs import DIAMETER, MASS, TIME, bulk
+from nanorocks_ros.experiment.settings import PriorSettings, SimulationSettings
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.contact_terms import ContactTerms
+from nanorocks_ros.inference.decay_library import library_of
+from nanorocks_ros.inference.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.restitution import posterior_of, tables_of
+from nanorocks_ros.physics.confined import confined_gas
+from nanorocks_ros.physics.haff_fit import fit_haff
+from nanorocks_ros.physics.instantaneous import instantaneous_cor
+from nanorocks_ros.physics.paper import (
+    RELATIVE_TO_MEAN_SPEED,
+    paper_instantaneous_restitution,
+)
+from nanorocks_ros.physics.rotation import SOLID_SPHERE
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.ensemble import cooling_runs
+from nanorocks_ros.simulation.initial import resting_beads, rules_of
+from nanorocks_ros.simulation.shaking import after_shaking
+
+PAIRS, WALLS = 0.89, 0.97
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Roughness:
+    """Tangential restitution and coefficient of friction of beads, and whether walls have them."""
+
+    tangential: float = -1.0
+    friction: float = 1e6
+    walls: bool = True
+
+    @property
+    def name(self):
+        """In tables."""
+        if self.tangential <= -1.0:
+            return 'smooth'
+        slides = f', μ {self.friction:g}' if self.friction < 1e6 else ''
+        return f'β {self.tangential:g}{slides}' + ('' if self.walls else ', smooth walls')
+
+    @property
+    def settings(self):
+        """Of a simulation."""
+        return {
+            'tangential_restitution': self.tangential,
+            'wall_tangential_restitution': self.tangential if self.walls else -1.0,
+            'friction': self.friction,
+            'wall_friction': self.friction,
+        }
+
+
+SMOOTH = Roughness()
+# Like glass and acrylic, and twice as rough: Foerster et al. 1994, Phys. Fluids 6, 1108, and
+# Lorenz et al. 1997, Phys. Fluids 9, 2823; from memory.
+BEADS = Roughness(tangential=0.4, friction=0.1)
+RUBBING = Roughness(tangential=0.4, friction=0.25)
+SMOOTH_WALLS = Roughness(tangential=0.4, friction=0.1, walls=False)
+HALF = Roughness(tangential=0.0)
+ROUGH = (
+    Roughness(tangential=0.4, friction=0.03),
+    BEADS,
+    RUBBING,
+    SMOOTH_WALLS,
+    Roughness(tangential=-0.5),
+    HALF,
+    Roughness(tangential=0.5),
+)
+BULK_DENSITY = 0.1
+_FIRST, _LAST, _RATE, _ERROR = 1.75, 20.0, 30.0, 0.02
+_NS = 1e9
+
+
+def settings_of(tray, roughness, **values):
+    """Of a simulated tray."""
+    return SimulationSettings(
+        **{
+            'tray': tray.number,
+            'restitution': PAIRS,
+            'wall_restitution': WALLS,
+            **roughness.settings,
+            'mean_speed': 0.010,
+            'seed': 99,
+            'first_shake': 0.0,
+            'frame_rate': _RATE,
+            **values,
+        }
+    )
+
+
+def bulk_course(restitution, tangential, seeds, duration=600.0):
+    """Collisions of each bead, and rotation over translation, in a periodic box, from no spin."""
+    rows = []
+    for seed in seeds:
+        gas = bulk(
+            5,
+            BULK_DENSITY,
+            seed,
+            restitution=restitution,
+            tangential_restitution=tangential,
+        )
+        times = np.linspace(0.0, duration, 61) * TIME
+        course = gas.follow(times[-1], times, times)
+        inertia = SOLID_SPHERE * MASS * (0.5 * DIAMETER) ** 2
+        rotation = inertia * np.mean(course.spins**2, axis=(1, 2))
+        translation = MASS * np.mean(course.velocities**2, axis=(1, 2))
+        collisions = 2.0 * course.observations.pair_collisions / gas.radii.size
+        rows.append((collisions, rotation, translation))
+    collisions, rotation, translation = np.mean(rows, axis=0)
+    return collisions, rotation / translation
+
+
+def tray_ratios(number, roughness, times, runs, **values):
+    """Rotation over translation of each species in a tray, (n_species, n_times)."""
+    tray = load_trays()[number]
+    settings = settings_of(tray, roughness, **values)
+    rotation, translation = [], []
+    for run in range(runs):
+        rules = rules_of(settings, tray, run)
+        resting = resting_beads(settings, tray, run)
+        beads = after_shaking(settings, rules, resting, run, 0)
+        course = HardSphereGas(beads, rules).follow(times[-1], times)
+        spins = (course.spins**2).mean(axis=2) * SOLID_SPHERE * resting.radii**2
+        speeds = (course.velocities**2).mean(axis=2)
+        own = [beads.species == k for k in range(len(tray.species))]
+        mass = resting.masses
+        rotation.append([(mass * spins)[:, one].mean(axis=1) for one in own])
+        translation.append([(mass * speeds)[:, one].mean(axis=1) for one in own])
+    return np.mean(rotation, axis=0) / np.mean(translation, axis=0)
+
+
+def speeds_of(number, roughness, times, runs, **values):
+    """Mean projected speeds of a tray, (n_runs, n_times), [m/s]."""
+    tray = load_trays()[number]
+    settings = settings_of(tray, roughness, **values)
+    return cooling_runs(settings, tray, times, range(runs)).mean_projected_speed
+
+
+def paper_values(speeds, step, tray):
+    """The paper's estimate and the speed it stands at, of curves (n_curves, n_times).
+
+    From speeds 1 s apart; the collision speed is that of the mean over all curves, so that
+    noise moves no value from one speed to another.
+    """
+    lag = round(1.0 / step)
+    found = paper_instantaneous_restitution(
+        speeds[:, :-lag], speeds[:, lag:], lag * step, tray.diameter, tray.number_density
+    )
+    return found, RELATIVE_TO_MEAN_SPEED * speeds.mean(axis=0)[:-lag]
+
+
+def spread(values, speed, edges):
+    """How the estimates scatter by speed.
+
+    Parameters
+    ----------
+    values : ndarray (n_curves, n_times)
+    speed : ndarray (n_times,)
+    edges : sequence of float
+        Of the ranges of speed, [m/s].
+
+    Returns
+    -------
+    middle, half, above_one, highest, half_log : ndarray (n_ranges,)
+        Median, half of the range of the middle 68 %, share above 1, quantile 97.5 %, and half
+        of the same range of the logarithm; NaN where no speed is in the range.
+    """
+    rows = []
+    for low, high in pairwise(edges):
+        inside = values[:, (speed >= low) & (speed < high)]
+        if inside.size:
+            lower, middle, upper, highest = np.nanquantile(inside, (0.16, 0.5, 0.84, 0.975))
+            above = np.nanmean(inside > 1.0)
+            half, logs = 0.5 * (upper - lower), 0.5 * np.log(upper / lower)
+            rows.append((middle, half, above, highest, logs))
+        else:
+            rows.append((math.nan,) * 5)
+    return np.array(rows).T
+
+
+def single_collisions(restitution, roughness, ratio, n=400_000, seed=1):
+    """Relative speed after over before single collisions, (n,), weighted as collisions happen.
+
+    Parameters
+    ----------
+    restitution : float
+    roughness : Roughness
+    ratio : float
+        Temperature of the rotation over that of the translation.
+    """
+    random = np.random.default_rng(seed)
+    # Along the normal Rayleigh's law, as beads meet the more often the faster; kT = m = r = 1.
+    normal = math.sqrt(2.0) * random.rayleigh(size=n)
+    across = math.sqrt(2.0) * random.normal(size=(n, 2))
+    turning = math.sqrt(2.0 * ratio / SOLID_SPHERE) * random.normal(size=(n, 2))
+    slip = across + turning
+    size = np.hypot(*slip.T)
+    # Per unit of reduced mass, 1/2.
+    mass = SOLID_SPHERE / (1.0 + SOLID_SPHERE)
+    grip = mass * (1.0 + roughness.tangential) * size
+    slide = roughness.friction * (1.0 + restitution) * normal
+    push = np.minimum(grip, slide) / size
+    after = across - push[:, np.newaxis] * slip
+    before = np.sqrt(normal**2 + (across**2).sum(axis=1))
+    return np.sqrt((restitution * normal) ** 2 + (after**2).sum(axis=1)) / before
+
+
+def local_rates(speeds, times, tray, error, cycles):
+    """Our local decay rates of one mean over cycles after another, (n_means, 4, 4).
+
+    Speed [m/s], slope of 1/v with its stated error [1/m], restitution, in four windows.
+    """
+    gas = confined_gas(tray)
+    found = []
+    for one in speeds:
+        local = instantaneous_cor(
+            (times, one, np.full(times.size, error)),
+            tray,
+            gas,
+            wall_restitution=WALLS,
+            cycles=cycles,
+            windows=4,
+        ).local
+        found.append((local.speed, local.decay_rate, local.decay_rate_error, local.restitution))
+    return np.array(found)
+
+
+def read_cycles(number, roughness, cycles):
+    """What decays, contacts and both say of the cycles of a tray, beads taken for smooth.
+
+    Returns
+    -------
+    posteriors : dict of Posterior
+        'walls known': of the decays alone; 'decay'; 'all': with rebounds and collisions.
+    decay_rate : float, [1/m]
+        Of Haff's law, fitted to the mean decay.
+    counts : tuple of 2 floats
+        Rebounds and collisions found in a cycle.
+    """
+    tray = load_trays()[number]
+    settings = settings_of(tray, roughness)
+    library = library_of(tray)
+    times = np.arange(_FIRST, _LAST, 0.1)
+    noise = np.random.default_rng([number, cycles]).standard_normal((cycles, times.size))
+    speeds = cooling_runs(settings, tray, times, range(cycles)).mean_projected_speed
+    speeds = speeds * np.exp(_ERROR * noise)
+    prior = PriorSettings()
+    camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
+    tables = tables_of(library, tray, prior)
+    decays = [decay_likelihood(tables, times, one, _ERROR * one, camera) for one in speeds]
+    decay = reduce(add, decays).integrated()
+    contacts = reduce(
+        add, (_contacts(tray, settings, run) for run in range(cycles)), ContactTerms.of(())
+    )
+    read = partial(posterior_of, tables, decay)
+    walls = (prior.wall_low, prior.wall_high)
+    posteriors = {
+        'walls known': read((WALLS, WALLS)),
+        'decay': read(walls),
+        'all': read(
+            walls,
+            of_beads=contacts.of_beads(prior.collision_bias),
+            of_walls=contacts.of_walls(prior.rebound_bias),
+        ),
+    }
+    mean = speeds.mean(axis=0)
+    rate = fit_haff(times, mean, _ERROR * mean, tray.count * cycles).decay_rate
+    return posteriors, rate, (contacts.rebounds / cycles, contacts.collisions / cycles)
+
+
+def _contacts(tray, settings, run):
+    tracks = true_tracks(tray, settings, run, round(_LAST * _RATE))
+    found = contacts_of(tray, tracks)
+    return ContactTerms.of([one for one in found if one.stamp_ns > _FIRST * _NS])

@@ -1,0 +1,116 @@
+"""``nanorocks autocorrelation BAG``: growing clusters by the width of the autocorrelation."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.experiment.settings import PipelineSettings
+
+if TYPE_CHECKING:
+    import argparse
+
+    from nanorocks_ros.study.autocorrelations import BagClusters, CycleClusters
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    from nanorocks_ros.cli.flags import add_bag
+
+    parser = commands.add_parser(
+        'autocorrelation', help='cluster sizes by autocorrelation over a cycle, as in figure 8'
+    )
+    add_bag(parser)
+    parser.add_argument('-o', '--output', help='picture to write: .png, .pdf or .svg')
+    parser.add_argument('--table', help='table of all pictures to write, .csv')
+    parser.add_argument('--cycle', type=int, default=1, help='shaking events so far; default 1')
+    parser.add_argument('--force', action='store_true', help='replace files that exist')
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure, print, write; the exit code."""
+    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.study.autocorrelations import cycle_clusters, write_clusters
+    from nanorocks_ros.study.output_files import check_outputs
+
+    settings = settings_from(options, PipelineSettings(), options.parameters)
+    named = {'--output': options.output, '--table': options.table}
+    files = {flag: Path(name) for flag, name in named.items() if name}
+    kinds = {'--output': ('.png', '.pdf', '.svg'), '--table': ('.csv',)}
+    check_outputs(files, kinds, force=options.force)
+    try:
+        with Progress('measuring') as progress:
+            found = cycle_clusters(
+                Path(options.bag),
+                settings,
+                cycle=options.cycle,
+                image_topic=options.image_topic,
+                progress=progress.count,
+            )
+    except KeyboardInterrupt as interruption:
+        raise KeyboardInterrupt('nothing was written') from interruption
+    for notice in found.notices:
+        print(f'nanorocks: {notice}', file=sys.stderr)
+    if '--table' in files:
+        write_clusters(files['--table'], found)
+    if '--output' in files:
+        from nanorocks_ros.study.autocorrelation_figure import autocorrelation_figure
+
+        autocorrelation_figure(files['--output'], found, settings.preprocess.pixels_per_metre)
+    for flag, path in files.items():
+        print(f'nanorocks: {flag[2:]} in {path}', file=sys.stderr)
+    _print(found, as_json=options.json)
+    return 0
+
+
+def _print(found: BagClusters, *, as_json: bool) -> None:
+    ends = {number: _end(tray) for number, tray in found.trays.items()}
+    if as_json:
+        shown = {
+            str(number): {name: _known(value) for name, value in end.items()}
+            for number, end in ends.items()
+        }
+        print(json.dumps({'cycle': found.cycle, 'trays': shown}, allow_nan=False))
+        return
+    for number, end in ends.items():
+        size = end['cluster_size']
+        told = f'{size:.1f} ± {end["cluster_size_error"]:.1f} beads'
+        if math.isnan(size):
+            told = f'unknown ({end["size_status"].replace("_", " ")})'
+            if math.isfinite(end['cluster_size_lower']):
+                told = f'more than {end["cluster_size_lower"]:.1f} beads'
+        true = end['true_cluster_size']
+        truth = '' if math.isnan(true) else f', true {true:.1f}'
+        print(
+            f'tray {number}: clusters at the end {told}{truth}; area {end["level_area"] * 1e6:.3f}'
+            f" mm2, axes ratio {end['axes_ratio']:.2f}; onset by the paper's rule "
+            f'{end["paper_onset"]:.1f} s'
+        )
+
+
+def _end(tray: CycleClusters) -> dict[str, Any]:
+    last = tray.estimates[-1]
+    return {
+        'pictures': len(tray.estimates),
+        'level_area': last.level_area,
+        'breadth': last.breadth,
+        'axes_ratio': last.axes_ratio,
+        'direction': last.direction,
+        'cluster_size': last.cluster_size,
+        'cluster_size_error': last.cluster_size_error,
+        'cluster_size_lower': last.cluster_size_lower,
+        'cluster_size_upper': last.cluster_size_upper,
+        'size_status': last.size_status.name.lower(),
+        'true_cluster_size': float(tray.true_sizes()[-1]),
+        'paper_onset': tray.paper_onset(),
+        'true_onset': tray.true_onset(),
+    }
+
+
+def _known(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
