@@ -1,8 +1,8 @@
 """``python -m benchmarks.campaign_pictures FOLDER``: pictures of packing, dust and a campaign.
 
 The campaign is simulated: 60 cycles of trays 1, 3 and 5 in recordings of 10, shaken to 10 mm/s.
-Beads that meet at less than 0.2 mm/s stick, in cycles 18 to 25 at less than 3 mm/s: that stands for
-a quiet time. Speeds get an error of 0.1 mm/s; restitutions are those of the confined theory.
+Beads that meet at less than 0.2 mm/s stick, in cycles 18 to 25 at less than 3 mm/s: that stands
+for a quiet time. Speeds get an error of 0.1 mm/s; restitutions are those of the confined theory.
 """
 
 from __future__ import annotations

@@ -33,8 +33,9 @@ class Trend:
     Parameters
     ----------
     slope, slope_error : float
-        Change of the value in a cycle, and one standard error; NaN for too few values. The error
-        takes cycles for independent: neighbours that are alike make it too small.
+        Change of the value in a cycle, and one standard error; NaN for too few values, and for
+        the error where values don't scatter. It takes cycles for independent: neighbours that
+        are alike make it too small.
     middle : float
         Median of the values less that of the line through 0.
     samples : int
@@ -71,10 +72,16 @@ def robust_trend(cycles: NDArray[np.float64], values: NDArray[np.float64]) -> Tr
     slope, _, low, high = stats.theilslopes(y, x, alpha=_ONE_SIGMA)
     return Trend(
         slope=float(slope),
-        slope_error=0.5 * float(high - low),
+        slope_error=0.5 * float(high - low) or _least_squares_error(x, y - slope * x),
         middle=float(np.median(y - slope * x)),
         samples=int(x.size),
     )
+
+
+def _least_squares_error(x: NDArray[np.float64], left: NDArray[np.float64]) -> float:
+    """Of a slope where most values are the same, such as counts, so that the median has none."""
+    scatter = float(np.std(left, ddof=2)) / math.sqrt(float(np.sum((x - x.mean()) ** 2)))
+    return scatter or math.nan
 
 
 class QuietPeriod(NamedTuple):
@@ -137,7 +144,7 @@ def quiet_periods(
         raise ConfigurationError(
             'false alarms',
             f'{false_alarms!r} with {orders} random orders',
-            'give more than 0 and up to 0.5, and as many orders as it needs',
+            f'give {1.0 / (orders + 1):g} to 0.5',
         )
     if shortest < 1:
         raise ConfigurationError('shortest', f'{shortest}', 'give 1 or more cycles')

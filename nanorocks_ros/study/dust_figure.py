@@ -13,6 +13,7 @@ from nanorocks_ros.physics.dust import (
     BOUNCING_SLOPE,
     BOUNCING_SLOPE_SOURCE,
     CURVES,
+    MILLIMETRE_STICKS_BELOW,
     PAPER_STICKING_SPEEDS,
     STICKING_SEEN,
     UNVERIFIED,
@@ -109,7 +110,7 @@ def dust_figure(path: Path, points: Sequence[MeasuredThreshold]) -> dict[str, An
     axes.set_xscale('log')
     axes.set_yscale('log')
     axes.set_xlim(*(_MG * one for one in _MASSES))
-    axes.set_ylim(0.02, 1000.0)
+    axes.set_ylim(0.02, 2000.0)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter('{x:g}')
     axes.set_xlabel('mass of a particle [mg]')
@@ -182,6 +183,12 @@ def _draw_published(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
         lw=0,
         label=f'{STICKING_SEEN.name}: {STICKING_SEEN.source}',
     )
+    axes.axhline(
+        _MM * MILLIMETRE_STICKS_BELOW,
+        color=_SEEN,
+        lw=1.2,
+        label=f'aggregates of a millimetre always stick below: {STICKING_SEEN.source}',
+    )
     middle = np.exp(np.mean(np.log([(one.mass, one.speed) for one in points]), axis=0))
     ends = middle[0] * np.array([1.0 / _SLOPE_SPAN, _SLOPE_SPAN])
     axes.plot(
@@ -225,4 +232,6 @@ def _draw_points(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
             textcoords='offset points',
             ha='right' if left else 'left',
             fontsize=8.5,
+            bbox={'facecolor': 'white', 'alpha': 0.7, 'lw': 0, 'pad': 0.5},
+            zorder=6,
         )

@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 # Level areas are taken together over this time, [s]; of a cycle the last part is its end.
 _TOGETHER = 2.0
 _END = 0.15
+# By then clusters have formed in the paper (its figure 8e), [s].
+_SETTLED = 6.0, 14.0
 # The picture holds the tray and so much around it, [m].
 _AROUND = 0.004
 _FEWEST = 5
@@ -86,13 +88,16 @@ class Compaction:
         (ff_end - ff_min) / ff_min as the paper has it, which is widest / end - 1: the number of
         beads, the calibration and the height cancel. The widest of values that scatter is wide by
         chance, so that this is above 0 for clusters that don't change.
+    settled : float
+        The same from a time that is fixed, 6 to 14 s after the shaking event, to the end.
     true : float
-        The same of the filling factor from true places; NaN where not known.
+        As `apparent`, of the filling factor from true places; NaN where not known.
     """
 
     widest: float
     end: float
     apparent: float
+    settled: float
     true: float
 
 
@@ -123,11 +128,13 @@ def compaction(curve: PackingCurve) -> Compaction:
         )
     then = curve.filling[widest * step : (widest + 1) * step]
     now = curve.filling[-last * step :]
+    middle = (curve.times >= _SETTLED[0]) & (curve.times <= _SETTLED[1])
     known = np.isfinite(then).any() and np.isfinite(now).any()
     return Compaction(
         widest=float(areas[widest]),
         end=end,
         apparent=max(float(areas[widest]), end) / end - 1.0,
+        settled=float(np.mean(curve.level_area[middle])) / end - 1.0 if middle.any() else math.nan,
         true=float(np.nanmean(now) / np.nanmean(then)) - 1.0 if known else math.nan,
     )
 

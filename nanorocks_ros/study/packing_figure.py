@@ -139,7 +139,7 @@ def _draw_fillings(axes: Axes, curves: Mapping[int, Sequence[PackingCurve]]) -> 
     axes.text(
         0.99,
         HEXAGONAL_LAYER - 0.008,
-        f'hexagonal layer, {HEXAGONAL_LAYER:.3f}: the most of a flat one',
+        f'hexagonal layer of equal beads, {HEXAGONAL_LAYER:.3f}',
         ha='right',
         va='top',
         fontsize=8.5,
