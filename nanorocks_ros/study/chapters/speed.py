@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from nanorocks_ros.experiment.paper_values import PAPER_PEAK_SPEED
 from nanorocks_ros.experiment.settings import SimulationSettings
@@ -119,7 +120,9 @@ def _draw_ratios(path: Path, found: ComparedSpeeds, cycle: int) -> None:
     axes.set(xscale='log', yscale='log', xlabel='true mean projected speed [mm/s]',
              ylabel='measured / true')  # fmt: skip
     for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter('{x:g}')
+        axis.set_minor_formatter(NullFormatter())
     axes.grid(alpha=0.25)
     axes.legend(frameon=False)
     with whole_file(path) as part:
