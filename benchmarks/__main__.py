@@ -24,6 +24,7 @@ ALL = (
     'closed_forms',
     'contacts',
     'sticking',
+    'sticking_films',
     'packing',
     'rotation',
     'engine',

@@ -45,7 +45,7 @@ FOLDER = 'NANOROCKS_FILMS'
 
 # The plate holds eight cells: four of tray 1 and four of tray 3, [mm], give as many cycles for
 # the price of one picture.
-_PLACES = {
+PLACES = {
     1: ((4.0, 5.0), (23.0, 5.0), (42.0, 5.0), (61.0, 5.0)),
     3: ((42.0, 25.0), (42.0, 41.0), (4.0, 60.0), (42.0, 60.0)),
 }
@@ -126,7 +126,7 @@ def make(films: list[Film], workers: Workers) -> None:
 
 def load(films: list[Film]) -> dict[int, list[Cycle]]:
     """The cycles of each tray, of the films that were made."""
-    found: dict[int, list[Cycle]] = {number: [] for number in _PLACES}
+    found: dict[int, list[Cycle]] = {number: [] for number in PLACES}
     for film in films:
         path = folder() / film.name
         if path.exists():
@@ -139,7 +139,7 @@ def _cells() -> tuple[dict[int, Tray], dict[int, int]]:
     """The cells of the plate by number, and which tray each of them is like."""
     flown = load_trays()
     cells, like = {}, {}
-    for tray, places in _PLACES.items():
+    for tray, places in PLACES.items():
         for x, y in places:
             number = len(cells) + 1
             place = (x * _MILLIMETRE, y * _MILLIMETRE)
