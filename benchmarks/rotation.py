@@ -12,8 +12,9 @@ from itertools import pairwise
 import numpy as np
 
 from benchmarks import rough_gas as gas
+from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.physics.haff_fit import fit_haff
+from nanorocks_ros.physics.confined import confined_gas
 from nanorocks_ros.physics.rotation import (
     SOLID_SPHERE,
     rough_temperature_ratio,
@@ -130,8 +131,8 @@ def _paper_estimate():
     tray = load_trays()[1]
     names = [f'{1e3 * low:g} to {1e3 * high:g} mm/s' for low, high in pairwise(EDGES)]
     _table(
-        "The paper's instantaneous restitution in tray 1, speeds 1 s apart, noise 0.1 mm/s: median "
-        '± half of the middle 68 % (share above 1), by collision speed',
+        "The paper's instantaneous restitution in tray 1, speeds 1 s apart, noise 0.1 mm/s: "
+        'median ± half of the middle 68 % (share above 1), by collision speed',
         'beads', 'speeds', *names, '97.5 % at 1 to 2', 'width as speed to the power',
     )  # fmt: skip
     for rough in CASES:
@@ -150,34 +151,36 @@ def _paper_estimate():
 
 
 def _local():
-    tray = load_trays()[1]
+    theory = confined_gas(load_trays()[1])
     _table(
-        f'Ours in tray 1, mean of {TOGETHER} cycles, 0.5 to 20 s, 0.5 mm/s or faster: slope of 1/v in four windows',
-        'beads', 'noise of the mean', 'collision speeds [mm/s]',
-        'slopes [1/m] ± scatter (stated error)', 'restitutions',
+        f'Ours in tray 1, mean of {TOGETHER} cycles, 0.5 to 20 s, 0.5 mm/s or faster: slope of '
+        '1/v in four windows',
+        'beads', 'noise of the mean', 'collision speeds [mm/s]', 'slopes [1/m] ± scatter',
+        'restitutions',
     )  # fmt: skip
     for rough in CASES:
         speeds = gas.speeds_of(1, rough, TIMES, RUNS)
         # Slower ones are lost in the noise.
         inside = (TIMES <= 20.0) & (speeds.mean(axis=0) > 5.0 * NOISE)
-        times, speeds = TIMES[inside], speeds[:, inside]
         for noise in (0.0, NOISE):
-            each = curves(speeds, TOGETHER, 0.0, noise)
-            found = gas.local_rates(each, times, tray, max(noise, 1e-6), TOGETHER)
-            speed, rates, errors, values = found.transpose(1, 0, 2)
-            scatter = rates.std(axis=0, ddof=1)
+            each = curves(speeds[:, inside], TOGETHER, 0.0, noise)
+            speed, slopes = gas.local_rates(each, TIMES[inside])
+            means = slopes.mean(axis=0)
             shown = [
-                f'{a:.1f} ± {b:.1f} ({c:.1f})'
-                for a, b, c in zip(
-                    rates.mean(axis=0), scatter, np.median(errors, axis=0), strict=True
-                )
+                f'{a:.0f} ± {b:.1f}'
+                for a, b in zip(means, slopes.std(axis=0, ddof=1), strict=True)
             ]
-            read = [
-                f'{np.nanmean(one):.3f}' if np.isfinite(one).any() else 'none' for one in values.T
-            ]
-            at = [f'{2e3 * one:.2g}' for one in speed.mean(axis=0)]
+            at = [f'{2e3 * one:.2g}' for one in speed]
+            read = [_restitution(theory, one) for one in means]
             label = '0.1 mm/s' if noise else 'none'
             _row(rough.name, label, ', '.join(at), ', '.join(shown), ', '.join(read))
+
+
+def _restitution(theory, rate):
+    try:
+        return f'{theory.restitution(float(rate), gas.WALLS):.3f}'
+    except FitError:
+        return 'none'
 
 
 def _camera():
@@ -242,4 +245,4 @@ def friction_rate(friction, walls):
     rough = gas.Roughness(tangential=0.4, friction=friction, walls=walls)
     start = PAPER_SPEED * 4.0 / math.pi
     mean = gas.speeds_of(1, rough, times, 120, mean_speed=start).mean(axis=0)
-    return fit_haff(times, mean, 0.02 * mean, load_trays()[1].count * 120).decay_rate
+    return gas.haff_rate(times, mean)

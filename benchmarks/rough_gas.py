@@ -12,6 +12,7 @@ from itertools import pairwise
 from operator import add
 
 import numpy as np
+from scipy import optimize
 
 from benchmarks.contacts import contacts_of, true_tracks
 from benchmarks.hard_sphere_runs import DIAMETER, MASS, TIME, bulk
@@ -21,9 +22,7 @@ from nanorocks_ros.inference.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay_library import library_of
 from nanorocks_ros.inference.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.restitution import posterior_of, tables_of
-from nanorocks_ros.physics.confined import confined_gas
-from nanorocks_ros.physics.haff_fit import fit_haff
-from nanorocks_ros.physics.instantaneous import instantaneous_cor
+from nanorocks_ros.physics.instantaneous import local_slopes
 from nanorocks_ros.physics.paper import (
     RELATIVE_TO_MEAN_SPEED,
     paper_instantaneous_restitution,
@@ -219,24 +218,30 @@ def single_collisions(restitution, roughness, ratio, n=400_000, seed=1):
     return np.sqrt((restitution * normal) ** 2 + (after**2).sum(axis=1)) / before
 
 
-def local_rates(speeds, times, tray, error, cycles):
-    """Our local decay rates of one mean over cycles after another, (n_means, 4, 4).
+def local_rates(speeds, times, windows=4):
+    """Slopes of 1/v of one mean over cycles after another, in windows even in ln v.
 
-    Speed [m/s], slope of 1/v with its stated error [1/m], restitution, in four windows.
+    Returns
+    -------
+    speed : ndarray (windows,), [m/s]
+    slopes : ndarray (n_means, windows), [1/m]
     """
-    gas = confined_gas(tray)
-    found = []
-    for one in speeds:
-        local = instantaneous_cor(
-            (times, one, np.full(times.size, error)),
-            tray,
-            gas,
-            wall_restitution=WALLS,
-            cycles=cycles,
-            windows=4,
-        ).local
-        found.append((local.speed, local.decay_rate, local.decay_rate_error, local.restitution))
-    return np.array(found)
+    law = speeds.mean(axis=0)
+    share = np.log(law[0] / law) / np.log(law[0] / law[-1])
+    place = np.clip((share * windows).astype(int), 0, windows - 1)
+    # The mean may rise for a moment, and windows must follow one another.
+    place = np.maximum.accumulate(place)
+    middle = [np.exp(np.log(law[place == k]).mean()) for k in range(windows)]
+    return np.array(middle), local_slopes(times, speeds, law, place)
+
+
+def haff_rate(times, mean):
+    """Decay rate 1 / (v0 tau) of Haff's law fitted to ln v, all times counting alike, [1/m]."""
+
+    def residual(logs):
+        return np.log(mean) - logs[0] + np.log1p(math.exp(logs[0] + logs[1]) * times)
+
+    return math.exp(optimize.least_squares(residual, (math.log(mean[0]), math.log(50.0))).x[1])
 
 
 def read_cycles(number, roughness, cycles):
@@ -277,8 +282,7 @@ def read_cycles(number, roughness, cycles):
             of_walls=contacts.of_walls(prior.rebound_bias),
         ),
     }
-    mean = speeds.mean(axis=0)
-    rate = fit_haff(times, mean, _ERROR * mean, tray.count * cycles).decay_rate
+    rate = haff_rate(times, speeds.mean(axis=0))
     return posteriors, rate, (contacts.rebounds / cycles, contacts.collisions / cycles)
 
 
