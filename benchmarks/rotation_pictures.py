@@ -108,7 +108,8 @@ def _readings(axes):
                 FRICTIONS, values, f'{marker}-', color=colour, label=f'tray {number}: {text}'
             )
     axes.axhline(gas.PAIRS, color='black', lw=0.7)
-    axes.set_ylim(0.0, 1.0)
+    # Room for the legend above.
+    axes.set_ylim(0.0, 1.3)
     axes.set_xlabel('friction μ of beads and walls, β = 0.4')
     axes.set_ylabel('restitution of the beads as read')
     axes.set_title('rough beads taken for smooth; the truth is 0.89', fontsize=10)
