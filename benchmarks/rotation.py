@@ -211,18 +211,17 @@ def _bias():
         f'What is read where beads are taken for smooth: truth 0.89 and 0.97, {CYCLES} cycles '
         'together',
         'tray, beads', 'decay rate [1/m]', 'beads, walls known', 'by decay: beads', 'walls',
-        'with contacts: beads', 'walls', 'tension', 'rebounds, collisions in a cycle',
+        'with contacts: beads', 'walls', 'contacts alone: beads', 'walls',
+        'tension: of a cycle, of all', 'rebounds, collisions in a cycle',
     )  # fmt: skip
     for number in (1, 3):
         for rough in (gas.SMOOTH, *gas.ROUGH):
-            read, rate, (rebounds, collisions) = gas.read_cycles(number, rough, CYCLES)
-            cells = [f'{read["walls known"].mean[0]:.3f}']
-            for name in ('decay', 'all'):
-                cells += [f'{one:.3f}' for one in read[name].mean]
-            tension = f'{read["all"].tension:.1f}'
+            read, numbers = gas.read_cycles(number, rough, CYCLES)
+            rate, tension, rebounds, collisions, *alone = numbers
+            each = [read['walls known'].mean[0], *read['decay'].mean, *read['all'].mean, *alone]
             _row(
-                f'{number}, {rough.name}', f'{rate:.0f}', *cells, tension,
-                f'{rebounds:.0f}, {collisions:.0f}',
+                f'{number}, {rough.name}', f'{rate:.0f}', *(f'{one:.3f}' for one in each),
+                f'{tension:.1f}, {read["all"].tension:.1f}', f'{rebounds:.0f}, {collisions:.0f}',
             )  # fmt: skip
 
 

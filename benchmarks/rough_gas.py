@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial, reduce
+from functools import reduce
 from itertools import pairwise
 from operator import add
 
@@ -18,6 +18,7 @@ from benchmarks.contacts import contacts_of, true_tracks
 from benchmarks.hard_sphere_runs import DIAMETER, MASS, TIME, bulk
 from nanorocks_ros.experiment.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.contact_estimate import contact_estimate
 from nanorocks_ros.inference.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay_library import library_of
 from nanorocks_ros.inference.decay_likelihood import decay_likelihood
@@ -251,10 +252,9 @@ def read_cycles(number, roughness, cycles):
     -------
     posteriors : dict of Posterior
         'walls known': of the decays alone; 'decay'; 'all': with rebounds and collisions.
-    decay_rate : float, [1/m]
-        Of Haff's law, fitted to the mean decay.
-    counts : tuple of 2 floats
-        Rebounds and collisions found in a cycle.
+    numbers : tuple of 6 floats
+        Decay rate of the mean decay [1/m]; median tension of the cycles one by one; rebounds and
+        collisions found in a cycle; restitutions of beads and walls by these alone.
     """
     tray = load_trays()[number]
     settings = settings_of(tray, roughness)
@@ -267,23 +267,47 @@ def read_cycles(number, roughness, cycles):
     camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
     tables = tables_of(library, tray, prior)
     decays = [decay_likelihood(tables, times, one, _ERROR * one, camera) for one in speeds]
-    decay = reduce(add, decays).integrated()
-    contacts = reduce(
-        add, (_contacts(tray, settings, run) for run in range(cycles)), ContactTerms.of(())
-    )
-    read = partial(posterior_of, tables, decay)
-    walls = (prior.wall_low, prior.wall_high)
-    posteriors = {
-        'walls known': read((WALLS, WALLS)),
-        'decay': read(walls),
-        'all': read(
+    contacts = [_contacts(tray, settings, run) for run in range(cycles)]
+    together, walls = reduce(add, decays).integrated(), (prior.wall_low, prior.wall_high)
+
+    def with_contacts(decay, found):
+        return posterior_of(
+            tables,
+            decay,
             walls,
-            of_beads=contacts.of_beads(prior.collision_bias),
-            of_walls=contacts.of_walls(prior.rebound_bias),
-        ),
+            of_beads=found.of_beads(prior.collision_bias),
+            of_walls=found.of_walls(prior.rebound_bias),
+        )
+
+    each = [
+        with_contacts(decay.integrated(), found)
+        for decay, found in zip(decays, contacts, strict=True)
+    ]
+    everything = reduce(add, contacts)
+    posteriors = {
+        'walls known': posterior_of(tables, together, (WALLS, WALLS)),
+        'decay': posterior_of(tables, together, walls),
+        'all': with_contacts(together, everything),
     }
     rate = haff_rate(times, speeds.mean(axis=0))
-    return posteriors, rate, (contacts.rebounds / cycles, contacts.collisions / cycles)
+    return posteriors, (
+        rate,
+        float(np.median([one.tension for one in each])),
+        everything.rebounds / cycles,
+        everything.collisions / cycles,
+        *_alone(everything),
+    )
+
+
+def _alone(contacts):
+    """Restitutions of beads and walls by contacts alone; NaN without any."""
+    found = []
+    for term in (contacts.of_beads(), contacts.of_walls()):
+        if term is None:
+            found.append(math.nan)
+        else:
+            found.append(contact_estimate(term.restitution, term.log_likelihood).restitution)
+    return found
 
 
 def _contacts(tray, settings, run):
