@@ -66,7 +66,7 @@ class Roughness:
 
 SMOOTH = Roughness()
 # Like glass and acrylic, and twice as rough: Foerster et al. 1994, Phys. Fluids 6, 1108, and
-# Lorenz et al. 1997, Phys. Fluids 9, 2823; from memory.
+# Lorenz et al. 1997, Exp. Mech. 37, 292; from memory.
 BEADS = Roughness(tangential=0.4, friction=0.1)
 RUBBING = Roughness(tangential=0.4, friction=0.25)
 SMOOTH_WALLS = Roughness(tangential=0.4, friction=0.1, walls=False)
