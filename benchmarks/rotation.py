@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from benchmarks import rough_gas as gas
+from benchmarks import rough_sharing as energy
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.physics.confined import confined_gas
@@ -71,7 +72,7 @@ def _bulk():
         'theory', 'in the end', 'a smooth restitution that cools alike',
     )  # fmt: skip
     for restitution, tangential in BULK:
-        collisions, ratio = gas.bulk_course(restitution, tangential, SEEDS)
+        collisions, ratio = energy.bulk_course(restitution, tangential, SEEDS)
         cells = []
         for at in (10.0, 20.0, 30.0):
             theory = temperature_ratio_course(np.array([at]), restitution, tangential)[0]
@@ -83,17 +84,29 @@ def _bulk():
 
 
 def _sharing():
+    rows = []
     _table(
         'The same in trays 1 and 3, from no rotation; last: after a really shaken start',
         'tray, beads', 'species', *(f'{one:g} s' for one in SHARING_TIMES[1:]), 'shaken, at 0 s',
     )  # fmt: skip
     for number, runs in SHARING.items():
         for rough in gas.ROUGH:
-            ratios = gas.tray_ratios(number, rough, SHARING_TIMES, runs)
-            shaken = gas.tray_ratios(number, rough, SHARING_TIMES[:1], runs, speeds='shaken')
+            found = energy.sharing(number, rough, SHARING_TIMES, runs)
+            shaken = energy.sharing(number, rough, SHARING_TIMES[:1], runs, speeds='shaken')
             for k, one in enumerate(load_trays()[number].species):
-                values = [f'{value:.2f}' for value in (*ratios[k, 1:], shaken[k, 0])]
-                _row(f'{number}, {rough.name}', one.material, *values)
+                values = [*found.ratio[k, 1:], shaken.ratio[k, 0]]
+                name = f'{number}, {rough.name}'
+                _row(name, one.material, *(f'{value:.2f}' for value in values))
+                upright = found.upright_flight[k, 1:], found.upright_spin[k, 1:]
+                shown = [f'{a:.1f}, {b:.2f}' for a, b in zip(*upright, strict=True)]
+                rows.append((name, one.material, *shown))
+    _table(
+        'Mean square of velocity along z over that along x and y, and part of the rotation that is '
+        'about z',
+        'tray, beads', 'species', *(f'{one:g} s' for one in SHARING_TIMES[1:]),
+    )  # fmt: skip
+    for row in rows:
+        _row(*row)
 
 
 def _single():
@@ -103,7 +116,7 @@ def _single():
     )  # fmt: skip
     for rough in (gas.SMOOTH, gas.BEADS, gas.RUBBING, gas.HALF):
         for ratio in (0.0, 0.3, 1.0):
-            found = gas.single_collisions(gas.PAIRS, rough, ratio)
+            found = energy.single_collisions(gas.PAIRS, rough, ratio)
             ends = np.quantile(found, (0.025, 0.16, 0.84, 0.975))
             _row(rough.name, ratio, *(f'{e:.2f}' for e in ends), f'{np.mean(found > 1.0):.3f}')
 

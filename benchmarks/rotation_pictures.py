@@ -9,6 +9,7 @@ import matplotlib as mpl
 import numpy as np
 
 from benchmarks import rough_gas as gas
+from benchmarks import rough_sharing as energy
 from benchmarks.rotation import NOISE, RUNS, SEEDS, STEP, TIMES, TOGETHER, curves
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.physics.paper import RELATIVE_TO_MEAN_SPEED
@@ -20,7 +21,7 @@ from matplotlib.figure import Figure
 COLOURS = ('#30506f', '#c23b22', '#e0a458', '#5b8c5a')
 CASES = (gas.SMOOTH, gas.SMOOTH_WALLS, gas.BEADS, gas.RUBBING)
 SHARING_TIMES = np.linspace(0.0, 20.0, 41)
-CYCLES = 4
+CYCLES = 6
 FRICTIONS = (0.0, 0.03, 0.1, 0.25)
 EDGES = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 14.0]) * 1e-3
 
@@ -40,7 +41,7 @@ def main(folder):
 
 def _bulk(axes):
     for tangential, colour in zip((0.5, 0.0, -0.5), COLOURS, strict=False):
-        collisions, ratio = gas.bulk_course(gas.PAIRS, tangential, SEEDS)
+        collisions, ratio = energy.bulk_course(gas.PAIRS, tangential, SEEDS)
         each = np.linspace(0.0, 40.0, 200)
         axes.plot(
             each,
@@ -59,7 +60,7 @@ def _bulk(axes):
 
 def _tray(axes):
     for rough, colour in zip(CASES[1:], COLOURS[1:], strict=False):
-        ratio = gas.tray_ratios(1, rough, SHARING_TIMES, 120)[0]
+        ratio = energy.sharing(1, rough, SHARING_TIMES, 120).ratio[0]
         axes.plot(SHARING_TIMES, ratio, color=colour, label=rough.name)
     axes.axhline(1.0, color='black', lw=0.7)
     axes.set_xlabel('time since shaking [s]')
@@ -96,14 +97,14 @@ def _readings(axes):
         found = [
             gas.read_cycles(
                 number, gas.Roughness(tangential=0.4 if mu else -1.0, friction=mu), CYCLES
-            )[0]
+            )
             for mu in FRICTIONS
         ]
-        for key, colour, text in (
-            ('walls known', COLOURS[1], 'decay, walls known'),
-            ('all', COLOURS[0], 'decay, rebounds, collisions'),
+        for colour, text, values in (
+            (COLOURS[1], 'decay, walls known', [one[0]['walls known'].mean[0] for one in found]),
+            (COLOURS[0], 'decay and contacts', [one[0]['all'].mean[0] for one in found]),
+            (COLOURS[3], 'contacts alone', [one[1][4] for one in found]),
         ):
-            values = [one[key].mean[0] for one in found]
             axes.plot(
                 FRICTIONS, values, f'{marker}-', color=colour, label=f'tray {number}: {text}'
             )
@@ -113,7 +114,7 @@ def _readings(axes):
     axes.set_xlabel('friction μ of beads and walls, β = 0.4')
     axes.set_ylabel('restitution of the beads as read')
     axes.set_title('rough beads taken for smooth; the truth is 0.89', fontsize=10)
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend(frameon=False, fontsize=8, ncols=2)
 
 
 if __name__ == '__main__':

@@ -1,4 +1,4 @@
-"""Cooling gases of rough beads: temperatures of rotation, and what one reads of their decays.
+"""Cooling gases of rough beads: decays, and what one reads from them.
 
 Restitutions 0.89 (beads) and 0.97 (walls), started at 10 mm/s without rotation.
 """
@@ -15,7 +15,6 @@ import numpy as np
 from scipy import optimize
 
 from benchmarks.contacts import contacts_of, true_tracks
-from benchmarks.hard_sphere_runs import DIAMETER, MASS, TIME, bulk
 from nanorocks_ros.experiment.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.contact_estimate import contact_estimate
@@ -28,11 +27,7 @@ from nanorocks_ros.physics.paper import (
     RELATIVE_TO_MEAN_SPEED,
     paper_instantaneous_restitution,
 )
-from nanorocks_ros.physics.rotation import SOLID_SPHERE
-from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.ensemble import cooling_runs
-from nanorocks_ros.simulation.initial import resting_beads, rules_of
-from nanorocks_ros.simulation.shaking import after_shaking
 
 PAIRS, WALLS = 0.89, 0.97
 
@@ -80,7 +75,6 @@ ROUGH = (
     HALF,
     Roughness(tangential=0.5),
 )
-BULK_DENSITY = 0.1
 _FIRST, _LAST, _RATE, _ERROR = 1.75, 20.0, 30.0, 0.02
 _NS = 1e9
 
@@ -100,47 +94,6 @@ def settings_of(tray, roughness, **values):
             **values,
         }
     )
-
-
-def bulk_course(restitution, tangential, seeds, duration=600.0):
-    """Collisions of each bead, and rotation over translation, in a periodic box, from no spin."""
-    rows = []
-    for seed in seeds:
-        gas = bulk(
-            5,
-            BULK_DENSITY,
-            seed,
-            restitution=restitution,
-            tangential_restitution=tangential,
-        )
-        times = np.linspace(0.0, duration, 61) * TIME
-        course = gas.follow(times[-1], times, times)
-        inertia = SOLID_SPHERE * MASS * (0.5 * DIAMETER) ** 2
-        rotation = inertia * np.mean(course.spins**2, axis=(1, 2))
-        translation = MASS * np.mean(course.velocities**2, axis=(1, 2))
-        collisions = 2.0 * course.observations.pair_collisions / gas.radii.size
-        rows.append((collisions, rotation, translation))
-    collisions, rotation, translation = np.mean(rows, axis=0)
-    return collisions, rotation / translation
-
-
-def tray_ratios(number, roughness, times, runs, **values):
-    """Rotation over translation of each species in a tray, (n_species, n_times)."""
-    tray = load_trays()[number]
-    settings = settings_of(tray, roughness, **values)
-    rotation, translation = [], []
-    for run in range(runs):
-        rules = rules_of(settings, tray, run)
-        resting = resting_beads(settings, tray, run)
-        beads = after_shaking(settings, rules, resting, run, 0)
-        course = HardSphereGas(beads, rules).follow(times[-1], times)
-        spins = (course.spins**2).mean(axis=2) * SOLID_SPHERE * resting.radii**2
-        speeds = (course.velocities**2).mean(axis=2)
-        own = [beads.species == k for k in range(len(tray.species))]
-        mass = resting.masses
-        rotation.append([(mass * spins)[:, one].mean(axis=1) for one in own])
-        translation.append([(mass * speeds)[:, one].mean(axis=1) for one in own])
-    return np.mean(rotation, axis=0) / np.mean(translation, axis=0)
 
 
 def speeds_of(number, roughness, times, runs, **values):
@@ -190,33 +143,6 @@ def spread(values, speed, edges):
         else:
             rows.append((math.nan,) * 5)
     return np.array(rows).T
-
-
-def single_collisions(restitution, roughness, ratio, n=400_000, seed=1):
-    """Relative speed after over before single collisions, (n,), weighted as collisions happen.
-
-    Parameters
-    ----------
-    restitution : float
-    roughness : Roughness
-    ratio : float
-        Temperature of the rotation over that of the translation.
-    """
-    random = np.random.default_rng(seed)
-    # Along the normal Rayleigh's law, as beads meet the more often the faster; kT = m = r = 1.
-    normal = math.sqrt(2.0) * random.rayleigh(size=n)
-    across = math.sqrt(2.0) * random.normal(size=(n, 2))
-    turning = math.sqrt(2.0 * ratio / SOLID_SPHERE) * random.normal(size=(n, 2))
-    slip = across + turning
-    size = np.hypot(*slip.T)
-    # Per unit of reduced mass, 1/2.
-    mass = SOLID_SPHERE / (1.0 + SOLID_SPHERE)
-    grip = mass * (1.0 + roughness.tangential) * size
-    slide = roughness.friction * (1.0 + restitution) * normal
-    push = np.minimum(grip, slide) / size
-    after = across - push[:, np.newaxis] * slip
-    before = np.sqrt(normal**2 + (across**2).sum(axis=1))
-    return np.sqrt((restitution * normal) ** 2 + (after**2).sum(axis=1)) / before
 
 
 def local_rates(speeds, times, windows=4):
