@@ -101,8 +101,8 @@ def _sharing():
                 shown = [f'{a:.1f}, {b:.2f}' for a, b in zip(*upright, strict=True)]
                 rows.append((name, one.material, *shown))
     _table(
-        'Mean square of velocity along z over that along x and y, and part of the rotation that is '
-        'about z',
+        'Mean square of velocity along z over that along x and y, and part of the rotation that '
+        'is about z',
         'tray, beads', 'species', *(f'{one:g} s' for one in SHARING_TIMES[1:]),
     )  # fmt: skip
     for row in rows:

@@ -66,7 +66,8 @@ class Sharing:
     @property
     def upright_spin(self):
         """Part of the energy of rotation that is about z; 1/3 where all axes are alike."""
-        return self.spin[..., 2] / self.spin.sum(axis=2)
+        total = self.spin.sum(axis=2)
+        return self.spin[..., 2] / np.where(total > 0.0, total, np.nan)
 
 
 def sharing(number, roughness, times, runs, **values):
