@@ -12,8 +12,10 @@ from itertools import pairwise
 import numpy as np
 
 from benchmarks import rough_gas as gas
+from benchmarks import rough_sharing as energy
+from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.physics.haff_fit import fit_haff
+from nanorocks_ros.physics.confined import confined_gas
 from nanorocks_ros.physics.rotation import (
     SOLID_SPHERE,
     rough_temperature_ratio,
@@ -70,7 +72,7 @@ def _bulk():
         'theory', 'in the end', 'a smooth restitution that cools alike',
     )  # fmt: skip
     for restitution, tangential in BULK:
-        collisions, ratio = gas.bulk_course(restitution, tangential, SEEDS)
+        collisions, ratio = energy.bulk_course(restitution, tangential, SEEDS)
         cells = []
         for at in (10.0, 20.0, 30.0):
             theory = temperature_ratio_course(np.array([at]), restitution, tangential)[0]
@@ -82,17 +84,29 @@ def _bulk():
 
 
 def _sharing():
+    rows = []
     _table(
         'The same in trays 1 and 3, from no rotation; last: after a really shaken start',
         'tray, beads', 'species', *(f'{one:g} s' for one in SHARING_TIMES[1:]), 'shaken, at 0 s',
     )  # fmt: skip
     for number, runs in SHARING.items():
         for rough in gas.ROUGH:
-            ratios = gas.tray_ratios(number, rough, SHARING_TIMES, runs)
-            shaken = gas.tray_ratios(number, rough, SHARING_TIMES[:1], runs, speeds='shaken')
+            found = energy.sharing(number, rough, SHARING_TIMES, runs)
+            shaken = energy.sharing(number, rough, SHARING_TIMES[:1], runs, speeds='shaken')
             for k, one in enumerate(load_trays()[number].species):
-                values = [f'{value:.2f}' for value in (*ratios[k, 1:], shaken[k, 0])]
-                _row(f'{number}, {rough.name}', one.material, *values)
+                values = [*found.ratio[k, 1:], shaken.ratio[k, 0]]
+                name = f'{number}, {rough.name}'
+                _row(name, one.material, *(f'{value:.2f}' for value in values))
+                upright = found.upright_flight[k, 1:], found.upright_spin[k, 1:]
+                shown = [f'{a:.1f}, {b:.2f}' for a, b in zip(*upright, strict=True)]
+                rows.append((name, one.material, *shown))
+    _table(
+        'Mean square of velocity along z over that along x and y, and part of the rotation that '
+        'is about z',
+        'tray, beads', 'species', *(f'{one:g} s' for one in SHARING_TIMES[1:]),
+    )  # fmt: skip
+    for row in rows:
+        _row(*row)
 
 
 def _single():
@@ -102,7 +116,7 @@ def _single():
     )  # fmt: skip
     for rough in (gas.SMOOTH, gas.BEADS, gas.RUBBING, gas.HALF):
         for ratio in (0.0, 0.3, 1.0):
-            found = gas.single_collisions(gas.PAIRS, rough, ratio)
+            found = energy.single_collisions(gas.PAIRS, rough, ratio)
             ends = np.quantile(found, (0.025, 0.16, 0.84, 0.975))
             _row(rough.name, ratio, *(f'{e:.2f}' for e in ends), f'{np.mean(found > 1.0):.3f}')
 
@@ -130,8 +144,8 @@ def _paper_estimate():
     tray = load_trays()[1]
     names = [f'{1e3 * low:g} to {1e3 * high:g} mm/s' for low, high in pairwise(EDGES)]
     _table(
-        "The paper's instantaneous restitution in tray 1, speeds 1 s apart, noise 0.1 mm/s: median "
-        '± half of the middle 68 % (share above 1), by collision speed',
+        "The paper's instantaneous restitution in tray 1, speeds 1 s apart, noise 0.1 mm/s: "
+        'median ± half of the middle 68 % (share above 1), by collision speed',
         'beads', 'speeds', *names, '97.5 % at 1 to 2', 'width as speed to the power',
     )  # fmt: skip
     for rough in CASES:
@@ -150,34 +164,36 @@ def _paper_estimate():
 
 
 def _local():
-    tray = load_trays()[1]
+    theory = confined_gas(load_trays()[1])
     _table(
-        f'Ours in tray 1, mean of {TOGETHER} cycles, 0.5 to 20 s, 0.5 mm/s or faster: slope of 1/v in four windows',
-        'beads', 'noise of the mean', 'collision speeds [mm/s]',
-        'slopes [1/m] ± scatter (stated error)', 'restitutions',
+        f'Ours in tray 1, mean of {TOGETHER} cycles, 0.5 to 20 s, 0.5 mm/s or faster: slope of '
+        '1/v in four windows',
+        'beads', 'noise of the mean', 'collision speeds [mm/s]', 'slopes [1/m] ± scatter',
+        'restitutions',
     )  # fmt: skip
     for rough in CASES:
         speeds = gas.speeds_of(1, rough, TIMES, RUNS)
         # Slower ones are lost in the noise.
         inside = (TIMES <= 20.0) & (speeds.mean(axis=0) > 5.0 * NOISE)
-        times, speeds = TIMES[inside], speeds[:, inside]
         for noise in (0.0, NOISE):
-            each = curves(speeds, TOGETHER, 0.0, noise)
-            found = gas.local_rates(each, times, tray, max(noise, 1e-6), TOGETHER)
-            speed, rates, errors, values = found.transpose(1, 0, 2)
-            scatter = rates.std(axis=0, ddof=1)
+            each = curves(speeds[:, inside], TOGETHER, 0.0, noise)
+            speed, slopes = gas.local_rates(each, TIMES[inside])
+            means = slopes.mean(axis=0)
             shown = [
-                f'{a:.1f} ± {b:.1f} ({c:.1f})'
-                for a, b, c in zip(
-                    rates.mean(axis=0), scatter, np.median(errors, axis=0), strict=True
-                )
+                f'{a:.0f} ± {b:.1f}'
+                for a, b in zip(means, slopes.std(axis=0, ddof=1), strict=True)
             ]
-            read = [
-                f'{np.nanmean(one):.3f}' if np.isfinite(one).any() else 'none' for one in values.T
-            ]
-            at = [f'{2e3 * one:.2g}' for one in speed.mean(axis=0)]
+            at = [f'{2e3 * one:.2g}' for one in speed]
+            read = [_restitution(theory, one) for one in means]
             label = '0.1 mm/s' if noise else 'none'
             _row(rough.name, label, ', '.join(at), ', '.join(shown), ', '.join(read))
+
+
+def _restitution(theory, rate):
+    try:
+        return f'{theory.restitution(float(rate), gas.WALLS):.3f}'
+    except FitError:
+        return 'none'
 
 
 def _camera():
@@ -208,18 +224,17 @@ def _bias():
         f'What is read where beads are taken for smooth: truth 0.89 and 0.97, {CYCLES} cycles '
         'together',
         'tray, beads', 'decay rate [1/m]', 'beads, walls known', 'by decay: beads', 'walls',
-        'with contacts: beads', 'walls', 'tension', 'rebounds, collisions in a cycle',
+        'with contacts: beads', 'walls', 'contacts alone: beads', 'walls',
+        'tension: of a cycle, of all', 'rebounds, collisions in a cycle',
     )  # fmt: skip
     for number in (1, 3):
         for rough in (gas.SMOOTH, *gas.ROUGH):
-            read, rate, (rebounds, collisions) = gas.read_cycles(number, rough, CYCLES)
-            cells = [f'{read["walls known"].mean[0]:.3f}']
-            for name in ('decay', 'all'):
-                cells += [f'{one:.3f}' for one in read[name].mean]
-            tension = f'{read["all"].tension:.1f}'
+            read, numbers = gas.read_cycles(number, rough, CYCLES)
+            rate, tension, rebounds, collisions, *alone = numbers
+            each = [read['walls known'].mean[0], *read['decay'].mean, *read['all'].mean, *alone]
             _row(
-                f'{number}, {rough.name}', f'{rate:.0f}', *cells, tension,
-                f'{rebounds:.0f}, {collisions:.0f}',
+                f'{number}, {rough.name}', f'{rate:.0f}', *(f'{one:.3f}' for one in each),
+                f'{tension:.1f}, {read["all"].tension:.1f}', f'{rebounds:.0f}, {collisions:.0f}',
             )  # fmt: skip
 
 
@@ -242,4 +257,4 @@ def friction_rate(friction, walls):
     rough = gas.Roughness(tangential=0.4, friction=friction, walls=walls)
     start = PAPER_SPEED * 4.0 / math.pi
     mean = gas.speeds_of(1, rough, times, 120, mean_speed=start).mean(axis=0)
-    return fit_haff(times, mean, 0.02 * mean, load_trays()[1].count * 120).decay_rate
+    return gas.haff_rate(times, mean)

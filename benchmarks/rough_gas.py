@@ -1,4 +1,4 @@
-"""Cooling gases of rough beads: temperatures of rotation, and what one reads of their decays.
+"""Cooling gases of rough beads: decays, and what one reads from them.
 
 Restitutions 0.89 (beads) and 0.97 (walls), started at 10 mm/s without rotation.
 """
@@ -7,32 +7,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial, reduce
+from functools import reduce
 from itertools import pairwise
 from operator import add
 
 import numpy as np
+from scipy import optimize
 
 from benchmarks.contacts import contacts_of, true_tracks
-from benchmarks.hard_sphere_runs import DIAMETER, MASS, TIME, bulk
 from nanorocks_ros.experiment.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.contact_estimate import contact_estimate
 from nanorocks_ros.inference.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay_library import library_of
 from nanorocks_ros.inference.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.restitution import posterior_of, tables_of
-from nanorocks_ros.physics.confined import confined_gas
-from nanorocks_ros.physics.haff_fit import fit_haff
-from nanorocks_ros.physics.instantaneous import instantaneous_cor
+from nanorocks_ros.physics.instantaneous import local_slopes
 from nanorocks_ros.physics.paper import (
     RELATIVE_TO_MEAN_SPEED,
     paper_instantaneous_restitution,
 )
-from nanorocks_ros.physics.rotation import SOLID_SPHERE
-from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.ensemble import cooling_runs
-from nanorocks_ros.simulation.initial import resting_beads, rules_of
-from nanorocks_ros.simulation.shaking import after_shaking
 
 PAIRS, WALLS = 0.89, 0.97
 
@@ -66,7 +61,7 @@ class Roughness:
 
 SMOOTH = Roughness()
 # Like glass and acrylic, and twice as rough: Foerster et al. 1994, Phys. Fluids 6, 1108, and
-# Lorenz et al. 1997, Phys. Fluids 9, 2823; from memory.
+# Lorenz et al. 1997, Exp. Mech. 37, 292; from memory.
 BEADS = Roughness(tangential=0.4, friction=0.1)
 RUBBING = Roughness(tangential=0.4, friction=0.25)
 SMOOTH_WALLS = Roughness(tangential=0.4, friction=0.1, walls=False)
@@ -80,7 +75,6 @@ ROUGH = (
     HALF,
     Roughness(tangential=0.5),
 )
-BULK_DENSITY = 0.1
 _FIRST, _LAST, _RATE, _ERROR = 1.75, 20.0, 30.0, 0.02
 _NS = 1e9
 
@@ -100,47 +94,6 @@ def settings_of(tray, roughness, **values):
             **values,
         }
     )
-
-
-def bulk_course(restitution, tangential, seeds, duration=600.0):
-    """Collisions of each bead, and rotation over translation, in a periodic box, from no spin."""
-    rows = []
-    for seed in seeds:
-        gas = bulk(
-            5,
-            BULK_DENSITY,
-            seed,
-            restitution=restitution,
-            tangential_restitution=tangential,
-        )
-        times = np.linspace(0.0, duration, 61) * TIME
-        course = gas.follow(times[-1], times, times)
-        inertia = SOLID_SPHERE * MASS * (0.5 * DIAMETER) ** 2
-        rotation = inertia * np.mean(course.spins**2, axis=(1, 2))
-        translation = MASS * np.mean(course.velocities**2, axis=(1, 2))
-        collisions = 2.0 * course.observations.pair_collisions / gas.radii.size
-        rows.append((collisions, rotation, translation))
-    collisions, rotation, translation = np.mean(rows, axis=0)
-    return collisions, rotation / translation
-
-
-def tray_ratios(number, roughness, times, runs, **values):
-    """Rotation over translation of each species in a tray, (n_species, n_times)."""
-    tray = load_trays()[number]
-    settings = settings_of(tray, roughness, **values)
-    rotation, translation = [], []
-    for run in range(runs):
-        rules = rules_of(settings, tray, run)
-        resting = resting_beads(settings, tray, run)
-        beads = after_shaking(settings, rules, resting, run, 0)
-        course = HardSphereGas(beads, rules).follow(times[-1], times)
-        spins = (course.spins**2).mean(axis=2) * SOLID_SPHERE * resting.radii**2
-        speeds = (course.velocities**2).mean(axis=2)
-        own = [beads.species == k for k in range(len(tray.species))]
-        mass = resting.masses
-        rotation.append([(mass * spins)[:, one].mean(axis=1) for one in own])
-        translation.append([(mass * speeds)[:, one].mean(axis=1) for one in own])
-    return np.mean(rotation, axis=0) / np.mean(translation, axis=0)
 
 
 def speeds_of(number, roughness, times, runs, **values):
@@ -192,51 +145,30 @@ def spread(values, speed, edges):
     return np.array(rows).T
 
 
-def single_collisions(restitution, roughness, ratio, n=400_000, seed=1):
-    """Relative speed after over before single collisions, (n,), weighted as collisions happen.
+def local_rates(speeds, times, windows=4):
+    """Slopes of 1/v of one mean over cycles after another, in windows even in ln v.
 
-    Parameters
-    ----------
-    restitution : float
-    roughness : Roughness
-    ratio : float
-        Temperature of the rotation over that of the translation.
+    Returns
+    -------
+    speed : ndarray (windows,), [m/s]
+    slopes : ndarray (n_means, windows), [1/m]
     """
-    random = np.random.default_rng(seed)
-    # Along the normal Rayleigh's law, as beads meet the more often the faster; kT = m = r = 1.
-    normal = math.sqrt(2.0) * random.rayleigh(size=n)
-    across = math.sqrt(2.0) * random.normal(size=(n, 2))
-    turning = math.sqrt(2.0 * ratio / SOLID_SPHERE) * random.normal(size=(n, 2))
-    slip = across + turning
-    size = np.hypot(*slip.T)
-    # Per unit of reduced mass, 1/2.
-    mass = SOLID_SPHERE / (1.0 + SOLID_SPHERE)
-    grip = mass * (1.0 + roughness.tangential) * size
-    slide = roughness.friction * (1.0 + restitution) * normal
-    push = np.minimum(grip, slide) / size
-    after = across - push[:, np.newaxis] * slip
-    before = np.sqrt(normal**2 + (across**2).sum(axis=1))
-    return np.sqrt((restitution * normal) ** 2 + (after**2).sum(axis=1)) / before
+    law = speeds.mean(axis=0)
+    share = np.log(law[0] / law) / np.log(law[0] / law[-1])
+    place = np.clip((share * windows).astype(int), 0, windows - 1)
+    # The mean may rise for a moment, and windows must follow one another.
+    place = np.maximum.accumulate(place)
+    middle = [np.exp(np.log(law[place == k]).mean()) for k in range(windows)]
+    return np.array(middle), local_slopes(times, speeds, law, place)
 
 
-def local_rates(speeds, times, tray, error, cycles):
-    """Our local decay rates of one mean over cycles after another, (n_means, 4, 4).
+def haff_rate(times, mean):
+    """Decay rate 1 / (v0 tau) of Haff's law fitted to ln v, all times counting alike, [1/m]."""
 
-    Speed [m/s], slope of 1/v with its stated error [1/m], restitution, in four windows.
-    """
-    gas = confined_gas(tray)
-    found = []
-    for one in speeds:
-        local = instantaneous_cor(
-            (times, one, np.full(times.size, error)),
-            tray,
-            gas,
-            wall_restitution=WALLS,
-            cycles=cycles,
-            windows=4,
-        ).local
-        found.append((local.speed, local.decay_rate, local.decay_rate_error, local.restitution))
-    return np.array(found)
+    def residual(logs):
+        return np.log(mean) - logs[0] + np.log1p(math.exp(logs[0] + logs[1]) * times)
+
+    return math.exp(optimize.least_squares(residual, (math.log(mean[0]), math.log(50.0))).x[1])
 
 
 def read_cycles(number, roughness, cycles):
@@ -246,10 +178,9 @@ def read_cycles(number, roughness, cycles):
     -------
     posteriors : dict of Posterior
         'walls known': of the decays alone; 'decay'; 'all': with rebounds and collisions.
-    decay_rate : float, [1/m]
-        Of Haff's law, fitted to the mean decay.
-    counts : tuple of 2 floats
-        Rebounds and collisions found in a cycle.
+    numbers : tuple of 6 floats
+        Decay rate of the mean decay [1/m]; median tension of the cycles one by one; rebounds and
+        collisions found in a cycle; restitutions of beads and walls by these alone.
     """
     tray = load_trays()[number]
     settings = settings_of(tray, roughness)
@@ -262,24 +193,47 @@ def read_cycles(number, roughness, cycles):
     camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
     tables = tables_of(library, tray, prior)
     decays = [decay_likelihood(tables, times, one, _ERROR * one, camera) for one in speeds]
-    decay = reduce(add, decays).integrated()
-    contacts = reduce(
-        add, (_contacts(tray, settings, run) for run in range(cycles)), ContactTerms.of(())
-    )
-    read = partial(posterior_of, tables, decay)
-    walls = (prior.wall_low, prior.wall_high)
-    posteriors = {
-        'walls known': read((WALLS, WALLS)),
-        'decay': read(walls),
-        'all': read(
+    contacts = [_contacts(tray, settings, run) for run in range(cycles)]
+    together, walls = reduce(add, decays).integrated(), (prior.wall_low, prior.wall_high)
+
+    def with_contacts(decay, found):
+        return posterior_of(
+            tables,
+            decay,
             walls,
-            of_beads=contacts.of_beads(prior.collision_bias),
-            of_walls=contacts.of_walls(prior.rebound_bias),
-        ),
+            of_beads=found.of_beads(prior.collision_bias),
+            of_walls=found.of_walls(prior.rebound_bias),
+        )
+
+    each = [
+        with_contacts(decay.integrated(), found)
+        for decay, found in zip(decays, contacts, strict=True)
+    ]
+    everything = reduce(add, contacts)
+    posteriors = {
+        'walls known': posterior_of(tables, together, (WALLS, WALLS)),
+        'decay': posterior_of(tables, together, walls),
+        'all': with_contacts(together, everything),
     }
-    mean = speeds.mean(axis=0)
-    rate = fit_haff(times, mean, _ERROR * mean, tray.count * cycles).decay_rate
-    return posteriors, rate, (contacts.rebounds / cycles, contacts.collisions / cycles)
+    rate = haff_rate(times, speeds.mean(axis=0))
+    return posteriors, (
+        rate,
+        float(np.median([one.tension for one in each])),
+        everything.rebounds / cycles,
+        everything.collisions / cycles,
+        *_alone(everything),
+    )
+
+
+def _alone(contacts):
+    """Restitutions of beads and walls by contacts alone; NaN without any."""
+    found = []
+    for term in (contacts.of_beads(), contacts.of_walls()):
+        if term is None:
+            found.append(math.nan)
+        else:
+            found.append(contact_estimate(term.restitution, term.log_likelihood).restitution)
+    return found
 
 
 def _contacts(tray, settings, run):

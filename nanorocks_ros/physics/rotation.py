@@ -150,11 +150,6 @@ def smooth_equivalent(restitution: float, tangential_restitution: float) -> floa
     restitution : float, [0, 1]
     tangential_restitution : float, [-1, 1]
 
-    Returns
-    -------
-    float
-        0 where rough beads cool faster than any smooth ones.
-
     Raises
     ------
     ConfigurationError
@@ -162,7 +157,7 @@ def smooth_equivalent(restitution: float, tangential_restitution: float) -> floa
     """
     rates = rough_rates(restitution, tangential_restitution)
     back = rates.exchange * _ends(rates)[0] if rates.exchange > 0.0 else 0.0
-    return math.sqrt(max(0.0, 1.0 - 4.0 * (rates.loss - back)))
+    return math.sqrt(1.0 - 4.0 * (rates.loss - back))
 
 
 def spin_of(mean_projected_speed: float, diameter: float, ratio: float = 1.0) -> float:
