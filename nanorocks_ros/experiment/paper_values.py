@@ -42,3 +42,6 @@ PAPER_HAFF_TIME = 1.64
 
 PAPER_ELLIPSE = (0.95, 2.8)
 """Axes a and b of its wall ellipse, as printed (section 4.1)."""
+
+PAPER_ROTATION = 0.1
+"""Rotation of beads that exchange energy with it, [degrees/s] (section 4.2)."""

@@ -36,6 +36,7 @@ from nanorocks_ros.study.windows import cooling_window
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.study.campaign import CycleFiles
     from nanorocks_ros.study.chapters.context import Context
 
@@ -194,6 +195,12 @@ def _with_interval(cycles: Sequence[dict[str, Any]], name: str) -> str:
     return f'{value:.3f} [{lower:.3f}, {upper:.3f}]'
 
 
+def _rate(tray: Tray) -> float:
+    """Decay rate 1/(v0 tau) of the mean projected speed in figure 7, [1/m]."""
+    relative = math.sqrt(2.0 * reported.PAPER_ENERGY / tray.species[0].bead_mass)
+    return 1.0 / (0.5 * relative * reported.PAPER_HAFF_TIME)
+
+
 def _errata() -> list[Erratum]:
     tray = load_trays()[_TRAY]
     decay = (
@@ -211,8 +218,9 @@ def _errata() -> list[Erratum]:
             'time, takes beads for a dilute gas in a large box, and leaves out the walls, which '
             'in tray 1 take more energy than the beads. On simulated decays it returns 0.91 for a '
             f'true 0.50. Its worked example gives {paper_restitution(*decay):.3f} here as '
-            'printed, from a decay that is four times as fast as that of a gas with that '
-            'restitution: there beads stick.'
+            f'printed, from a decay rate of {_rate(tray):.0f} /m, which is four times that of a '
+            'simulated gas with that restitution: beads that stick cool so fast, and so do beads '
+            'that rub on floor and lid (docs/rotation.md).'
         ),
         Erratum(
             text=f'The axes of its wall ellipse are printed as a = {printed[0]:g}, b = '
