@@ -1,7 +1,7 @@
 """Clusters, first merges and sticking speeds in films with all effects, against the truth.
 
 Plates of eight cells, four like tray 1 and four like tray 3 or 5, JPEG 85, 26 s after a shaking
-event at 10 mm/s, restitutions 0.89 and 0.97. In a sticking film each of the four has its own
+event at 10 mm/s, restitutions 0.89 and 0.97; sizes are by tracks. In a sticking film each of the four has its own
 sticking speed; in a control nothing sticks. Films are kept as those of `cor_films` are.
 """
 
@@ -151,7 +151,7 @@ def _errors(one: Filmed) -> tuple[np.ndarray, np.ndarray]:
     times = np.array([each.stamp_ns / _NS for each in known])
     at = np.searchsorted(one.time, times - 0.5 / _RATE)
     bodies = np.array([each.bodies for each in known]) - one.bodies[at]
-    size = np.array([each.combined_size for each in known]) / one.weighted_size[at] - 1.0
+    size = np.array([each.weighted_size for each in known]) / one.weighted_size[at] - 1.0
     return bodies, size
 
 
@@ -207,6 +207,8 @@ def _film(cells: dict[int, Tray], gases: dict[int, SimulationSettings]) -> dict[
         'trays': list(cells),
         'preprocess.layout': 'plate',
         'preprocess.pixels_per_metre': _SCALE,
+        # Cells have other numbers than the trays that libraries were made for.
+        'cooling.relation': 'paper',
     }
     settings = with_values(PipelineSettings(), names, 'benchmark')
     stage = Preprocessor(settings, cells, 'film', View(camera=scene.camera.geometry.camera))
