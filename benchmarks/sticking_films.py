@@ -1,8 +1,9 @@
 """Clusters, first merges and sticking speeds in films with all effects, against the truth.
 
 Plates of eight cells, four like tray 1 and four like tray 3 or 5, JPEG 85, 26 s after a shaking
-event at 10 mm/s, restitutions 0.89 and 0.97; sizes are by tracks. In a sticking film each of the four has its own
-sticking speed; in a control nothing sticks. Films are kept as those of `cor_films` are.
+event at 10 mm/s, restitutions 0.89 and 0.97; sizes are by tracks. In a sticking film each of the
+four has its own sticking speed; in a control nothing sticks. Films are kept as those of
+`cor_films` are.
 """
 
 from __future__ import annotations
