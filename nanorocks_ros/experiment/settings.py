@@ -325,6 +325,19 @@ class PriorSettings:
         low=0.0,
         high=0.2,
     )
+    grain_scale_error: float = _setting(
+        0.3,
+        'relative standard error of speeds by the structure function in trays with grains, whose '
+        'outlines change as they turn',
+        low=0.0,
+        high=1.0,
+    )
+    grain_speed_bias: float = _setting(
+        0.1,
+        'standard deviation of a relative error of such speeds for each factor e in speed',
+        low=0.0,
+        high=0.5,
+    )
     collision_bias: float = _setting(
         0.008,
         'standard deviation of what the restitution of the beads by all collisions together may '

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import FitError
+from nanorocks_ros.experiment.colours import hue_of
 from nanorocks_ros.records import (
     CorEstimate,
     CorStatus,
@@ -18,6 +19,7 @@ from nanorocks_ros.records import (
     Quality,
     Rebound,
     SpeedEstimate,
+    SpeedMethod,
 )
 from nanorocks_ros.stages.contacts.of_cycle import ContactsOfCycle
 from nanorocks_ros.stages.readings import Decay, LibraryReading, PaperReading, Reading
@@ -59,6 +61,7 @@ class HaffFitter:
         self._tray = tray
         reading = LibraryReading if self._settings.relation == 'library' else PaperReading
         self._make_reading = partial(reading, settings, tray)
+        self._grains = any(hue_of(one.material) == 0 for one in tray.species)
         self._contacts = ContactsOfCycle(self._settings)
         self._restart()
 
@@ -185,6 +188,8 @@ class HaffFitter:
             time=np.array([(one.stamp_ns - start_ns) / NS for one in self._samples]),
             speed=np.array([one.mean_projected_speed for one in self._samples]),
             error=np.array([one.mean_projected_speed_error for one in self._samples]),
+            of_grains=self._grains
+            and any(one.method is SpeedMethod.STRUCTURE_FUNCTION for one in self._samples),
         )
         fields: dict[str, Any] = {'status': status}
         final = status is CorStatus.FINAL

@@ -38,11 +38,14 @@ class Decay:
     time : ndarray (n,), [s]
         Since the shaking event.
     speed, error : ndarray (n,), [m/s]
+    of_grains : bool
+        Whether the speeds are those of grains, by how their pictures change.
     """
 
     time: NDArray[np.float64]
     speed: NDArray[np.float64]
     error: NDArray[np.float64]
+    of_grains: bool = False
 
 
 class Reading(Protocol):
@@ -131,7 +134,11 @@ class LibraryReading:
         library = library_of(tray, settings.cooling.decay_library)
         self._tables = tables_of(library, tray, known)
         # What the library itself is off by acts as a wrong scale would.
-        self._camera = (math.hypot(known.scale_error, library.misfit), known.speed_bias)
+        scale = math.hypot(known.scale_error, library.misfit)
+        self._camera = {
+            False: (scale, known.speed_bias),
+            True: (math.hypot(scale, known.grain_scale_error), known.grain_speed_bias),
+        }
         self._biases = (known.collision_bias, known.rebound_bias)
         self._walls = (known.wall_low, known.wall_high)
         check_walls(self._walls)
@@ -151,7 +158,7 @@ class LibraryReading:
         if np.polyfit(decay.time, np.log(decay.speed), 1)[0] >= 0.0:
             raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
         likelihood = decay_likelihood(
-            self._tables, decay.time, decay.speed, decay.error, self._camera
+            self._tables, decay.time, decay.speed, decay.error, self._camera[decay.of_grains]
         )
         integrated = likelihood.integrated()
         posterior = self._posterior(integrated, contacts)

@@ -82,7 +82,7 @@ def test_the_pipeline_hands_the_count_on_to_its_stages(swinging):
     pipeline = Pipeline(settings(), 'cam', View(camera=LENS))
     for frame in swinging:
         pipeline.push(frame)
-    assert {one.clusters._shakes.cycle for one in pipeline.trays.values()} == {1}
+    assert {one.clusters._images._shakes.cycle for one in pipeline.trays.values()} == {1}
 
 
 def test_a_lens_of_another_size_is_refused(plate):
