@@ -46,6 +46,8 @@ _OUTSIDE = 0.1
 _WORST = math.log(3.0)
 # Sizes above that part of the largest all look alike: the weight is chosen without them.
 _GROWING = 0.7
+# Sizes that are tried for an interval.
+_GRID = 400
 # Of the bins of ln(size), and pictures that a bin needs.
 _BIN = 0.3
 _FEWEST = 8
@@ -70,7 +72,7 @@ class Width(NamedTuple):
 class SizeEstimate(NamedTuple):
     """A weight-averaged cluster size, [beads]; NaN where it is not known.
 
-    `lower` and `upper` are one standard error away, or the limit where the size is beyond.
+    `lower` and `upper`: sizes between which the width is one standard deviation off or less.
     """
 
     size: float
@@ -93,11 +95,13 @@ class ClusterCurve:
     level : float
         Of the autocorrelation.
     log_size : ndarray (n,)
-        Rising from 0; empty where the width says nothing of the size.
+        Rising from 0, to the largest simulated.
     reading : ndarray (n,)
         ln(breadth) + weight ln(level area / m^2), rising.
     scatter : ndarray (n,)
         Standard deviation of the reading of one picture, whatever the camera does.
+    end : int
+        Points up to the last whose size can be told; 0 where the width says nothing of the size.
     weight : float, >= 0
     least : Width
         Less is not of beads, of level area or of contrast.
@@ -114,6 +118,7 @@ class ClusterCurve:
     log_size: NDArray[np.float64]
     reading: NDArray[np.float64]
     scatter: NDArray[np.float64]
+    end: int
     weight: float
     least: Width
     breadths: tuple[float, float]
@@ -122,14 +127,7 @@ class ClusterCurve:
     @property
     def largest(self) -> float:
         """Weight-averaged size at which the curve ends, [beads]; NaN when there is none."""
-        return math.exp(self.log_size[-1]) if self.log_size.size else UNKNOWN
-
-    @property
-    def worst(self) -> float:
-        """Factor by which the size is uncertain at the end of the curve; NaN without one."""
-        if not self.log_size.size:
-            return UNKNOWN
-        return self.largest / self._inverse(float(self.reading[-1] - self.scatter[-1]))
+        return math.exp(self.log_size[self.end - 1]) if self.end else UNKNOWN
 
     def size_of(self, width: Width) -> SizeEstimate:
         """The size that goes with a width, never beyond the curve.
@@ -138,7 +136,7 @@ class ClusterCurve:
         ----------
         width : Width
         """
-        if not self.log_size.size:
+        if not self.end:
             return _unknown(SizeStatus.INSENSITIVE)
         if not (
             width.level_area > self.least.level_area
@@ -148,21 +146,30 @@ class ClusterCurve:
             < self.breadths[1] * width.inner_area
         ):
             return _unknown(SizeStatus.NOTHING)
-        breadth = width.level_area / width.inner_area
-        read = math.log(breadth) + self.weight * math.log(width.level_area)
+        read = math.log(width.level_area / width.inner_area)
+        read += self.weight * math.log(width.level_area)
+        lower, upper = self._interval(read)
         size = self._inverse(read)
-        scatter = float(np.interp(read, self.reading, self.scatter))
-        lower, upper = self._inverse(read - scatter), self._inverse(read + scatter)
         if math.isnan(size):
-            lowest = self.largest if math.isnan(lower) else lower
-            return SizeEstimate(UNKNOWN, UNKNOWN, lowest, UNKNOWN, SizeStatus.BEYOND)
-        # Beyond the end of the curve the upper error is taken to be as large as the lower one.
-        high = size * size / lower if math.isnan(upper) else upper
-        return SizeEstimate(size, 0.5 * (high - lower), lower, upper, SizeStatus.MEASURED)
+            return SizeEstimate(UNKNOWN, UNKNOWN, lower, upper, SizeStatus.BEYOND)
+        return SizeEstimate(size, 0.5 * (upper - lower), lower, upper, SizeStatus.MEASURED)
+
+    def _interval(self, read: float) -> tuple[float, float]:
+        """Least and largest size of which a reading is one standard deviation off or less.
+
+        All sizes that were simulated count, those beyond the end too: where the curve is flat,
+        what reads like ten beads may be all there are.
+        """
+        near = min(max(read, self.reading[0]), self.reading[-1])
+        log_size = np.linspace(0.0, self.log_size[-1], _GRID)
+        reading = np.interp(log_size, self.log_size, self.reading)
+        scatter = np.interp(log_size, self.log_size, self.scatter)
+        inside = log_size[np.abs(near - reading) <= scatter]
+        return math.exp(inside[0]), math.exp(inside[-1])
 
     def _inverse(self, read: float) -> float:
-        """Size at a reading: 1, the smallest there is, below the curve; NaN above."""
-        if read > self.reading[-1]:
+        """Size at a reading: 1, the smallest there is, below the curve; NaN beyond its end."""
+        if read > self.reading[self.end - 1]:
             return UNKNOWN
         return math.exp(float(np.interp(read, self.reading, self.log_size)))
 
@@ -208,7 +215,7 @@ def fit_curve(
     bins = np.where(seen[:, 2] < _SINGLE, -1, above)
     found = [bins == k for k in np.unique(bins) if (bins == k).sum() >= _FEWEST]
     nodes, means, spreads = np.empty((3, 0))
-    weight, least, breadths = 0.0, Width(0.0, 0.0, 0.0), (0.0, math.inf)
+    end, weight, least, breadths = 0, 0.0, Width(0.0, 0.0, 0.0), (0.0, math.inf)
     # Without pictures of single beads there is nothing to start from.
     if found and bins[found[0]][0] < 0:
         weight = _weight(log_size, log_area, log_breadth)
@@ -227,7 +234,9 @@ def fit_curve(
         )
         spreads = _scatter(log_size, reading, nodes, means)
         end = _useful(nodes, means, spreads)
-        nodes, means, spreads = nodes[:end], means[:end], spreads[:end]
+        # Flat from the last point to the largest there was.
+        nodes = np.append(nodes, log_size.max())
+        means, spreads = np.append(means, means[-1]), np.append(spreads, spreads[-1])
     return ClusterCurve(
         tray=tray,
         made_by=made_by,
@@ -235,6 +244,7 @@ def fit_curve(
         log_size=nodes,
         reading=means,
         scatter=spreads,
+        end=end,
         weight=weight,
         least=least,
         breadths=breadths,

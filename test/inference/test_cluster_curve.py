@@ -49,17 +49,26 @@ def test_sizes_within_the_range_are_those_simulated_with_their_error(size):
 
 def test_the_curve_rises():
     assert (np.diff(CURVE.log_size) > 0.0).all()
-    assert (np.diff(CURVE.reading) > 0.0).all()
+    assert (np.diff(CURVE.reading[: CURVE.end]) > 0.0).all()
+    assert (np.diff(CURVE.reading) >= 0.0).all()
     assert CURVE.log_size[0] == 0.0
 
 
 def test_where_the_breadth_no_longer_grows_the_range_ends():
     assert 12.0 < CURVE.largest < 65.0
-    found = CURVE.size_of(seen(1.03 * math.exp(0.5 * CURVE.reading[-1] - 0.5 * math.log(AREA))))
+    found = CURVE.size_of(
+        seen(1.03 * math.exp(0.5 * (CURVE.reading[CURVE.end - 1] - math.log(AREA))))
+    )
     assert found.status is SizeStatus.BEYOND
     assert math.isnan(found.size)
-    assert math.isnan(found.upper)
     assert found.lower <= CURVE.largest
+    assert found.upper == pytest.approx(100.0, rel=0.03)
+
+
+def test_what_may_as_well_be_all_beads_is_not_bounded_below_that():
+    found = CURVE.size_of(seen(2.5 * 20.0**0.2 * math.exp(-0.02)))
+    assert found.status is SizeStatus.MEASURED
+    assert found.upper == pytest.approx(100.0, rel=0.03)
 
 
 def test_single_beads_have_size_one_however_narrow_their_picture_happens_to_be():
