@@ -155,7 +155,7 @@ def _cost() -> None:
 
 def _read(curve, rows: np.ndarray):
     """Estimates of rows of samples: size, lower, upper, and whether there is a size."""
-    found = [curve.size_of(Width(*one)) for one in rows[:, 4:7]]
+    found = [curve.size_of(Width(*one)) for one in rows[:, 4:8]]
     sizes = np.array([[one.size, one.lower, one.upper] for one in found]).T
     return *sizes, np.array([one.status for one in found])
 
@@ -214,7 +214,10 @@ def _by_paper(runs: list[np.ndarray]) -> np.ndarray:
 
 def _fillings(found: dict[str, np.ndarray]) -> None:
     flown = load_trays()
-    print('with another number of beads than the calibration: estimate / true, median\n')
+    print(
+        'with another number of beads than the calibration: share of pictures with a size, median '
+        'of estimate / true\n'
+    )
     print('| tray | ' + ' | '.join(f'{part:g} of the beads' for part in _FILLINGS) + ' |')
     print('| --- |' + ' --- |' * len(_FILLINGS))
     for tray in _TRAYS:
@@ -228,8 +231,11 @@ def _fillings(found: dict[str, np.ndarray]) -> None:
             told = np.isfinite(size)
             known = np.isfinite(lower)
             inside = ((lower <= rows[:, 3]) & (rows[:, 3] <= upper))[known]
+            inside = inside if known.any() else np.array([np.nan])
             ratio = np.median(size[told] / rows[told, 3]) if told.any() else np.nan
-            cells.append(f'{ratio:.2f}, in the interval {inside.mean():.2f}')
+            cells.append(
+                f'{told.mean():.2f} measured, {ratio:.2f}, in the interval {inside.mean():.2f}'
+            )
         print(f'| {tray} | ' + ' | '.join(cells) + ' |')
     print()
 

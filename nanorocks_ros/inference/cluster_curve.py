@@ -36,10 +36,15 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
 
+# Part of the contrast of the darkest pixel from which on a pixel counts as covered.
+DARKER = 0.15
 # Level of the area that the level area is divided by.
 INNER_LEVEL = 0.7
 # Of what single beads were simulated to show: the least level area and contrast that are beads.
 _SMALL, _FAINT = 0.6, 0.4
+# Beads and what is left of their shadows cover 0.71 to 1.4 times the area of their discs; with
+# less to see than this, beads are missing, and those left would seem to be large clusters.
+_COVER = 0.68
 # By which ln(breadth) may be outside those simulated.
 _OUTSIDE = 0.1
 # Of ln(size): a factor of three.
@@ -61,12 +66,14 @@ class Width(NamedTuple):
     """How wide the autocorrelation of a picture is, and the contrast of the picture.
 
     `level_area` and `inner_area`: where it exceeds the level and `INNER_LEVEL`, [m^2]; `contrast`:
-    standard deviation of the picture, [gray levels].
+    standard deviation of the picture, [gray levels]; `cover`: share of it that is darker than
+    `DARKER` of its darkest pixel, NaN when it is not known.
     """
 
     level_area: float
     inner_area: float
     contrast: float
+    cover: float = UNKNOWN
 
 
 class SizeEstimate(NamedTuple):
@@ -107,6 +114,8 @@ class ClusterCurve:
         Less is not of beads, of level area or of contrast.
     breadths : tuple of 2 floats
         Less or more is not of beads.
+    discs : float
+        Area of the discs of all beads, over that of the floor.
     samples : ndarray of float32, (n_samples, 6)
         What it was made from: run, time since the shaking event [s], size, level area and inner
         area [m^2], contrast.
@@ -122,6 +131,7 @@ class ClusterCurve:
     weight: float
     least: Width
     breadths: tuple[float, float]
+    discs: float
     samples: NDArray[np.float32]
 
     @property
@@ -138,6 +148,8 @@ class ClusterCurve:
         """
         if not self.end:
             return _unknown(SizeStatus.INSENSITIVE)
+        if width.cover < _COVER * self.discs:
+            return _unknown(SizeStatus.NOTHING)
         if not (
             width.level_area > self.least.level_area
             and width.contrast > self.least.contrast
@@ -194,7 +206,11 @@ def build_command(tray: Tray) -> str:
 
 
 def fit_curve(
-    tray: str, level: float, samples: NDArray[np.float32], made_by: str = '{}'
+    tray: str,
+    level: float,
+    samples: NDArray[np.float32],
+    made_by: str = '{}',
+    discs: float = 0.0,
 ) -> ClusterCurve:
     """The curve through simulated pictures.
 
@@ -207,6 +223,8 @@ def fit_curve(
         See `ClusterCurve`.
     made_by : str
         JSON.
+    discs : float
+        See `ClusterCurve`.
     """
     seen = samples[samples[:, 4] > 0.0].astype(np.float64)
     log_size, log_area = np.log(seen[:, 2]), np.log(seen[:, 3])
@@ -248,6 +266,7 @@ def fit_curve(
         weight=weight,
         least=least,
         breadths=breadths,
+        discs=discs,
         samples=samples,
     )
 
@@ -380,9 +399,21 @@ def _curves(arrays: Mapping[str, NDArray[Any]]) -> dict[str, ClusterCurve]:
     samples, level = arrays['samples'], float(arrays['level'])
     made_by = str(arrays['made_by'])
     return {
-        str(key): fit_curve(str(key), level, samples[samples[:, 0] == number, 1:], made_by)
+        str(key): fit_curve(
+            str(key), level, samples[samples[:, 0] == number, 1:], made_by, _discs(str(key))
+        )
         for number, key in zip(arrays['trays'], arrays['keys'], strict=True)
     }
+
+
+def _discs(key: str) -> float:
+    """Area of the discs of all beads over that of the floor, from a `curve_key`."""
+    tray = json.loads(key)
+    discs = sum(
+        one['count'] * 0.25 * math.pi * (0.5 * (one['low'] + one['high'])) ** 2
+        for one in tray['species']
+    )
+    return float(discs / (tray['dimensions'][0] * tray['dimensions'][1]))
 
 
 def as_arrays(

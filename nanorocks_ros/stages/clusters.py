@@ -5,9 +5,17 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.settings import PipelineSettings
-from nanorocks_ros.inference.cluster_curve import INNER_LEVEL, SizeEstimate, Width, curve_of
+from nanorocks_ros.inference.cluster_curve import (
+    DARKER,
+    INNER_LEVEL,
+    SizeEstimate,
+    Width,
+    curve_of,
+)
 from nanorocks_ros.physics.autocorrelation import LevelRegion, autocorrelation, level_region
 from nanorocks_ros.records import (
     UNKNOWN,
@@ -21,7 +29,6 @@ from nanorocks_ros.stages.shaking import NS, CycleFollower
 from nanorocks_ros.stages.tray_contrast import tray_contrast
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
@@ -37,12 +44,14 @@ class Correlated(NamedTuple):
     """The autocorrelation of what stands out in a tray image.
 
     `values`: ndarray of float32, 1 at zero lag, in the centre; `side` of its pixels, [m];
-    `contrast`: standard deviation of what stands out, [gray levels].
+    `contrast`: standard deviation of what stands out, [gray levels]; `cover`: share of the picture
+    that does clearly.
     """
 
     values: NDArray[np.float32]
     side: float
     contrast: float
+    cover: float
 
     def region(self, level: float) -> LevelRegion:
         """Where it exceeds a level."""
@@ -51,7 +60,7 @@ class Correlated(NamedTuple):
     def width(self, level_area: float) -> Width:
         """With a level area that is known, [px^2]."""
         inner = level_region(self.values, INNER_LEVEL).area
-        return Width(level_area * self.side**2, inner * self.side**2, self.contrast)
+        return Width(level_area * self.side**2, inner * self.side**2, self.contrast, self.cover)
 
 
 def correlated(gray: NDArray[np.uint8], pixels_per_metre: float) -> Correlated:
@@ -66,7 +75,8 @@ def correlated(gray: NDArray[np.uint8], pixels_per_metre: float) -> Correlated:
     halve = pixels_per_metre >= _FINE and min(gray.shape) > 1
     contrast = tray_contrast(gray, halve=halve)
     side = (2.0 if halve else 1.0) / pixels_per_metre
-    return Correlated(autocorrelation(contrast), side, float(contrast.std()))
+    cover = float(np.count_nonzero(contrast < DARKER * contrast.min())) / contrast.size
+    return Correlated(autocorrelation(contrast), side, float(contrast.std()), cover)
 
 
 class ClusterAutocorrelator:

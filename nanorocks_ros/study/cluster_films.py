@@ -171,7 +171,7 @@ def samples_of_run(plan: ClusterPlan, run: int) -> NDArray[np.float32]:
     SimulationError
         When the beads do not fit, or a run has events without end.
     """
-    return filmed_run(plan, run, drawn_run(plan, run), TIMES[: plan.moments])
+    return filmed_run(plan, run, drawn_run(plan, run), TIMES[: plan.moments])[:, :-1]
 
 
 def filmed_run(
@@ -190,8 +190,8 @@ def filmed_run(
 
     Returns
     -------
-    ndarray of float32, (n_samples, 7)
-        As `samples_of_run`.
+    ndarray of float32, (n_samples, 8)
+        As `samples_of_run`, and the share of the picture that is covered.
     """
     from nanorocks_ros.simulation.scene.film import SceneFilm
 
@@ -211,7 +211,7 @@ def filmed_run(
         moment = film.at(number, round(_NS * number / simulation.frame_rate))
         for tray, size, width in _measured(moment, preprocessor, plan.level, scene):
             rows.append((tray, run, time, size, *width))
-    return np.array(rows, dtype=np.float32).reshape(-1, 7)
+    return np.array(rows, dtype=np.float32).reshape(-1, 8)
 
 
 def _measured(
