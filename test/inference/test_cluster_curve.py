@@ -93,6 +93,20 @@ def test_what_no_picture_of_beads_showed_has_no_size(width):
     assert math.isnan(found.size)
 
 
+def test_where_beads_are_missing_there_is_no_size():
+    curve = fit_curve('a tray', 0.5, made_up(0.2, 0.03), discs=0.25)
+    full, partial = (seen(3.0)._replace(cover=cover) for cover in (0.22, 0.15))
+    assert curve.size_of(full).status is SizeStatus.MEASURED
+    assert curve.size_of(partial).status is SizeStatus.NOTHING
+    # Of a picture whose cover nobody measured nothing is known.
+    assert curve.size_of(seen(3.0)).status is SizeStatus.MEASURED
+
+
+def test_the_discs_of_the_flown_beads_cover_what_their_number_says():
+    # 15 beads of 2 mm on 15 mm x 15 mm.
+    assert curve_of(load_trays()[1]).discs == pytest.approx(15 * math.pi / 225.0)
+
+
 def test_a_tray_whose_breadth_does_not_depend_on_the_size_is_insensitive():
     curve = fit_curve('a tray', 0.5, made_up(0.01, 0.05))
     assert math.isnan(curve.largest)
