@@ -14,7 +14,8 @@ from scipy.signal import fftconvolve
 
 from benchmarks.films import filmed
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.cluster_curve import INNER_LEVEL, Width, curve_of
+from nanorocks_ros.inference.cluster_curve import curve_of
+from nanorocks_ros.inference.cluster_size import INNER_LEVEL, Width
 from nanorocks_ros.physics.autocorrelation import autocorrelation, level_region
 from nanorocks_ros.physics.paper_clusters import paper_calibration, paper_onset
 from nanorocks_ros.records import SizeStatus

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import argparse
 
-    from nanorocks_ros.inference.cluster_curve import ClusterCurve
+    from nanorocks_ros.inference.cluster_size import ClusterCurve
 
 _STRONGEST = 2.0
 

@@ -9,13 +9,8 @@ import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.settings import PipelineSettings
-from nanorocks_ros.inference.cluster_curve import (
-    DARKER,
-    INNER_LEVEL,
-    SizeEstimate,
-    Width,
-    curve_of,
-)
+from nanorocks_ros.inference.cluster_curve import curve_of
+from nanorocks_ros.inference.cluster_size import DARKER, INNER_LEVEL, SizeEstimate, Width
 from nanorocks_ros.physics.autocorrelation import LevelRegion, autocorrelation, level_region
 from nanorocks_ros.records import (
     UNKNOWN,
@@ -32,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.inference.cluster_curve import ClusterCurve
+    from nanorocks_ros.inference.cluster_size import ClusterCurve
 
 # From this scale on, two by two pixels show as much of the clusters as one does, in a quarter of
 # the time: then such a pixel is as large as one at half this scale. [px/m]

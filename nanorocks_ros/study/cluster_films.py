@@ -23,7 +23,8 @@ from nanorocks_ros.experiment.settings import (
     with_values,
 )
 from nanorocks_ros.experiment.view import View
-from nanorocks_ros.inference.cluster_curve import Width, curve_key
+from nanorocks_ros.inference.cluster_curve import curve_key
+from nanorocks_ros.inference.cluster_size import Width
 from nanorocks_ros.records import Frame, TrayImage
 from nanorocks_ros.stages.clusters import correlated
 from nanorocks_ros.stages.preprocess import Preprocessor

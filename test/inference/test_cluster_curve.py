@@ -10,7 +10,9 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.cluster_curve import Width, as_arrays, curve_of, fit_curve
+from nanorocks_ros.inference.cluster_curve import as_arrays, curve_of
+from nanorocks_ros.inference.cluster_curve_fit import fit_curve
+from nanorocks_ros.inference.cluster_size import Width
 from nanorocks_ros.records import SizeStatus
 from nanorocks_ros.study.archive import write_archive
 
