@@ -90,7 +90,7 @@ def _draw_sizes(axes: Axes, tray: CycleClusters) -> None:
     axes.fill_between(times, lower, upper, where=known, color=_OURS, alpha=0.2, lw=0)
     label = 'calibrated by simulated clusters, band 68 %'
     axes.plot(times, size, '.-', ms=3, lw=0.8, color=_OURS, label=label)
-    paper = tray.paper_calibration().size(tray.column('level_area'))
+    paper = tray.paper_sizes()
     label = f"paper's straight line to {tray.counted():.1f} beads per cluster counted at the end"
     axes.plot(times, paper, color=_PAPER, lw=1.0, ls='--', label=label)
     for onset, colour, text in (

@@ -87,7 +87,7 @@ def test_what_is_counted_at_the_end_is_the_truth_and_makes_the_papers_line(found
     counted = tray.counted()
     assert 2.0 <= counted <= 15.0
     ends = tray.column('level_area')[tray.times >= tray.times[-1] - 2.0]
-    sizes = tray.paper_calibration().size(ends)
+    sizes = tray.paper_sizes()[-ends.size :]
     assert sizes.mean() == pytest.approx(counted)
 
 
@@ -116,10 +116,30 @@ def test_the_command_writes_picture_and_table_and_says_what_it_found(bag, tmp_pa
     assert 'add --force' in capsys.readouterr().err
 
 
+def test_without_a_shake_cycle_0_can_be_looked_at(bag):
+    settings = with_values(PipelineSettings(), ON_PLATE, 'test')
+    before = cycle_clusters(bag, settings, cycle=0).trays[1]
+    assert math.isnan(before.true_onset())
+    assert (before.true_sizes() == 1.0).all()
+    assert before.times.max() < 0.5
+
+
 def test_a_cycle_that_is_not_there_is_one_line(bag, capsys):
     assert main(['autocorrelation', str(bag), *FLAGS, '--cycle', '7']) == 1
     said = capsys.readouterr().err
-    assert 'holds no cycle 7; name another with --cycle' in said
+    assert 'holds no cycle 7; name another with --cycle: 0, 1' in said
+    assert said.count('\n') == 1
+
+
+def test_trays_with_nothing_in_them_are_drawn_with_what_is_known(bag, tmp_path, capsys):
+    # Trays 3 and 5 of this film are empty.
+    flags = [*FLAGS[:1], '3', '5', *FLAGS[3:]]
+    picture = tmp_path / 'empty.png'
+    arguments = ['autocorrelation', str(bag), *flags, '-o', str(picture), '--json']
+    assert main(arguments) == 0
+    said = json.loads(capsys.readouterr().out)['trays']
+    assert [said[tray]['size_status'] for tray in ('3', '5')] == ['nothing', 'nothing']
+    assert picture.exists()
 
 
 def test_without_a_known_truth_the_papers_own_counts_are_taken(tmp_path):
