@@ -1,4 +1,4 @@
-"""Pictures for docs/theory.md and docs/sweeps.md, made by the commands that anybody can give.
+"""Pictures for docs/theory.md, restitution.md and sweeps.md, made by commands anybody can give.
 
 ``python -m benchmarks.closed_form_pictures FOLDER`` writes them: some minutes of one core. Cycles
 are simulated, without rotation, and their mean speeds have random errors put on them.
@@ -17,6 +17,7 @@ from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.recordings.results import write_csv
 from nanorocks_ros.simulation.ensemble import cooling_runs
+from nanorocks_ros.simulation.shaking import ShakenTray
 
 TIMES = np.arange(0.1, 30.0, 0.1)
 PERIOD = 60.0
@@ -49,11 +50,42 @@ def measured_cycles(path, cycles, error, *, tray=1, restitution=0.89, walls=0.99
     write_csv(path, list(FIELDS), list(FIELDS.values()), rows)
 
 
+def measured_mixture(path, cycles, error, *, tray=5, restitution=0.89, walls=0.97, seed=4):
+    """The same with the speeds of both species of a mixture, 5 a second, started at 10 mm/s."""
+    settings = SimulationSettings(
+        tray=tray,
+        restitution=restitution,
+        wall_restitution=walls,
+        mean_speed=0.010,
+        first_shake=0.0,
+        frame_rate=5.0,
+        seed=seed,
+    )
+    counts = [one.count for one in load_trays()[tray].species]
+    species = np.repeat(np.arange(2), counts)
+    rng = np.random.default_rng(seed)
+    rows = []
+    for run in range(cycles):
+        start = run * PERIOD
+        for k, moment in enumerate(ShakenTray(settings, load_trays()[tray], run).moments(126)):
+            each = np.hypot(*moment.velocities[:, :2].T)
+            own = [each[species == one].mean() + error * rng.normal() for one in (0, 1)]
+            mean = np.average(own, weights=counts)
+            if k:
+                speeds = (mean, error, own[0], error, own[1], error)
+                rows.append((start + 0.2 * k, run + 1, start, *speeds))
+    names = [f'{one}_species_speed{end}' for one in ('first', 'second') for end in ('', '_error')]
+    write_csv(path, [*FIELDS, *names], [*FIELDS.values(), *['m/s'] * 4], rows)
+
+
 def _draw(folder, scratch):
     table = scratch / 'tray_1_speed.csv'
     measured_cycles(table, 18, 3e-4)
     for kind in ('decay', 'instantaneous'):
         yield ('figure', kind, str(table), '-o', str(folder / f'{kind}.png'), '--force')
+    mixture = scratch / 'tray_5_speed.csv'
+    measured_mixture(mixture, 18, 1e-4)
+    yield ('figure', 'decay', str(mixture), '-o', str(folder / 'species.png'), '--force')
     grid = {
         'walls': ('--restitution', '0.7:1:31', '--wall-restitution', '0.95:1:11'),
         'width': ('--restitution', '0.7:0.9:21', '--restitution-width', '0:0.2:6'),

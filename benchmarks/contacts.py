@@ -23,7 +23,7 @@ from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.experiment.view import View
 from nanorocks_ros.inference.contact_estimate import contact_estimate
 from nanorocks_ros.inference.contacts import pair_log_likelihood, rebound_log_likelihood
-from nanorocks_ros.records import Frame, PairCollision, Rebound, Tracks, TrayImage
+from nanorocks_ros.records import BeadsTruth, Frame, PairCollision, Rebound, Tracks, TrayImage
 from nanorocks_ros.simulation.scene.film import SceneFilm
 from nanorocks_ros.simulation.shaking import ShakenTray
 from nanorocks_ros.stages.contacts.find import ContactFinder
@@ -64,7 +64,17 @@ def true_tracks(
 ) -> Iterator[Tracks]:
     """Tracks of a gas as a tracker would give them that never loses a bead."""
     gas = ShakenTray(settings, tray, run)
-    rng = np.random.default_rng([settings.seed, run])
+    return tracks_of(gas, tray, np.random.default_rng([settings.seed, run]), frames, jitter)
+
+
+def tracks_of(
+    gas: ShakenTray,
+    tray: Tray,
+    rng: np.random.Generator,
+    frames: int,
+    jitter: float = _JITTER,
+) -> Iterator[Tracks]:
+    """The same of a gas of one's own, which is where it is drawn each time."""
     species = np.repeat(
         np.arange(len(tray.species), dtype=np.int32), [one.count for one in tray.species]
     )
@@ -164,7 +174,15 @@ def film(
     numbers: tuple[int, ...], pairs: float, walls: float, seconds: float, seed: int
 ) -> Iterator[tuple[TrayImage, Tracks]]:
     """Images and tracks of trays, from a film of the plate with all effects, JPEG 85."""
-    scene = SceneFilm(_settings(pairs, walls, seed), SceneSettings(trays=numbers))
+    for image, tracks, _ in filmed_tracks(numbers, _settings(pairs, walls, seed), seconds):
+        yield image, tracks
+
+
+def filmed_tracks(
+    numbers: tuple[int, ...], simulation: SimulationSettings, seconds: float
+) -> Iterator[tuple[TrayImage, Tracks, BeadsTruth]]:
+    """The same of any gas, with the truth about the beads."""
+    scene = SceneFilm(simulation, SceneSettings(trays=numbers))
     names = {
         'trays': list(numbers),
         'preprocess.layout': 'plate',
@@ -175,13 +193,14 @@ def film(
     stage = Preprocessor(settings, trays, 'film', View(camera=scene.camera.geometry.camera))
     trackers = {number: Tracker(settings, tray) for number, tray in trays.items()}
     for moment in scene.moments(round(seconds * _RATE)):
+        truth = {one.tray: one for one in moment.beads}
         jpeg = cv2.imencode('.jpg', moment.frame.image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
         image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR)
         frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
         for record in stage.push(frame):
             if isinstance(record, TrayImage):
                 for tracks in trackers[record.tray].push(record):
-                    yield record, tracks
+                    yield record, tracks, truth[record.tray]
 
 
 def _report_filmed() -> None:

@@ -53,6 +53,19 @@ class SizeStatus(IntEnum):
     UNCALIBRATED = 5
 
 
+class StickingStatus(IntEnum):
+    """What is known of a sticking speed (constants of ``ClusterEstimate.msg``).
+
+    The message gives each its name with ``STICKING_`` before it.
+    """
+
+    UNKNOWN = 0
+    MEASURED = 1
+    NO_MERGE = 2
+    STUCK_FROM_THE_START = 3
+    NO_UPPER_LIMIT = 4
+
+
 class Quality(IntFlag):
     """What is wrong with the picture of a tray since the last one, or with a speed from it.
 
@@ -294,7 +307,7 @@ class SpeedEstimate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterEstimate:
-    """Width of the autocorrelation of one tray image, and what it says of clusters.
+    """Width of the autocorrelation of one tray image, and clusters by that and by tracks.
 
     Parameters
     ----------
@@ -317,6 +330,21 @@ class ClusterEstimate:
         Sizes between which the width is one standard deviation off or less; of a size that is
         beyond the calibration, too.
     size_status : SizeStatus
+    bodies, bodies_error : float
+        Free bodies by tracks: single beads and clusters; unknown where beads are not tracked.
+    mean_size, weighted_size, weighted_size_error : float, [beads]
+        By tracks: beads of a body, mean over the bodies and over the beads.
+    clustered_share : float, 0 to 1
+        Of the beads, in bodies of two and more, by tracks.
+    combined_size, combined_size_error : float, [beads]
+        Weight-averaged size by the autocorrelation and by tracks together.
+    onset : float, [s]
+        First merge of the cycle, since the shaking event; unknown before.
+    sticking_status : StickingStatus
+    sticking_speed, sticking_speed_lower, sticking_speed_upper : float, [m/s]
+        Beads that meet more slowly stick: by the merges of this cycle so far, with an interval.
+    mean_sticking_speed, mean_sticking_speed_lower, mean_sticking_speed_upper : float, [m/s]
+        By all cycles before this one.
     """
 
     stamp_ns: int
@@ -332,6 +360,22 @@ class ClusterEstimate:
     cluster_size_lower: float = UNKNOWN
     cluster_size_upper: float = UNKNOWN
     size_status: SizeStatus = SizeStatus.UNCALIBRATED
+    bodies: float = UNKNOWN
+    bodies_error: float = UNKNOWN
+    mean_size: float = UNKNOWN
+    weighted_size: float = UNKNOWN
+    weighted_size_error: float = UNKNOWN
+    clustered_share: float = UNKNOWN
+    combined_size: float = UNKNOWN
+    combined_size_error: float = UNKNOWN
+    onset: float = UNKNOWN
+    sticking_status: StickingStatus = StickingStatus.UNKNOWN
+    sticking_speed: float = UNKNOWN
+    sticking_speed_lower: float = UNKNOWN
+    sticking_speed_upper: float = UNKNOWN
+    mean_sticking_speed: float = UNKNOWN
+    mean_sticking_speed_lower: float = UNKNOWN
+    mean_sticking_speed_upper: float = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -397,6 +441,12 @@ class CorEstimate:
         Standard deviations by which decay, rebounds and collisions disagree.
     mean_wall_restitution, mean_wall_restitution_error : float
         As `mean_restitution`.
+    first_species_initial_speed, first_species_initial_speed_error : float, [m/s]
+        As `initial_speed`, of the first of `Tray.species` by itself; of a mixture whose species
+        were told apart, once the cycle is over.
+    first_species_haff_time, first_species_haff_time_error : float, [s]
+    second_species_initial_speed, second_species_initial_speed_error : float, [m/s]
+    second_species_haff_time, second_species_haff_time_error : float, [s]
     """
 
     stamp_ns: int
@@ -429,6 +479,14 @@ class CorEstimate:
     tension: float = UNKNOWN
     mean_wall_restitution: float = UNKNOWN
     mean_wall_restitution_error: float = UNKNOWN
+    first_species_initial_speed: float = UNKNOWN
+    first_species_initial_speed_error: float = UNKNOWN
+    first_species_haff_time: float = UNKNOWN
+    first_species_haff_time_error: float = UNKNOWN
+    second_species_initial_speed: float = UNKNOWN
+    second_species_initial_speed_error: float = UNKNOWN
+    second_species_haff_time: float = UNKNOWN
+    second_species_haff_time_error: float = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -666,3 +724,87 @@ class PairCollision:
 
     def __post_init__(self) -> None:
         _freeze_arrays(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Merge:
+    """Two beads that stick to each other from some instant on.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Since when they stay beside each other.
+    known_ns : int
+        The picture that made it improbable enough that they are free.
+    tray, cycle : int
+    tracks : ndarray of int32, (2,)
+    joins : bool
+        Whether it made one body of two; False for two beads of one body.
+    """
+
+    stamp_ns: int
+    known_ns: int
+    tray: int
+    cycle: int
+    tracks: NDArray[np.int32]
+    joins: bool
+
+    def __post_init__(self) -> None:
+        _freeze_arrays(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodyEstimate:
+    """Free bodies of one tray: single beads, and clusters of beads that stick together.
+
+    Errors hold beads that are not seen and pairs of which it is not known yet.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        The instant that is counted, some time before it was published.
+    tray, cycle : int
+    beads : int
+        In the tray.
+    followed : int
+        Of these, known at that instant; numbers of bodies are scaled to all beads.
+    bodies, bodies_error : float
+    mean_size, mean_size_error : float
+        Beads of a body: mean over the bodies.
+    weighted_size, weighted_size_error : float
+        Beads of the body of a bead: mean over the beads.
+    clustered_share, clustered_share_error : float, 0 to 1
+        Of the beads, in bodies of two and more.
+    clusters, clusters_error : float
+        Bodies of two and more beads.
+    sizes : ndarray (5,)
+        Bodies of 1, 2, 3, 4 to 6, and 7 or more beads.
+    first_merge_ns : int or None
+        When the first two beads of the cycle began to stick together; None before.
+    """
+
+    stamp_ns: int
+    tray: int
+    cycle: int
+    beads: int
+    followed: int
+    bodies: float
+    bodies_error: float
+    mean_size: float
+    mean_size_error: float
+    weighted_size: float
+    weighted_size_error: float
+    clustered_share: float
+    clustered_share_error: float
+    clusters: float
+    clusters_error: float
+    sizes: NDArray[np.float64]
+    first_merge_ns: int | None = None
+
+    def __post_init__(self) -> None:
+        _freeze_arrays(self)
+
+    @property
+    def merged(self) -> bool:
+        """Whether any beads stick together in this cycle."""
+        return self.first_merge_ns is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -74,6 +75,12 @@ def _print_cycles(results: TrayResults) -> None:
         print('  no COR: no shaking event with a decay after it was found')
     for one in cycles:
         print(f'  cycle {one.cycle}: {_cor_text(one)}')
+        for name in ('first', 'second'):
+            speed, time = (
+                getattr(one, f'{name}_species_{what}') for what in ('initial_speed', 'haff_time')
+            )
+            if math.isfinite(time):
+                print(f'    {name} species: v0 {speed * 1e3:.2f} mm/s, tau {time:.2f} s')
     if len(cycles) > 1:
         last = cycles[-1]
         print(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,9 +12,11 @@ from nanorocks_ros.errors import ConfigurationError
 if TYPE_CHECKING:
     import argparse
 
-    from nanorocks_ros.physics.instantaneous import InstantaneousCor
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.study.cycles import CycleSpeeds
 
 _PICTURES = ('.png', '.pdf', '.svg')
+_SPAN = (0.5, 20.0)
 _KINDS = {
     'decay': "energy of the beads as they cool, with our fit and the paper's (its figure 7)",
     'instantaneous': 'restitution against speed, and what noise alone makes of it (figure 13)',
@@ -24,8 +25,12 @@ _KINDS = {
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser('figure', help='draw measured decays as the paper does')
+    from nanorocks_ros.cli import figure_cor, figure_dust, figure_long_term, figure_packing
+
+    parser = commands.add_parser('figure', help='draw what was measured as the paper does')
     kinds = parser.add_subparsers(dest='kind', metavar='KIND', required=True)
+    for module in (figure_cor, figure_packing, figure_dust, figure_long_term):
+        module.add_parser(kinds)
     for kind, text in _KINDS.items():
         one = kinds.add_parser(kind, help=text, description=text)
         one.add_argument('speeds', help='results of `nanorocks analyse`, or their table of speeds')
@@ -35,9 +40,11 @@ def add_parser(commands: Any) -> None:
             '--wall-restitution', type=float, default=0.99, help='taken for known; default 0.99'
         )
         one.add_argument(
-            '--first', type=float, default=0.5, help='[s] since the shaking event; default 0.5'
+            '--first',
+            type=float,
+            help='[s] since the shaking event; default 0.5, as analysed where the tray swung on',
         )
-        one.add_argument('--last', type=float, default=20.0, help='[s]; default 20')
+        one.add_argument('--last', type=float, help='[s]; default 20, or as analysed then')
         one.add_argument('--trays', default='', help='YAML file of trays; default: those flown')
         one.add_argument('--json', action='store_true', help='print one JSON object, SI units')
         one.add_argument('--force', action='store_true', help='replace a picture that exists')
@@ -48,31 +55,16 @@ def run(options: argparse.Namespace) -> int:
     """Read, draw, print; the exit code."""
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.study.cycles import read_cycles, speed_table
-    from nanorocks_ros.study.decay_figure import decay_figure
-    from nanorocks_ros.study.instantaneous_figure import instantaneous_figure
     from nanorocks_ros.study.output_files import check_outputs
 
     path = Path(options.output)
     check_outputs({'--output': path}, {'--output': _PICTURES}, force=options.force)
-    if not 0.0 <= options.first < options.last:
-        raise ConfigurationError(
-            '--first, --last',
-            f'{options.first:g} to {options.last:g} s',
-            'give two times, rising, none below 0',
-        )
     table, number = speed_table(Path(options.speeds), options.tray)
     if number is None:
         raise ConfigurationError('--tray', 'is not known from the name', 'name the tray')
     tray = tray_by_number(load_trays(options.trays), number)
     cycles = read_cycles(table)
-    given = {
-        'wall_restitution': options.wall_restitution,
-        'span': (options.first, options.last),
-    }
-    if options.kind == 'decay':
-        values: dict[str, Any] = decay_figure(path, tray, cycles, **given)
-    else:
-        values = _as_json(instantaneous_figure(path, tray, cycles, **given))
+    values = _drawn(options, table, tray, cycles)
     if options.json:
         shown = {'tray': number, 'cycles': len(cycles), **values}
         print(json.dumps(shown, allow_nan=False))
@@ -81,25 +73,29 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _as_json(found: InstantaneousCor) -> dict[str, Any]:
-    local = found.local
-    arrays = {
-        'collision_speed': found.collision_speed,
-        'paper_restitution': found.paper,
-        'noise_95': found.noise[[0, 3]],
-        'noise_and_gas_95': found.noise_and_gas[[0, 3]],
-        'local_speed': local.speed,
-        'local_decay_rate': local.decay_rate,
-        'local_decay_rate_error': local.decay_rate_error,
-        'local_restitution': local.restitution,
-        'local_restitution_lower': local.lower,
-        'local_restitution_upper': local.upper,
-    }
-    return {name: _known(array.tolist()) for name, array in arrays.items()}
+def _drawn(
+    options: argparse.Namespace, table: Path, tray: Tray, cycles: tuple[CycleSpeeds, ...]
+) -> dict[str, Any]:
+    """Draw the picture; its numbers."""
+    from nanorocks_ros.study.cycles import cooling_part, species_cycles
+    from nanorocks_ros.study.decay_figure import decay_figure
+    from nanorocks_ros.study.instantaneous_figure import (
+        instantaneous_figure,
+        instantaneous_values,
+    )
+    from nanorocks_ros.study.windows import cooling_window, span_of
 
-
-def _known(value: Any) -> Any:
-    """Numbers as JSON has them: null for NaN."""
-    if isinstance(value, list):
-        return [_known(one) for one in value]
-    return value if math.isfinite(value) else None
+    path, walls = Path(options.output), options.wall_restitution
+    window = cooling_window(table)
+    start = window.start if window else 0.0
+    usual = (window.first, window.last) if window and start > 0.0 else _SPAN
+    span = span_of(options.first, options.last, usual)
+    if options.kind == 'decay':
+        species = species_cycles(table, tray)
+        return decay_figure(
+            path, tray, cycles, wall_restitution=walls, span=span, species=species, start=start
+        )
+    cycles, span = cooling_part(cycles, span, start)
+    return instantaneous_values(
+        instantaneous_figure(path, tray, cycles, wall_restitution=walls, span=span)
+    )

@@ -30,6 +30,7 @@ def build_parser() -> argparse.ArgumentParser:
         figure,
         library,
         look,
+        reproduce,
         simulate,
         speeds,
         sweep,
@@ -50,6 +51,7 @@ def build_parser() -> argparse.ArgumentParser:
     figure.add_parser(commands)
     library.add_parser(commands)
     look.add_parser(commands)
+    reproduce.add_parser(commands)
     simulate.add_parser(commands)
     speeds.add_parser(commands)
     sweep.add_parser(commands)

@@ -84,6 +84,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Sweep, write, print; the exit code."""
+    from nanorocks_ros.cli.progress import RunProgress
     from nanorocks_ros.study.sweep import sweep
     from nanorocks_ros.study.tasks import Workers
 
@@ -96,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
     # Before hours of work, not after.
     reference = _reference(options, plan)
     output = Path(options.output)
-    with _Progress() as progress:
+    with RunProgress() as progress:
         found = sweep(plan, output, workers, progress.update, progress.notice)
     if options.csv:
         units = {row.name: row.unit for row in rows(SimulationSettings())}
@@ -105,31 +106,6 @@ def run(options: argparse.Namespace) -> int:
         _draw(Path(options.figure), found, reference, options.free_speed)
     _print(options, found)
     return 0
-
-
-class _Progress:
-    """Runs done, their rate and the time left on a terminal; silence elsewhere."""
-
-    def __enter__(self) -> _Progress:
-        self._bar: Any = None
-        return self
-
-    def update(self, done: int, total: int) -> None:
-        from tqdm import tqdm
-
-        if self._bar is None:
-            # Evenly weighed: tasks come in bursts.
-            self._bar = tqdm(
-                total=total, initial=done, unit='run', leave=False, disable=None, smoothing=0.0
-            )
-        self._bar.update(done - self._bar.n)
-
-    def notice(self, text: str) -> None:
-        print(f'nanorocks: {text}', file=sys.stderr)
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.close()
 
 
 def _plan(options: argparse.Namespace) -> SweepPlan:

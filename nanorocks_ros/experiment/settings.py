@@ -189,6 +189,42 @@ class ClusterSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class BodySettings:
+    """From tracks to the beads that stick together."""
+
+    interval: float = _setting(0.2, 'time between two counts of bodies', 's', low=0.0, high=60.0)
+    delay: float = _setting(
+        1.0,
+        'bodies are counted so long afterwards: whether beads stick takes a while to see',
+        's',
+        low=0.0,
+        high=60.0,
+    )
+    false_alarms: float = _setting(
+        0.01,
+        'share of cycles without sticking in which beads are taken to stick together',
+        low=1e-6,
+        high=0.5,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StickingSettings:
+    """From merges to the speed below which beads stick."""
+
+    measure: str = _setting(
+        'normal',
+        'which relative speed of two beads decides whether they stick: along the line of centres, '
+        'or all of it',
+        choices=('normal', 'total'),
+    )
+    rate_error: float = _setting(
+        0.1, 'relative standard error of the rates at which bodies meet', low=0.0, high=1.0
+    )
+    probability: float = _setting(0.95, 'probability of the interval', low=0.5, high=0.999)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CoolingSettings:
     """From speeds to the coefficient of restitution."""
 
@@ -219,6 +255,11 @@ class CoolingSettings:
         'this share of the beads',
         low=0.0,
         high=10.0,
+    )
+    until_merge: bool = _setting(
+        True,
+        'end with the first merge of the cycle: beads that stick take more energy than those that '
+        'bounce',
     )
     rebounds: bool = _setting(
         True, 'use rebounds from the side walls, seen in the tracks, besides the decay'
@@ -306,6 +347,8 @@ class PipelineSettings:
     speed: SpeedSettings = field(default_factory=SpeedSettings)
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
     clusters: ClusterSettings = field(default_factory=ClusterSettings)
+    bodies: BodySettings = field(default_factory=BodySettings)
+    sticking: StickingSettings = field(default_factory=StickingSettings)
     cooling: CoolingSettings = field(default_factory=CoolingSettings)
     prior: PriorSettings = field(default_factory=PriorSettings)
 
@@ -354,6 +397,13 @@ class SimulationSettings:
     wall_tangential_restitution: float = _setting(
         -1.0, 'tangential restitution at the walls; -1: smooth', low=-1.0, high=1.0
     )
+    friction: float = _setting(
+        1e6,
+        'coefficient of friction of rough beads, above which contacts slide; large: none slides',
+        low=0.0,
+        high=1e6,
+    )
+    wall_friction: float = _setting(1e6, 'the same of rough beads at the walls', low=0.0, high=1e6)
     speeds: str = _setting(
         'uniform',
         'speeds after a shaking event: even in [0, 2 mean], Maxwellian, or those of a tray whose '

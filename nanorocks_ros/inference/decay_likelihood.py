@@ -87,8 +87,6 @@ class DecayLikelihood:
         Of it with the nuisances, in units of their standard deviations.
     information : ndarray (n_places, n_z, n_z)
         Minus its second derivative.
-    log_amplitude : ndarray (n_places,)
-        ln a of the last decay, [ln m/s].
     deviation : ndarray (n_places,)
         Sum of the squares of the whitened residuals.
     samples : int
@@ -98,7 +96,6 @@ class DecayLikelihood:
     log_likelihood: NDArray[np.float64]
     gradient: NDArray[np.float64]
     information: NDArray[np.float64]
-    log_amplitude: NDArray[np.float64]
     deviation: NDArray[np.float64]
     samples: int
 
@@ -107,7 +104,6 @@ class DecayLikelihood:
             log_likelihood=self.log_likelihood + other.log_likelihood,
             gradient=self.gradient + other.gradient,
             information=self.information + other.information,
-            log_amplitude=other.log_amplitude,
             deviation=self.deviation + other.deviation,
             samples=self.samples + other.samples,
         )
@@ -172,7 +168,7 @@ def _over(
     library = tables.decays
     mean = tables.mean[places]
     n_z = tables.slopes.shape[1] + len(CAMERA_NUISANCES)
-    numbers = np.empty((len(mean), 3))
+    numbers = np.empty((len(mean), 2))
     gradient = np.empty((len(mean), n_z))
     information = np.empty((len(mean), n_z, n_z))
     _evaluate(
@@ -192,8 +188,7 @@ def _over(
         log_likelihood=numbers[:, 0],
         gradient=gradient,
         information=information,
-        log_amplitude=numbers[:, 1],
-        deviation=numbers[:, 2],
+        deviation=numbers[:, 1],
         samples=cells.size,
     )
 
@@ -281,7 +276,6 @@ def _evaluate(
         _sum_up(columns, numbers[place], gradients[place], informations[place])
         off = (amplitude - expected) / _AMPLITUDE_SPREAD
         numbers[place, 0] -= 0.5 * (log_determinant + off * off)
-        numbers[place, 1] = amplitude
 
 
 @compiled
@@ -418,4 +412,4 @@ def _sum_up(
             information[z, y] = total
             information[y, z] = total
     numbers[0] = -0.5 * deviation
-    numbers[2] = deviation
+    numbers[1] = deviation

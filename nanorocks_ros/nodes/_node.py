@@ -26,9 +26,11 @@ from nanorocks_ros.nodes._now_and_then import NowAndThen
 from nanorocks_ros.nodes._shell import array_message, image_message, message_class, qos_of
 from nanorocks_ros.records import (
     Autocorrelation,
+    BodyEstimate,
     ClusterEstimate,
     CorEstimate,
     GroundTruth,
+    Merge,
     MotionMask,
     Notice,
     PairCollision,
@@ -44,6 +46,8 @@ _ARRAYS = {
     CorEstimate: topics.COR,
     Rebound: topics.REBOUND,
     PairCollision: topics.COLLISION,
+    BodyEstimate: topics.BODIES,
+    Merge: topics.MERGE,
     GroundTruth: topics.TRUTH,
 }
 _IMAGES = {

@@ -6,7 +6,7 @@ from functools import partial
 
 from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.nodes._node import NanorocksNode
-from nanorocks_ros.records import PairCollision, Rebound, SpeedEstimate
+from nanorocks_ros.records import Merge, PairCollision, Rebound, SpeedEstimate
 from nanorocks_ros.stages.cooling import HaffFitter
 from nanorocks_ros.stages.pipeline import trays_of
 from nanorocks_ros.stages.warm_up import warm_up_cooling
@@ -21,6 +21,7 @@ class HaffFitterNode(NanorocksNode):
         (topics.SPEED, SpeedEstimate),
         (topics.REBOUND, Rebound),
         (topics.COLLISION, PairCollision),
+        (topics.MERGE, Merge),
     )
     # Times are only ever compared with one another, so any epoch does.
     _EPOCH_NS = 0

@@ -1,4 +1,4 @@
-"""Node: tray images in, mean projected speeds, contacts and motion masks out."""
+"""Node: tray images in, mean projected speeds, contacts, bodies and motion masks out."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class SpeedEstimatorNode(TrayStageNode):
 
     def __init__(self):
         outputs = (topics.SPEED, topics.MOTION, topics.TRACKS)
-        outputs = (*outputs, topics.REBOUND, topics.COLLISION)
+        outputs = (*outputs, topics.REBOUND, topics.COLLISION, topics.BODIES, topics.MERGE)
         super().__init__('speed_estimator', SpeedEstimator, outputs, in_color=True)
 
     def prepare(self, stage, tray):

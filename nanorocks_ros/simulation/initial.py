@@ -107,6 +107,8 @@ def rules_of(settings: SimulationSettings, tray: Tray, run: int = 0) -> Collisio
         sticking_measure=settings.sticking_measure,
         tangential_restitution=tangential[0],
         wall_tangential_restitution=tangential[1],
+        friction=settings.friction,
+        wall_friction=settings.wall_friction,
         seed=settings.seed,
         run=run,
     )

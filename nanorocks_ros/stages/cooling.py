@@ -13,6 +13,7 @@ from nanorocks_ros.errors import FitError
 from nanorocks_ros.records import (
     CorEstimate,
     CorStatus,
+    Merge,
     PairCollision,
     Quality,
     Rebound,
@@ -21,6 +22,7 @@ from nanorocks_ros.records import (
 from nanorocks_ros.stages.contacts.of_cycle import ContactsOfCycle
 from nanorocks_ros.stages.readings import Decay, LibraryReading, PaperReading, Reading
 from nanorocks_ros.stages.shaking import NS
+from nanorocks_ros.stages.species_decays import species_decays
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.settings import PipelineSettings
@@ -54,6 +56,7 @@ class HaffFitter:
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.cooling
+        self._tray = tray
         reading = LibraryReading if self._settings.relation == 'library' else PaperReading
         self._make_reading = partial(reading, settings, tray)
         self._contacts = ContactsOfCycle(self._settings)
@@ -64,18 +67,32 @@ class HaffFitter:
         self._samples: list[SpeedEstimate] = []
         self._cycle = 0
         self._finished = True
+        self._merged = False
         self._last_update_ns: int | None = None
         self._reading: Reading = self._make_reading()
 
-    def push(self, record: SpeedEstimate | Rebound | PairCollision) -> tuple[CorEstimate, ...]:
-        """Take the next speed or contact; empty between two updates and before the first shake.
+    def push(
+        self, record: SpeedEstimate | Rebound | PairCollision | Merge
+    ) -> tuple[CorEstimate, ...]:
+        """Take the next speed, contact or merge; empty between two updates and before any shake.
 
         A speed whose stamp goes back ends the cycle and starts all afresh, running mean included.
         """
         if isinstance(record, SpeedEstimate):
             return self._push_speed(record)
+        if isinstance(record, Merge):
+            return self._push_merge(record)
         self._contacts.push(record)
         return ()
+
+    def _push_merge(self, merge: Merge) -> tuple[CorEstimate, ...]:
+        """End the window where beads began to stick, which is known some time later."""
+        if not self._settings.until_merge or merge.cycle != self._cycle:
+            return ()
+        if not self._finished:
+            self._samples = [one for one in self._samples if one.stamp_ns < merge.stamp_ns]
+            self._merged = True
+        return self.flush()
 
     def _push_speed(self, speed: SpeedEstimate) -> tuple[CorEstimate, ...]:
         found: tuple[CorEstimate, ...] = ()
@@ -88,21 +105,29 @@ class HaffFitter:
             found = (*found, *self.flush())
             self._cycle, self._samples, self._finished = speed.cycle, [], False
             self._last_update_ns = None
+            self._merged = False
             self._contacts.next_cycle()
         if speed.cycle_start_ns is None or self._finished:
             return found
         age = (speed.stamp_ns - speed.cycle_start_ns) / NS
         if not self._samples and self._driven(speed):
+            # A tray that swings drives the gas, but does nothing to a single contact.
+            self._count_contacts(speed)
             return found
         first = self._samples[0] if self._samples else speed
         if speed.stamp_ns - self._start_ns(first) > self._settings.duration * NS:
             return (*found, *self.flush())
         if age > 0.0 and age >= self._settings.delay and _usable(speed):
             self._samples.append(speed)
-            self._contacts.count(self._samples[0].stamp_ns, speed.stamp_ns)
+            self._count_contacts(speed)
             if self._update_due(speed.stamp_ns):
                 found = (*found, *self._estimate(CorStatus.COOLING))
         return found
+
+    def _count_contacts(self, speed: SpeedEstimate) -> None:
+        """Count those since the shaking was over, up to shortly before a speed."""
+        shake_ns = speed.cycle_start_ns or 0
+        self._contacts.count(shake_ns + round(self._settings.delay * NS), speed.stamp_ns)
 
     def _driven(self, speed: SpeedEstimate) -> bool:
         """Whether the tray still swings too fast for the gas in it to cool freely."""
@@ -133,9 +158,27 @@ class HaffFitter:
         self._last_update_ns = stamp_ns
         return True
 
+    def _undetermined(self) -> tuple[CorEstimate, ...]:
+        """What is said of a cycle with too few speeds: that they tell nothing."""
+        stamp_ns = self._samples[-1].stamp_ns if self._samples else self._last_stamp_ns
+        if stamp_ns is None or not (self._samples or self._merged):
+            return ()
+        return (
+            CorEstimate(
+                stamp_ns=stamp_ns,
+                tray=self._tray.number,
+                cycle=self._cycle,
+                status=CorStatus.UNDETERMINED,
+                relation=self._reading.relation,
+                restitution_lower=0.0,
+                restitution_upper=1.0,
+                samples=len(self._samples),
+            ),
+        )
+
     def _estimate(self, status: CorStatus) -> tuple[CorEstimate, ...]:
         if len(self._samples) < self._settings.fewest_samples:
-            return ()
+            return self._undetermined() if status is CorStatus.FINAL else ()
         last = self._samples[-1]
         shake_ns, start_ns = last.cycle_start_ns or 0, self._start_ns(self._samples[0])
         decay = Decay(
@@ -154,6 +197,9 @@ class HaffFitter:
                 'restitution_lower': 0.0,
                 'restitution_upper': 1.0,
             }
+        if status is CorStatus.FINAL:
+            few = self._settings.fewest_samples
+            fields.update(species_decays(self._tray, decay.time, self._samples, few))
         quality = reduce(or_, (one.quality for one in self._samples))
         if fields.get('tension', 0.0) > _TENSE:
             quality |= Quality.INCONSISTENT

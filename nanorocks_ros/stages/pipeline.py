@@ -8,9 +8,11 @@ from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.records import (
     Autocorrelation,
+    BodyEstimate,
     ClusterEstimate,
     CorEstimate,
     Frame,
+    Merge,
     MotionMask,
     Notice,
     PairCollision,
@@ -19,7 +21,7 @@ from nanorocks_ros.records import (
     Tracks,
     TrayImage,
 )
-from nanorocks_ros.stages.clusters import ClusterAutocorrelator
+from nanorocks_ros.stages.cluster_estimator import ClusterEstimator
 from nanorocks_ros.stages.cooling import HaffFitter
 from nanorocks_ros.stages.preprocess import Preprocessor
 from nanorocks_ros.stages.speed import SpeedEstimator
@@ -38,6 +40,8 @@ Result = (
     | Tracks
     | Rebound
     | PairCollision
+    | BodyEstimate
+    | Merge
     | ClusterEstimate
     | Autocorrelation
     | CorEstimate
@@ -68,7 +72,7 @@ class TrayStages:
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self.speed = SpeedEstimator(settings, tray)
-        self.clusters = ClusterAutocorrelator(settings, tray)
+        self.clusters = ClusterEstimator(settings, tray)
         self.cooling = HaffFitter(settings, tray)
 
     def push(self, image: TrayImage) -> tuple[Result, ...]:
@@ -76,10 +80,16 @@ class TrayStages:
         found: list[Result] = []
         for record in self.speed.push(image):
             found.append(record)
-            if isinstance(record, SpeedEstimate | Rebound | PairCollision):
+            if isinstance(record, SpeedEstimate | Rebound | PairCollision | Merge):
                 found += self.cooling.push(record)
+            if isinstance(record, SpeedEstimate | BodyEstimate | Merge):
+                self.clusters.push(record)
         found += self.clusters.push(image)
         return tuple(found)
+
+    def flush(self) -> tuple[CorEstimate | ClusterEstimate, ...]:
+        """What was held back when the images ended."""
+        return (*self.cooling.flush(), *self.clusters.flush())
 
 
 class Pipeline:
@@ -124,6 +134,6 @@ class Pipeline:
                 found += self.trays[record.tray].push(record)
         return tuple(found)
 
-    def flush(self) -> tuple[CorEstimate, ...]:
-        """The final estimates of the cycles that were still cooling when the frames ended."""
-        return tuple(one for tray in self.trays.values() for one in tray.cooling.flush())
+    def flush(self) -> tuple[CorEstimate | ClusterEstimate, ...]:
+        """What was held back when the frames ended: final estimates, and the last of clusters."""
+        return tuple(one for tray in self.trays.values() for one in tray.flush())

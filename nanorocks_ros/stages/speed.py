@@ -6,6 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import (
+    BodyEstimate,
+    Merge,
     MotionMask,
     PairCollision,
     Quality,
@@ -30,7 +32,8 @@ if TYPE_CHECKING:
 _CERTAIN = 0.2
 _REST = 5e-5
 
-Measured = SpeedEstimate | MotionMask | Tracks | Rebound | PairCollision
+Seen = Rebound | PairCollision | BodyEstimate | Merge
+Measured = SpeedEstimate | MotionMask | Tracks | Seen
 
 
 class SpeedEstimator:
@@ -78,7 +81,7 @@ class SpeedEstimator:
 
         Returns
         -------
-        tuple of SpeedEstimate, MotionMask, Tracks, Rebound or PairCollision
+        tuple of SpeedEstimate, MotionMask, Tracks, contacts, BodyEstimate or Merge
             Empty while a window is filling. A stamp that goes back starts all afresh.
         """
         if self._last_stamp_ns is not None and image.stamp_ns <= self._last_stamp_ns:
@@ -96,7 +99,7 @@ class SpeedEstimator:
             found += [one for one in records if isinstance(one, Tracks) and self.emit_tracks]
             found += self._by_tracks([one for one in records if isinstance(one, SpeedEstimate)])
             if of_use and (method == 'tracking' or self._tracks.reliable):
-                found += [one for one in records if isinstance(one, Rebound | PairCollision)]
+                found += [one for one in records if isinstance(one, Seen)]
         if method == 'structure_function' or (method == 'auto' and not self._tracks.reliable):
             # Who looks at the tracks must not change what is said of a forced method.
             if self._tracks.judged and method == 'auto':

@@ -1,4 +1,4 @@
-"""Mean projected speed and single contacts from tracks, where most beads are tracked."""
+"""Mean projected speed, contacts and bodies from tracks, where most beads are tracked."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import numpy as np
 from nanorocks_ros.experiment.colours import hue_of
 from nanorocks_ros.records import (
     UNKNOWN,
+    BodyEstimate,
+    Merge,
     PairCollision,
     Quality,
     Rebound,
@@ -19,6 +21,7 @@ from nanorocks_ros.records import (
     Tracks,
     TrayImage,
 )
+from nanorocks_ros.stages.bodies.count import BodyCounter
 from nanorocks_ros.stages.contacts.find import ContactFinder
 from nanorocks_ros.stages.shaking import NS, CycleFollower
 from nanorocks_ros.stages.tracking.mean_speed import RELIABLE_SHARE, mean_speeds
@@ -78,6 +81,7 @@ class TrackSpeed:
         self._tracker = Tracker(settings, tray)
         wanted = settings.cooling.rebounds or settings.cooling.collisions
         self._contacts = ContactFinder(tray) if wanted else None
+        self._bodies = BodyCounter(settings, tray)
         self._recent: deque[Tracks] = deque()
         self._shares: deque[np.ndarray] = deque(maxlen=_MEMORY_FRAMES)
         self._followed: deque[float] = deque(maxlen=_MEMORY_SPEEDS)
@@ -93,9 +97,9 @@ class TrackSpeed:
 
     def push(
         self, image: TrayImage, shakes: CycleFollower, shaken: bool
-    ) -> tuple[SpeedEstimate | Tracks | Rebound | PairCollision, ...]:
-        """Take the next image: the tracks, contacts in them, and a speed when one is due."""
-        found: list[SpeedEstimate | Tracks | Rebound | PairCollision] = []
+    ) -> tuple[SpeedEstimate | Tracks | Rebound | PairCollision | BodyEstimate | Merge, ...]:
+        """Take the next image: tracks, what beads do in them, and a speed when one is due."""
+        found: list[SpeedEstimate | Tracks | Rebound | PairCollision | BodyEstimate | Merge] = []
         if shaken:
             self._recent.clear()
             self._next_ns = None
@@ -110,6 +114,7 @@ class TrackSpeed:
                 self._recent.popleft()
             self._judge(tracks)
             found += self._contacts_in(tracks, shakes)
+            found += self._bodies.push(tracks, shakes.cycle)
             if self._next_ns is None or tracks.stamp_ns >= self._next_ns:
                 self._next_ns = tracks.stamp_ns + self._interval_ns
                 found += self._speeds(shakes)

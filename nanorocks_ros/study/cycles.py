@@ -18,13 +18,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-_COLUMNS = (
-    'time',
-    'cycle',
-    'cycle_start',
-    'mean_projected_speed',
-    'mean_projected_speed_error',
-)
+    from nanorocks_ros.experiment.trays import Tray
+
+MEAN = 'mean_projected_speed'
+_COLUMNS = ('time', 'cycle', 'cycle_start')
 _FORM = 'name the results of `nanorocks analyse`, or their tray_K_speed.csv'
 _TABLE = 'tray_{}_speed.csv'
 # Fewer speeds are no decay.
@@ -83,21 +80,22 @@ def speed_table(path: Path, tray: int | None = None) -> tuple[Path, int | None]:
     return path / _TABLE.format(number), number
 
 
-def read_cycles(path: Path) -> tuple[CycleSpeeds, ...]:
+def read_cycles(path: Path, speed: str = MEAN) -> tuple[CycleSpeeds, ...]:
     """The cycles of a table of speeds; what comes before the first shaking event is left out.
 
     Parameters
     ----------
     path : Path
-        CSV table with the columns time, cycle, cycle_start [s] and mean_projected_speed with
-        its error [m/s].
+        CSV table with the columns time, cycle, cycle_start [s] and a speed with its error [m/s].
+    speed : str, optional
+        Which speed.
 
     Raises
     ------
     RecordingError
         When it cannot be read, or holds no cycle.
     """
-    rows = _rows(path)
+    rows = _rows(path, (*_COLUMNS, speed, f'{speed}_error'))
     known = np.isfinite(rows[:, :4]).all(axis=1) & (rows[:, 3] > 0.0)
     rows = rows[known]
     # A recording that was played twice holds cycle 1 twice, from different shaking events.
@@ -121,13 +119,35 @@ def read_cycles(path: Path) -> tuple[CycleSpeeds, ...]:
     return tuple(found)
 
 
-def _rows(path: Path) -> NDArray[np.float64]:
-    """The columns of a table, (n, 5)."""
+def species_cycles(path: Path, tray: Tray) -> tuple[tuple[CycleSpeeds, ...], ...]:
+    """The cycles of each species of a mixture, in the order of `Tray.species`.
+
+    Parameters
+    ----------
+    path : Path
+        As for `read_cycles`.
+    tray : Tray
+
+    Returns
+    -------
+    tuple of tuples of CycleSpeeds
+        Empty for a single species, or when the table does not hold the speeds of two.
+    """
+    if len(tray.species) < 2:
+        return ()
+    try:
+        return tuple(read_cycles(path, f'{one}_species_speed') for one in ('first', 'second'))
+    except RecordingError:
+        return ()
+
+
+def _rows(path: Path, columns: tuple[str, ...]) -> NDArray[np.float64]:
+    """Columns of a table, (n, n_columns)."""
     try:
         with path.open(encoding='utf-8', newline='') as stream:
             header, *lines = [line for line in csv.reader(stream) if line]
         names = [name.split('[')[0].strip() for name in header]
-        places = [names.index(name) for name in _COLUMNS]
+        places = [names.index(name) for name in columns]
         values = [[float(line[k]) for k in places] for line in lines]
     except OSError as error:
         raise RecordingError(
@@ -135,7 +155,36 @@ def _rows(path: Path) -> NDArray[np.float64]:
         ) from error
     except (ValueError, IndexError, csv.Error) as error:
         raise RecordingError(str(path), 'is no table of speeds by cycle', _FORM) from error
-    return np.array(values, dtype=np.float64).reshape(len(values), len(_COLUMNS))
+    return np.array(values, dtype=np.float64).reshape(len(values), len(columns))
+
+
+def cooling_part(
+    cycles: Sequence[CycleSpeeds], span: tuple[float, float], start: float
+) -> tuple[tuple[CycleSpeeds, ...], tuple[float, float]]:
+    """Cycles and span in times since the gas began to cool; speeds before that are left out.
+
+    Parameters
+    ----------
+    cycles : sequence of CycleSpeeds
+    span : tuple of 2 floats, [s]
+        First and last time that is used, since the shaking event.
+    start : float, [s]
+        When the gas began to cool, since the shaking event. A span that begins earlier is
+        believed instead.
+    """
+    start = min(start, span[0])
+    found = []
+    for one in cycles:
+        late = one.times >= start
+        found.append(
+            CycleSpeeds(
+                cycle=one.cycle,
+                times=one.times[late] - start,
+                speed=one.speed[late],
+                error=one.error[late],
+            )
+        )
+    return tuple(found), (span[0] - start, span[1] - start)
 
 
 def mean_cycle(

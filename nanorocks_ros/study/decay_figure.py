@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
 from scipy import optimize
 
-from nanorocks_ros.errors import FitError
+from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.physics.confined_decay import confined_restitution
 from nanorocks_ros.physics.estimate import Estimate
-from nanorocks_ros.physics.haff import granular_energy, haff_speed
+from nanorocks_ros.physics.haff import haff_speed
 from nanorocks_ros.physics.haff_fit import HaffFit, fit_haff
-from nanorocks_ros.physics.paper import RELATIVE_TO_MEAN_SPEED, paper_restitution
+from nanorocks_ros.physics.paper import paper_restitution
 from nanorocks_ros.study.cycles import check_errors, mean_cycle
+from nanorocks_ros.study.library_decay import LibraryDecay, library_decay
 from nanorocks_ros.study.output_files import whole_file
+from nanorocks_ros.study.species_energy import (
+    draw_species,
+    relative_energy,
+    species_energies,
+    species_values,
+)
 
 mpl.use('Agg')
 from matplotlib.collections import LineCollection
@@ -32,8 +39,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.study.curves import SpeedCurve
     from nanorocks_ros.study.cycles import CycleSpeeds
 
-_MM, _NANOJOULE = 1e3, 1e9
-_MEASURED, _FIT, _PAPER = '#30506f', '#c23b22', '#e8b93c'
+_NANOJOULE = 1e9
+_MEASURED, _FIT, _PAPER, _LIBRARY = '#30506f', '#c23b22', '#e8b93c', '#000000'
 
 
 def decay_figure(
@@ -43,8 +50,12 @@ def decay_figure(
     *,
     wall_restitution: float,
     span: tuple[float, float],
-) -> dict[str, float | None]:
-    """The energy of each cycle and of their mean, with our fit and the paper's.
+    species: Sequence[Sequence[CycleSpeeds]] = (),
+    start: float = 0.0,
+) -> dict[str, Any]:
+    """The energy of each cycle and of their mean, with our fit, the library's and the paper's.
+
+    Of a mixture the energy of each species is drawn below, with a fit of its own.
 
     Parameters
     ----------
@@ -55,11 +66,16 @@ def decay_figure(
         For the confined theory.
     span : tuple of 2 floats, [s]
         First and last time since the shaking event that is fitted.
+    species : sequence of sequences of CycleSpeeds, optional
+        The cycles of each species of a mixture, in the order of `Tray.species`.
+    start : float, [s], optional
+        From when on the gas cools, since the shaking event: initial speeds are those of then,
+        unless `span` begins before it.
 
     Returns
     -------
     dict
-        What was fitted, in SI; None where a relation has no value.
+        What was fitted, in SI; None where a relation has no value, or the tray no library.
 
     Raises
     ------
@@ -74,51 +90,117 @@ def decay_figure(
     """
     curve = mean_cycle(cycles, *span)
     check_errors(curve)
-    fit = fit_haff(curve.times, curve.speed, curve.error, tray.count * len(cycles))
-    energy, time = _paper_fit(curve, tray.mean_mass)
-    found = _values(tray, fit, (energy, time), wall_restitution)
-    figure = Figure(figsize=(8.0, 5.5), layout='constrained')
-    axes = figure.subplots()
-    _draw_energy(axes, tray, cycles, curve)
-    scale = _relative_energy(1.0, tray.mean_mass) * _NANOJOULE
-    law = haff_speed(curve.times, fit.initial_speed, fit.haff_time)
+    origin = min(start, span[0])
+    age = curve.times - origin
+    fit = fit_haff(age, curve.speed, curve.error, tray.count * len(cycles))
+    energy, time = _paper_fit(age, curve.speed, tray.mean_mass)
+    found: dict[str, Any] = _values(tray, fit, (energy, time), wall_restitution)
+    library = _library(tray, cycles, curve, start)
+    each = species_energies(tray, species, span, origin)
+    figure = Figure(figsize=(8.0, 9.0 if each else 5.5), layout='constrained')
+    panels = figure.subplots(2 if each else 1, 1, sharex=True, squeeze=False)[:, 0]
+    _draw_energy(panels[0], tray, cycles, curve)
+    _draw_laws(panels[0], tray, (curve.times, age), (fit, energy, time), found)
+    _draw_library(panels[0], tray, library)
+    panels[0].legend(frameon=False, fontsize=9)
+    for one in panels[1:]:
+        draw_species(one, each, origin)
+    panels[-1].set_xlabel('time since the shaking event [s]')
+    panels[0].set_title(
+        f'Tray {tray.number}, {len(cycles)} cycle{"s" if len(cycles) > 1 else ""}: '
+        f'1/(v0 tau) = {fit.decay_rate:.3g} ± {fit.decay_rate * fit.log_decay_rate_error:.2g} /m',
+        fontsize=10,
+    )
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=110)
+    return {
+        **found,
+        'cooling_start': origin,
+        'library': None if library is None else _library_values(library),
+        **species_values(each),
+    }
+
+
+def _library(
+    tray: Tray, cycles: Sequence[CycleSpeeds], curve: SpeedCurve, start: float
+) -> LibraryDecay | None:
+    try:
+        return library_decay(tray, cycles, curve, start)
+    except (ConfigurationError, FitError):
+        # Another tray than those flown; too short a decay.
+        return None
+
+
+def _library_values(library: LibraryDecay) -> dict[str, float]:
+    found = {'initial_speed': library.initial_speed}
+    for name in ('restitution', 'wall_restitution'):
+        value, lower, upper = getattr(library, name)
+        found |= {name: value, f'{name}_lower': lower, f'{name}_upper': upper}
+    return found
+
+
+def _draw_laws(
+    axes: Axes,
+    tray: Tray,
+    times: tuple[NDArray[np.float64], NDArray[np.float64]],
+    fits: tuple[HaffFit, float, float],
+    found: dict[str, Any],
+) -> None:
+    """Our fit of Haff's law and the paper's (its energy [J] and time [s]).
+
+    Times are those since the shaking event and since the gas began to cool.
+    """
+    fit, energy, time = fits
+    shown, age = times
+    scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
+    law = haff_speed(age, fit.initial_speed, fit.haff_time)
     label = f"Haff's law, speeds weighted: {_cor_text('confined theory', found, 'confined')}"
-    axes.plot(curve.times, scale * law**2, color=_FIT, lw=2, zorder=3, label=label)
+    axes.plot(shown, scale * law**2, color=_FIT, lw=2, zorder=3, label=label)
     axes.plot(
-        curve.times,
-        _NANOJOULE * energy / (1.0 + curve.times / time) ** 2,
+        shown,
+        _NANOJOULE * energy / (1.0 + age / time) ** 2,
         color=_PAPER,
         lw=2,
         ls='--',
         zorder=4,
         label=f'as the paper fits, energies alike: {_cor_text("its COR", found, "paper")}',
     )
-    axes.set_title(
-        f'Tray {tray.number}, {len(cycles)} cycle{"s" if len(cycles) > 1 else ""}: '
-        f'1/(v0 tau) = {fit.decay_rate:.3g} ± {fit.decay_rate * fit.log_decay_rate_error:.2g} /m',
-        fontsize=10,
+
+
+def _draw_library(axes: Axes, tray: Tray, library: LibraryDecay | None) -> None:
+    if library is None:
+        return
+    scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
+    axes.plot(
+        library.times,
+        scale * library.speed**2,
+        color=_LIBRARY,
+        lw=1.6,
+        ls=':',
+        zorder=5,
+        label=f'simulated decays: COR {_interval(library.restitution)}, '
+        f'walls {_interval(library.wall_restitution)}',
     )
-    axes.legend(frameon=False)
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=110)
-    return found
 
 
-def _relative_energy(speed: float, mass: float) -> float:
-    return granular_energy(RELATIVE_TO_MEAN_SPEED * speed, mass)
+def _interval(values: tuple[float, float, float]) -> str:
+    value, lower, upper = values
+    return f'{value:.3f} [{lower:.3f}, {upper:.3f}]'
 
 
-def _paper_fit(curve: SpeedCurve, mass: float) -> tuple[float, float]:
+def _paper_fit(
+    times: NDArray[np.float64], speed: NDArray[np.float64], mass: float
+) -> tuple[float, float]:
     """T0 [J] and tau0 [s] of the paper's fit: least squares of the energies, all alike."""
-    scale = _relative_energy(1.0, mass)
-    energies = scale * curve.speed**2
+    scale = relative_energy(1.0, mass)
+    energies = scale * speed**2
 
     def residual(logs: NDArray[np.float64]) -> NDArray[np.float64]:
-        law = np.exp(logs[0]) / (1.0 + curve.times * np.exp(-logs[1])) ** 2
+        law = np.exp(logs[0]) / (1.0 + times * np.exp(-logs[1])) ** 2
         difference: NDArray[np.float64] = (energies - law) / energies[0]
         return difference
 
-    start = np.log([energies[0], 0.3 * curve.times[-1] + 1e-9])
+    start = np.log([energies[0], 0.3 * times[-1] + 1e-9])
     best = optimize.least_squares(residual, start).x
     return float(np.exp(best[0])), float(np.exp(best[1]))
 
@@ -162,7 +244,7 @@ def _cor_text(name: str, found: dict[str, float | None], key: str) -> str:
 
 
 def _draw_energy(axes: Axes, tray: Tray, cycles: Sequence[CycleSpeeds], curve: SpeedCurve) -> None:
-    scale = _relative_energy(1.0, tray.mean_mass) * _NANOJOULE
+    scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
     if len(cycles) > 1:
         lines = [np.column_stack((one.times, scale * one.speed**2)) for one in cycles]
         axes.add_collection(
@@ -188,6 +270,5 @@ def _draw_energy(axes: Axes, tray: Tray, cycles: Sequence[CycleSpeeds], curve: S
     axes.set_yscale('log')
     # Noise about zero reaches down without end.
     axes.set_ylim(bottom=0.3 * scale * float(curve.speed.min()) ** 2)
-    axes.set_xlabel('time since the shaking event [s]')
     axes.set_ylabel(r'energy at the relative speed $\frac{1}{2} m (2\bar{v})^2$ [nJ]')
     axes.grid(alpha=0.25)

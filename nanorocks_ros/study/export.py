@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,7 +14,7 @@ from nanorocks_ros.experiment.settings import rows
 from nanorocks_ros.recordings.messages import float_array_message, time_message
 from nanorocks_ros.recordings.results import write_csv
 from nanorocks_ros.recordings.writer import BagWriter
-from nanorocks_ros.records import CorEstimate, CorStatus
+from nanorocks_ros.records import ClusterEstimate, CorEstimate, CorStatus
 from nanorocks_ros.study.results_bag import offered
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import NS, ArrayRecord, layout, to_array
@@ -77,14 +78,25 @@ def _tray_as_json(analysis: Analysis, results: TrayResults) -> dict[str, Any]:
         'method': [one.method.name.lower() for one in results.speeds],
         'quality': [one.quality.names() for one in results.speeds],
         'cycles': [
-            _cycle_as_json(one, seconds(starts[one.stamp_ns] or 0))
+            _cycle_as_json(one, seconds(starts[one.stamp_ns] or 0), _of_cycle(results, one))
             for one in last_of_each_cycle(results.cors)
         ],
         'truth': _truth_as_json(analysis, results),
     }
 
 
-def _cycle_as_json(cor: CorEstimate, start: float) -> dict[str, Any]:
+def _of_cycle(results: TrayResults, cor: CorEstimate) -> list[ClusterEstimate]:
+    """Those of the same cycle, and, of a recording that was played twice, of the same time."""
+    own = [one for one in results.clusters if one.cycle == cor.cycle]
+    rising = [k for k in range(1, len(own)) if own[k].stamp_ns <= own[k - 1].stamp_ns]
+    parts = [own[a:b] for a, b in itertools.pairwise([0, *rising, len(own)])]
+    near = [one for one in parts if one and one[0].stamp_ns <= cor.stamp_ns <= one[-1].stamp_ns]
+    return (near or parts)[-1]
+
+
+def _cycle_as_json(
+    cor: CorEstimate, start: float, clusters: Sequence[ClusterEstimate]
+) -> dict[str, Any]:
     return {
         'cycle': cor.cycle,
         'start': start,
@@ -109,14 +121,34 @@ def _cycle_as_json(cor: CorEstimate, start: float) -> dict[str, Any]:
         'window_start': _known(cor.window_start),
         'window_end': _known(cor.window_end),
         'cooling_start': _known(cor.cooling_start),
+        **{
+            name: _known(getattr(cor, name))
+            for name in (field.name for field in layout(CorEstimate).fields)
+            if '_species_' in name
+        },
         'relation': cor.relation.name.lower(),
         'status': cor.status.name.lower(),
         'reduced_chi_square': _known(cor.reduced_chi_square),
         'samples': cor.samples,
-        'cluster_size': None,
-        'bodies': None,
-        'onset': None,
-        'sticking_speed': None,
+        **_clusters_as_json(clusters),
+    }
+
+
+def _clusters_as_json(clusters: Sequence[ClusterEstimate]) -> dict[str, Any]:
+    """What is known of the clusters at the end of a cycle."""
+    if not clusters:
+        return dict.fromkeys(('cluster_size', 'bodies', 'onset', 'sticking_speed'))
+    last = clusters[-1]
+    return {
+        'cluster_size': _known(last.combined_size),
+        'cluster_size_error': _known(last.combined_size_error),
+        'bodies': _known(last.bodies),
+        'bodies_error': _known(last.bodies_error),
+        'onset': _known(last.onset),
+        'sticking_status': last.sticking_status.name.lower(),
+        'sticking_speed': _known(last.sticking_speed),
+        'sticking_speed_lower': _known(last.sticking_speed_lower),
+        'sticking_speed_upper': _known(last.sticking_speed_upper),
     }
 
 
@@ -183,6 +215,8 @@ def _write_tables(analysis: Analysis, results: TrayResults, folder: Path, number
         'cor': results.cors,
         'rebound': results.rebounds,
         'collision': results.collisions,
+        'bodies': results.bodies,
+        'merge': results.merges,
     }
     for name, records in tables.items():
         if not records:
@@ -215,6 +249,8 @@ def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> No
             (topics.COR, results.cors),
             (topics.REBOUND, results.rebounds),
             (topics.COLLISION, results.collisions),
+            (topics.BODIES, results.bodies),
+            (topics.MERGE, results.merges),
         ):
             name = topic.absolute(number)
             table[name] = offered(topic)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -161,5 +162,31 @@ def _draw_local(axes: Axes, found: InstantaneousCor, walls: float) -> None:
     axes.set_xscale('log')
     axes.xaxis.set_major_formatter('{x:g}')
     axes.xaxis.set_minor_formatter('{x:g}')
+    # All numbers on one line.
+    axes.tick_params(axis='x', which='both', length=4, pad=4)
     axes.legend(frameon=False, fontsize=9)
     axes.grid(alpha=0.25)
+
+
+def instantaneous_values(found: InstantaneousCor) -> dict[str, Any]:
+    """What was found, in SI, as JSON has it: None for NaN."""
+    local = found.local
+    arrays = {
+        'collision_speed': found.collision_speed,
+        'paper_restitution': found.paper,
+        'noise_95': found.noise[[0, 3]],
+        'noise_and_gas_95': found.noise_and_gas[[0, 3]],
+        'local_speed': local.speed,
+        'local_decay_rate': local.decay_rate,
+        'local_decay_rate_error': local.decay_rate_error,
+        'local_restitution': local.restitution,
+        'local_restitution_lower': local.lower,
+        'local_restitution_upper': local.upper,
+    }
+    return {name: _known(array.tolist()) for name, array in arrays.items()}
+
+
+def _known(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_known(one) for one in value]
+    return value if math.isfinite(value) else None

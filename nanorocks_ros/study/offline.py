@@ -10,10 +10,12 @@ import numpy as np
 
 from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.records import (
+    BodyEstimate,
     ClusterEstimate,
     CorEstimate,
     Frame,
     GroundTruth,
+    Merge,
     Notice,
     PairCollision,
     Rebound,
@@ -31,6 +33,16 @@ if TYPE_CHECKING:
 NS = 1_000_000_000
 Progress = Callable[[int, int], None]
 
+# Where the records of a tray are kept.
+_LISTS: dict[type, str] = {
+    SpeedEstimate: 'speeds',
+    ClusterEstimate: 'clusters',
+    CorEstimate: 'cors',
+    Rebound: 'rebounds',
+    PairCollision: 'collisions',
+    BodyEstimate: 'bodies',
+    Merge: 'merges',
+}
 # A gap of more than this many usual intervals means that frames are missing.
 _GAP = 1.5
 
@@ -44,6 +56,8 @@ class TrayResults:
     cors: list[CorEstimate] = field(default_factory=list)
     rebounds: list[Rebound] = field(default_factory=list)
     collisions: list[PairCollision] = field(default_factory=list)
+    bodies: list[BodyEstimate] = field(default_factory=list)
+    merges: list[Merge] = field(default_factory=list)
     truth: list[GroundTruth] = field(default_factory=list)
 
 
@@ -162,8 +176,8 @@ def analyse(
     if result.refused:
         result.notices.append(f'{bag.where}: {result.refused} frames could not be used')
         result.complete = False
-    for final in pipeline.flush():
-        result.trays[final.tray].cors.append(final)
+    for record in pipeline.flush():
+        getattr(result.trays[record.tray], _LISTS[type(record)]).append(record)
     # Known only after reading: where a damaged bag ends.
     result.notices[:0] = bag.reader.notices
     result.complete = result.complete and bag.reader.complete
@@ -190,13 +204,5 @@ def _push(result: Analysis, pipeline: Pipeline, frame: Frame) -> None:
     for record in records:
         if isinstance(record, Notice):
             result.notices.append(record.text)
-        elif isinstance(record, SpeedEstimate):
-            result.trays[record.tray].speeds.append(record)
-        elif isinstance(record, ClusterEstimate):
-            result.trays[record.tray].clusters.append(record)
-        elif isinstance(record, CorEstimate):
-            result.trays[record.tray].cors.append(record)
-        elif isinstance(record, Rebound):
-            result.trays[record.tray].rebounds.append(record)
-        elif isinstance(record, PairCollision):
-            result.trays[record.tray].collisions.append(record)
+        elif type(record) in _LISTS:
+            getattr(result.trays[record.tray], _LISTS[type(record)]).append(record)

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.experiment import settings as st
 from nanorocks_ros.records import (
+    BodyEstimate,
     ClusterEstimate,
     CorEstimate,
     GroundTruth,
+    Merge,
     PairCollision,
     Rebound,
     SpeedEstimate,
@@ -32,6 +34,8 @@ _RECORDS = (
     CorEstimate,
     Rebound,
     PairCollision,
+    BodyEstimate,
+    Merge,
     GroundTruth,
     TrayState,
 )

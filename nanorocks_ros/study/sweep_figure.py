@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import textwrap
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.settings import SimulationSettings, rows
 from nanorocks_ros.study.deviation import chi_square
+from nanorocks_ros.study.output_files import whole_file
 from nanorocks_ros.study.sweep_contours import contours
 
 mpl.use('Agg')
@@ -106,7 +108,8 @@ def chi_square_figure(
     figure.colorbar(mesh, ax=axes, label=r'mean $\chi^2$ over the times', extend='min')
     _draw_contours(axes, sweep, curve)
     _mark(axes, sweep, values, curve)
-    figure.savefig(path, dpi=110)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=110)
 
 
 def _mark(axes: Axes, sweep: Sweep, values: NDArray[np.float64], curve: SpeedCurve) -> None:
@@ -129,10 +132,19 @@ def _mark(axes: Axes, sweep: Sweep, values: NDArray[np.float64], curve: SpeedCur
     )
     axes.set_xlabel(_label(first))
     axes.set_ylabel(_label(second))
-    axes.set_title(f'{sweep.runs} runs at each of {values.size} points')
+    axes.set_title(f'{_held(sweep)}{sweep.runs} runs at each of {values.size} points')
     # Beside the map, whose corners may hold what matters.
     figure: Any = axes.figure
     figure.legend(loc='outside lower center', ncols=3, fontsize=9, facecolor='#c8ccd4')
+
+
+def _held(sweep: Sweep) -> str:
+    """Tray and walls, where they do not vary."""
+    settings = json.loads(sweep.question)['settings']
+    names = {'tray': 'tray', 'wall_restitution': 'walls'}
+    varied = {axis.name for axis in sweep.axes}
+    held = [f'{text} {settings[name]:g}' for name, text in names.items() if name not in varied]
+    return f'{", ".join(held).capitalize()}: ' if held else ''
 
 
 def _draw_contours(axes: Axes, sweep: Sweep, curve: SpeedCurve) -> None:

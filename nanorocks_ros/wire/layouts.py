@@ -13,17 +13,20 @@ import numpy as np
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.records import (
+    BodyEstimate,
     ClusterEstimate,
     CorEstimate,
     CorRelation,
     CorStatus,
     GroundTruth,
+    Merge,
     PairCollision,
     Quality,
     Rebound,
     SizeStatus,
     SpeedEstimate,
     SpeedMethod,
+    StickingStatus,
     TrayState,
 )
 
@@ -41,6 +44,8 @@ ArrayRecord = (
     | TrayState
     | Rebound
     | PairCollision
+    | BodyEstimate
+    | Merge
 )
 RecordType = TypeVar(
     'RecordType',
@@ -51,6 +56,8 @@ RecordType = TypeVar(
     TrayState,
     Rebound,
     PairCollision,
+    BodyEstimate,
+    Merge,
 )
 
 _ENUMERATIONS = {
@@ -59,10 +66,11 @@ _ENUMERATIONS = {
     'status': CorStatus,
     'relation': CorRelation,
     'size_status': SizeStatus,
+    'sticking_status': StickingStatus,
 }
-_COUNTS = frozenset(
-    ('cycle', 'samples', 'bodies', 'color', 'rebounds', 'collisions', 'track', 'species', 'wall')
-)
+# By the type that a record declares.
+_WHOLE = {'int': int, 'bool': bool}
+_SIZES = ('1', '2', '3', '4_to_6', '7_or_more')
 # Of two beads, or of two directions: the array in the record, and the place in it.
 _AXES = {'x': 0, 'y': 1}
 _OF_BEADS = {
@@ -89,6 +97,7 @@ _PARTS: dict[str, tuple[str, tuple[int, ...]]] = {
         for k in (0, 1)
         for letter, axis in _AXES.items()
     },
+    **{f'bodies_of_{size}': ('sizes', (k,)) for k, size in enumerate(_SIZES)},
     **{
         f'{name}_{letter}': (name, (axis,))
         for name in ('separation', 'place')
@@ -96,8 +105,14 @@ _PARTS: dict[str, tuple[str, tuple[int, ...]]] = {
     },
 }
 _INTEGERS = frozenset(('tracks', 'species'))
+_LENGTHS = {'sizes': len(_SIZES)}
 # Fields of the array that a record keeps as an integer stamp.
-_STAMPS = {'time': 'stamp_ns', 'cycle_start': 'cycle_start_ns'}
+_STAMPS = {
+    'time': 'stamp_ns',
+    'cycle_start': 'cycle_start_ns',
+    'known': 'known_ns',
+    'first_merge': 'first_merge_ns',
+}
 _FIELD = re.compile(r'^float32\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
 _CONSTANT = re.compile(r'^float32\s+([A-Z]\w*)\s*=\s*(\d+)$')
 
@@ -159,8 +174,7 @@ def to_array(record: ArrayRecord, epoch_ns: int) -> NDArray[np.float32]:
 
     Parameters
     ----------
-    record : SpeedEstimate, ClusterEstimate, CorEstimate, GroundTruth, TrayState, Rebound or
-        PairCollision
+    record : any of ArrayRecord
     epoch_ns : int, [ns]
         What `time` counts from.
 
@@ -217,13 +231,14 @@ def from_array(
         )
     if not math.isfinite(values[0]):
         raise FrameError(where, f'time is {values[0]}', 'publish the time in element 0')
+    kinds = {field.name: field.type for field in dataclasses.fields(record_type)}
     items: dict[str, Any] = {'tray': tray, **_wholes(fields, values)}
     for field, value in zip(fields, values, strict=True):
         if field.name in _PARTS:
             continue
         name = _STAMPS.get(field.name, field.name)
         try:
-            items[name] = _value(field.name, float(value), epoch_ns)
+            items[name] = _value(field.name, kinds[name], float(value), epoch_ns)
         except (ValueError, OverflowError) as error:
             raise FrameError(
                 where,
@@ -244,7 +259,7 @@ def _wholes(
     }
     found: dict[str, NDArray[Any]] = {}
     for (whole, place), value in known.items():
-        shape = (2,) * len(place)
+        shape = (_LENGTHS.get(whole, 2),) * len(place)
         found.setdefault(whole, np.full(shape, np.nan))[place] = value
     return {
         whole: values.astype(np.int32) if whole in _INTEGERS else values
@@ -252,9 +267,9 @@ def _wholes(
     }
 
 
-def _value(name: str, value: float, epoch_ns: int) -> object:
+def _value(name: str, kind: object, value: float, epoch_ns: int) -> object:
     if name in _STAMPS:
         return epoch_ns + round(value * NS) if math.isfinite(value) else None
-    if name in _COUNTS:
-        return int(value)
+    if kind in _WHOLE:
+        return _WHOLE[kind](value)
     return _ENUMERATIONS[name](int(value)) if name in _ENUMERATIONS else value

@@ -74,6 +74,15 @@ REBOUND = Topic(
 COLLISION = Topic(
     name='tray_{tray}/collision', type=ARRAY, depth=1000, doc='PairCollision: of two beads'
 )
+BODIES = Topic(
+    name='tray_{tray}/bodies',
+    type=ARRAY,
+    depth=1000,
+    doc='BodyEstimate: single beads and clusters',
+)
+MERGE = Topic(
+    name='tray_{tray}/merge', type=ARRAY, depth=1000, doc='Merge: of two beads that stick'
+)
 TRACKS = Topic(
     name='tray_{tray}/tracks',
     type=IMAGE,
@@ -114,6 +123,8 @@ TOPICS = (
     TRACKS,
     REBOUND,
     COLLISION,
+    BODIES,
+    MERGE,
     CLUSTER,
     AUTOCORRELATION,
     COR,

@@ -93,7 +93,9 @@ def assert_same_numbers(arrays, rounding):
         # one arrives. What was provisional when the bag ended is final offline alone.
         first = int(np.argmin(np.abs(expected[:, 0] - found[0, 0])))
         assert first < len(expected) // 2, kind
-        assert len(expected) - first - len(found) in (0, 1), kind
+        # Those of clusters are held back for two seconds.
+        most = 11 if kind is ClusterEstimate else 1
+        assert 0 <= len(expected) - first - len(found) <= most, kind
         same = expected[first : first + len(found)]
         np.testing.assert_allclose(found, same, rtol=rounding, atol=1e-9)
 

@@ -147,3 +147,18 @@ def test_ensembles_that_cannot_be_run_are_refused():
         cooling_runs(SETTINGS, TRAY, [-1.0, 0.5], [0])
     with pytest.raises(ConfigurationError, match='mean_speed'):
         cooling_runs(replace(SETTINGS, mean_speed=float('nan')), TRAY, [0.5], [0])
+
+
+def test_friction_at_floor_and_lid_slows_a_gas_and_without_it_rough_beads_are_smooth():
+    def last_speeds(**values):
+        settings = SimulationSettings(**values)
+        return cooling_runs(settings, TRAY, [10.0], range(8)).mean_projected_speed[:, 0]
+
+    rough = {'tangential_restitution': 0.4, 'wall_tangential_restitution': 0.4}
+    sliding = [
+        last_speeds(**rough, friction=mu, wall_friction=mu).mean() for mu in (0.0, 0.05, 0.25)
+    ]
+    assert sliding[1] < 0.7 * sliding[0]
+    assert sliding[2] < 0.7 * sliding[1]
+    free = last_speeds(**rough, friction=0.0, wall_friction=0.0)
+    np.testing.assert_array_equal(free, last_speeds())

@@ -16,6 +16,7 @@ from nanorocks_ros.physics.paper import paper_restitution_of_decay
 from nanorocks_ros.records import (
     CorRelation,
     CorStatus,
+    Merge,
     Quality,
     Rebound,
     SpeedEstimate,
@@ -312,8 +313,21 @@ def test_it_does_not_matter_when_in_two_seconds_a_contact_comes_in():
     found = all_estimates(fitter(), by_stamp([*speeds, *seen]))
     assert all_estimates(fitter(), late) == found
     *_, final = found
-    first, last = final.window_start * NS, (final.window_end - 2.0) * NS
+    first, last = 1.75 * NS, (final.window_end - 2.0) * NS
     assert final.rebounds == sum(first <= one.stamp_ns <= last for one in seen) < 40
+
+
+def test_contacts_in_a_tray_that_swings_count_though_speeds_do_not():
+    swinging = [
+        replace(one, tray_speed=1.0 if one.stamp_ns < 8.0 * NS else 0.0)
+        for one in simulated_cycle()
+    ]
+    seen = list(rebounds(np.random.default_rng(1), 60, 0.5, 20.0))
+    *_, final = all_estimates(fitter(), by_stamp([*swinging, *seen]))
+    assert final.window_start == pytest.approx(8.0, abs=0.11)
+    last = (final.window_end - 2.0) * NS
+    expected = sum(1.75 * NS <= one.stamp_ns <= last for one in seen)
+    assert final.rebounds == expected > sum(one.stamp_ns > 8.0 * NS for one in seen)
 
 
 def test_rebounds_that_the_decay_cannot_go_with_are_flagged():
@@ -343,3 +357,48 @@ def test_contacts_of_all_cycles_count_in_the_mean():
     )
     ratio = first.mean_wall_restitution_error / last.mean_wall_restitution_error
     assert ratio == pytest.approx(2.0, abs=0.6)
+
+
+def merge(time, cycle=1, known=1.0):
+    return Merge(
+        stamp_ns=round(time * NS),
+        known_ns=round((time + known) * NS),
+        tray=1,
+        cycle=cycle,
+        tracks=np.array([1, 2], dtype=np.int32),
+        joins=True,
+    )
+
+
+def as_known(records):
+    return sorted(
+        records, key=lambda one: one.known_ns if isinstance(one, Merge) else one.stamp_ns
+    )
+
+
+def test_the_window_ends_with_the_first_merge():
+    speeds = simulated_cycle()
+    *_, cut = all_estimates(fitter(**{'cooling.duration': 12.0}), speeds)
+    found = all_estimates(fitter(), as_known([*speeds, merge(12.05), merge(14.0)]))
+    finals = [one for one in found if one.status is CorStatus.FINAL]
+    assert len(finals) == 1
+    assert finals[0] == cut
+    *_, later = all_estimates(fitter(**{'cooling.until_merge': False}), [*speeds, merge(12.05)])
+    assert later.window_end == pytest.approx(20.0, abs=0.11)
+
+
+def test_a_gas_whose_beads_stick_at_once_tells_nothing():
+    for time in (0.5, 2.0):
+        (only,) = all_estimates(fitter(), as_known([*simulated_cycle(), merge(time, known=0.4)]))
+        assert only.status is CorStatus.UNDETERMINED
+        assert (only.restitution_lower, only.restitution_upper) == (0.0, 1.0)
+        assert math.isnan(only.restitution)
+        assert only.cycle == 1
+
+
+def test_a_merge_of_another_cycle_ends_no_window():
+    stage = fitter()
+    records = [merge(0.1, cycle=0), *simulated_cycle(), merge(19.0, cycle=2)]
+    *_, final = all_estimates(stage, records)
+    assert final.status is CorStatus.FINAL
+    assert final.window_end == pytest.approx(20.0, abs=0.11)

@@ -15,6 +15,7 @@ from nanorocks_ros.recordings.results import write_csv
 from nanorocks_ros.records import SpeedEstimate, SpeedMethod
 from nanorocks_ros.study.cycles import (
     check_errors,
+    cooling_part,
     mean_cycle,
     read_cycles,
     read_decay,
@@ -145,3 +146,18 @@ def test_errors_that_are_not_known_are_refused_where_they_are_needed(tmp_path):
 
 def test_simulated_tables_hold_as_many_cycles_as_asked(tmp_path):
     assert len(read_cycles(simulated_table(tmp_path / 'a.csv', 3))) == 3
+
+
+def test_times_can_count_from_when_the_gas_began_to_cool(tmp_path):
+    cycles = read_cycles(simulated_table(tmp_path / 'a.csv', 2))
+    found, span = cooling_part(cycles, (4.0, 20.0), 3.0)
+    assert span == (1.0, 17.0)
+    for one, later in zip(cycles, found, strict=True):
+        assert later.times[0] == pytest.approx(0.0, abs=1e-9)
+        assert later.speed[0] == one.speed[29]
+        assert len(later.times) == len(later.speed) == len(later.error) == len(one.times) - 29
+    # Who asks for earlier times gets them.
+    found, span = cooling_part(cycles, (1.0, 20.0), 3.0)
+    assert span == (0.0, 19.0)
+    assert found[0].times[0] == pytest.approx(0.0, abs=1e-9)
+    assert len(found[0].times) == len(cycles[0].times) - 9

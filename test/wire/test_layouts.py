@@ -13,17 +13,20 @@ from rosbags.typesys import get_types_from_msg
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.records import (
+    BodyEstimate,
     ClusterEstimate,
     CorEstimate,
     CorRelation,
     CorStatus,
     GroundTruth,
+    Merge,
     PairCollision,
     Quality,
     Rebound,
     SizeStatus,
     SpeedEstimate,
     SpeedMethod,
+    StickingStatus,
     TrayState,
 )
 from nanorocks_ros.wire.layouts import from_array, layout, to_array
@@ -41,6 +44,7 @@ WHOLE = {
     **{f'radius_{k}': 'radii' for k in '12'},
     **{f'mass_{k}': 'masses' for k in '12'},
     **{f'temperature_{k}': 'temperatures' for k in '12'},
+    **{f'bodies_of_{size}': 'sizes' for size in ('1', '2', '3', '4_to_6', '7_or_more')},
 }
 
 RECORDS = (
@@ -108,6 +112,33 @@ RECORDS = (
         temperatures=np.array([9e-6, 8e-6]),
         height=3e-3,
         place=np.array([4e-3, 5e-3]),
+    ),
+    BodyEstimate(
+        stamp_ns=EPOCH + 5 * 10**9,
+        tray=1,
+        cycle=2,
+        beads=15,
+        followed=14,
+        bodies=11.5,
+        bodies_error=0.3,
+        mean_size=1.3,
+        mean_size_error=0.03,
+        weighted_size=1.9,
+        weighted_size_error=0.1,
+        clustered_share=0.4,
+        clustered_share_error=0.05,
+        clusters=2.0,
+        clusters_error=0.2,
+        sizes=np.array([9.0, 1.0, 0.0, 1.0, 0.5]),
+        first_merge_ns=EPOCH + 2 * 10**9,
+    ),
+    Merge(
+        stamp_ns=EPOCH + 2 * 10**9,
+        known_ns=EPOCH + 3 * 10**9,
+        tray=1,
+        cycle=2,
+        tracks=np.array([3, 11], dtype=np.int32),
+        joins=True,
     ),
     ClusterEstimate(stamp_ns=EPOCH + 1, tray=1, cycle=0, level_area=2e-6, correlation_length=8e-4),
     ClusterEstimate(
@@ -185,7 +216,12 @@ def test_every_array_starts_with_time_and_cycle_and_holds_the_whole_record(recor
     names = [field.name for field in layout(type(record)).fields]
     assert names[:2] == ['time', 'cycle']
     expected = {field.name for field in dataclasses.fields(record)} - {'tray'}
-    renamed = {'stamp_ns': 'time', 'cycle_start_ns': 'cycle_start'}
+    renamed = {
+        'stamp_ns': 'time',
+        'cycle_start_ns': 'cycle_start',
+        'known_ns': 'known',
+        'first_merge_ns': 'first_merge',
+    }
     parts = [
         name if name in expected or name in renamed.values() else WHOLE[name] for name in names
     ]
@@ -205,6 +241,12 @@ def test_every_array_starts_with_time_and_cycle_and_holds_the_whole_record(recor
 def test_the_constants_are_those_of_the_code(record_type, enumerations):
     expected = {one.name: one.value for kind in enumerations for one in kind}
     assert layout(record_type).constants == expected
+
+
+def test_the_constants_of_clusters_are_those_of_the_code():
+    expected = {one.name: one.value for one in SizeStatus}
+    expected |= {f'STICKING_{one.name}': one.value for one in StickingStatus}
+    assert layout(ClusterEstimate).constants == expected
 
 
 def test_not_known_is_nan_and_never_zero():

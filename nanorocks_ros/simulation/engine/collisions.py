@@ -184,7 +184,7 @@ def collide_pair(state: State, rules: Rules, i: int, j: int, now: float) -> int:
         impulse = along * normal[0], along * normal[1], along * normal[2]
         if rules.rough:
             tangential = _SMOOTH if elastic else rules.tangential
-            rub, heat = rub_pair(state, rules, i, j, normal, tangential)
+            rub, heat = rub_pair(state, rules, i, j, normal, tangential, along)
             loss += heat
             impulse = impulse[0] + rub[0], impulse[1] + rub[1], impulse[2] + rub[2]
             remember(state, PAIR, -closing, length(impulse))

@@ -81,10 +81,45 @@ def tangential(slip: Vector, normal: Vector) -> Vector:
 
 
 @inlined
+def or_sliding(restitution: float, mass: float, slip: Vector, limit: float) -> float:
+    """Tangential restitution of a contact, or the lower one of surfaces that slide to its end.
+
+    Parameters
+    ----------
+    restitution : float
+        Of a contact that grips.
+    mass : float, [kg]
+        Tangential impulse for a change of the slip, per (1 + restitution).
+    slip : tuple of 3 floats, [m/s]
+    limit : float, [kg m/s]
+        Coefficient of friction times the normal impulse.
+
+    References
+    ----------
+    Foerster, Louge, Chang, Allia 1994, Phys. Fluids 6, 1108 (from memory).
+    """
+    speed = math.sqrt(slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2])
+    if mass * (1.0 + restitution) * speed > limit:
+        return limit / (mass * speed) - 1.0
+    return restitution
+
+
+@inlined
 def rub_pair(
-    state: State, rules: Rules, i: int, j: int, normal: Vector, restitution: float
+    state: State, rules: Rules, i: int, j: int, normal: Vector, restitution: float, along: float
 ) -> tuple[Vector, float]:
     """Tangential part of a collision of two beads.
+
+    Parameters
+    ----------
+    state : State
+    rules : Rules
+    i, j : int
+    normal : tuple of 3 floats
+    restitution : float
+        Tangential one of a contact that grips.
+    along : float, [kg m/s]
+        Normal impulse, of either sign.
 
     Returns
     -------
@@ -104,6 +139,7 @@ def rub_pair(
         normal,
     )
     mass = 1.0 / (softness(state, rules, i) + softness(state, rules, j))
+    restitution = or_sliding(restitution, mass, slip, rules.friction * abs(along))
     per = -mass * (1.0 + restitution)
     impulse = per * slip[0], per * slip[1], per * slip[2]
     push(state, rules, i, impulse, normal, -1.0)
@@ -120,8 +156,9 @@ def rub_wall(
     normal: Vector,
     wall_velocity: Vector,
     restitution: float,
+    along: float,
 ) -> tuple[Vector, float]:
-    """Tangential part of a collision with a wall.
+    """Tangential part of a collision with a wall; see `rub_pair`.
 
     Returns
     -------
@@ -141,6 +178,7 @@ def rub_wall(
         normal,
     )
     mass = 1.0 / softness(state, rules, i)
+    restitution = or_sliding(restitution, mass, slip, rules.wall_friction * abs(along))
     per = -mass * (1.0 + restitution)
     impulse = per * slip[0], per * slip[1], per * slip[2]
     push(state, rules, i, impulse, normal, -1.0)

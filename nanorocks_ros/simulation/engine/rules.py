@@ -164,6 +164,8 @@ class Rules(NamedTuple):
     rough: bool
     tangential: float
     wall_tangential: float
+    friction: float
+    wall_friction: float
     moving: bool
     amplitude: tuple[float, float, float]
     angular_frequency: float
@@ -201,6 +203,9 @@ class CollisionRules:
         Of rough spheres, which rotate: of the tangential velocity of the surfaces at the
         contact; -1 is smooth, 1 perfectly rough. None: beads have no spin; for the walls:
         smooth.
+    friction, wall_friction : float, >= 0
+        Of rough spheres, Coulomb's: where the tangential impulse would be larger than this times
+        the normal one, surfaces slide, and it is as large. Infinite: nothing slides.
     motion : WallMotion or None
     seed, run : int, >= 0
         Of a restitution drawn at random; runs of one seed differ.
@@ -228,6 +233,8 @@ class CollisionRules:
     sticking_measure: str = 'normal'
     tangential_restitution: float | None = None
     wall_tangential_restitution: float | None = None
+    friction: float = math.inf
+    wall_friction: float = math.inf
     motion: WallMotion | None = None
     seed: int = 0
     run: int = 0
@@ -279,6 +286,8 @@ class CollisionRules:
             wall_tangential=_tangential(
                 'wall_tangential_restitution', self.wall_tangential_restitution
             ),
+            friction=_friction('friction', self.friction),
+            wall_friction=_friction('wall_friction', self.wall_friction),
             moving=self.motion is not None,
             amplitude=_three(motion.amplitude),
             angular_frequency=float(motion.angular_frequency),
@@ -393,6 +402,12 @@ def _tangential(name: str, value: float | None) -> float:
         return _SMOOTH
     if not -1.0 <= value <= 1.0:
         raise SimulationError(name, f'{value!r} is outside [-1, 1]', 'give a value from -1 to 1')
+    return float(value)
+
+
+def _friction(name: str, value: float) -> float:
+    if not value >= 0.0:
+        raise SimulationError(name, f'{value!r}', 'give 0 or more')
     return float(value)
 
 

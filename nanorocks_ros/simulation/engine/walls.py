@@ -333,7 +333,7 @@ def rub_and_book(
             displacement(rules, 2, time)[1],
         )
         restitution = -1.0 if elastic else rules.wall_tangential
-        rub, heat = rub_wall(state, rules, i, normal, velocity, restitution)
+        rub, heat = rub_wall(state, rules, i, normal, velocity, restitution, push)
         work = rub[0] * velocity[0] + rub[1] * velocity[1] + rub[2] * velocity[2]
         state.books[WALL_LOSS] += heat + work
         add(state, MOMENTUM, rub)

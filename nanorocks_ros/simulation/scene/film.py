@@ -83,6 +83,8 @@ class SceneFilm:
     scene : SceneSettings
     trays : mapping of int to Tray, optional
         All cells of the plate; by default those that were flown.
+    gases : mapping of int to SimulationSettings, optional
+        Of trays whose gas differs; seed, shaking events and camera are common to all.
 
     Raises
     ------
@@ -97,15 +99,21 @@ class SceneFilm:
         simulation: SimulationSettings,
         scene: SceneSettings,
         trays: Mapping[int, Tray] | None = None,
+        gases: Mapping[int, SimulationSettings] | None = None,
     ) -> None:
-        check_settings(simulation)
+        own = {
+            number: _in_common(simulation, (gases or {}).get(number, simulation))
+            for number in scene.trays
+        }
         check_scene(scene)
-        _check_swing(simulation, scene)
+        for one in (simulation, *own.values()):
+            check_settings(one)
+            _check_swing(one, scene)
         self._simulation = simulation
         cells = dict(trays or load_trays())
         self._swing = wall_motion_of(simulation, scene)
         self._gases = {
-            number: _gas(simulation, scene, tray_by_number(cells, number))
+            number: _gas(own[number], scene, tray_by_number(cells, number))
             for number in sorted(scene.trays)
         }
         self._species = {number: stock(cells[number]).species for number in self._gases}
@@ -191,6 +199,12 @@ class SceneFilm:
             species=self._species[tray],
             bodies=gas.bodies,
         )
+
+
+def _in_common(simulation: SimulationSettings, own: SimulationSettings) -> SimulationSettings:
+    """The gas of one tray, with what all trays of a film share."""
+    names = ('seed', 'first_shake', 'shake_period', 'frame_rate', 'width_px', 'height_px')
+    return replace(own, **{name: getattr(simulation, name) for name in names})
 
 
 def _gas(simulation: SimulationSettings, scene: SceneSettings, tray: Tray) -> ShakenTray:

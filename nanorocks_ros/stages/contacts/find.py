@@ -13,6 +13,7 @@ from nanorocks_ros.stages.contacts.checks import FAR, LEAST_SIGNAL, only_these_t
 from nanorocks_ros.stages.contacts.flights import Line, Meeting, meeting
 from nanorocks_ros.stages.contacts.history import LONGEST, Kink, TrackHistory
 from nanorocks_ros.stages.contacts.surroundings import Surroundings
+from nanorocks_ros.stages.contacts.waiting import Waiting
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,7 +40,7 @@ _STRAIGHT = 4.0
 # How far off the wall a rebound may be seen, in radii; and in sums of radii, how close or far
 # two beads: less is one over the other, whose places are not good then.
 _WALL_SLACK = 0.15
-_NEAREST, _FURTHEST, _ABOUT = 0.9, 1.05, 0.3
+_NEAREST, _FURTHEST = 0.9, 1.05
 # Error of a measured radius, over it, that outlines leave besides the stated one.
 _OUTLINE = 0.02
 # Part of an interval by which the contact may lie outside the pictures around it.
@@ -64,7 +65,7 @@ class ContactFinder:
         self._last_ns: int | None = None
         self._histories: dict[int, TrackHistory] = {}
         self._around = Surroundings(3 * LONGEST)
-        self._waiting: list[tuple[Kink, Meeting]] = []
+        self._waiting: list[Waiting] = []
         self._scatter: list[deque[float]] = [deque(maxlen=_FLIGHTS) for _ in self._round]
         self._variances = [1.0 for _ in self._round]
 
@@ -82,7 +83,7 @@ class ContactFinder:
         self._around.push(time, tracks)
         kinks = self._kinks(time, tracks)
         horizon = time - 2 * LONGEST * self._around.interval
-        self._waiting = [one for one in self._waiting if one[1].time > horizon]
+        self._waiting = [one for one in self._waiting if one.when.time > horizon]
         return tuple(found for kink in kinks for found in self._contact(kink))
 
     def flush(self) -> tuple[Rebound | PairCollision, ...]:
@@ -145,13 +146,16 @@ class ContactFinder:
         rebound = self._rebound(kink, when)
         if rebound is not None:
             return (rebound,)
-        for other, its in self._waiting:
-            near = self._together(when, its) and _near(other, kink, when.time)
-            pair = self._pair((other, kink)) if near else None
+        this = Waiting.of(kink, when)
+        for other in self._waiting:
+            # Hundreds wait: a quick look at each.
+            soon = abs(other.when.time - when.time) < this.slack + other.slack
+            near = soon and other.near(this, when.time) and self._together(when, other.when)
+            pair = self._pair((other.kink, kink)) if near else None
             if pair is not None:
-                self._waiting = [one for one in self._waiting if one[0] is not other]
+                self._waiting = [one for one in self._waiting if one is not other]
                 return (pair,)
-        self._waiting.append((kink, when))
+        self._waiting.append(this._replace(slack=this.slack + self._around.interval))
         return ()
 
     def _between(self, kink: Kink, when: Meeting) -> bool:
@@ -262,13 +266,6 @@ class ContactFinder:
             height=self._tray.dimensions[2],
             place=here - self._around.displacement(when.time),
         )
-
-
-def _near(first: Kink, second: Kink, time: float) -> bool:
-    """Whether two beads were about a diameter apart; a quick look."""
-    apart = second.before.at(time) - first.before.at(time)
-    reach = first.radius + second.radius
-    return (1.0 - _ABOUT) * reach < math.hypot(*apart) < (1.0 + _ABOUT) * reach
 
 
 def _place(kink: Kink, time: float) -> tuple[NDArray[np.float64], float]:

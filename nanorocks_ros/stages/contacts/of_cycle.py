@@ -19,7 +19,7 @@ _MOST_WAITING = 5000
 
 
 class ContactsOfCycle:
-    """Gathers the contacts within the cooling window.
+    """Gathers the contacts from the end of the shaking to that of the cooling window.
 
     One is known a second and a half after it happened. Those of the last two seconds before the
     last speed never count: so it does not matter in which order speeds and contacts come in.
@@ -42,7 +42,7 @@ class ContactsOfCycle:
             self._waiting.append(contact)
 
     def count(self, first_ns: int, last_ns: int) -> None:
-        """Count those between the first speed of the window and the last so far."""
+        """Count those between the end of the shaking and the last speed so far."""
         latest = last_ns - LATEST_NS
         ripe = [one for one in self._waiting if one.stamp_ns <= latest]
         self._keep(lambda stamp_ns: stamp_ns > latest)

@@ -51,6 +51,13 @@ RULES = {
         'wall_restitution': 0.95,
     },
     'rough': {'restitution': 0.9, 'wall_restitution': 0.9, **ROUGH},
+    'rough and sliding': {
+        'restitution': 0.9,
+        'wall_restitution': 0.9,
+        'friction': 0.2,
+        'wall_friction': 0.1,
+        **ROUGH,
+    },
     'rough and sticking': {
         'restitution': 0.95,
         'sticking_speed': 0.2,

@@ -88,6 +88,8 @@ def viscoelastic(value, at_speed):
         ({'tangential_restitution': NAN}, 'tangential_restitution: nan is outside'),
         ({'wall_tangential_restitution': 2.0}, 'wall_tangential_restitution: 2.0 is outside'),
         ({'wall_tangential_restitution': NAN}, 'wall_tangential_restitution: nan is outside'),
+        ({'friction': -0.1}, 'friction: -0.1; give 0 or more'),
+        ({'wall_friction': NAN}, 'wall_friction: nan; give 0 or more'),
         (motion(amplitude=(NAN, 0, 0)), 'motion: .* give finite amplitudes'),
         (motion(amplitude=(0, INF, 0)), 'motion: .* give finite amplitudes'),
         (motion(amplitude=(1, 0)), 'motion: .* give finite amplitudes'),

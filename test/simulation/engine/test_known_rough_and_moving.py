@@ -89,6 +89,48 @@ def test_a_rough_wall_sets_a_bead_spinning(kernel, side):
     assert gas.books[9:12] == near([1, 0, -1.5 * inward])
 
 
+@pytest.mark.parametrize('friction', [0.0, 0.05, 0.06])
+def test_surfaces_that_slide_push_by_friction_times_the_normal_impulse(kernel, friction):
+    """As head on above: normal impulse 2, slip 1, 1/mu_t = 7; 0.75/7 grips, 0.12 never comes."""
+    gas = gas_of(
+        [(3, 5, 5), (7, 5, 5)],
+        [(1, 0, 0), (-1, 0, 0)],
+        spins=[(0, 0, 1), (0, 0, 0)],
+        tangential_restitution=-0.25,
+        friction=friction,
+        kernel=kernel,
+    )
+    before = gas.beads()
+    course = gas.follow(1.5, [1.5], log=True)
+    rub = min(2 * friction, 0.75 / 7)
+    assert course.velocities[0] == near(np.array([(-1, -rub, 0), (1, rub, 0)]))
+    assert course.spins[0, :, 2] == near([1 - 2.5 * rub, -2.5 * rub])
+    assert course.events['impulse'] == near([math.hypot(2.0, rub)])
+    after = gas.beads()
+    assert energy(after) + gas.books[0] == near(energy(before))
+    assert angular_momentum(after) == near(angular_momentum(before))
+
+
+@pytest.mark.parametrize('side', [0, 1])
+def test_a_bead_slides_along_a_wall_that_it_presses_too_little(kernel, side):
+    """As at the rough wall above: normal impulse 1.5, of which 0.4 along the wall and not 1."""
+    inward = 1 - 2 * side
+    gas = gas_of(
+        [(3, 5, 5 - 2 * inward)],
+        [(2, 0, -inward)],
+        radii=0.5,
+        wall_restitution=(1, 1, 1, 1, 0.5, 0.5),
+        wall_tangential_restitution=0.75,
+        wall_friction=0.4,
+        kernel=kernel,
+    )
+    before = gas.beads()
+    course = gas.follow(3.0, [3.0], log=True)
+    assert course.velocities[0, 0] == near([1.4, 0.0, 0.5 * inward])
+    assert course.spins[0, 0] == near([0.0, 3.0 * inward, 0.0])
+    assert energy(gas.beads()) + gas.books[1] == near(energy(before))
+
+
 def test_beads_without_friction_keep_their_spins(kernel):
     spins = [(1, 2, 3), (-1, 0, 2)]
     gas = gas_of(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -34,6 +35,7 @@ def laws(numbers):
 
 random_laws = unit.map(lambda mean: UniformRestitution(mean=mean, width=min(mean, 1.0 - mean)))
 rough = st.none() | st.floats(-1.0, 1.0)
+sliding = st.just(math.inf) | st.floats(0.0, 1.0)
 
 
 @st.composite
@@ -51,6 +53,8 @@ def rules_at_rest(draw, numbers=unit):
         sticking_measure=draw(st.sampled_from(['normal', 'total'])),
         tangential_restitution=draw(rough),
         wall_tangential_restitution=draw(rough),
+        friction=draw(sliding),
+        wall_friction=draw(sliding),
         seed=draw(st.integers(0, 1000)),
     )
 

@@ -27,6 +27,8 @@ class Rules:
     wall_sticking_speed: float = 0.0
     tangential_restitution: float | None = None
     wall_tangential_restitution: float | None = None
+    friction: float = math.inf
+    wall_friction: float = math.inf
     motion: Any = None
     seed: int = 1
 

@@ -135,7 +135,8 @@ class ReferenceGas:
         radii = beads.radii[i], beads.radii[j]
         slipping = slip(normal, u, radii[0] * self.spins[i] + radii[1] * self.spins[j])
         along = normal_impulse(normal, u, per_masses, restitution)
-        across = tangential_impulse(slipping, per_masses, radii, per_inertias, tangential)
+        most = self.rules.friction * math.sqrt(along @ along)
+        across = tangential_impulse(slipping, per_masses, radii, per_inertias, tangential, most)
         self.note_on_fixed(i, j, along + across)
         beads.push(i, -(along + across))
         beads.push(j, along + across)
@@ -187,10 +188,11 @@ class ReferenceGas:
         rebound = max(restitution * approach, least)
         radii, per_inertias = (beads.radii[i],), (beads.per_inertia(i),)
         slipping = slip(normal, u, radii[0] * self.spins[i])
-        across = tangential_impulse(
-            slipping, (beads.per_mass(i),), radii, per_inertias, tangential
-        )
         along = beads.mass(i) * (approach + rebound) * normal
+        most = self.rules.wall_friction * math.sqrt(along @ along)
+        across = tangential_impulse(
+            slipping, (beads.per_mass(i),), radii, per_inertias, tangential, most
+        )
         wall_velocity = self.tray.velocity(self.time)[axis]
         beads.push(i, -across)
         beads.set_velocity(i, axis, wall_velocity + inward * rebound)

@@ -46,6 +46,18 @@ def test_trays_with_the_same_beads_do_different_things():
     assert not np.array_equal(found.beads[0].velocities, found.beads[1].velocities)
 
 
+def test_one_tray_may_hold_another_gas_than_the_rest():
+    elastic = replace(SHAKEN, restitution=1.0, wall_restitution=1.0, seed=99, first_shake=0.2)
+    found = SceneFilm(SHAKEN, SMALL, gases={3: elastic}).at(9, 0)
+    alone, same = film().at(9, 0).beads
+    np.testing.assert_array_equal(found.beads[0].velocities, alone.velocities)
+    gas = ShakenTray(
+        replace(SHAKEN, tray=3, restitution=1.0, wall_restitution=1.0), TRAYS[3], run=3
+    )
+    np.testing.assert_array_equal(found.beads[1].velocities, gas.at(0.3)[1])
+    assert not np.array_equal(found.beads[1].velocities, same.velocities)
+
+
 def test_positions_are_relative_to_the_floor_of_the_swinging_tray():
     one = film(scene=SWINGING).at(14, 0)
     still = film(scene=replace(SWINGING, swing_knocks=False)).at(14, 0)

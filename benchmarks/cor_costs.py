@@ -1,0 +1,97 @@
+"""What restitutions cost: a fit, a node of a library, a search of the paper's size."""
+
+from __future__ import annotations
+
+from time import process_time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.contact_terms import ContactTerms
+from nanorocks_ros.physics.haff_fit import fit_haff
+from nanorocks_ros.simulation.ensemble import cooling_runs
+from nanorocks_ros.stages.readings import Decay, LibraryReading
+from nanorocks_ros.study.build_library import LibraryPlan, cool_node
+from nanorocks_ros.study.sweep import sweep
+from nanorocks_ros.study.sweep_plan import sweep_plan
+from nanorocks_ros.study.tasks import Workers
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_TIMES = np.arange(1.75, 20.0, 0.25)
+_ERROR = 0.02
+_REPEATS = 50
+# Of the library of tray 1 in the package.
+_NODES, _RUNS_OF_NODE, _SEED = 40, 24, 1
+# The paper's search: points along each axis and runs at each; and the part that is measured.
+_POINTS, _RUNS = 40, 178
+_SOME_POINTS, _SOME_RUNS = 10, 40
+
+
+def print_costs() -> None:
+    """Print them; times of one machine, to be held against one another."""
+    fit, law = _fits()
+    print(f"one update: {1e3 * fit:.1f} ms of CPU, {fit / law:.1f} fits of Haff's law")
+    node = _library_node()
+    print(
+        f'one node of the library of tray 1, {_RUNS_OF_NODE} runs: {1e3 * node:.0f} ms of CPU '
+        f'(mean of {_NODES}), {node / fit:.1f} updates'
+    )
+    part = _search()
+    share = _SOME_POINTS**2 * _SOME_RUNS / (_POINTS**2 * _RUNS)
+    print(
+        f'search of {_POINTS} x {_POINTS} points with {_RUNS} runs each, tray 1: '
+        f'{part / share / 60.0:.1f} min of CPU, half of that on two free cores; extrapolated from '
+        f'{_SOME_POINTS} x {_SOME_POINTS} points with {_SOME_RUNS} runs each '
+        f'({100.0 * share:.1f} % of it) in {part:.1f} s'
+    )
+
+
+def _cost(work: Callable[[], object], repeats: int) -> float:
+    """CPU time of one, once it is compiled, [s]."""
+    work()
+    begin = process_time()
+    for _ in range(repeats):
+        work()
+    return (process_time() - begin) / repeats
+
+
+def _fits() -> tuple[float, float]:
+    """One live update, and a fit of Haff's law to the same speeds, [s]."""
+    tray = load_trays()[1]
+    settings = SimulationSettings(
+        restitution=0.89, wall_restitution=0.97, seed=4242, mean_speed=0.01
+    )
+    (speed,) = cooling_runs(settings, tray, _TIMES, [0]).mean_projected_speed
+    decay = Decay(time=_TIMES, speed=speed, error=_ERROR * speed)
+    reading, none = LibraryReading(PipelineSettings(), tray), ContactTerms.of(())
+    return (
+        _cost(lambda: reading.read(decay, none, final=False), _REPEATS),
+        _cost(lambda: fit_haff(_TIMES, speed, _ERROR * speed, tray.count), _REPEATS),
+    )
+
+
+def _library_node() -> float:
+    plan = LibraryPlan(tray=load_trays()[1], nodes=_NODES, runs=_RUNS_OF_NODE, seed=_SEED)
+    cool_node(plan, 0)
+    begin = process_time()
+    for number in range(_NODES):
+        cool_node(plan, number)
+    return (process_time() - begin) / _NODES
+
+
+def _search() -> float:
+    """A part of the search, evenly over the grid, [s]."""
+    plan = sweep_plan(
+        SimulationSettings(tray=1, seed=1, mean_speed=0.01),
+        {
+            'restitution': np.linspace(0.5, 1.0, _SOME_POINTS).tolist(),
+            'wall_restitution': np.linspace(0.8, 1.0, _SOME_POINTS).tolist(),
+        },
+        _TIMES,
+        _SOME_RUNS,
+    )
+    return _cost(lambda: sweep(plan, workers=Workers(processes=1)), 1)

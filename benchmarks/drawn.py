@@ -1,0 +1,47 @@
+"""Trays and starts drawn from what the priors say of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from nanorocks_ros.experiment.settings import PriorSettings
+    from nanorocks_ros.experiment.trays import Tray
+
+
+def varied(
+    tray: Tray, wall: float, prior: PriorSettings, random: np.random.Generator
+) -> tuple[Tray, dict[str, float | str]]:
+    """A tray as the priors allow, and settings of its gas.
+
+    Parameters
+    ----------
+    tray : Tray
+    wall : float
+        Restitution of its side walls.
+    prior : PriorSettings
+    random : Generator
+    """
+    species = list(tray.species)
+    most = max(range(len(species)), key=lambda k: species[k].count)
+    size = 1.0 + prior.diameter_error * random.standard_normal()
+    count = species[most].count + round(prior.count_error * random.standard_normal())
+    species[most] = replace(
+        species[most],
+        diameter_low=size * species[most].diameter_low,
+        diameter_high=size * species[most].diameter_high,
+        count=count,
+    )
+    length, width, height = tray.dimensions
+    height += prior.height_error * random.standard_normal()
+    loss = (1.0 - wall) * math.exp(prior.floor_lid_spread * random.standard_normal())
+    values: dict[str, float | str] = {
+        'vertical_speed_factor': math.exp(prior.anisotropy_spread * random.standard_normal()),
+        'speeds': 'maxwellian' if random.random() < 0.5 else 'uniform',
+        'floor_lid_difference': (1.0 - loss) - wall,
+    }
+    return replace(tray, species=tuple(species), dimensions=(length, width, height)), values

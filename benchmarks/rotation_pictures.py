@@ -1,0 +1,121 @@
+"""The picture of docs/rotation.md: ``python -m benchmarks.rotation_pictures FOLDER``, a minute."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+
+from benchmarks import rough_gas as gas
+from benchmarks import rough_sharing as energy
+from benchmarks.rotation import NOISE, RUNS, SEEDS, STEP, TIMES, TOGETHER, curves
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.physics.paper import RELATIVE_TO_MEAN_SPEED
+from nanorocks_ros.physics.rotation import temperature_ratio_course
+
+mpl.use('Agg')
+from matplotlib.figure import Figure
+
+COLOURS = ('#30506f', '#c23b22', '#e0a458', '#5b8c5a')
+CASES = (gas.SMOOTH, gas.SMOOTH_WALLS, gas.BEADS, gas.RUBBING)
+SHARING_TIMES = np.linspace(0.0, 20.0, 41)
+CYCLES = 6
+FRICTIONS = (0.0, 0.03, 0.1, 0.25)
+EDGES = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 14.0]) * 1e-3
+
+
+def main(folder):
+    """Write rotation.png."""
+    figure = Figure(figsize=(11.0, 8.4), layout='constrained')
+    axes = figure.subplots(2, 2)
+    _bulk(axes[0, 0])
+    _tray(axes[0, 1])
+    _widths(axes[1, 0])
+    _readings(axes[1, 1])
+    for one in axes.flat:
+        one.grid(alpha=0.25)
+    figure.savefig(Path(folder) / 'rotation.png', dpi=90)
+
+
+def _bulk(axes):
+    for tangential, colour in zip((0.5, 0.0, -0.5), COLOURS, strict=False):
+        collisions, ratio = energy.bulk_course(gas.PAIRS, tangential, SEEDS)
+        each = np.linspace(0.0, 40.0, 200)
+        axes.plot(
+            each,
+            temperature_ratio_course(each, gas.PAIRS, tangential),
+            color=colour,
+            label=f'β = {tangential:g}',
+        )
+        axes.plot(collisions, ratio, '.', ms=5, color=colour)
+    axes.set_xlim(0.0, 40.0)
+    axes.set_ylim(0.0)
+    axes.set_xlabel('collisions of each bead')
+    axes.set_ylabel('rotation over translation')
+    axes.set_title('without walls: theory (lines), 500 simulated beads', fontsize=10)
+    axes.legend(frameon=False, fontsize=9)
+
+
+def _tray(axes):
+    for rough, colour in zip(CASES[1:], COLOURS[1:], strict=False):
+        ratio = energy.sharing(1, rough, SHARING_TIMES, 120).ratio[0]
+        axes.plot(SHARING_TIMES, ratio, color=colour, label=rough.name)
+    axes.axhline(1.0, color='black', lw=0.7)
+    axes.set_xlabel('time since shaking [s]')
+    axes.set_ylabel('rotation over translation')
+    axes.set_ylim(0.0)
+    axes.set_title('tray 1, started without rotation', fontsize=10)
+    axes.legend(frameon=False, fontsize=9)
+
+
+def _widths(axes):
+    tray = load_trays()[1]
+    middle = np.sqrt(EDGES[:-1] * EDGES[1:]) * 1e3
+    for rough, colour in zip(CASES, COLOURS, strict=True):
+        speeds = gas.speeds_of(1, rough, TIMES, RUNS)
+        for noise, style, name in ((0.0, '-', rough.name), (NOISE, '--', None)):
+            each = curves(speeds, TOGETHER, 0.0, noise)
+            values, speed = gas.paper_values(each, STEP, tray)
+            axes.plot(middle, gas.spread(values, speed, EDGES)[1], style, color=colour, label=name)
+    axes.plot([], [], '--', color='gray', label='the same with 0.1 mm/s of noise')
+    axes.axvline(5.0, color='black', lw=0.7, ls=':')
+    axes.set_xscale('log')
+    axes.set_yscale('log')
+    axes.xaxis.set_major_formatter('{x:g}')
+    axes.xaxis.set_minor_formatter('{x:g}')
+    axes.tick_params(axis='x', which='both', length=4, pad=4)
+    axes.set_xlabel(f'collision speed, {RELATIVE_TO_MEAN_SPEED:g} v [mm/s]')
+    axes.set_ylabel("half width (68 %) of the paper's COR")
+    axes.set_title(f'tray 1, mean of {TOGETHER} cycles', fontsize=10)
+    axes.legend(frameon=False, fontsize=8)
+
+
+def _readings(axes):
+    for number, marker in ((1, 'o'), (3, 's')):
+        found = [
+            gas.read_cycles(
+                number, gas.Roughness(tangential=0.4 if mu else -1.0, friction=mu), CYCLES
+            )
+            for mu in FRICTIONS
+        ]
+        for colour, text, values in (
+            (COLOURS[1], 'decay, walls known', [one[0]['walls known'].mean[0] for one in found]),
+            (COLOURS[0], 'decay and contacts', [one[0]['all'].mean[0] for one in found]),
+            (COLOURS[3], 'contacts alone', [one[1][4] for one in found]),
+        ):
+            axes.plot(
+                FRICTIONS, values, f'{marker}-', color=colour, label=f'tray {number}: {text}'
+            )
+    axes.axhline(gas.PAIRS, color='black', lw=0.7)
+    # Room for the legend above.
+    axes.set_ylim(0.0, 1.3)
+    axes.set_xlabel('friction μ of beads and walls, β = 0.4')
+    axes.set_ylabel('restitution of the beads as read')
+    axes.set_title('rough beads taken for smooth; the truth is 0.89', fontsize=10)
+    axes.legend(frameon=False, fontsize=8, ncols=2)
+
+
+if __name__ == '__main__':
+    main(sys.argv[1] if len(sys.argv) > 1 else 'docs')

@@ -1,0 +1,121 @@
+"""Decays of the species of a mixture, each by itself, and how they share the energy.
+
+Mean speeds from true places, 5 a second, with errors of 2 %; walls 0.97, start at 10 mm/s. The
+reference of a species is Haff's law fitted to its mean decay over all cycles; bias is that of the
+median cycle, "covered" is by one standard error. Energies are true ones, of velocities along the
+picture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nanorocks_ros.experiment.settings import SimulationSettings
+from nanorocks_ros.experiment.trays import Tray, load_trays
+from nanorocks_ros.physics.haff_fit import HaffFit, fit_haff
+from nanorocks_ros.simulation.shaking import ShakenTray
+
+_CYCLES = 120
+_TIMES = 0.2 * np.arange(1, 101)
+_FIRST = 1.75
+_ERROR = 0.02
+_WINDOW = _TIMES >= _FIRST
+_HEAD = (
+    'tray', 'species', 'beads', 'v0 [mm/s]', 'tau [s]', 'ln tau of a cycle: bias', 'sd', 'covered',
+    'ln 1/(v0 tau): bias', 'sd', 'covered',
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mixture:
+    """Mean speeds and energies, (cycles, times, species), [m/s] and [J]."""
+
+    speeds: np.ndarray
+    energies: np.ndarray
+
+
+def cooled(tray: Tray, restitution: float) -> Mixture:
+    settings = SimulationSettings(
+        tray=tray.number,
+        restitution=restitution,
+        wall_restitution=0.97,
+        mean_speed=0.010,
+        first_shake=0.0,
+        frame_rate=5.0,
+        seed=4,
+    )
+    counts = [one.count for one in tray.species]
+    species = np.repeat(np.arange(2), counts)
+    density = np.repeat([one.density for one in tray.species], counts)
+    speeds = np.empty((_CYCLES, _TIMES.size, 2))
+    energies = np.empty_like(speeds)
+    for run in range(_CYCLES):
+        gas = ShakenTray(settings, tray, run)
+        mass = density * np.pi / 6.0 * (2.0 * gas.radii) ** 3
+        for k, moment in enumerate(gas.moments(_TIMES.size + 1)):
+            if k:
+                square = (moment.velocities[:, :2] ** 2).sum(axis=1)
+                for one in (0, 1):
+                    own = species == one
+                    speeds[run, k - 1, one] = np.sqrt(square[own]).mean()
+                    energies[run, k - 1, one] = 0.5 * (mass * square)[own].mean()
+    return Mixture(speeds=speeds, energies=energies)
+
+
+def _fitted(speed: np.ndarray, error: np.ndarray, beads: int) -> HaffFit:
+    return fit_haff(_TIMES[_WINDOW], speed[_WINDOW], error[_WINDOW], beads)
+
+
+def _row(tray: Tray, restitution: float, number: int, found: Mixture) -> None:
+    species = tray.species[number]
+    each = found.speeds[..., number]
+    mean, scatter = each.mean(axis=0), each.std(axis=0, ddof=1) / np.sqrt(_CYCLES)
+    whole = _fitted(mean, scatter, species.count * _CYCLES)
+    rng = np.random.default_rng(1)
+    fits = [
+        _fitted(one * (1.0 + _ERROR * rng.normal(size=one.size)), _ERROR * one, species.count)
+        for one in each
+    ]
+    cells = [f'{tray.number}, beads {restitution:g}', species.material, f'{species.count}']
+    cells += [f'{1e3 * whole.initial_speed:.2f}', f'{whole.haff_time:.2f}']
+    for logs, errors in (
+        (
+            np.log([one.haff_time / whole.haff_time for one in fits]),
+            np.array([one.haff_time_error / one.haff_time for one in fits]),
+        ),
+        (
+            np.log([one.decay_rate / whole.decay_rate for one in fits]),
+            np.array([one.log_decay_rate_error for one in fits]),
+        ),
+    ):
+        cells += [f'{np.median(logs):+.2f}', f'{logs.std(ddof=1):.2f}']
+        cells += [f'{np.mean(np.abs(logs) < errors):.2f}']
+    print('| ' + ' | '.join(cells) + ' |')
+
+
+def report() -> None:
+    """Print both tables."""
+    print('| ' + ' | '.join(_HEAD) + ' |\n|' + ' --- |' * len(_HEAD))
+    lines = []
+    for number in (3, 5):
+        tray = load_trays()[number]
+        for restitution in (0.7, 0.89):
+            found = cooled(tray, restitution)
+            for one in (0, 1):
+                _row(tray, restitution, one, found)
+            shares = found.energies.mean(axis=0)
+            ratio = shares[:, 0] / shares[:, 1]
+            masses = [one.bead_mass for one in tray.species]
+            squares = found.speeds.mean(axis=0) ** 2 * masses
+            names = '/'.join(one.material for one in tray.species)
+            lines.append(
+                f'| {number}, beads {restitution:g} | {names} | {ratio[0]:.2f} '
+                f'| {ratio[_WINDOW].mean():.2f} '
+                f'| {(squares[:, 0] / squares[:, 1])[_WINDOW].mean():.2f} |'
+            )
+    print(
+        '\n| tray | energy of a bead | at 0.2 s | 1.8 to 20 s | by mean speeds |\n|' + ' --- |' * 5
+    )
+    print('\n'.join(lines))

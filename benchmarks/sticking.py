@@ -1,0 +1,266 @@
+"""Bodies, sizes, first merges and sticking speeds from tracks, against the truth.
+
+First true places at 30 pictures a second with errors like those of tracking, 58 s after a
+shaking event at 10 mm/s; then tracks of films with all effects of the camera.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.contacts import filmed_tracks, tracks_of
+from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings
+from nanorocks_ros.experiment.trays import Tray, load_trays
+from nanorocks_ros.inference.sticking import StickingCycle, sticking_cycle, sticking_estimate
+from nanorocks_ros.physics.sticking import slow_contacts
+from nanorocks_ros.records import BodyEstimate, Merge, Tracks
+from nanorocks_ros.simulation.shaking import ShakenTray
+from nanorocks_ros.stages.bodies.count import BodyCounter
+
+_RATE = 30.0
+_SECONDS = 58.0
+_SPEED = 0.010
+_TRAYS = (1, 3, 5)
+_STICKING = (1e-3, 3e-3, 5e-3, 10.4e-3)
+_CYCLES = 6
+_CONTROLS = 7
+_CONTROL_TRUTHS = [(pairs, walls) for pairs in (0.5, 0.7, 0.89, 0.95) for walls in (0.9, 0.97)]
+_FILM_SECONDS = 26.0
+_FILM_STICKING = (3e-3,)
+_FILM_SEED = 9
+_NS = 1e9
+
+
+@dataclass(frozen=True)
+class Course:
+    """A cycle as counted and as it was: the true values are those at the frames.
+
+    Parameters
+    ----------
+    counts : list of BodyEstimate
+    merges : list of Merge
+    times : ndarray (n,), [s]
+    bodies, weighted_size, speeds : ndarray (n,)
+        True; mean projected speed of the beads, [m/s].
+    """
+
+    counts: list[BodyEstimate]
+    merges: list[Merge]
+    times: np.ndarray
+    bodies: np.ndarray
+    weighted_size: np.ndarray
+    speeds: np.ndarray
+
+    @property
+    def first_true(self) -> float:
+        """Time of the first true merge, [s]; NaN without."""
+        fell = self.bodies < self.bodies.max()
+        return float(self.times[np.argmax(fell)]) if fell.any() else np.nan
+
+    @property
+    def first(self) -> float:
+        """The same as found."""
+        return min((one.stamp_ns / _NS for one in self.merges), default=np.nan)
+
+
+def course(tray: Tray, pictures: Iterable[tuple[Tracks, np.ndarray, float]]) -> Course:
+    """Count the bodies of a cycle.
+
+    Parameters
+    ----------
+    tray : Tray
+    pictures : iterable of (Tracks, bodies, mean projected speed)
+        With the truth: for each bead the number of its body; [m/s].
+    """
+    counter = BodyCounter(PipelineSettings(), tray)
+    found: list[BodyEstimate | Merge] = []
+    rows = []
+    for tracks, bodies, speed in pictures:
+        found += counter.push(tracks, 1)
+        sizes = np.unique(bodies, return_counts=True)[1]
+        rows.append((tracks.stamp_ns / _NS, sizes.size, (sizes**2).sum() / sizes.sum(), speed))
+    found += counter.flush()
+    times, numbers, sizes, speeds = np.array(rows).T
+    return Course(
+        counts=[one for one in found if isinstance(one, BodyEstimate)],
+        merges=[one for one in found if isinstance(one, Merge)],
+        times=times,
+        bodies=numbers,
+        weighted_size=sizes,
+        speeds=speeds,
+    )
+
+
+def simulated(
+    number: int, run: int, seed: int = 5, seconds: float = _SECONDS, **values: float | str
+) -> Course:
+    """One cycle of a tray with true places."""
+    tray = load_trays()[number]
+    names = {'restitution': 0.89, 'wall_restitution': 0.97, 'mean_speed': _SPEED, **values}
+    settings = SimulationSettings(seed=seed, first_shake=0.0, frame_rate=_RATE, **names)
+    gas = ShakenTray(settings, tray, run)
+    rng = np.random.default_rng([seed, run])
+    pictures = tracks_of(gas, tray, rng, round(seconds * _RATE))
+    return course(
+        tray, ((one, gas.bodies, np.hypot(*one.velocities.T).mean()) for one in pictures)
+    )
+
+
+def _report_controls() -> None:
+    print('\nControls without sticking: restitutions 0.5 to 0.95, walls 0.9 and 0.97\n')
+    print('| tray | cycles | with a false merge |')
+    print('| --- | --- | --- |')
+    for number in _TRAYS:
+        false = [
+            bool(simulated(number, run, 7, restitution=pairs, wall_restitution=walls).merges)
+            for pairs, walls in _CONTROL_TRUTHS
+            for run in range(_CONTROLS)
+        ]
+        print(f'| {number} | {len(false)} | {sum(false)} |', flush=True)
+
+
+def compared(one: Course) -> tuple[np.ndarray, ...]:
+    """Time, bodies, its error, its truth, weighted size, its error, its truth: (7, n)."""
+    rows = [
+        (c.stamp_ns / _NS, c.bodies, c.bodies_error, c.weighted_size, c.weighted_size_error)
+        for c in one.counts
+    ]
+    times, bodies, error, size, size_error = np.array(rows).T
+    at = np.searchsorted(one.times, times - 1e-6)
+    return times, bodies, error, one.bodies[at], size, size_error, one.weighted_size[at]
+
+
+def size_row(cycles: list[Course]) -> str:
+    """Cells of the table of sizes, over some cycles."""
+    columns = [np.concatenate(part) for part in zip(*map(compared, cycles), strict=True)]
+    _, bodies, error, true, size, size_error, true_size = columns
+    ratio = size / true_size - 1.0
+    onset = np.array([one.first - one.first_true for one in cycles])
+    known = onset[np.isfinite(onset)]
+    delays = [(m.known_ns - m.stamp_ns) / _NS for one in cycles for m in one.merges]
+    covered = np.mean(np.abs(bodies - true) <= np.maximum(2.0 * error, 0.5))
+    covered_size = np.mean(np.abs(size - true_size) <= np.maximum(2.0 * size_error, 0.1))
+    lines = [
+        f'{np.mean([one.bodies[-1] for one in cycles]):.1f}',
+        f'{np.mean(bodies - true):+.2f} ({np.sqrt(np.mean((bodies - true) ** 2)):.2f})',
+        f'{ratio.mean():+.1%} ({np.sqrt(np.mean(ratio**2)):.1%})',
+        f'{covered:.0%}, {covered_size:.0%}',
+        f'{np.mean([one.first_true for one in cycles]):.2f}',
+        f'{known.mean():+.2f} ({np.abs(known).max():.2f}), {len(known)}/{len(cycles)}'
+        if known.size
+        else 'none found',
+        f'{np.median(delays):.2f}, {np.quantile(delays, 0.9):.2f}' if delays else '',
+    ]
+    return ' | '.join(lines)
+
+
+SIZE_HEADER = (
+    'bodies at the end | error of bodies: mean (rms) | of weighted size | within 2 errors: '
+    'bodies, size | first merge [s] | found later by: mean (largest) [s], in | known after '
+    '[s]: median, 90 % |'
+)
+
+
+def _report_sizes(courses: dict[tuple[int, float], list[Course]]) -> None:
+    print(f'\nTrue places with the errors of tracking, {_CYCLES} cycles each\n')
+    print(f'| tray, sticking speed | {SIZE_HEADER}')
+    print('| --- |' + ' --- |' * 7)
+    for (number, speed), cycles in courses.items():
+        print(f'| {number}, {1e3 * speed:g} mm/s | {size_row(cycles)} |', flush=True)
+
+
+def _cycle(one: Course, beads: int, merges: list[Merge]) -> StickingCycle:
+    stamps = np.rint(one.times[1:] * _NS).astype(np.int64)
+    return sticking_cycle(beads, merges, stamps, one.speeds[1:], 0)
+
+
+def _true_merges(one: Course) -> list[Merge]:
+    """As if all had been found."""
+    fallen = -np.diff(one.bodies, prepend=one.counts[0].beads)
+    stamps = np.rint(np.repeat(one.times, fallen.astype(np.int64)) * _NS).astype(np.int64)
+    fields = {'tray': 0, 'cycle': 1, 'tracks': np.zeros(2, dtype=np.int32), 'joins': True}
+    return [Merge(stamp_ns=int(at), known_ns=int(at), **fields) for at in stamps]
+
+
+def threshold_row(number: int, speed: float, cycles: list[Course], measure: str) -> str:
+    """Cells of the table of sticking speeds."""
+    tray = load_trays()[number]
+    contacts = slow_contacts(tray)
+    given = [_cycle(one, tray.count, one.merges) for one in cycles]
+    true = [_cycle(one, tray.count, _true_merges(one)) for one in cycles]
+    each = [sticking_estimate([one], contacts, tray.count, measure=measure) for one in given]
+    ratios = np.array([one.sticking_speed for one in each]) / speed
+    covered = sum(one.lower <= speed <= one.upper for one in each)
+    cells = [
+        f'{np.nanmean(ratios):.2f} ({np.nanstd(ratios):.2f}) of {np.isfinite(ratios).sum()}',
+        f'{covered}/{len(each)}',
+    ]
+    for known in (given, true):
+        found = sticking_estimate(known, contacts, tray.count, measure=measure)
+        cells.append(
+            f'{found.sticking_speed / speed:.2f} '
+            f'[{found.lower / speed:.2f}, {found.upper / speed:.2f}]'
+        )
+    return ' | '.join(cells)
+
+
+def _report_thresholds(
+    courses: dict[tuple[int, float], list[Course]], measure: str = 'normal'
+) -> None:
+    print('\nSticking speed, along the line of centres, over the truth, by true speeds\n')
+    print(
+        '| tray, sticking speed | of one cycle: mean (sd) of those measured | '
+        '95 % intervals that hold the truth | of all cycles [95 %] | from the true merges |'
+    )
+    print('| --- |' + ' --- |' * 4)
+    for (number, speed), cycles in courses.items():
+        row = threshold_row(number, speed, cycles, measure)
+        print(f'| {number}, {1e3 * speed:g} mm/s | {row} |', flush=True)
+
+
+def _report_films() -> None:
+    print(f'\nTracks of films with all effects, {_FILM_SECONDS:g} s, one cycle each\n')
+    for number, one in _filmed(0.0, _FILM_SEED).items():
+        print(f'Tray {number}, nothing sticks: {len(one.merges)} false merges\n')
+    courses = {
+        (number, speed): [one]
+        for speed in _FILM_STICKING
+        for number, one in _filmed(speed, _FILM_SEED).items()
+    }
+    print(f'| tray, sticking speed | {SIZE_HEADER}')
+    print('| --- |' + ' --- |' * 7)
+    for (number, speed), cycles in courses.items():
+        print(f'| {number}, {1e3 * speed:g} mm/s | {size_row(cycles)} |', flush=True)
+    _report_thresholds(courses)
+
+
+def _filmed(speed: float, seed: int) -> dict[int, Course]:
+    settings = SimulationSettings(
+        restitution=0.89,
+        wall_restitution=0.97,
+        seed=seed,
+        mean_speed=_SPEED,
+        first_shake=0.0,
+        frame_rate=_RATE,
+        sticking_speed=speed,
+    )
+    pictures: dict[int, list[tuple[Tracks, np.ndarray, float]]] = {n: [] for n in _TRAYS}
+    for image, tracks, truth in filmed_tracks(_TRAYS, settings, _FILM_SECONDS):
+        pictures[image.tray].append((tracks, truth.bodies, truth.projected_speeds.mean()))
+    return {number: course(load_trays()[number], seen) for number, seen in pictures.items()}
+
+
+def report() -> None:
+    """Print the tables."""
+    courses = {
+        (number, speed): [simulated(number, run, sticking_speed=speed) for run in range(_CYCLES)]
+        for number in _TRAYS
+        for speed in _STICKING
+    }
+    _report_sizes(courses)
+    _report_thresholds(courses)
+    _report_controls()
+    _report_films()

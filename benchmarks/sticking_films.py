@@ -1,0 +1,243 @@
+"""Clusters, first merges and sticking speeds in films with all effects, against the truth.
+
+Plates of eight cells, four like tray 1 and four like tray 3 or 5, JPEG 85, 26 s after a shaking
+event at 10 mm/s, restitutions 0.89 and 0.97; sizes are by tracks. In a sticking film each of the
+four has its own sticking speed; in a control nothing sticks. Films are kept as those of
+`cor_films` are.
+"""
+
+from __future__ import annotations
+
+import math
+import pickle
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from benchmarks.filmed_cycles import PLACES, folder
+from nanorocks_ros.experiment.settings import (
+    PipelineSettings,
+    SceneSettings,
+    SimulationSettings,
+    with_values,
+)
+from nanorocks_ros.experiment.trays import Tray, load_trays
+from nanorocks_ros.experiment.view import View
+from nanorocks_ros.inference.sticking import StickingCycle, sticking_cycle, sticking_estimate
+from nanorocks_ros.physics.paper_clusters import paper_onset
+from nanorocks_ros.physics.sticking import slow_contacts
+from nanorocks_ros.records import (
+    ClusterEstimate,
+    Frame,
+    Merge,
+    SpeedEstimate,
+    TrayImage,
+)
+from nanorocks_ros.simulation.scene.film import SceneFilm
+from nanorocks_ros.stages.pipeline import TrayStages
+from nanorocks_ros.stages.preprocess import Preprocessor
+from nanorocks_ros.study.tasks import Workers, run_tasks
+
+_STICKING = (1e-3, 3e-3, 5e-3, 10.4e-3)
+_FILMS, _CONTROLS = 6, 4
+_SECONDS, _SHAKE = 26.5, 0.5
+_RATE, _SCALE, _QUALITY = 30.0, 12500.0, 85
+_NS = 1e9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Filmed:
+    """What the stages made of one cell, and what was in it.
+
+    Parameters
+    ----------
+    tray : int
+        Whose beads and sides they were.
+    sticking : float, [m/s]
+    clusters : tuple of ClusterEstimate
+    speeds : tuple of SpeedEstimate
+    merges : tuple of Merge
+    time : ndarray (n,), [s]
+    bodies, weighted_size : ndarray (n,)
+        True.
+    """
+
+    tray: int
+    sticking: float
+    clusters: tuple[ClusterEstimate, ...]
+    speeds: tuple[SpeedEstimate, ...]
+    merges: tuple[Merge, ...]
+    time: np.ndarray
+    bodies: np.ndarray
+    weighted_size: np.ndarray
+
+    @property
+    def first(self) -> float:
+        """True first merge, [s]; NaN without."""
+        fallen = np.flatnonzero(self.bodies < self.bodies[0])
+        return float(self.time[fallen[0]]) if fallen.size else math.nan
+
+
+def report() -> None:
+    """Print the tables."""
+    films = {f'sticking_{k}.pickle': (k, True) for k in range(_FILMS)}
+    films |= {f'control_{k}.pickle': (k, False) for k in range(_CONTROLS)}
+    missing = {name: one for name, one in films.items() if not (folder() / name).exists()}
+    run_tasks(_make, missing, Workers())
+    cells = [one for name in films for one in pickle.loads((folder() / name).read_bytes())]
+    _report_controls([one for one in cells if one.sticking == 0.0])
+    print(
+        '\n| tray, sticking speed | cells | error of bodies: mean (rms) | of size: mean (rms) '
+        '| first merge found later by: mean (largest) [s] | paper: onset [s], true '
+        '| sticking speed / truth, one cycle: mean (sd) | 95 % hold | all [95 %] |'
+    )
+    print('| --- ' * 9 + '|')
+    for tray in (1, 3, 5):
+        for speed in _STICKING:
+            own = [one for one in cells if (one.tray, one.sticking) == (tray, speed)]
+            if own:
+                print(_row(tray, speed, own), flush=True)
+
+
+def _report_controls(cells: list[Filmed]) -> None:
+    print(
+        '| tray | controls | with a merge | paper: onset found in | at [s] |\n'
+        + '| --- ' * 5
+        + '|'
+    )
+    for tray in (1, 3, 5):
+        own = [one for one in cells if one.tray == tray]
+        onsets = np.array([_paper_onset(one) for one in own])
+        print(
+            f'| {tray} | {len(own)} | {sum(bool(one.merges) for one in own)} '
+            f'| {np.isfinite(onsets).sum()} | {np.nanmedian(onsets):.1f} |'
+        )
+
+
+def _paper_onset(one: Filmed) -> float:
+    times = np.array([each.stamp_ns / _NS for each in one.clusters])
+    areas = np.array([each.level_area for each in one.clusters])
+    return paper_onset(times, areas, _SHAKE) - _SHAKE
+
+
+def _row(tray: int, speed: float, cells: list[Filmed]) -> str:
+    bodies, sizes = (np.concatenate(part) for part in zip(*map(_errors, cells), strict=True))
+    late = [
+        min(each.stamp_ns for each in one.merges) / _NS - one.first for one in cells if one.merges
+    ]
+    onset = np.nanmean([_paper_onset(one) for one in cells])
+    true = np.nanmean([one.first - _SHAKE for one in cells])
+    beads = load_trays()[tray].count
+    contacts = slow_contacts(load_trays()[tray])
+    cycles = [_cycle(one, beads) for one in cells]
+    each = [sticking_estimate([one], contacts, beads) for one in cycles]
+    ratio = np.array([one.sticking_speed for one in each]) / speed
+    held = sum(one.lower <= speed <= one.upper for one in each)
+    both = sticking_estimate(cycles, contacts, beads)
+    return (
+        f'| {tray}, {1e3 * speed:g} mm/s | {len(cells)} '
+        f'| {bodies.mean():+.2f} ({np.sqrt(np.mean(bodies**2)):.2f}) '
+        f'| {100 * sizes.mean():+.0f} % ({100 * np.sqrt(np.mean(sizes**2)):.0f} %) '
+        f'| {np.mean(late):+.2f} ({np.abs(late).max():.2f}) | {onset:.1f}, {true:.2f} '
+        f'| {np.nanmean(ratio):.2f} ({np.nanstd(ratio):.2f}) | {held}/{len(cells)} '
+        f'| {both.sticking_speed / speed:.2f} [{both.lower / speed:.2f}, '
+        f'{both.upper / speed:.2f}] |'
+    )
+
+
+def _errors(one: Filmed) -> tuple[np.ndarray, np.ndarray]:
+    """Of the number of bodies, and of the size over the true one, where they are told."""
+    known = [each for each in one.clusters if each.cycle == 1 and math.isfinite(each.bodies)]
+    times = np.array([each.stamp_ns / _NS for each in known])
+    at = np.searchsorted(one.time, times - 0.5 / _RATE)
+    bodies = np.array([each.bodies for each in known]) - one.bodies[at]
+    size = np.array([each.weighted_size for each in known]) / one.weighted_size[at] - 1.0
+    return bodies, size
+
+
+def _cycle(one: Filmed, beads: int) -> StickingCycle:
+    speeds = [each for each in one.speeds if each.cycle == 1]
+    return sticking_cycle(
+        beads,
+        one.merges,
+        np.array([each.stamp_ns for each in speeds], dtype=np.int64),
+        np.array([each.mean_projected_speed for each in speeds]),
+        round(_SHAKE * _NS),
+    )
+
+
+def _make(task: tuple[int, bool]) -> None:
+    cv2.setNumThreads(1)
+    number, sticks = task
+    flown = load_trays()
+    cells: dict[int, Tray] = {}
+    like: dict[int, int] = {}
+    for shown, places in PLACES.items():
+        tray = 5 if shown == 3 and number % 2 else shown
+        for x, y in places:
+            cell = len(cells) + 1
+            cells[cell] = replace(flown[tray], number=cell, place=(1e-3 * x, 1e-3 * y))
+            like[cell] = tray
+    gases = {
+        cell: SimulationSettings(
+            seed=2000 + 2 * number + int(sticks),
+            mean_speed=0.010,
+            first_shake=_SHAKE,
+            frame_rate=_RATE,
+            restitution=0.89,
+            wall_restitution=0.97,
+            sticking_speed=_STICKING[(cell - 1) % 4] if sticks else 0.0,
+        )
+        for cell in cells
+    }
+    found = _film(cells, gases)
+    kept = [
+        Filmed(tray=like[cell], sticking=gases[cell].sticking_speed, **values)
+        for cell, values in found.items()
+    ]
+    path = folder() / f'{"sticking" if sticks else "control"}_{number}.pickle'
+    unfinished = path.with_suffix('.part')
+    unfinished.write_bytes(pickle.dumps(kept))
+    unfinished.replace(path)
+
+
+def _film(cells: dict[int, Tray], gases: dict[int, SimulationSettings]) -> dict[int, dict]:
+    scene = SceneFilm(gases[1], SceneSettings(trays=tuple(cells)), cells, gases)
+    names = {
+        'trays': list(cells),
+        'preprocess.layout': 'plate',
+        'preprocess.pixels_per_metre': _SCALE,
+        # Cells have other numbers than the trays that libraries were made for.
+        'cooling.relation': 'paper',
+    }
+    settings = with_values(PipelineSettings(), names, 'benchmark')
+    stage = Preprocessor(settings, cells, 'film', View(camera=scene.camera.geometry.camera))
+    stages = {cell: TrayStages(settings, tray) for cell, tray in cells.items()}
+    records: dict[int, list] = {cell: [] for cell in cells}
+    truth: dict[int, list[tuple[float, float, float]]] = {cell: [] for cell in cells}
+    for moment in scene.moments(round(_SECONDS * _RATE)):
+        for beads in moment.beads:
+            sizes = np.unique(beads.bodies, return_counts=True)[1]
+            weighted = float(np.sum(sizes**2) / sizes.sum())
+            truth[beads.tray].append((beads.stamp_ns / _NS, float(sizes.size), weighted))
+        quality = [cv2.IMWRITE_JPEG_QUALITY, _QUALITY]
+        jpeg = cv2.imencode('.jpg', moment.frame.image, quality)[1]
+        image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR)
+        frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
+        for record in stage.push(frame):
+            if isinstance(record, TrayImage):
+                records[record.tray] += stages[record.tray].push(record)
+    found = {}
+    for cell, tray in stages.items():
+        own = [*records[cell], *tray.flush()]
+        time, bodies, weighted = np.array(truth[cell]).T
+        found[cell] = {
+            'clusters': tuple(one for one in own if isinstance(one, ClusterEstimate)),
+            'speeds': tuple(one for one in own if isinstance(one, SpeedEstimate)),
+            'merges': tuple(one for one in own if isinstance(one, Merge) and one.cycle == 1),
+            'time': time,
+            'bodies': bodies,
+            'weighted_size': weighted,
+        }
+    return found

@@ -1,0 +1,243 @@
+"""What changes over many cycles: trends, and periods in which clusters were larger than usual."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from nanorocks_ros.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+# Of normal values, standard deviation over median absolute deviation.
+_MAD = 1.4826
+_ONE_SIGMA = 0.6827
+# With fewer points a slope has no error.
+_FEWEST = 5
+# Mean of a period over what is usual, in standard deviations of a cycle: beside a stretch of small
+# clusters usual ones would pass for large.
+_LEAST_EXCESS = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trend:
+    """A robust straight line through values by cycle.
+
+    Parameters
+    ----------
+    slope, slope_error : float
+        Change of the value in a cycle, and one standard error; NaN for too few values, and for
+        the error where values don't scatter. It takes cycles for independent: neighbours that
+        are alike make it too small.
+    middle : float
+        Median of the values less that of the line through 0.
+    samples : int
+    """
+
+    slope: float
+    slope_error: float
+    middle: float
+    samples: int
+
+    def at(self, cycles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The line."""
+        return np.asarray(self.middle + self.slope * cycles)
+
+
+def robust_trend(cycles: NDArray[np.float64], values: NDArray[np.float64]) -> Trend:
+    """The median of the slopes between any two values, which outliers do not move.
+
+    Parameters
+    ----------
+    cycles, values : ndarray (n,)
+        Values may be NaN, not known.
+
+    References
+    ----------
+    Theil 1950; Sen 1968, J. Am. Stat. Assoc. 63, 1379, whose interval, at 68 %, is the error.
+    """
+    x, y = np.asarray(cycles, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    known = np.isfinite(x) & np.isfinite(y)
+    x, y = x[known], y[known]
+    if x.size < _FEWEST or np.ptp(x) == 0.0:
+        middle = float(np.median(y)) if y.size else math.nan
+        return Trend(slope=math.nan, slope_error=math.nan, middle=middle, samples=int(x.size))
+    slope, _, low, high = stats.theilslopes(y, x, alpha=_ONE_SIGMA)
+    return Trend(
+        slope=float(slope),
+        slope_error=0.5 * float(high - low) or _least_squares_error(x, y - slope * x),
+        middle=float(np.median(y - slope * x)),
+        samples=int(x.size),
+    )
+
+
+def _least_squares_error(x: NDArray[np.float64], left: NDArray[np.float64]) -> float:
+    """Of a slope where most values are the same, such as counts, so that the median has none."""
+    scatter = float(np.std(left, ddof=2)) / math.sqrt(float(np.sum((x - x.mean()) ** 2)))
+    return scatter or math.nan
+
+
+class QuietPeriod(NamedTuple):
+    """Cycles in a row in which clusters were larger than usual, in all trays together.
+
+    Parameters
+    ----------
+    first, last : int
+        Places in the series, both within.
+    excess : float
+        Mean of the cycles in it, in standard deviations of a cycle.
+    chance : float
+        Part of the series in random order that hold a period as clear as this.
+    """
+
+    first: int
+    last: int
+    excess: float
+    chance: float
+
+
+def quiet_periods(
+    sizes: NDArray[np.float64],
+    false_alarms: float = 0.01,
+    shortest: int = 3,
+    orders: int = 999,
+    seed: int = 1,
+) -> tuple[QuietPeriod, ...]:
+    """Periods in which clusters grew larger, as the paper sees three by eye.
+
+    Sizes are taken about the trend of each tray, in units of its scatter, and averaged over the
+    trays. The clearest period is the run of cycles with the largest sum over the root of their
+    number, of those that are a standard deviation above the usual on average. It counts when the
+    same cycles in random order have one as clear in no more than `false_alarms` of the draws.
+    Then the rest is searched in the same way.
+
+    Parameters
+    ----------
+    sizes : ndarray (n_trays, n_cycles)
+        NaN where not known.
+    false_alarms : float, (0, 0.5]
+        Part of series without any period that one is found in, cycles being independent.
+    shortest : int, >= 1
+        Cycles of a period.
+    orders : int
+        Random orders that are drawn, 1 / `false_alarms` or more.
+    seed : int
+
+    Returns
+    -------
+    tuple of QuietPeriod
+        In order of time.
+
+    Raises
+    ------
+    ConfigurationError
+        For numbers outside their ranges.
+    """
+    if not (0.0 < false_alarms <= 0.5) or orders < 1.0 / false_alarms - 1.0 - 1e-9:
+        raise ConfigurationError(
+            'false alarms',
+            f'{false_alarms!r} with {orders} random orders',
+            f'give {1.0 / (orders + 1):g} to 0.5',
+        )
+    if shortest < 1:
+        raise ConfigurationError('shortest', f'{shortest}', 'give 1 or more cycles')
+    series = combined_series(sizes)
+    places = np.flatnonzero(np.isfinite(series))
+    pieces = [places] if places.size else []
+    rng = np.random.default_rng(seed)
+    found: list[QuietPeriod] = []
+    while pieces:
+        values = [series[piece] for piece in pieces]
+        best = _clearest(values, shortest)
+        if best is None:
+            break
+        clear, which, first, last = best
+        every = np.concatenate(values)
+        chance = _chance(clear, every, [one.size for one in values], shortest, (orders, rng))
+        if chance > false_alarms:
+            break
+        piece = pieces.pop(which)
+        own = piece[first : last + 1]
+        found.append(QuietPeriod(int(own[0]), int(own[-1]), float(np.mean(series[own])), chance))
+        pieces += [part for part in (piece[:first], piece[last + 1 :]) if part.size]
+    return tuple(sorted(found))
+
+
+def combined_series(sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean over the trays of sizes about their trends, in units of its scatter, (n_cycles,)."""
+    rows = np.atleast_2d(np.asarray(sizes, dtype=np.float64))
+    cycles = np.arange(rows.shape[1], dtype=np.float64)
+    scores = np.full(rows.shape, np.nan)
+    for k, row in enumerate(rows):
+        trend = robust_trend(cycles, row)
+        if math.isfinite(trend.slope):
+            scores[k] = _scaled(row - trend.at(cycles))
+    counts = np.isfinite(scores).sum(axis=0)
+    total = np.nansum(scores, axis=0)
+    # The mean of fewer trays scatters more: all are given the same scatter.
+    mean = np.where(counts > 0, total / np.sqrt(np.maximum(counts, 1)), np.nan)
+    return _scaled(mean)
+
+
+def _scaled(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    known = values[np.isfinite(values)]
+    if known.size == 0:
+        return values
+    middle = float(np.median(known))
+    scatter = _MAD * float(np.median(np.abs(known - middle)))
+    return np.asarray(
+        (values - middle) / scatter if scatter > 0.0 else np.full_like(values, np.nan)
+    )
+
+
+def _clearest(
+    values: Sequence[NDArray[np.float64]], shortest: int
+) -> tuple[float, int, int, int] | None:
+    """How clear the clearest run is, the number of its piece, and its ends there."""
+    best: tuple[float, int, int, int] | None = None
+    for which, one in enumerate(values):
+        sums = np.concatenate(([0.0], np.cumsum(one)))
+        for length in range(shortest, _longest(one.size) + 1):
+            runs = (sums[length:] - sums[:-length]) / math.sqrt(length)
+            first = int(np.argmax(runs))
+            if runs[first] < _LEAST_EXCESS * math.sqrt(length):
+                continue
+            if best is None or runs[first] > best[0]:
+                best = float(runs[first]), which, first, first + length - 1
+    return best
+
+
+def _chance(
+    clear: float,
+    values: NDArray[np.float64],
+    lengths: Sequence[int],
+    shortest: int,
+    draws: tuple[int, np.random.Generator],
+) -> float:
+    """Part of random orders, this one included, that hold a run as clear."""
+    orders, rng = draws
+    shuffled = rng.permuted(np.tile(values, (orders, 1)), axis=1)
+    best = np.full(orders, -np.inf)
+    start = 0
+    for size in lengths:
+        piece = shuffled[:, start : start + size]
+        start += size
+        sums = np.concatenate((np.zeros((orders, 1)), np.cumsum(piece, axis=1)), axis=1)
+        for length in range(shortest, _longest(size) + 1):
+            runs = (sums[:, length:] - sums[:, :-length]).max(axis=1) / math.sqrt(length)
+            best = np.where(
+                runs >= _LEAST_EXCESS * math.sqrt(length), np.maximum(best, runs), best
+            )
+    return float(1 + np.count_nonzero(best >= clear)) / (orders + 1)
+
+
+def _longest(cycles: int) -> int:
+    """More than half of all cycles are no period: they are what is usual."""
+    return cycles // 2

@@ -1,0 +1,124 @@
+"""How often beads of a gas meet slowly enough to stick, by the kinetic theory of `confined`.
+
+Derived in docs/clusters.md.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.physics.confined import confined_gas
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+
+MEASURES = 'normal', 'total'
+
+# Mean of |x| of a normal law of variance 1.
+_MEAN = math.sqrt(2.0 / math.pi)
+_ALIKE = 1e-3
+_SMALL = 0.01
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlowContacts:
+    """Contacts of two beads, by how fast these meet, where the mean projected speed is 1 m/s.
+
+    Make one with `slow_contacts`.
+
+    Parameters
+    ----------
+    rates : ndarray (n,), [1/m]
+        Contacts of a bead per way that a bead goes in the picture, of each kind.
+    normal, tangential : ndarray (n,), [m^2/s^2]
+        Variance of a component of the relative velocity of the beads of that kind: along the
+        line of centres, and across it.
+    """
+
+    rates: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    tangential: NDArray[np.float64]
+
+    @property
+    def rate(self) -> float:
+        """All contacts of a bead per way in the picture, kappa, [1/m]."""
+        return float(self.rates.sum())
+
+    def slower(self, speed: ArrayLike, measure: str = 'normal') -> NDArray[np.float64]:
+        """Contacts of a bead per way, [1/m], at less than a speed, over the mean projected one.
+
+        Parameters
+        ----------
+        speed : array_like
+        measure : 'normal' or 'total'
+            Along the line of centres, or all of the relative velocity.
+
+        Raises
+        ------
+        ConfigurationError
+            For another measure.
+        """
+        if measure not in MEASURES:
+            raise ConfigurationError(
+                'sticking measure', f'{measure!r}', f'choose of {", ".join(MEASURES)}'
+            )
+        square = np.square(np.asarray(speed, dtype=np.float64))[..., np.newaxis]
+        normal, across = 2.0 * self.normal, 2.0 * self.tangential
+        if measure == 'normal':
+            share = -np.expm1(-square / normal)
+        else:
+            share = _sum_of_exponentials(square, normal, across)
+        return np.asarray(share @ self.rates)
+
+
+def slow_contacts(
+    tray: Tray, restitution: float = 0.89, wall_restitution: float = 0.97
+) -> SlowContacts:
+    """Contacts in a tray that cools by Haff's law.
+
+    Parameters
+    ----------
+    tray : Tray
+    restitution, wall_restitution : float, [0, 1]
+        They shift energy between the directions of space; contacts depend little on them.
+
+    Raises
+    ------
+    ConfigurationError
+        When a restitution is none, or the tray too crowded for the theory.
+    FitError
+        When there is no such steady state.
+    """
+    gas = confined_gas(tray)
+    temperature = gas.cooling(restitution, wall_restitution).granular_temperature
+    both = temperature[:, np.newaxis] + temperature
+    squares = gas.contacts.squares
+    normal = np.einsum('abqi,abi->abq', squares, both)
+    tangential = 0.5 * (both.sum(axis=-1)[..., np.newaxis] - normal)
+    counts = gas.beads.counts / gas.beads.counts.sum()
+    # The mean approach speed counts those that come nearer: half of the mean modulus.
+    rates = counts[:, np.newaxis, np.newaxis] * gas.contacts.pairs * np.sqrt(normal) * 0.5 * _MEAN
+    some = rates > 0.0
+    return SlowContacts(rates=rates[some], normal=normal[some], tangential=tangential[some])
+
+
+def _sum_of_exponentials(
+    value: NDArray[np.float64], one: NDArray[np.float64], other: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Probability that the sum of two exponential numbers of these means is below a value.
+
+    The square of a relative velocity is such a sum: along the line of centres, since fast beads
+    meet more often, and across it, where there are two components.
+    """
+    other = np.where(np.abs(other / one - 1.0) < _ALIKE, one * (1.0 + _ALIKE), other)
+    exact = (other * np.expm1(-value / other) - one * np.expm1(-value / one)) / (one - other)
+    # Where the difference would cancel.
+    small = 0.5 * value**2 / (one * other) * (1.0 - value * (1.0 / one + 1.0 / other) / 3.0)
+    return np.asarray(np.where(value < _SMALL * np.minimum(one, other), small, exact))

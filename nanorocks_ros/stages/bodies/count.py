@@ -1,0 +1,305 @@
+"""From tracks to bodies: which beads stick together, since when, and how many bodies there are."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nanorocks_ros.inference.persistence import (
+    chance,
+    encounter_rate,
+    largest_chance,
+)
+from nanorocks_ros.records import BodyEstimate, Merge
+from nanorocks_ros.stages.bodies.births import Births
+from nanorocks_ros.stages.bodies.ghosts import Ghosts
+from nanorocks_ros.stages.bodies.pairs import Beads, Bond, Pairs
+from nanorocks_ros.stages.bodies.sizes import bodies_of, size_fields
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.settings import PipelineSettings
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.records import Tracks
+
+_NS = 1e9
+# Pictures over this time are kept, to find when beads began to stay beside each other, [s].
+_LOOK_BACK = 10.0
+# How much more probable than chance a merge must be where others were seen; and merges assumed
+# before the first.
+_BELIEVED = 0.1
+_UNSEEN_MERGES = 0.5
+# So many beads make the surroundings of one; they are not taken for colder than this, against
+# the gas, since beads that stick together move alike.
+_NEIGHBOURS = 12
+_COLDEST = 0.1
+# Tracks break off this often at most, of each bead on average, [s]: where they break more often,
+# nobody can tell who stays beside whom. Of films without sticking 7 to 100 s in trays 1, 3 and 5,
+# where none of what stays together is one bead found twice; 1 to 3 s in trays 4 and 7.
+_HELD_TOGETHER = 5.0
+# Share of a new mean energy taken over in each picture.
+_ENERGY_SHARE = 0.2
+
+
+class _Picture(NamedTuple):
+    """One of the last pictures: beads seen, and all that are known to be there."""
+
+    time: float
+    stamp_ns: int
+    ids: NDArray[np.int64]
+    places: NDArray[np.float64]
+    known: frozenset[int]
+
+
+class BodyCounter:
+    """Counts the bodies of one tray.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    tray : Tray
+
+    Raises
+    ------
+    ConfigurationError
+        For a rate of false alarms that is none.
+    """
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self._settings = settings.bodies
+        self._tray = tray
+        self._largest = largest_chance(tray, self._settings.false_alarms)
+        self._rate = encounter_rate(tray)
+        self._pairs = Pairs(partial(chance, rate=self._rate))
+        self._first_ns = 0
+        self._last_ns: int | None = None
+        self._births = Births()
+        self._restart(0)
+
+    def _restart(self, cycle: int) -> None:
+        self._cycle = cycle
+        self._births.next_cycle()
+        self._pairs.clear()
+        self._ghosts = Ghosts()
+        self._bonds: dict[tuple[int, int], Bond] = {}
+        self._first_merge: int | None = None
+        self._pictures: deque[_Picture] = deque()
+        self._waiting: deque[_Picture] = deque()
+        self._due_ns: int | None = None
+        self._way = 0.0
+        self._energies = np.zeros(len(self._tray.species))
+
+    def push(self, tracks: Tracks, cycle: int = 0) -> tuple[BodyEstimate | Merge, ...]:
+        """Take the next picture: merges that became known, and a count when one is due.
+
+        Parameters
+        ----------
+        tracks : Tracks
+        cycle : int
+            Shaking events so far: another one sets all beads apart. A stamp that goes back
+            starts all afresh.
+        """
+        if self._last_ns is not None and tracks.stamp_ns <= self._last_ns:
+            self._births = Births()
+            self._restart(cycle)
+        found: tuple[BodyEstimate | Merge, ...] = ()
+        if cycle != self._cycle:
+            found = self.flush()
+            self._restart(cycle)
+        if not self._pictures:
+            self._first_ns = tracks.stamp_ns
+        self._last_ns = tracks.stamp_ns
+        time = (tracks.stamp_ns - self._first_ns) / _NS
+        ids = self._ghosts.named(tracks, self._bonds)
+        self._births.push(tracks, ids)
+        beads = self._beads(tracks, ids)
+        self._keep(time, tracks, beads, ids)
+        bonds, broken = self._pairs.push(time, beads, self._allowed())
+        for ids_of in broken:
+            self._bonds.pop(ids_of, None)
+        due = self._due(tracks.stamp_ns)
+        if self._unclear():
+            return found
+        merges = [
+            self._merge(bond, tracks.stamp_ns)
+            for bond in bonds
+            if not self._births.one_bead(bond.ids)
+        ]
+        return (*found, *merges, *due)
+
+    def flush(self) -> tuple[BodyEstimate, ...]:
+        """Counts of the instants for which nothing more will be known."""
+        left, self._waiting = list(self._waiting), deque()
+        return () if self._unclear() else tuple(self._count(one) for one in left)
+
+    def _unclear(self) -> bool:
+        """Whether tracks break off so often that nobody can tell who stays beside whom."""
+        time = self._pictures[-1].time if self._pictures else 0.0
+        return self._births.rate(time) * _HELD_TOGETHER > self._tray.count
+
+    def _beads(self, tracks: Tracks, ids: NDArray[np.int64]) -> Beads:
+        self._learn(tracks)
+        seen = np.flatnonzero(tracks.seen)
+        seen = seen[np.argsort(ids[seen], kind='stable')]
+        return Beads(
+            ids=ids[seen],
+            places=tracks.positions[seen],
+            errors=tracks.position_errors[seen],
+            radii=tracks.radii[seen],
+            radius_errors=self._radius_errors(tracks)[seen],
+            variances=self._variances(tracks)[seen],
+            height=self._tray.dimensions[2],
+        )
+
+    def _radius_errors(self, tracks: Tracks) -> NDArray[np.float64]:
+        """0 where all beads of a species are alike: their size is known better than measured."""
+        alike = np.array([one.diameter_low == one.diameter_high for one in self._tray.species])
+        return np.where(alike[tracks.species], 0.0, tracks.radius_errors)
+
+    def _learn(self, tracks: Tracks) -> None:
+        """Energy of a component of the motion of each species, less what errors add.
+
+        Of a species of many sizes the large ones are slow: two of them seem to stay together.
+        """
+        square = 0.5 * np.sum(np.square(tracks.velocities), axis=1)
+        speed = np.nan_to_num(np.sqrt(2.0 * square[tracks.seen]))
+        if self._pictures and speed.size:
+            step = (tracks.stamp_ns - self._pictures[-1].stamp_ns) / _NS
+            self._way += float(speed.mean()) * step
+        known = tracks.seen & np.isfinite(square) & np.isfinite(tracks.velocity_errors)
+        excess = (square - np.square(tracks.velocity_errors)) * _masses(tracks)
+        for species in range(self._energies.size):
+            own = excess[known & (tracks.species == species)]
+            if own.size:
+                mean = max(float(own.mean()), 0.0)
+                last = self._energies[species]
+                share = _ENERGY_SHARE if last > 0.0 else 1.0
+                self._energies[species] = last + share * (mean - last)
+
+    def _variances(self, tracks: Tracks) -> NDArray[np.float64]:
+        """Mean square of a component of the velocity that a bead has in this gas, there.
+
+        A gas of inelastic beads is cold where it is dense, and there beads stay together.
+        """
+        own = self._energies[tracks.species]
+        square = 0.5 * np.sum(np.square(tracks.velocities), axis=1)
+        ratio = (
+            (square - np.square(tracks.velocity_errors))
+            * _masses(tracks)
+            / np.where(own > 0.0, own, np.inf)
+        )
+        known = tracks.seen & np.isfinite(ratio)
+        everybody = own / _masses(tracks)
+        if np.count_nonzero(known) <= _NEIGHBOURS:
+            return np.asarray(everybody)
+        tree = cKDTree(tracks.positions[known])
+        near = tree.query(tracks.positions, k=_NEIGHBOURS)[1]
+        around = ratio[known][near].mean(axis=1)
+        return np.asarray(everybody * np.clip(around, _COLDEST, 1.0))
+
+    def _keep(self, time: float, tracks: Tracks, beads: Beads, ids: NDArray[np.int64]) -> None:
+        known = frozenset(ids.tolist()) | self._ghosts.hidden
+        picture = _Picture(time, tracks.stamp_ns, beads.ids, beads.places, known)
+        self._pictures.append(picture)
+        while time - self._pictures[0].time > _LOOK_BACK:
+            self._pictures.popleft()
+        if self._due_ns is None or tracks.stamp_ns >= self._due_ns:
+            self._due_ns = tracks.stamp_ns + round(self._settings.interval * _NS)
+            self._waiting.append(picture)
+
+    def _odds(self) -> float:
+        """Merges per encounter, as of this cycle so far."""
+        met = 0.5 * self._tray.count * self._rate * self._way
+        return (len(self._bonds) + _UNSEEN_MERGES) / max(met, 1.0)
+
+    def _allowed(self) -> float:
+        """The chance of free beads below which they are a body.
+
+        Where beads are known to stick others do, too: then the more probable is believed.
+        """
+        return self._largest if not self._bonds else max(self._largest, _BELIEVED * self._odds())
+
+    def _merge(self, bond: Bond, known_ns: int) -> Merge:
+        start = self._since(bond)
+        joined = bodies_of(bond.ids, self._bonds)
+        self._bonds[bond.ids] = bond._replace(start=start)
+        stamp_ns = self._first_ns + round(start * _NS)
+        if self._first_merge is None or stamp_ns < self._first_merge:
+            self._first_merge = stamp_ns
+        return Merge(
+            stamp_ns=stamp_ns,
+            known_ns=known_ns,
+            tray=self._tray.number,
+            cycle=self._cycle,
+            tracks=np.array(bond.ids, dtype=np.int32),
+            joins=joined[bond.ids[0]] != joined[bond.ids[1]],
+        )
+
+    def _since(self, bond: Bond) -> float:
+        """Since when the separation has been what it is now: a jump in a track is no beginning."""
+        start, misses = bond.start, 0
+        for picture in reversed(self._pictures):
+            if picture.time >= bond.start:
+                continue
+            rows = np.searchsorted(picture.ids, bond.ids)
+            if rows.max() >= picture.ids.size or (picture.ids[rows] != bond.ids).any():
+                misses += 1
+            else:
+                apart = picture.places[rows[1]] - picture.places[rows[0]]
+                if np.abs(apart - bond.offset).max() < bond.tolerance:
+                    start, misses = picture.time, 0
+                else:
+                    misses += 1
+            if misses > 2:
+                break
+        return start
+
+    def _due(self, stamp_ns: int) -> tuple[BodyEstimate, ...]:
+        found = []
+        delay_ns = round(self._settings.delay * _NS)
+        while self._waiting and stamp_ns - self._waiting[0].stamp_ns >= delay_ns:
+            found.append(self._count(self._waiting.popleft()))
+        return tuple(found)
+
+    def _count(self, picture: _Picture) -> BodyEstimate:
+        bonds = [ids for ids, one in self._bonds.items() if one.start <= picture.time]
+        body = bodies_of(picture.known, bonds)
+        sizes = Counter(body.values())
+        first = self._first_merge
+        return BodyEstimate(
+            stamp_ns=picture.stamp_ns,
+            tray=self._tray.number,
+            cycle=self._cycle,
+            beads=self._tray.count,
+            followed=len(picture.known),
+            first_merge_ns=first if first is not None and first <= picture.stamp_ns else None,
+            **size_fields(
+                np.array(list(sizes.values()), dtype=np.int64),
+                self._tray.count,
+                self._possible(body, sizes),
+            ),
+        )
+
+    def _possible(self, body: dict[int, int], sizes: Counter[int]) -> list[tuple[int, int, float]]:
+        """Bodies that may have joined: free pairs look as theirs by chance, and merges happen.
+
+        As often, by encounters, as they did so far in this cycle.
+        """
+        odds = self._odds()
+        pairs, chances = self._pairs.pending()
+        found: dict[tuple[int, int], float] = {}
+        for (first, second), one in zip(pairs.tolist(), chances.tolist(), strict=True):
+            if first in body and second in body and body[first] != body[second]:
+                key = min(body[first], body[second]), max(body[first], body[second])
+                found[key] = max(found.get(key, 0.0), odds / (odds + one))
+        return [(sizes[a], sizes[b], one) for (a, b), one in found.items()]
+
+
+def _masses(tracks: Tracks) -> NDArray[np.float64]:
+    """Up to the density, which beads of a species share, [m^3]."""
+    return np.asarray(tracks.radii**3)

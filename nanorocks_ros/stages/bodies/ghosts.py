@@ -1,0 +1,77 @@
+"""Beads of a body that are hidden: they stay in it, and come back under their old number."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.records import Tracks
+    from nanorocks_ros.stages.bodies.pairs import Bond
+
+# In radii, how far from its place in the body a bead may come back.
+_NEAR = 0.5
+
+
+class Ghosts:
+    """Numbers of beads that outlive the numbers of their tracks.
+
+    Attributes
+    ----------
+    hidden : frozenset of int
+        Beads whose tracks have ended, in a body of which another bead is still followed.
+    """
+
+    def __init__(self) -> None:
+        self.hidden: frozenset[int] = frozenset()
+        self._names: dict[int, int] = {}
+        self._species: dict[int, int] = {}
+        self._wanted: dict[int, NDArray[np.float64]] = {}
+
+    def named(self, tracks: Tracks, bonds: Mapping[tuple[int, int], Bond]) -> NDArray[np.int64]:
+        """Numbers of the beads of a picture, (n,).
+
+        Parameters
+        ----------
+        tracks : Tracks
+        bonds : mapping
+            By the numbers of both beads.
+        """
+        present = set(tracks.ids.tolist())
+        self._names = {new: old for new, old in self._names.items() if new in present}
+        for row, number in enumerate(tracks.ids.tolist()):
+            if number not in self._names:
+                self._names[number] = self._back(tracks, row, number)
+            self._species[self._names[number]] = int(tracks.species[row])
+        ids = np.array([self._names[one] for one in tracks.ids.tolist()], dtype=np.int64)
+        places = dict(zip(ids.tolist(), tracks.positions, strict=True))
+        self._wanted = _places_of_hidden(places, bonds)
+        self.hidden = frozenset(self._wanted)
+        return ids
+
+    def _back(self, tracks: Tracks, row: int, number: int) -> int:
+        """The bead that a new track is, or itself."""
+        for hidden, place in self._wanted.items():
+            near = np.hypot(*(tracks.positions[row] - place)) < _NEAR * tracks.radii[row]
+            taken = hidden in self._names.values()
+            if near and not taken and self._species[hidden] == tracks.species[row]:
+                return hidden
+        return number
+
+
+def _places_of_hidden(
+    places: Mapping[int, NDArray[np.float64]], bonds: Mapping[tuple[int, int], Bond]
+) -> dict[int, NDArray[np.float64]]:
+    """Where beads of bodies should be that are not followed, by their partners."""
+    found: dict[int, NDArray[np.float64]] = {}
+    for (first, second), bond in bonds.items():
+        if first in places and second not in places:
+            found[second] = places[first] + np.array(bond.offset)
+        elif second in places and first not in places:
+            found[first] = places[second] - np.array(bond.offset)
+    return found

@@ -1,0 +1,167 @@
+"""From merges and speeds to when beads began to stick, and below which speed they do."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import NanorocksError
+from nanorocks_ros.inference.sticking import (
+    StickingCycle,
+    StickingEstimate,
+    sticking_cycle,
+    sticking_estimate,
+)
+from nanorocks_ros.physics.sticking import slow_contacts
+from nanorocks_ros.records import BodyEstimate, Merge, SpeedEstimate
+from nanorocks_ros.stages.shaking import NS
+
+if TYPE_CHECKING:
+    from nanorocks_ros.experiment.settings import PipelineSettings
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.physics.sticking import SlowContacts
+
+# Fewer speeds are no cycle.
+_FEWEST_SPEEDS = 4
+# A merge is used in what is said of an instant when it was known that much later at the latest.
+_KNOWN_NS = 1_000_000_000
+# Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
+_ROUNDING_NS = 1_000_000
+
+
+@dataclass(slots=True)
+class _Cycle:
+    """What was seen since a shaking event."""
+
+    number: int
+    start_ns: int | None = None
+    stamps_ns: list[int] = field(default_factory=list)
+    speeds: list[float] = field(default_factory=list)
+    merges: list[Merge] = field(default_factory=list)
+    bodies: list[BodyEstimate] = field(default_factory=list)
+
+
+class StickingMeter:
+    """Follows the merges of one tray, cycle by cycle.
+
+    What it says of an instant depends only on records of times up to then, and merges known a
+    second later at the latest, in whatever order they came in.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    tray : Tray
+    """
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self._settings = settings.sticking
+        self._tray = tray
+        self._contacts: SlowContacts | None = None
+        with suppress(NanorocksError):
+            # Without a theory of the tray merges are counted, but no speed follows from them.
+            self._contacts = slow_contacts(tray)
+        self._restart()
+
+    def _restart(self) -> None:
+        self._cycles = {0: _Cycle(0)}
+        self._last_ns: int | None = None
+        self._finished: dict[int, StickingCycle] = {}
+        self._all: tuple[int, StickingEstimate] | None = None
+
+    def push(self, record: SpeedEstimate | BodyEstimate | Merge) -> None:
+        """Take the next record; a speed whose stamp goes back starts all afresh."""
+        if isinstance(record, SpeedEstimate):
+            if self._last_ns is not None and record.stamp_ns <= self._last_ns:
+                self._restart()
+            self._last_ns = record.stamp_ns
+        cycle = self._cycles.setdefault(record.cycle, _Cycle(record.cycle))
+        if isinstance(record, Merge):
+            cycle.merges.append(record)
+        elif isinstance(record, BodyEstimate):
+            cycle.bodies.append(record)
+        else:
+            cycle.start_ns = record.cycle_start_ns
+            if np.isfinite(record.mean_projected_speed):
+                cycle.stamps_ns.append(record.stamp_ns)
+                cycle.speeds.append(record.mean_projected_speed)
+        # Of earlier cycles nothing more is asked, once the next is on its way.
+        for number in [one for one in self._cycles if one < record.cycle - 1]:
+            del self._cycles[number]
+
+    def bodies(self, cycle: int, stamp_ns: int) -> BodyEstimate | None:
+        """The last count of bodies up to an instant of a cycle."""
+        own = self._cycles.get(cycle)
+        last_ns = stamp_ns + _ROUNDING_NS
+        found = [one for one in own.bodies if one.stamp_ns <= last_ns] if own else []
+        return max(found, key=lambda one: one.stamp_ns, default=None)
+
+    def onset(self, cycle: int, stamp_ns: int) -> float | None:
+        """Time of the first merge since the shaking event, [s], as of an instant; None before."""
+        own = self._cycles.get(cycle)
+        known = [one.stamp_ns for one in self._known(own, stamp_ns)] if own else []
+        if not known or own is None or own.start_ns is None:
+            return None
+        return (min(known) - own.start_ns) / NS
+
+    def of_cycle(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
+        """What the cycle says of the sticking speed up to an instant; None when nothing."""
+        seen = self._seen(cycle, stamp_ns)
+        return self._estimate([seen]) if seen else None
+
+    def of_all(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
+        """The same of all cycles that were over by then."""
+        before = cycle - 1
+        if before > 0 and before not in self._finished:
+            seen = self._seen(before, stamp_ns)
+            if seen is not None:
+                self._finished[before] = seen
+        if not self._finished:
+            return None
+        # The last cycle may have been joined since.
+        if self._all is None or self._all[0] != len(self._finished):
+            found = self._estimate(list(self._finished.values()))
+            if found is None:
+                return None
+            self._all = len(self._finished), found
+        return self._all[1]
+
+    def _known(self, cycle: _Cycle, stamp_ns: int) -> list[Merge]:
+        last_ns = stamp_ns + _ROUNDING_NS
+        return [
+            one
+            for one in cycle.merges
+            if one.stamp_ns <= last_ns and one.known_ns <= last_ns + _KNOWN_NS
+        ]
+
+    def _seen(self, cycle: int, stamp_ns: int) -> StickingCycle | None:
+        own = self._cycles.get(cycle)
+        # Without counts of bodies nobody looked for merges.
+        if own is None or own.start_ns is None or not own.bodies:
+            return None
+        used = int(np.searchsorted(own.stamps_ns, stamp_ns + _ROUNDING_NS))
+        if used < _FEWEST_SPEEDS:
+            return None
+        return sticking_cycle(
+            self._tray.count,
+            self._known(own, stamp_ns),
+            np.array(own.stamps_ns[:used], dtype=np.int64),
+            np.array(own.speeds[:used]),
+            own.start_ns,
+        )
+
+    def _estimate(self, cycles: list[StickingCycle]) -> StickingEstimate | None:
+        if self._contacts is None:
+            return None
+        with suppress(NanorocksError):
+            return sticking_estimate(
+                cycles,
+                self._contacts,
+                self._tray.count,
+                measure=self._settings.measure,
+                rate_error=self._settings.rate_error,
+                probability=self._settings.probability,
+            )
+        return None

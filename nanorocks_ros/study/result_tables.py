@@ -1,0 +1,64 @@
+"""Tables that `nanorocks analyse` wrote, read back by the names of their columns."""
+
+from __future__ import annotations
+
+import csv
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import RecordingError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+_FORM = 'name the folder of results of `nanorocks analyse`'
+
+
+def trays_of(folder: Path, table: str) -> tuple[int, ...]:
+    """Numbers of the trays of which a folder of results holds a table, such as ``cluster``.
+
+    Raises
+    ------
+    RecordingError
+        When it is no folder, or holds none.
+    """
+    if not folder.is_dir():
+        raise RecordingError(str(folder), 'is no folder', _FORM)
+    names = (one.stem.split('_') for one in folder.glob(f'tray_*_{table}.csv'))
+    found = tuple(sorted(int(one[1]) for one in names if len(one) == 3 and one[1].isdigit()))
+    if not found:
+        raise RecordingError(str(folder), f'holds no tray_K_{table}.csv', _FORM)
+    return found
+
+
+def read_columns(
+    path: Path, wanted: Sequence[str], optional: Sequence[str] = ()
+) -> dict[str, NDArray[np.float64]]:
+    """Columns of a table; those that are optional only where they are there.
+
+    Raises
+    ------
+    RecordingError
+        When the table cannot be read, or a column that is wanted is missing.
+    """
+    try:
+        with path.open(encoding='utf-8', newline='') as stream:
+            header, *lines = [line for line in csv.reader(stream) if line]
+        names = [name.split('[')[0].strip() for name in header]
+        missing = [one for one in wanted if one not in names]
+        if missing:
+            raise RecordingError(str(path), f'has no column {", ".join(missing)}', _FORM)
+        kept = [k for k, name in enumerate(names) if name in {*wanted, *optional}]
+        values = [[float(line[k]) for k in kept] for line in lines]
+    except OSError as error:
+        raise RecordingError(
+            str(path), f'cannot be read ({error.strerror})', 'name another folder'
+        ) from error
+    except (ValueError, IndexError, csv.Error) as error:
+        raise RecordingError(str(path), 'is no table of numbers', _FORM) from error
+    columns = np.array(values, dtype=np.float64).reshape(len(values), len(kept)).T
+    return {names[k]: column for k, column in zip(kept, columns, strict=True)}
