@@ -21,7 +21,7 @@ from nanorocks_ros.records import (
     TrayImage,
 )
 from nanorocks_ros.stages.shaking import NS, CycleFollower
-from nanorocks_ros.stages.tray_contrast import tray_contrast
+from nanorocks_ros.stages.tray_contrast import tray_contrast, tray_levels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -67,8 +67,29 @@ def correlated(gray: NDArray[np.uint8], pixels_per_metre: float) -> Correlated:
     pixels_per_metre : float
         Fine images are taken at half their resolution.
     """
-    halve = pixels_per_metre >= _FINE and min(gray.shape) > 1
-    contrast = tray_contrast(gray, halve=halve)
+    halve = _halves(gray, pixels_per_metre)
+    return _correlated(tray_contrast(gray, halve=halve), pixels_per_metre, halve=halve)
+
+
+def correlated_with_shadows(gray: NDArray[np.uint8], pixels_per_metre: float) -> Correlated:
+    """The same of the image as it is, for methods that do not even the floor.
+
+    Parameters
+    ----------
+    gray, pixels_per_metre
+        As for `correlated`.
+    """
+    halve = _halves(gray, pixels_per_metre)
+    return _correlated(tray_levels(gray, halve=halve), pixels_per_metre, halve=halve)
+
+
+def _halves(gray: NDArray[np.uint8], pixels_per_metre: float) -> bool:
+    return pixels_per_metre >= _FINE and min(gray.shape) > 1
+
+
+def _correlated(
+    contrast: NDArray[np.float32], pixels_per_metre: float, *, halve: bool
+) -> Correlated:
     side = (2.0 if halve else 1.0) / pixels_per_metre
     cover = float(np.count_nonzero(contrast < DARKER * contrast.min())) / contrast.size
     return Correlated(autocorrelation(contrast), side, float(contrast.std()), cover)

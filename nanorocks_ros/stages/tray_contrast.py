@@ -41,6 +41,35 @@ def tray_contrast(gray: NDArray[np.uint8], *, halve: bool) -> NDArray[np.float32
     ndarray of float32, (rows, columns), <= 0, [gray levels]
         Of half the size when halved.
     """
+    found, seen = _levelled(gray, halve=halve)
+    floor, dark = _levels(found, seen)
+    # A bin lower, so that of an even floor nothing is left.
+    _clip(found, seen, np.float32(floor - _SHADOW * (floor - dark) - _BIN))
+    return found
+
+
+def tray_levels(gray: NDArray[np.uint8], *, halve: bool) -> NDArray[np.float32]:
+    """The same with the shadows: deviations of an image from the plane that fits it best.
+
+    Parameters
+    ----------
+    gray, halve
+        As for `tray_contrast`.
+
+    Returns
+    -------
+    ndarray of float32, (rows, columns), [gray levels]
+        0 in glare.
+    """
+    found, seen = _levelled(gray, halve=halve)
+    found[~seen] = 0.0
+    return found
+
+
+def _levelled(
+    gray: NDArray[np.uint8], *, halve: bool
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Deviations from the plane, and where there is no glare."""
     step = 2 if halve and min(gray.shape) > 1 else 1
     shape = gray.shape[0] // step, gray.shape[1] // step
     found = np.empty(shape, dtype=np.float32)
@@ -53,10 +82,7 @@ def tray_contrast(gray: NDArray[np.uint8], *, halve: bool) -> NDArray[np.float32
     # many planes.
     plane = np.linalg.lstsq(matrix, sums[6:], rcond=None)[0]
     _subtract(found, seen, plane.astype(np.float32))
-    floor, dark = _levels(found, seen)
-    # A bin lower, so that of an even floor nothing is left.
-    _clip(found, seen, np.float32(floor - _SHADOW * (floor - dark) - _BIN))
-    return found
+    return found, seen
 
 
 @compiled
