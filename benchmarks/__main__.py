@@ -16,6 +16,7 @@ ALL = (
     'speed_trays',
     'speed_accuracy',
     'area_calibration',
+    'autocorrelation',
     'deflections',
     'cor_recovery',
     'cor_films',

@@ -327,7 +327,8 @@ class ClusterEstimate:
     cluster_size, cluster_size_error : float, [beads]
         Number of beads per body, averaged over the beads (weight-averaged): 1 when all are single.
     cluster_size_lower, cluster_size_upper : float, [beads]
-        One standard error away; of a size that is beyond the calibration, the lower limit.
+        Sizes between which the width is one standard deviation off or less; of a size that is
+        beyond the calibration, too.
     size_status : SizeStatus
     bodies, bodies_error : float
         Free bodies by tracks: single beads and clusters; unknown where beads are not tracked.

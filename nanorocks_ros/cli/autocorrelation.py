@@ -79,11 +79,12 @@ def _print(found: BagClusters, *, as_json: bool) -> None:
         return
     for number, end in ends.items():
         size = end['cluster_size']
-        told = f'{size:.1f} ± {end["cluster_size_error"]:.1f} beads'
+        lower, upper = end['cluster_size_lower'], end['cluster_size_upper']
+        told = f'{size:.1f} beads ({lower:.1f} to {upper:.1f})'
         if math.isnan(size):
             told = f'unknown ({end["size_status"].replace("_", " ")})'
-            if math.isfinite(end['cluster_size_lower']):
-                told = f'more than {end["cluster_size_lower"]:.1f} beads'
+            if math.isfinite(lower):
+                told = f'{lower:.1f} to {upper:.1f} beads'
         true = end['true_cluster_size']
         truth = '' if math.isnan(true) else f', true {true:.1f}'
         print(

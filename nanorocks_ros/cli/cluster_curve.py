@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import argparse
 
-    from nanorocks_ros.inference.cluster_curve import ClusterCurve
+    from nanorocks_ros.inference.cluster_size import ClusterCurve
 
 _STRONGEST = 2.0
 
@@ -111,7 +111,4 @@ def _values(curve: ClusterCurve) -> dict[str, Any]:
 def _sentence(curve: ClusterCurve) -> str:
     if math.isnan(curve.largest):
         return 'the autocorrelation says nothing of the size of its clusters'
-    return (
-        f'sizes up to {curve.largest:.1f}; of a picture of so large clusters the size is known to '
-        f'a factor of {curve.worst:.1f}'
-    )
+    return f'sizes up to {curve.largest:.1f} beads'

@@ -1,33 +1,19 @@
-"""From the width of an autocorrelation to the size of the clusters, by simulated ones.
-
-The area in which the autocorrelation exceeds a level depends on the camera as much as on the
-clusters: shadows and blur alone make it up to half as large again. They widen the peak at every
-level alike, though, so that the *breadth*, the area over the one at a higher level, hardly depends
-on them. What is *read* from a picture is ln(breadth) + weight ln(area), with the weight that tells
-sizes best where nothing is known of the camera.
-
-Where two beads touch or lie over each other in the picture they are one object to the
-autocorrelation, whether they stick or not, and where all beads hang together its width is that of
-the tray. So the reading rises slowly with ln(size), its mean over many simulated pictures is held
-as a rising curve, and what single pictures scatter about it is the error of a size. A curve ends
-where that error grows beyond a factor of three: there the width says nothing more.
-"""
+"""Curves of cluster sizes: which tray they are for, and the files that hold them."""
 
 from __future__ import annotations
 
 import json
 import math
 import zipfile
-from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.records import UNKNOWN, SizeStatus
+from nanorocks_ros.inference.cluster_curve_fit import fit_curve
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -35,140 +21,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.inference.cluster_size import ClusterCurve
 
-# Level of the area that the level area is divided by.
-INNER_LEVEL = 0.7
-# Of what single beads were simulated to show: the least level area and contrast that are beads.
-_SMALL, _FAINT = 0.6, 0.4
-# By which ln(breadth) may be outside those simulated.
-_OUTSIDE = 0.1
-# Of ln(size): a factor of three.
-_WORST = math.log(3.0)
-# Sizes above that part of the largest all look alike: the weight is chosen without them.
-_GROWING = 0.7
-# Of the bins of ln(size), and pictures that a bin needs.
-_BIN = 0.3
-_FEWEST = 8
-# Sizes below this are single beads, with a pair here and there.
-_SINGLE = 1.05
 _FORMAT = 1
 PACKAGED = 'cluster_curves.npz'
-
-
-class Width(NamedTuple):
-    """How wide the autocorrelation of a picture is, and the contrast of the picture.
-
-    `level_area` and `inner_area`: where it exceeds the level and `INNER_LEVEL`, [m^2]; `contrast`:
-    standard deviation of the picture, [gray levels].
-    """
-
-    level_area: float
-    inner_area: float
-    contrast: float
-
-
-class SizeEstimate(NamedTuple):
-    """A weight-averaged cluster size, [beads]; NaN where it is not known.
-
-    `lower` and `upper` are one standard error away, or the limit where the size is beyond.
-    """
-
-    size: float
-    error: float
-    lower: float
-    upper: float
-    status: SizeStatus
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ClusterCurve:
-    """Mean reading of one tray as a rising function of ln(weight-averaged size).
-
-    Parameters
-    ----------
-    tray : str
-        What is seen of a tray, see `curve_key`.
-    made_by : str
-        JSON: version, seed, runs, level.
-    level : float
-        Of the autocorrelation.
-    log_size : ndarray (n,)
-        Rising from 0; empty where the width says nothing of the size.
-    reading : ndarray (n,)
-        ln(breadth) + weight ln(level area / m^2), rising.
-    scatter : ndarray (n,)
-        Standard deviation of the reading of one picture, whatever the camera does.
-    weight : float, >= 0
-    least : Width
-        Less is not of beads, of level area or of contrast.
-    breadths : tuple of 2 floats
-        Less or more is not of beads.
-    samples : ndarray of float32, (n_samples, 6)
-        What it was made from: run, time since the shaking event [s], size, level area and inner
-        area [m^2], contrast.
-    """
-
-    tray: str
-    made_by: str
-    level: float
-    log_size: NDArray[np.float64]
-    reading: NDArray[np.float64]
-    scatter: NDArray[np.float64]
-    weight: float
-    least: Width
-    breadths: tuple[float, float]
-    samples: NDArray[np.float32]
-
-    @property
-    def largest(self) -> float:
-        """Weight-averaged size at which the curve ends, [beads]; NaN when there is none."""
-        return math.exp(self.log_size[-1]) if self.log_size.size else UNKNOWN
-
-    @property
-    def worst(self) -> float:
-        """Factor by which the size is uncertain at the end of the curve; NaN without one."""
-        if not self.log_size.size:
-            return UNKNOWN
-        return self.largest / self._inverse(float(self.reading[-1] - self.scatter[-1]))
-
-    def size_of(self, width: Width) -> SizeEstimate:
-        """The size that goes with a width, never beyond the curve.
-
-        Parameters
-        ----------
-        width : Width
-        """
-        if not self.log_size.size:
-            return _unknown(SizeStatus.INSENSITIVE)
-        if not (
-            width.level_area > self.least.level_area
-            and width.contrast > self.least.contrast
-            and self.breadths[0] * width.inner_area
-            < width.level_area
-            < self.breadths[1] * width.inner_area
-        ):
-            return _unknown(SizeStatus.NOTHING)
-        breadth = width.level_area / width.inner_area
-        read = math.log(breadth) + self.weight * math.log(width.level_area)
-        size = self._inverse(read)
-        scatter = float(np.interp(read, self.reading, self.scatter))
-        lower, upper = self._inverse(read - scatter), self._inverse(read + scatter)
-        if math.isnan(size):
-            lowest = self.largest if math.isnan(lower) else lower
-            return SizeEstimate(UNKNOWN, UNKNOWN, lowest, UNKNOWN, SizeStatus.BEYOND)
-        # Beyond the end of the curve the upper error is taken to be as large as the lower one.
-        high = size * size / lower if math.isnan(upper) else upper
-        return SizeEstimate(size, 0.5 * (high - lower), lower, upper, SizeStatus.MEASURED)
-
-    def _inverse(self, read: float) -> float:
-        """Size at a reading: 1, the smallest there is, below the curve; NaN above."""
-        if read > self.reading[-1]:
-            return UNKNOWN
-        return math.exp(float(np.interp(read, self.reading, self.log_size)))
-
-
-def _unknown(status: SizeStatus) -> SizeEstimate:
-    return SizeEstimate(UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, status)
 
 
 def curve_key(tray: Tray) -> str:
@@ -184,125 +40,6 @@ def curve_key(tray: Tray) -> str:
 def build_command(tray: Tray) -> str:
     """What to type to get the curve of a tray."""
     return f'nanorocks cluster-curve --tray {tray.number} -o curve.npz'
-
-
-def fit_curve(
-    tray: str, level: float, samples: NDArray[np.float32], made_by: str = '{}'
-) -> ClusterCurve:
-    """The curve through simulated pictures.
-
-    Parameters
-    ----------
-    tray : str
-        Its `curve_key`.
-    level : float
-    samples : ndarray (n_samples, 6)
-        See `ClusterCurve`.
-    made_by : str
-        JSON.
-    """
-    seen = samples[samples[:, 4] > 0.0].astype(np.float64)
-    log_size, log_area = np.log(seen[:, 2]), np.log(seen[:, 3])
-    log_breadth = np.log(seen[:, 3] / seen[:, 4])
-    above = np.floor((log_size - math.log(_SINGLE)) / _BIN)
-    bins = np.where(seen[:, 2] < _SINGLE, -1, above)
-    found = [bins == k for k in np.unique(bins) if (bins == k).sum() >= _FEWEST]
-    nodes, means, spreads = np.empty((3, 0))
-    weight, least, breadths = 0.0, Width(0.0, 0.0, 0.0), (0.0, math.inf)
-    # Without pictures of single beads there is nothing to start from.
-    if found and bins[found[0]][0] < 0:
-        weight = _weight(log_size, log_area, log_breadth)
-        reading = log_breadth + weight * log_area
-        nodes, means = _rising(
-            np.array([log_size[one].mean() for one in found]),
-            np.array([reading[one].mean() for one in found]),
-            np.array([one.sum() for one in found], dtype=np.float64),
-        )
-        nodes[0] = 0.0
-        single = seen[found[0]].min(axis=0)
-        least = Width(_SMALL * float(single[3]), 0.0, _FAINT * float(single[5]))
-        breadths = (
-            math.exp(log_breadth.min() - _OUTSIDE),
-            math.exp(log_breadth.max() + _OUTSIDE),
-        )
-        spreads = _scatter(log_size, reading, nodes, means)
-        end = _useful(nodes, means, spreads)
-        nodes, means, spreads = nodes[:end], means[:end], spreads[:end]
-    return ClusterCurve(
-        tray=tray,
-        made_by=made_by,
-        level=level,
-        log_size=nodes,
-        reading=means,
-        scatter=spreads,
-        weight=weight,
-        least=least,
-        breadths=breadths,
-        samples=samples,
-    )
-
-
-def _weight(
-    log_size: NDArray[np.float64],
-    log_area: NDArray[np.float64],
-    log_breadth: NDArray[np.float64],
-) -> float:
-    """Of ln(area) beside ln(breadth): Fisher's linear discriminant, none of them negative."""
-    growing = log_size <= log_size.max() + math.log(_GROWING)
-    terms = np.polynomial.polynomial.polyvander(log_size[growing], 3)
-    seen = np.column_stack((log_area, log_breadth))[growing]
-    factors = np.linalg.lstsq(terms, seen, rcond=None)[0]
-    noise = np.cov((seen - terms @ factors).T)
-    largest = log_size[growing].max()
-    rise = (largest ** np.arange(1, 4)) @ factors[1:]
-    by_area, by_breadth = np.linalg.lstsq(noise, rise, rcond=None)[0]
-    return float(np.clip(by_area / by_breadth, 0.0, 1.0)) if by_breadth > 0.0 else 0.0
-
-
-def _rising(
-    places: NDArray[np.float64], values: NDArray[np.float64], weights: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Places and values that rise strictly: neighbours that do not are taken together."""
-    blocks: list[NDArray[np.float64]] = []
-    for one in np.column_stack((weights * places, weights * values, weights)):
-        blocks.append(one)
-        while len(blocks) > 1 and blocks[-2][1] / blocks[-2][2] >= blocks[-1][1] / blocks[-1][2]:
-            last = blocks.pop()
-            blocks[-1] = blocks[-1] + last
-    sums = np.array(blocks)
-    return sums[:, 0] / sums[:, 2], sums[:, 1] / sums[:, 2]
-
-
-def _scatter(
-    log_size: NDArray[np.float64],
-    reading: NDArray[np.float64],
-    nodes: NDArray[np.float64],
-    means: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Standard deviation about the curve of the pictures nearest to each node."""
-    squares = (reading - np.interp(log_size, nodes, means)) ** 2
-    nearest = np.abs(log_size[:, None] - nodes).argmin(axis=1)
-    # A node of very few pictures between others may have none that is nearest.
-    return np.array(
-        [
-            math.sqrt(squares[nearest == k].mean() if (nearest == k).any() else squares.mean())
-            for k in range(nodes.size)
-        ]
-    )
-
-
-def _useful(
-    nodes: NDArray[np.float64], means: NDArray[np.float64], spreads: NDArray[np.float64]
-) -> int:
-    """How many nodes there are up to the last whose size is known to a factor of three.
-
-    None when that is below three beads: then hardly more is known than that there are beads.
-    """
-    # Downwards, where there is a curve for sure; no size is below 1.
-    errors = nodes - np.interp(means - spreads, means, nodes)
-    good = np.flatnonzero((errors <= _WORST) & (means - means[0] > spreads))
-    end = int(good[-1]) + 1 if good.size else 0
-    return end if end and nodes[end - 1] >= _WORST else 0
 
 
 def curve_of(tray: Tray, path: str | Path = '') -> ClusterCurve:
@@ -370,9 +107,21 @@ def _curves(arrays: Mapping[str, NDArray[Any]]) -> dict[str, ClusterCurve]:
     samples, level = arrays['samples'], float(arrays['level'])
     made_by = str(arrays['made_by'])
     return {
-        str(key): fit_curve(str(key), level, samples[samples[:, 0] == number, 1:], made_by)
+        str(key): fit_curve(
+            str(key), level, samples[samples[:, 0] == number, 1:], made_by, _discs(str(key))
+        )
         for number, key in zip(arrays['trays'], arrays['keys'], strict=True)
     }
+
+
+def _discs(key: str) -> float:
+    """Area of the discs of all beads over that of the floor, from a `curve_key`."""
+    tray = json.loads(key)
+    discs = sum(
+        one['count'] * 0.25 * math.pi * (0.5 * (one['low'] + one['high'])) ** 2
+        for one in tray['species']
+    )
+    return float(discs / (tray['dimensions'][0] * tray['dimensions'][1]))
 
 
 def as_arrays(

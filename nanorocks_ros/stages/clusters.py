@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.settings import PipelineSettings
-from nanorocks_ros.inference.cluster_curve import INNER_LEVEL, SizeEstimate, Width, curve_of
+from nanorocks_ros.inference.cluster_curve import curve_of
+from nanorocks_ros.inference.cluster_size import DARKER, INNER_LEVEL, SizeEstimate, Width
 from nanorocks_ros.physics.autocorrelation import LevelRegion, autocorrelation, level_region
 from nanorocks_ros.records import (
     UNKNOWN,
@@ -18,14 +21,13 @@ from nanorocks_ros.records import (
     TrayImage,
 )
 from nanorocks_ros.stages.shaking import NS, CycleFollower
-from nanorocks_ros.stages.tray_contrast import tray_contrast
+from nanorocks_ros.stages.tray_contrast import tray_contrast, tray_levels
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.inference.cluster_curve import ClusterCurve
+    from nanorocks_ros.inference.cluster_size import ClusterCurve
 
 # From this scale on, two by two pixels show as much of the clusters as one does, in a quarter of
 # the time: then such a pixel is as large as one at half this scale. [px/m]
@@ -37,12 +39,14 @@ class Correlated(NamedTuple):
     """The autocorrelation of what stands out in a tray image.
 
     `values`: ndarray of float32, 1 at zero lag, in the centre; `side` of its pixels, [m];
-    `contrast`: standard deviation of what stands out, [gray levels].
+    `contrast`: standard deviation of what stands out, [gray levels]; `cover`: share of the picture
+    that does clearly.
     """
 
     values: NDArray[np.float32]
     side: float
     contrast: float
+    cover: float
 
     def region(self, level: float) -> LevelRegion:
         """Where it exceeds a level."""
@@ -51,7 +55,7 @@ class Correlated(NamedTuple):
     def width(self, level_area: float) -> Width:
         """With a level area that is known, [px^2]."""
         inner = level_region(self.values, INNER_LEVEL).area
-        return Width(level_area * self.side**2, inner * self.side**2, self.contrast)
+        return Width(level_area * self.side**2, inner * self.side**2, self.contrast, self.cover)
 
 
 def correlated(gray: NDArray[np.uint8], pixels_per_metre: float) -> Correlated:
@@ -63,10 +67,32 @@ def correlated(gray: NDArray[np.uint8], pixels_per_metre: float) -> Correlated:
     pixels_per_metre : float
         Fine images are taken at half their resolution.
     """
-    halve = pixels_per_metre >= _FINE and min(gray.shape) > 1
-    contrast = tray_contrast(gray, halve=halve)
+    halve = _halves(gray, pixels_per_metre)
+    return _correlated(tray_contrast(gray, halve=halve), pixels_per_metre, halve=halve)
+
+
+def correlated_with_shadows(gray: NDArray[np.uint8], pixels_per_metre: float) -> Correlated:
+    """The same of the image as it is, for methods that do not even the floor.
+
+    Parameters
+    ----------
+    gray, pixels_per_metre
+        As for `correlated`.
+    """
+    halve = _halves(gray, pixels_per_metre)
+    return _correlated(tray_levels(gray, halve=halve), pixels_per_metre, halve=halve)
+
+
+def _halves(gray: NDArray[np.uint8], pixels_per_metre: float) -> bool:
+    return pixels_per_metre >= _FINE and min(gray.shape) > 1
+
+
+def _correlated(
+    contrast: NDArray[np.float32], pixels_per_metre: float, *, halve: bool
+) -> Correlated:
     side = (2.0 if halve else 1.0) / pixels_per_metre
-    return Correlated(autocorrelation(contrast), side, float(contrast.std()))
+    cover = float(np.count_nonzero(contrast < DARKER * contrast.min())) / contrast.size
+    return Correlated(autocorrelation(contrast), side, float(contrast.std()), cover)
 
 
 class ClusterAutocorrelator:

@@ -1,4 +1,4 @@
-"""What stands out from the floor of a tray: no glare, no gradient of light, half the pixels."""
+"""What stands out from the floor of a tray: no glare, gradient or shadow, half the pixels."""
 
 from __future__ import annotations
 
@@ -16,11 +16,19 @@ if TYPE_CHECKING:
 _BRIGHT = 235
 
 
-def tray_contrast(gray: NDArray[np.uint8], *, halve: bool) -> NDArray[np.float32]:
-    """Deviations of an image from the plane that fits it best.
+# Ranks of the pixels that stand for the floor and for the darkest beads, and how much of the way
+# from one to the other is taken for shadow: with more of it small beads fade, too.
+_FLOOR, _DARK, _SHADOW = 0.75, 0.03, 0.25
+# Bins of the levels, [gray levels].
+_BIN, _BINS = 0.5, 1024
 
-    The light falls off across a tray; a plane takes out most of that, and with it a third of the
-    scatter of the autocorrelation's width.
+
+def tray_contrast(gray: NDArray[np.uint8], *, halve: bool) -> NDArray[np.float32]:
+    """By how much the pixels of an image are darker than shadows on the floor, and no more.
+
+    The light falls off across a tray: a plane is taken off. Beads and walls cast shadows, which
+    would make the beads seem half as large again: the floor and what is hardly darker than it
+    are made even. Glare is made so, too.
 
     Parameters
     ----------
@@ -30,9 +38,38 @@ def tray_contrast(gray: NDArray[np.uint8], *, halve: bool) -> NDArray[np.float32
 
     Returns
     -------
-    ndarray of float32, (rows, columns), [gray levels]
-        Of half the size when halved; 0 in glare.
+    ndarray of float32, (rows, columns), <= 0, [gray levels]
+        Of half the size when halved.
     """
+    found, seen = _levelled(gray, halve=halve)
+    floor, dark = _levels(found, seen)
+    # A bin lower, so that of an even floor nothing is left.
+    _clip(found, seen, np.float32(floor - _SHADOW * (floor - dark) - _BIN))
+    return found
+
+
+def tray_levels(gray: NDArray[np.uint8], *, halve: bool) -> NDArray[np.float32]:
+    """The same with the shadows: deviations of an image from the plane that fits it best.
+
+    Parameters
+    ----------
+    gray, halve
+        As for `tray_contrast`.
+
+    Returns
+    -------
+    ndarray of float32, (rows, columns), [gray levels]
+        0 in glare.
+    """
+    found, seen = _levelled(gray, halve=halve)
+    found[~seen] = 0.0
+    return found
+
+
+def _levelled(
+    gray: NDArray[np.uint8], *, halve: bool
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Deviations from the plane, and where there is no glare."""
     step = 2 if halve and min(gray.shape) > 1 else 1
     shape = gray.shape[0] // step, gray.shape[1] // step
     found = np.empty(shape, dtype=np.float32)
@@ -45,7 +82,7 @@ def tray_contrast(gray: NDArray[np.uint8], *, halve: bool) -> NDArray[np.float32
     # many planes.
     plane = np.linalg.lstsq(matrix, sums[6:], rcond=None)[0]
     _subtract(found, seen, plane.astype(np.float32))
-    return found
+    return found, seen
 
 
 @compiled
@@ -114,4 +151,35 @@ def _subtract(
         for j in range(columns):
             x = np.float32(j) - np.float32(0.5) * np.float32(columns - 1)
             level = plane[0] + plane[1] * x + plane[2] * y
-            found[i, j] = found[i, j] - level if seen[i, j] else np.float32(0.0)
+            found[i, j] -= level
+
+
+@compiled
+def _levels(found: NDArray[np.float32], seen: NDArray[np.bool_]) -> tuple[float, float]:
+    """Levels of the floor and of the darkest beads."""
+    counts = np.zeros(_BINS, dtype=np.int64)
+    total = 0
+    for i in range(found.shape[0]):
+        for j in range(found.shape[1]):
+            if seen[i, j]:
+                place = int(found[i, j] / _BIN + 0.5 * _BINS)
+                counts[min(max(place, 0), _BINS - 1)] += 1
+                total += 1
+    floor, dark, below = 0.0, 0.0, 0
+    for k in range(_BINS):
+        middle = (k + 0.5 - 0.5 * _BINS) * _BIN
+        if below <= _DARK * total:
+            dark = middle
+        if below <= _FLOOR * total:
+            floor = middle
+        below += counts[k]
+    return floor, dark
+
+
+@compiled
+def _clip(found: NDArray[np.float32], seen: NDArray[np.bool_], level: np.float32) -> None:
+    """What is brighter than a level, and glare, to 0."""
+    for i in range(found.shape[0]):
+        for j in range(found.shape[1]):
+            darker = seen[i, j] and found[i, j] < level
+            found[i, j] = found[i, j] - level if darker else np.float32(0.0)

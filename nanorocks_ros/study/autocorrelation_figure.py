@@ -86,14 +86,11 @@ def _draw_sizes(axes: Axes, tray: CycleClusters) -> None:
     )
     if len(tray.truth):
         axes.plot(*tray.truth[:, :2].T, color=_TRUTH, lw=3.5, alpha=0.7, label='true')
-    # Without an upper limit, as far as the axis goes.
-    top = np.where(np.isfinite(upper), upper, 1e6)
-    axes.fill_between(
-        times, lower, top, where=np.isfinite(lower).tolist(), color=_OURS, alpha=0.2, lw=0
-    )
-    label = 'calibrated by simulated clusters, ± 1 standard error'
+    known = np.isfinite(lower).tolist()
+    axes.fill_between(times, lower, upper, where=known, color=_OURS, alpha=0.2, lw=0)
+    label = 'calibrated by simulated clusters, band 68 %'
     axes.plot(times, size, '.-', ms=3, lw=0.8, color=_OURS, label=label)
-    paper = tray.paper_calibration().size(tray.column('level_area'))
+    paper = tray.paper_sizes()
     label = f"paper's straight line to {tray.counted():.1f} beads per cluster counted at the end"
     axes.plot(times, paper, color=_PAPER, lw=1.0, ls='--', label=label)
     for onset, colour, text in (
@@ -103,7 +100,8 @@ def _draw_sizes(axes: Axes, tray: CycleClusters) -> None:
         if math.isfinite(onset):
             axes.axvline(onset, color=colour, lw=1.2, ls=':', label=f'{text}: {onset:.1f} s')
     shown = np.concatenate([size, paper, tray.truth[:, 1]])
-    axes.set_ylim(0.8, 2.0 * max(np.nanmax(shown, initial=1.0), 3.0))
+    # Room for the legend.
+    axes.set_ylim(0.8, 12.0 * max(np.nanmax(shown, initial=1.0), 3.0))
     axes.set_yscale('log')
     axes.yaxis.set_major_formatter('{x:g}')
     axes.set_xlabel('time since the shaking event [s]')

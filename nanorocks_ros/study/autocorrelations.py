@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.errors import FitError, RecordingError
+from nanorocks_ros.errors import ConfigurationError, FitError, RecordingError
 from nanorocks_ros.physics.paper_clusters import (
     PAPER_TABLE_3,
-    PaperCalibration,
     paper_calibration,
     paper_onset,
 )
@@ -110,16 +109,17 @@ class CycleClusters:
         row = PAPER_TABLE_3.get(self.tray.number)
         return math.nan if row is None else row.beads_per_cluster
 
-    def paper_calibration(self) -> PaperCalibration:
-        """The paper's, with the end of this cycle.
+    def paper_sizes(self) -> NDArray[np.float64]:
+        """Sizes by the paper's straight line through the end of this cycle, (n,).
 
-        Raises
-        ------
-        ConfigurationError
-            When nothing was seen, or nothing is known to count.
+        NaN where nothing was seen, or nothing is known that could have been counted.
         """
         areas, times = self.column('level_area'), self.times
-        return paper_calibration(areas[times >= times[-1] - _END], self.counted())
+        try:
+            line = paper_calibration(areas[times >= times[-1] - _END], self.counted())
+        except ConfigurationError:
+            return np.full(areas.size, np.nan)
+        return line.size(areas)
 
     def paper_onset(self) -> float:
         """Onset of clustering by the paper's rule, since the start, [s]; NaN without one."""
@@ -177,8 +177,10 @@ def cycle_clusters(
     stages = {n: ClusterAutocorrelator(images.settings, one) for n, one in images.trays.items()}
     found: dict[int, CycleClusters] = {}
     notices = []
+    cycles: set[int] = set()
     for shot in images.shots(progress):
         for image in shot.images:
+            cycles.add(image.cycle or 0)
             stage = stages[image.tray]
             stage.emit_image = True
             records = stage.push(image)
@@ -191,7 +193,10 @@ def cycle_clusters(
             _keep(one, image.gray, records)
     if not found:
         raise RecordingError(
-            images.bag.where, f'holds no cycle {cycle}', 'name another with --cycle'
+            images.bag.where,
+            f'holds no cycle {cycle}',
+            f'name another with --cycle: {", ".join(str(one) for one in sorted(cycles))} '
+            '(0: before the first shaking event)',
         )
     for number, one in found.items():
         one.truth = _truth(images, number, cycle, one.start_ns)
@@ -247,7 +252,7 @@ def write_clusters(path: Path, found: BagClusters) -> None:
 
 def _rows(found: BagClusters) -> Iterator[tuple[object, ...]]:
     for number, tray in found.trays.items():
-        paper = tray.paper_calibration().size(tray.column('level_area')).tolist()
+        paper = tray.paper_sizes().tolist()
         times, truth = tray.times.tolist(), tray.true_sizes().tolist()
         for since, by_paper, true, one in zip(times, paper, truth, tray.estimates, strict=True):
             yield (

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
-    from nanorocks_ros.inference.cluster_curve import ClusterCurve
+    from nanorocks_ros.inference.cluster_size import ClusterCurve
     from nanorocks_ros.study.archive import Arrays
 
 _SAMPLES = 'samples'

@@ -23,13 +23,14 @@ from nanorocks_ros.experiment.settings import (
     with_values,
 )
 from nanorocks_ros.experiment.view import View
-from nanorocks_ros.inference.cluster_curve import Width, curve_key
+from nanorocks_ros.inference.cluster_curve import curve_key
+from nanorocks_ros.inference.cluster_size import Width
 from nanorocks_ros.records import Frame, TrayImage
 from nanorocks_ros.stages.clusters import correlated
 from nanorocks_ros.stages.preprocess import Preprocessor
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -171,9 +172,30 @@ def samples_of_run(plan: ClusterPlan, run: int) -> NDArray[np.float32]:
     SimulationError
         When the beads do not fit, or a run has events without end.
     """
+    return filmed_run(plan, run, drawn_run(plan, run), TIMES[: plan.moments])[:, :-1]
+
+
+def filmed_run(
+    plan: ClusterPlan, run: int, drawn: ClusterRun, times: Sequence[float]
+) -> NDArray[np.float32]:
+    """The same for a run that is given, at given times.
+
+    Parameters
+    ----------
+    plan : ClusterPlan
+    run : int, >= 0
+        Of which the gas is.
+    drawn : ClusterRun
+    times : sequence of float, [s]
+        Since the shaking event, rising.
+
+    Returns
+    -------
+    ndarray of float32, (n_samples, 8)
+        As `samples_of_run`, and the share of the picture that is covered.
+    """
     from nanorocks_ros.simulation.scene.film import SceneFilm
 
-    drawn = drawn_run(plan, run)
     simulation, scene, cells = _settings(plan, run, drawn)
     film = SceneFilm(simulation, scene, cells)
     names = {
@@ -185,12 +207,12 @@ def samples_of_run(plan: ClusterPlan, run: int) -> NDArray[np.float32]:
     view = View(camera=film.camera.geometry.camera)
     preprocessor = Preprocessor(settings, cells, 'cluster film', view)
     rows = []
-    for time in TIMES[: plan.moments]:
+    for time in times:
         number = round((_FIRST_SHAKE + time) * simulation.frame_rate)
         moment = film.at(number, round(_NS * number / simulation.frame_rate))
         for tray, size, width in _measured(moment, preprocessor, plan.level, scene):
             rows.append((tray, run, time, size, *width))
-    return np.array(rows, dtype=np.float32).reshape(-1, 7)
+    return np.array(rows, dtype=np.float32).reshape(-1, 8)
 
 
 def _measured(

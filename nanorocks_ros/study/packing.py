@@ -22,7 +22,7 @@ from nanorocks_ros.physics.packing import (
 from nanorocks_ros.records import Frame, TrayImage
 from nanorocks_ros.simulation.render import TrayCamera
 from nanorocks_ros.simulation.shaking import ShakenTray
-from nanorocks_ros.stages.clusters import correlated
+from nanorocks_ros.stages.clusters import correlated_with_shadows
 from nanorocks_ros.stages.packing import packing_of_clusters
 from nanorocks_ros.stages.preprocess import Preprocessor
 from nanorocks_ros.study.result_tables import read_columns
@@ -262,7 +262,8 @@ def simulated_packing(
         area = math.nan
         for record in stage.push(Frame(stamp_ns=stamp_ns, encoding='bgr8', image=image)):
             if isinstance(record, TrayImage):
-                seen = correlated(record.gray, scale)
+                # As the paper looks at pictures.
+                seen = correlated_with_shadows(record.gray, scale)
                 area = seen.region(pipeline.clusters.level).area * seen.side**2
         age = stamp_ns / 1e9 - (gas.origin or 0.0)
         rows.append((gas.cycle, age, area, *_truth(tray, gas, moment.positions)))

@@ -10,7 +10,9 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.cluster_curve import Width, as_arrays, curve_of, fit_curve
+from nanorocks_ros.inference.cluster_curve import as_arrays, curve_of
+from nanorocks_ros.inference.cluster_curve_fit import fit_curve
+from nanorocks_ros.inference.cluster_size import Width
 from nanorocks_ros.records import SizeStatus
 from nanorocks_ros.study.archive import write_archive
 
@@ -49,17 +51,26 @@ def test_sizes_within_the_range_are_those_simulated_with_their_error(size):
 
 def test_the_curve_rises():
     assert (np.diff(CURVE.log_size) > 0.0).all()
-    assert (np.diff(CURVE.reading) > 0.0).all()
+    assert (np.diff(CURVE.reading[: CURVE.end]) > 0.0).all()
+    assert (np.diff(CURVE.reading) >= 0.0).all()
     assert CURVE.log_size[0] == 0.0
 
 
 def test_where_the_breadth_no_longer_grows_the_range_ends():
     assert 12.0 < CURVE.largest < 65.0
-    found = CURVE.size_of(seen(1.03 * math.exp(0.5 * CURVE.reading[-1] - 0.5 * math.log(AREA))))
+    found = CURVE.size_of(
+        seen(1.03 * math.exp(0.5 * (CURVE.reading[CURVE.end - 1] - math.log(AREA))))
+    )
     assert found.status is SizeStatus.BEYOND
     assert math.isnan(found.size)
-    assert math.isnan(found.upper)
     assert found.lower <= CURVE.largest
+    assert found.upper == pytest.approx(100.0, rel=0.03)
+
+
+def test_what_may_as_well_be_all_beads_is_not_bounded_below_that():
+    found = CURVE.size_of(seen(2.5 * 20.0**0.2 * math.exp(-0.02)))
+    assert found.status is SizeStatus.MEASURED
+    assert found.upper == pytest.approx(100.0, rel=0.03)
 
 
 def test_single_beads_have_size_one_however_narrow_their_picture_happens_to_be():
@@ -82,6 +93,20 @@ def test_what_no_picture_of_beads_showed_has_no_size(width):
     found = CURVE.size_of(width)
     assert found.status is SizeStatus.NOTHING
     assert math.isnan(found.size)
+
+
+def test_where_beads_are_missing_there_is_no_size():
+    curve = fit_curve('a tray', 0.5, made_up(0.2, 0.03), discs=0.25)
+    full, partial = (seen(3.0)._replace(cover=cover) for cover in (0.22, 0.15))
+    assert curve.size_of(full).status is SizeStatus.MEASURED
+    assert curve.size_of(partial).status is SizeStatus.NOTHING
+    # Of a picture whose cover nobody measured nothing is known.
+    assert curve.size_of(seen(3.0)).status is SizeStatus.MEASURED
+
+
+def test_the_discs_of_the_flown_beads_cover_what_their_number_says():
+    # 15 beads of 2 mm on 15 mm x 15 mm.
+    assert curve_of(load_trays()[1]).discs == pytest.approx(15 * math.pi / 225.0)
 
 
 def test_a_tray_whose_breadth_does_not_depend_on_the_size_is_insensitive():

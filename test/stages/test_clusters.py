@@ -91,11 +91,13 @@ def test_the_noise_of_an_empty_floor_is_no_cluster():
     assert estimate.size_status is SizeStatus.NOTHING
 
 
-def test_one_bead_of_fifteen_is_too_little_to_tell_from_an_uneven_floor():
-    (estimate,) = pushed(ClusterAutocorrelator(PipelineSettings(), load_trays()[1]), bead_image(1))
+@pytest.mark.parametrize('count', [1, 2, 6])
+def test_of_a_few_beads_of_fifteen_the_size_is_unknown_rather_than_wrong(count):
+    gray = bead_image(count)
+    (estimate,) = pushed(ClusterAutocorrelator(PipelineSettings(), load_trays()[1]), gray)
     assert estimate.size_status is SizeStatus.NOTHING
     assert math.isnan(estimate.cluster_size)
-    assert estimate.axes_ratio == pytest.approx(1.0, abs=0.02)
+    assert estimate.axes_ratio == pytest.approx(1.0, abs=0.05)
 
 
 def bead_image(count):
