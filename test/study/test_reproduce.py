@@ -18,7 +18,7 @@ from nanorocks_ros.study.campaign import (
 from nanorocks_ros.study.reproduce import reproduce
 from nanorocks_ros.study.tasks import Workers
 
-PLAN = CampaignPlan(cycles=1, seconds=2.0, seed=2)
+PLAN = CampaignPlan(cycles=1, seconds=3.0, seed=2)
 ALONE = Workers(processes=1)
 
 
@@ -63,7 +63,7 @@ def test_the_report_has_every_chapter_even_of_films_too_short_for_some(campaign)
     path = reproduce(campaign, PLAN, ALONE, 2, lambda name, done: None, notices.append)
     text = path.read_text('utf-8')
     assert text.count('<section') == 10
-    # Nothing cools for long enough in two seconds.
+    # Nothing cools for long enough in three seconds.
     assert any(one.startswith('restitution: ') for one in notices)
     assert 'Could not be made' in text
     for name in ('Table 1', 'Table 2', 'Figure 1b', 'Figure 2:', 'Figure 4', 'Figure 11'):
@@ -77,7 +77,7 @@ def test_a_folder_of_something_else_or_of_another_plan_is_left_alone(campaign, t
     with pytest.raises(RecordingError, match='holds no campaign'):
         prepare_campaign(tmp_path, PLAN)
     # More cycles may follow later.
-    prepare_campaign(campaign, CampaignPlan(cycles=5, seconds=2.0, seed=2))
+    prepare_campaign(campaign, CampaignPlan(cycles=5, seconds=3.0, seed=2))
 
 
 @pytest.mark.parametrize(

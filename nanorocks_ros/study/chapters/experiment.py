@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _WIDTH = 1100
 _FRAME = 60
 # After the shaking event, when many beads move.
-_STEPS_AT = 1.8
+_STEPS_AT = 2.5
 
 
 def experiment_chapter(context: Context) -> Chapter:
