@@ -87,6 +87,7 @@ class BodyCounter:
         self._pairs.clear()
         self._ghosts = Ghosts()
         self._bonds: dict[tuple[int, int], Bond] = {}
+        self._doubted: list[Bond] = []
         self._first_merge: int | None = None
         self._pictures: deque[_Picture] = deque()
         self._waiting: deque[_Picture] = deque()
@@ -125,12 +126,20 @@ class BodyCounter:
         due = self._due(tracks.stamp_ns)
         if self._unclear():
             return found
-        merges = [
-            self._merge(bond, tracks.stamp_ns)
-            for bond in bonds
-            if not self._births.one_bead(bond.ids)
-        ]
+        merges = [self._merge(bond, tracks.stamp_ns) for bond in self._believed(bonds)]
         return (*found, *merges, *due)
+
+    def _believed(self, bonds: list[Bond]) -> list[Bond]:
+        """Those that are two beads: one of a pair that appeared over the other may be the same.
+
+        Once others are known to stick it is rather one that was hidden by its cluster.
+        """
+        sure = [one for one in bonds if not self._births.one_bead(one.ids)]
+        self._doubted += [one for one in bonds if self._births.one_bead(one.ids)]
+        if not sure and self._first_merge is None:
+            return []
+        believed, self._doubted = [*sure, *self._doubted], []
+        return believed
 
     def flush(self) -> tuple[BodyEstimate, ...]:
         """Counts of the instants for which nothing more will be known."""
@@ -138,7 +147,12 @@ class BodyCounter:
         return () if self._unclear() else tuple(self._count(one) for one in left)
 
     def _unclear(self) -> bool:
-        """Whether tracks break off so often that nobody can tell who stays beside whom."""
+        """Whether tracks break off so often that nobody can tell who stays beside whom.
+
+        Once beads are known to stick, tracks break since they hide each other.
+        """
+        if self._first_merge is not None:
+            return False
         time = self._pictures[-1].time if self._pictures else 0.0
         return self._births.rate(time) * _HELD_TOGETHER > self._tray.count
 
