@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -23,7 +22,8 @@ from nanorocks_ros.inference.library_fit import (
 )
 from nanorocks_ros.study.archive import write_archive
 from nanorocks_ros.study.journal import Journal
-from nanorocks_ros.study.tasks import Workers, as_finished
+from nanorocks_ros.study.resumed import fill_journal
+from nanorocks_ros.study.tasks import Workers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -131,13 +131,7 @@ def build_library(
     workers.check()
     folder = output.with_name(f'{output.name}.parts')
     with Journal(folder, plan.question()) as journal:
-        try:
-            _fill(journal, plan, workers, progress or (lambda done, total: None))
-        except KeyboardInterrupt:
-            done = len(journal.keys())
-            raise KeyboardInterrupt(
-                f'{done} parts are kept in {folder}; the same command goes on from there'
-            ) from None
+        fill_journal(journal, cool_nodes, _tasks(plan), workers, progress)
         for text in journal.notices:
             (notice or (lambda text: None))(text)
         library = fit_library(plan.tray, _decays(plan, journal), plan.question())
@@ -146,26 +140,12 @@ def build_library(
     return library
 
 
-def _fill(
-    journal: Journal, plan: LibraryPlan, workers: Workers, progress: Callable[[int, int], None]
-) -> None:
+def _tasks(plan: LibraryPlan) -> dict[str, _Nodes]:
     numbers = range(plan.nodes)
-    tasks = {
-        f'{part[0]}-{part[-1] + 1}': _Nodes(plan=plan, numbers=tuple(part))
-        for part in (
-            numbers[first : first + _NODES_IN_TASK]
-            for first in range(0, plan.nodes, _NODES_IN_TASK)
-        )
-    }
-    there = set(journal.good_keys())
-    missing = {key: task for key, task in tasks.items() if key not in there}
-    done = len(tasks) - len(missing)
-    progress(done, len(tasks))
-    with closing(as_finished(cool_nodes, missing, workers)) as results:
-        for key, found in results:
-            journal.write(key, found)
-            done += 1
-            progress(done, len(tasks))
+    parts = (
+        numbers[first : first + _NODES_IN_TASK] for first in range(0, plan.nodes, _NODES_IN_TASK)
+    )
+    return {f'{part[0]}-{part[-1] + 1}': _Nodes(plan=plan, numbers=tuple(part)) for part in parts}
 
 
 def _decays(plan: LibraryPlan, journal: Journal) -> Decays:

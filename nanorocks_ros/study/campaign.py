@@ -212,17 +212,26 @@ def run_campaign(
     ------
     RecordingError
         When something cannot be written or read.
+    KeyboardInterrupt
+        Ctrl-C; its text says what is kept.
     """
     tasks = plan.tasks(folder)
     missing = {name: one for name, one in tasks.items() if not _finished(one.folder)}
     done = len(tasks) - len(missing)
     progress(done / len(tasks))
-    run_tasks(
-        film_and_analyse,
-        missing,
-        workers,
-        lambda count, _: progress((done + count) / len(tasks)),
-    )
+    try:
+        run_tasks(
+            film_and_analyse,
+            missing,
+            workers,
+            lambda count, _: progress((done + count) / len(tasks)),
+        )
+    except KeyboardInterrupt:
+        kept = sum(_finished(one.folder) for one in tasks.values())
+        raise KeyboardInterrupt(
+            f'{kept} of {len(tasks)} cycles are kept in {folder}; the same command goes on from '
+            'there'
+        ) from None
     return [_read(one) for one in tasks.values()]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import closing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,8 @@ from nanorocks_ros.inference.cluster_curve import as_arrays, load_curves
 from nanorocks_ros.study.archive import write_archive
 from nanorocks_ros.study.cluster_films import ClusterPlan, samples_of_run
 from nanorocks_ros.study.journal import Journal
-from nanorocks_ros.study.tasks import Workers, as_finished
+from nanorocks_ros.study.resumed import fill_journal
+from nanorocks_ros.study.tasks import Workers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -80,13 +80,8 @@ def build_curves(
     workers.check()
     folder = output.with_name(f'{output.name}.parts')
     with Journal(folder, plan.question()) as journal:
-        try:
-            _fill(journal, plan, workers, progress or (lambda done, total: None))
-        except KeyboardInterrupt:
-            done = len(journal.keys())
-            raise KeyboardInterrupt(
-                f'{done} runs are kept in {folder}; the same command goes on from there'
-            ) from None
+        tasks = {str(run): _Run(plan=plan, run=run) for run in range(plan.runs)}
+        fill_journal(journal, film_run, tasks, workers, progress)
         for text in journal.notices:
             (notice or (lambda text: None))(text)
         samples = [journal.read(str(run))[_SAMPLES] for run in range(plan.runs)]
@@ -96,22 +91,6 @@ def build_curves(
         journal.delete()
     load_curves.cache_clear()
     return load_curves(str(output), packaged=False)
-
-
-def _fill(
-    journal: Journal, plan: ClusterPlan, workers: Workers, progress: Callable[[int, int], None]
-) -> None:
-    there = set(journal.good_keys())
-    missing = {
-        str(run): _Run(plan=plan, run=run) for run in range(plan.runs) if str(run) not in there
-    }
-    done = plan.runs - len(missing)
-    progress(done, plan.runs)
-    with closing(as_finished(film_run, missing, workers)) as results:
-        for key, found in results:
-            journal.write(key, found)
-            done += 1
-            progress(done, plan.runs)
 
 
 def film_run(task: _Run) -> Arrays:
