@@ -231,7 +231,8 @@ def test_the_pipeline_takes_a_camera_topic_and_sets_the_epoch_itself(graph):
     )
     graph.until(lambda: graph.node.count_subscribers(name) == 1)
     graph.until(lambda: publisher.get_subscription_count() == 1)
-    for frame in itertools.islice(BagFrames(SAMPLE).frames(), 60):
+    # Those of clusters are held back for two seconds.
+    for frame in itertools.islice(BagFrames(SAMPLE).frames(), 120):
         jpeg = encode_jpeg(frame.image, 90)
         publisher.publish(compressed_message(frame.stamp_ns, 'camera', jpeg))
         # Slower than a camera, for a queue of ten pictures must not overflow.
