@@ -57,8 +57,6 @@ PAPER_TABLE_3 = {
     7: _row(6.56, 42.17, 9.14, 98.7),
     8: _row(4.83, 133.01, 44.96, 80.4),
 }
-# [B19] section 3.2.2: trays whose autocorrelation gave no meaningful result, for the chalk.
-PAPER_WITHOUT_RESULT = (2, 4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,7 @@ from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.settings import SimulationSettings, with_values
 from nanorocks_ros.inference.decay_library import NUISANCES, count_step, tray_key
-from nanorocks_ros.inference.library_fit import (
+from nanorocks_ros.inference.decay_library_fit import (
     Decays,
     distances,
     fewest_nodes,

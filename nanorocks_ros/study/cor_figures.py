@@ -20,7 +20,7 @@ from nanorocks_ros.study.cycles import check_errors, cooling_part, mean_cycle
 from nanorocks_ros.study.decay_figure import decay_figure
 from nanorocks_ros.study.deviation import chi_square
 from nanorocks_ros.study.instantaneous_figure import instantaneous_figure
-from nanorocks_ros.study.library_decay import library_decay
+from nanorocks_ros.study.likeliest_decay import library_decay
 from nanorocks_ros.study.sweep import sweep
 from nanorocks_ros.study.sweep_figure import check_drawable, chi_square_figure
 from nanorocks_ros.study.sweep_plan import SweepPlan, sweep_plan

@@ -15,7 +15,7 @@ from nanorocks_ros.physics.haff import haff_speed
 from nanorocks_ros.physics.haff_fit import HaffFit, fit_haff
 from nanorocks_ros.physics.paper import paper_restitution
 from nanorocks_ros.study.cycles import check_errors, mean_cycle
-from nanorocks_ros.study.library_decay import LibraryDecay, library_decay
+from nanorocks_ros.study.likeliest_decay import LibraryDecay, library_decay
 from nanorocks_ros.study.output_files import whole_file
 from nanorocks_ros.study.species_energy import (
     draw_species,

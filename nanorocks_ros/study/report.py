@@ -166,12 +166,3 @@ def number(value: float | None, digits: int = 3, factor: float = 1.0) -> str:
     if value is None or not math.isfinite(value):
         return '–'
     return f'{factor * value:.{digits}g}'
-
-
-def with_error(value: float | None, error: float | None, digits: int = 3) -> str:
-    """A number and its standard error, so many digits behind the point."""
-    if value is None or not math.isfinite(value):
-        return '–'
-    if error is None or not math.isfinite(error):
-        return f'{value:.{digits}f}'
-    return f'{value:.{digits}f} ± {error:.{digits}f}'

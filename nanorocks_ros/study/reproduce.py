@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.study.campaign import CampaignPlan
     from nanorocks_ros.study.tasks import Workers
 
+# CPU time for a second of film, and its two analyses.
+_SECONDS = 5.0
 REPORT, PICTURES = 'report.html', 'pictures'
 _CHAPTERS: dict[str, Callable[[Context], Chapter]] = {
     'experiment': experiment_chapter,
@@ -128,7 +130,6 @@ def reproduce(
 
 def minutes(plan: CampaignPlan, cores: int) -> int:
     """About how long the films and their analysis take."""
-    # Of a second of film, on a core.
     return math.ceil(
-        2 * plan.cycles * plan.seconds * 3.5 / max(min(cores, 2 * plan.cycles), 1) / 60
+        2 * plan.cycles * plan.seconds * _SECONDS / max(min(cores, 2 * plan.cycles), 1) / 60
     )

@@ -12,7 +12,7 @@ from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay_library import NUISANCES, library_of, load_library
-from nanorocks_ros.inference.library_fit import node_of
+from nanorocks_ros.inference.decay_library_fit import node_of
 from nanorocks_ros.simulation.ensemble import cooling_runs
 from nanorocks_ros.study.build_library import LibraryPlan, cool_node
 

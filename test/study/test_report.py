@@ -15,7 +15,6 @@ from nanorocks_ros.study.report import (
     Section,
     Table,
     number,
-    with_error,
     write_report,
 )
 
@@ -81,7 +80,5 @@ def test_a_picture_that_is_missing_is_named(tmp_path):
 
 
 def test_numbers_that_are_not_known_are_dashes():
-    assert number(None) == number(float('nan')) == with_error(None, 1.0) == '–'
+    assert number(None) == number(float('nan')) == '–'
     assert number(0.0012345, 3, 1e3) == '1.23'
-    assert with_error(0.89, 0.0123) == '0.890 ± 0.012'
-    assert with_error(0.89, None) == '0.890'

@@ -91,9 +91,9 @@ def cluster_chapter(context: Context) -> Chapter:
             'known: its numbers stand beside ours, and need not agree with them.',
         ),
         Erratum(
-            text='A linear calibration of the autocorrelation fails: its area saturates near 2.2 '
-            'times that of single beads while clusters grow from 1 to 15. Ours is a curve from '
-            'simulated clusters that says where it ends, and tracks count bodies directly.'
+            text='A linear calibration of the autocorrelation fails: its area stops growing long '
+            'before the clusters do. Ours is a curve from simulated clusters that says where it '
+            'ends, and tracks count bodies directly.'
         ),
     ]  # fmt: skip
     return Chapter(section=section, differences=differences)

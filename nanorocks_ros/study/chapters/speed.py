@@ -58,8 +58,8 @@ def speed_chapter(context: Context) -> Chapter:
             text='The area that moves between two pictures is a measure of speed only while '
             'noise, shading and the choice of the threshold do not move with it; its factor has '
             'to be found by hand for each tray and speed. Printed, the recipe leaves open the '
-            'sign of the difference, the averaging and the threshold; its readings differ by '
-            'factors of 0.3 to 20.'
+            'sign of the difference, the averaging and the threshold, and its readings differ '
+            'from each other by more than from the truth.'
         ),
     ]  # fmt: skip
     rows, differences = [], []

@@ -14,7 +14,7 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import SpeedEstimate, SpeedMethod
 from nanorocks_ros.stages.cooling import HaffFitter
 from nanorocks_ros.study.cycles import mean_cycle, read_cycles
-from nanorocks_ros.study.library_decay import library_decay
+from nanorocks_ros.study.likeliest_decay import library_decay
 
 TRAY = load_trays()[1]
 NS = 1_000_000_000
