@@ -220,30 +220,14 @@ def _terms(
     measure: str,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sum of the logarithms of the rates of the merges, and merges expected, each (n,)."""
-    table = _Table.of(contacts, measure)
     # Bodies meet as beads do: pairs of them, at the speed of the beads.
     scale = 0.5 * one.bodies**2 / beads * one.speeds * (one.bodies > 1.0)
     ratio = grid[:, np.newaxis] / one.speeds
-    expected = trapezoid(scale * table.at(ratio), one.times, axis=1)
+    expected = trapezoid(scale * contacts.slower_between(ratio, measure), one.times, axis=1)
     speeds = np.interp(one.merges, one.times, one.speeds)
-    logs = np.log(table.at(grid[:, np.newaxis] / speeds) * speeds).sum(axis=1)
+    slower = contacts.slower_between(grid[:, np.newaxis] / speeds, measure)
+    logs = np.log(slower * speeds).sum(axis=1)
     return logs, np.asarray(expected)
-
-
-@dataclass(frozen=True, slots=True)
-class _Table:
-    """Contacts slower than a speed over the mean one, between nodes: it is asked for often."""
-
-    logs: NDArray[np.float64]
-    values: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, contacts: SlowContacts, measure: str) -> _Table:
-        logs = np.linspace(math.log(1e-6), math.log(1e4), 800)
-        return cls(logs, np.log(contacts.slower(np.exp(logs), measure)))
-
-    def at(self, ratio: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(np.exp(np.interp(np.log(ratio), self.logs, self.values)))
 
 
 def _first_part(one: StickingCycle, fewest: float) -> StickingCycle:

@@ -50,3 +50,12 @@ def test_contacts_of_an_isotropic_gas_are_those_of_the_closed_form():
 def test_another_measure_is_refused():
     with pytest.raises(ConfigurationError, match='tangential'):
         CONTACTS.slower(1.0, 'tangential')
+
+
+@pytest.mark.parametrize('measure', ['normal', 'total'])
+def test_between_nodes_contacts_are_as_many_as_worked_out_for_that_speed(measure):
+    contacts = slow_contacts(load_trays()[3])
+    speeds = np.geomspace(1e-3, 30.0, 97)
+    for _ in range(2):
+        found = contacts.slower_between(speeds, measure)
+        np.testing.assert_allclose(found, contacts.slower(speeds, measure), rtol=1e-3)
