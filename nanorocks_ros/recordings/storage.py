@@ -89,5 +89,10 @@ class StorageFile(Protocol):
     def messages_lost(self) -> int:
         """Messages known to be lost, so far."""
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
-        """The messages of some topics, or all, in order of log time."""
+    def messages(
+        self,
+        topics: Collection[str] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+    ) -> Iterator[BagMessage]:
+        """The messages of some topics and of some time, or all, in order of log time."""
