@@ -183,5 +183,6 @@ def _topics(index: McapIndex) -> dict[str, TopicInfo]:
             encoding=channel.message_encoding,
             definition=schema.data.decode('utf-8', 'replace') if schema else '',
             definition_format=schema.encoding if schema else '',
+            offered_qos=channel.metadata.get('offered_qos_profiles', ''),
         )
     return topics

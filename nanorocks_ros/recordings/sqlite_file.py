@@ -128,8 +128,11 @@ def _topics(database: sqlite3.Connection) -> tuple[dict[int, str], dict[str, Top
     counts = dict(database.execute('SELECT topic_id, count(*) FROM messages GROUP BY topic_id'))
     numbers: dict[int, str] = {}
     topics: dict[str, TopicInfo] = {}
-    for number, name, kind, encoding in database.execute(
-        'SELECT id, name, type, serialization_format FROM topics ORDER BY id'
+    columns = {row[1] for row in database.execute('PRAGMA table_info(topics)')}
+    # The first version of the format did not keep it.
+    qos = 'offered_qos_profiles' if 'offered_qos_profiles' in columns else "''"
+    for number, name, kind, encoding, offered in database.execute(
+        f'SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id'
     ):
         numbers[number] = name
         before = topics.get(name)
@@ -141,5 +144,6 @@ def _topics(database: sqlite3.Connection) -> tuple[dict[int, str], dict[str, Top
             encoding=encoding,
             definition=text,
             definition_format=form,
+            offered_qos=offered or '',
         )
     return numbers, topics

@@ -27,6 +27,8 @@ class TopicInfo:
         Text of the message definition kept in the recording; empty where there is none.
     definition_format : str
         ``ros2msg`` or ``ros2idl``.
+    offered_qos : str
+        How its publishers offered it, as the storage keeps it (YAML).
     """
 
     name: str
@@ -35,6 +37,7 @@ class TopicInfo:
     encoding: str = 'cdr'
     definition: str = ''
     definition_format: str = 'ros2msg'
+    offered_qos: str = ''
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
