@@ -77,7 +77,9 @@ class Chart:
 
 def _interval(topic: Topic, field: str, label: str, color: str) -> tuple[Curve, ...]:
     ends = (
-        Curve(topic=topic, field=f'{field}_{end}', label=end, color=color, width=_BAND)
+        Curve(
+            topic=topic, field=f'{field}_{end}', label=f'{label}, {end}', color=color, width=_BAND
+        )
         for end in ('lower', 'upper')
     )
     return (Curve(topic=topic, field=field, label=label, color=color), *ends)
@@ -191,13 +193,13 @@ class _Panels:
             'showXAxisLabels': True,
             'showYAxisLabels': True,
             'showLegend': True,
-            'legendDisplay': 'top',
+            # Above the plot it would leave no room for curves.
+            'legendDisplay': 'left',
             'showPlotValuesInLegend': True,
             'isSynced': True,
             'xAxisVal': 'timestamp',
-            'yAxisLabel': f'{chart.title} [{chart.unit}]',
-            'followingViewWidth': _ONE_CYCLE_S,
-            'sidebarDimension': 240,
+            'yAxisLabel': chart.unit,
+            'sidebarDimension': 300,
             **{key: value for key, value in limits.items() if value is not None},
         }
         return self.add('Plot', name, content)

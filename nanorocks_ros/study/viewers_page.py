@@ -37,8 +37,10 @@ who does not hear whom.
 _FOXGLOVE = """## Foxglove and Lichtblick
 
 ![The tab of tray 1: tracks, motion, autocorrelation; speed, restitution with its interval, \
-clusters]\
+clusters and sticking speed]\
 (viewers_foxglove.png)
+
+The tab of tray 1 in Lichtblick 1.28, with what `pipeline` made of `bags/tray_1_sample`.
 
 A recording needs no ROS: open the bag's `.mcap`, or that of the results, with *Open local file*,
 then *Layouts, Import from file*, `foxglove/nanorocks.json`. `nanorocks analyse BAG` writes the

@@ -77,7 +77,7 @@ def test_the_element_that_is_plotted_holds_the_restitution():
         if name.startswith('Plot!tray1') and chart['foxglovePanelTitle'] == 'Restitution'
         for path in chart['paths'][:3]
     }
-    assert found == {'COR': 0.875, 'lower': 0.75, 'upper': 0.9375}
+    assert found == {'COR': 0.875, 'COR, lower': 0.75, 'COR, upper': 0.9375}
 
 
 def test_every_panel_of_foxglove_has_a_place():
