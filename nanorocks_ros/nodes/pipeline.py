@@ -61,7 +61,8 @@ class PipelineNode(NanorocksNode):
             self._play_recorded()
 
     def _offer_everything(self):
-        self.offer((topics.EPOCH, topics.RAW))
+        # A camera that others publish has one publisher, theirs.
+        self.offer((topics.EPOCH,) if self._source == 'topic' else (topics.EPOCH, topics.RAW))
         for tray in self._settings.trays:
             self.offer(RESULT_TOPICS, tray)
 
