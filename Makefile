@@ -64,6 +64,7 @@ bench: venv ## Measure against the limits and against peers
 
 docs: venv ## Renew the pages of docs/ that are made from the code
 	@$(RUN) python -m nanorocks_ros.study.reference
+	@$(RUN) python -m nanorocks_ros.nodes.reference
 
 venv: ## Set up the environment that all of these use
 	@case '$(ROS_DISTRO)' in ''|jazzy) ;; *) \
