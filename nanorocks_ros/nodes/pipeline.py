@@ -9,6 +9,7 @@ from nanorocks_ros.nodes import _sources
 from nanorocks_ros.nodes._background import Background
 from nanorocks_ros.nodes._camera import Camera
 from nanorocks_ros.nodes._epoch import Epoch
+from nanorocks_ros.nodes._live_page import LivePage
 from nanorocks_ros.nodes._node import RESULT_TOPICS, NanorocksNode
 from nanorocks_ros.nodes._pacing import Pacer
 from nanorocks_ros.nodes._tracks import TracksPicture
@@ -38,6 +39,9 @@ class PipelineNode(NanorocksNode):
         self._bag = self.declare(st.BagSettings())
         self._pacing = self.declare(st.PacingSettings())
         camera = self.declare(st.CameraSettings())
+        page = self.declare(st.DashboardSettings(), prefix='dashboard_')
+        shown = self.declare(st.LivePageSettings()).dashboard
+        self._page = LivePage(self, page, self._settings.trays_file) if shown else None
         self._epoch = Epoch(self, may_set=True, follow=self._source == 'topic')
         self._reader = None
         self._where = self._source
@@ -156,4 +160,6 @@ class PipelineNode(NanorocksNode):
     def destroy_node(self):
         """End the thread before what it works for is gone."""
         self._background.close()
+        if self._page is not None:
+            self._page.close()
         super().destroy_node()

@@ -63,6 +63,14 @@ _GROUPS = (
     ('`bag_player`, `pipeline`', '', st.BagSettings()),
     ('`preprocessor`, `pipeline`', '', st.CameraSettings()),
     ('`pipeline`', '', st.SourceSettings()),
+    ('`pipeline`, the live page', '', st.LivePageSettings()),
+    (
+        '`dashboard`, `pipeline` under `dashboard_`, and `nanorocks dashboard`',
+        'The port of the page that the pipeline serves is `dashboard_port`; on the command line '
+        'it is `--port`.',
+        st.DashboardSettings(),
+    ),
+    ('`dashboard`', '', st.DashboardGraphSettings()),
 )
 
 
