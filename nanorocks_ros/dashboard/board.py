@@ -214,10 +214,13 @@ class Board:
         now_s : float, [s]
             Of a clock that never goes back.
         """
-        number = record.tray
+        self.expect(record.tray, now_s)
+        self._trays[record.tray].take(record, now_s)
+
+    def expect(self, number: int, now_s: float) -> None:
+        """Show a tray of which nothing is known but that somebody will tell."""
         if number not in self._trays:
-            self._trays[number] = TrayBoard(describe(self._known.get(number)))
-        self._trays[number].take(record, now_s)
+            self._trays[number] = TrayBoard(describe(self._known.get(number)), heard_s=now_s)
 
     def diagnose(
         self,

@@ -18,7 +18,7 @@ LAYERS = ('tray', 'tracks', 'motion')
 _QUALITY = 80
 _LARGEST_PX = 900
 # Blue, green, red and opacity of what moves.
-_MOVING = (60, 190, 255, 120)
+_MOVING = (60, 190, 255, 84)
 
 
 def encoded(layer: str, image: NDArray[np.uint8]) -> bytes:

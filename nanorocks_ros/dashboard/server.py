@@ -116,6 +116,10 @@ class PageServer:
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(_FAREWELL_S)
 
+    def expect(self, tray: int) -> None:
+        """Show that a tray is there."""
+        self._soon(self._board.expect, tray, time.monotonic())
+
     def take(self, record: Shown) -> None:
         """Show a result."""
         self._soon(self._board.take, record, time.monotonic())

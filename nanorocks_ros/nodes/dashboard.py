@@ -63,6 +63,7 @@ class DashboardNode(NanorocksNode):
 
     def _follow(self, tray):
         self._followed.add(tray)
+        self._server.expect(tray)
         for topic, kind in _RESULTS:
             self.listen(topic, partial(self._take, topic, kind, tray), tray, required=False)
         truth = partial(self._take, topics.TRUTH, GroundTruth, tray)

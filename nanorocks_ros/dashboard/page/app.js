@@ -123,15 +123,15 @@ function drawNumbers(tray) {
   number(
     'speed',
     speed && `${words.speed(speed.mean_projected_speed)} mm/s`,
-    speed ? `± ${words.speed(speed.mean_projected_speed_error)}, by ${speed.method.replaceAll('_', ' ')}` : 'no speed yet',
+    speed ? `${words.give(speed.mean_projected_speed_error, words.speed)} by ${speed.method.replaceAll('_', ' ')}` : 'no speed yet',
   );
   const fitted = cor && words.known(cor.haff_time);
-  number('haff', fitted && `${cor.haff_time.toFixed(2)} s`, fitted ? `± ${words.fixed(cor.haff_time_error, 2)} s` : 'no fit yet');
+  number('haff', fitted && `${cor.haff_time.toFixed(2)} s`, fitted ? words.give(cor.haff_time_error, (one) => one.toFixed(2), ' s') || 'of the fit' : 'no fit yet');
   const size = cluster && words.known(cluster.combined_size);
   number(
     'cluster',
-    size && `${cluster.combined_size.toFixed(1)} beads`,
-    size ? `± ${words.fixed(cluster.combined_size_error, 1)} per body` : 'not known yet',
+    size && cluster.combined_size.toFixed(1),
+    size ? `beads per body ${words.give(cluster.combined_size_error, (one) => one.toFixed(1))}` : 'not known yet',
   );
   number('sticking', ...(cluster ? words.sticking(cluster) : ['', 'not known yet']));
 }

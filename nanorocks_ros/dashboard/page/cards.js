@@ -26,7 +26,8 @@ export class Cards {
   }
 
   draw(trays, chosen, silentFor) {
-    this.bar.hidden = trays.size === 0;
+    // One tray alone is seen below.
+    this.bar.hidden = trays.size < 2;
     for (const number of [...this.shown.keys()]) {
       if (!trays.has(number)) {
         this.shown.get(number).card.remove();

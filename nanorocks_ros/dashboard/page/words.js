@@ -9,6 +9,9 @@ export const restitution = (value) => fixed(value, 3);
 export const interval = (lower, upper, show) =>
   known(lower) && known(upper) ? `[${show(lower)}, ${show(upper)}]` : '';
 
+/** One standard error, where it is known. */
+export const give = (value, show, more = '') => (known(value) ? `± ${show(value)}${more}` : '');
+
 /** Millimetres a second with the digits that mean something. */
 export function speed(value) {
   if (!known(value)) return '–';
@@ -41,11 +44,11 @@ export function sticking(cluster) {
       return [`${speed(cluster.sticking_speed)} mm/s`, between];
     case 'no_merge':
       return known(cluster.sticking_speed_upper)
-        ? [`below ${speed(cluster.sticking_speed_upper)} mm/s`, 'no beads stick yet']
+        ? [`< ${speed(cluster.sticking_speed_upper)} mm/s`, 'no beads stick yet']
         : ['', 'no beads stick yet'];
     case 'no_upper_limit':
       return known(cluster.sticking_speed_lower)
-        ? [`above ${speed(cluster.sticking_speed_lower)} mm/s`, 'no upper limit']
+        ? [`> ${speed(cluster.sticking_speed_lower)} mm/s`, 'no upper limit']
         : ['', 'no upper limit'];
     case 'stuck_from_the_start':
       return ['', 'beads stick from the start'];
@@ -57,6 +60,7 @@ export function sticking(cluster) {
 /** What a tray does at present: a state for its colour, and words. */
 export function trayState(tray, silentFor) {
   const shaken = tray.start !== null && tray.start !== undefined;
+  if (Object.keys(tray.latest).length === 0) return ['waiting', 'nothing measured yet'];
   if (silentFor > 4) return ['warning', `silent for ${duration(silentFor)}`];
   if (!shaken && !tray.latest.cor) return ['waiting', 'no shaking event yet'];
   const status = tray.latest.cor?.status;
