@@ -191,7 +191,7 @@ def _between(
     time: float, times: NDArray[np.float64], places: NDArray[np.float64]
 ) -> tuple[float, float]:
     """Place at a time, straight between two that are known; the last one after it."""
-    k = np.searchsorted(times, time)
+    k = int(np.searchsorted(times, time))
     if k == 0 or k == times.size:
         k = min(k, times.size - 1)
         return places[k, 0], places[k, 1]
