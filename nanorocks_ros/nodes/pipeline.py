@@ -80,6 +80,7 @@ class PipelineNode(NanorocksNode):
 
     def _offer_everything(self):
         self.offer((topics.EPOCH,))
+        # A camera that others publish has one publisher, theirs.
         if self._source != 'topic':
             self.offer((topics.RAW,))
             self.alone_on(topics.RAW.name)
