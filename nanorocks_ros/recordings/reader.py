@@ -236,6 +236,7 @@ def _merged_topics(files: Sequence[StorageFile]) -> dict[str, TopicInfo]:
                 encoding=before.encoding,
                 definition=before.definition or info.definition,
                 definition_format=before.definition_format,
+                qos=before.qos or info.qos,
             )
     return merged
 

@@ -7,6 +7,7 @@ from contextlib import closing
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.recordings.qos import recorded_qos
 from nanorocks_ros.recordings.storage import BagMessage, TopicInfo
 
 if TYPE_CHECKING:
@@ -128,8 +129,10 @@ def _topics(database: sqlite3.Connection) -> tuple[dict[int, str], dict[str, Top
     counts = dict(database.execute('SELECT topic_id, count(*) FROM messages GROUP BY topic_id'))
     numbers: dict[int, str] = {}
     topics: dict[str, TopicInfo] = {}
-    for number, name, kind, encoding in database.execute(
-        'SELECT id, name, type, serialization_format FROM topics ORDER BY id'
+    columns = {row[1] for row in database.execute('PRAGMA table_info(topics)')}
+    qos_column = 'offered_qos_profiles' if 'offered_qos_profiles' in columns else "''"
+    for number, name, kind, encoding, qos in database.execute(
+        f'SELECT id, name, type, serialization_format, {qos_column} FROM topics ORDER BY id'
     ):
         numbers[number] = name
         before = topics.get(name)
@@ -141,5 +144,6 @@ def _topics(database: sqlite3.Connection) -> tuple[dict[int, str], dict[str, Top
             encoding=encoding,
             definition=text,
             definition_format=form,
+            qos=recorded_qos(qos or ''),
         )
     return numbers, topics
