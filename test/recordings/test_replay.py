@@ -1,4 +1,4 @@
-"""Which part is played, what latched topics held there, and how topics were offered."""
+"""Which part is played, what latched topics held there, and that others can play it, too."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rosbags.rosbag2 import Reader
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.recordings.messages import float_array_message, time_message
 from nanorocks_ros.recordings.reader import open_bag
-from nanorocks_ros.recordings.replay import latest, offered_qos, played_part
+from nanorocks_ros.recordings.replay import latest, played_part
 from nanorocks_ros.recordings.writer import BagWriter, OfferedQos, OfferedTopic
 
 NS = 10**9
@@ -53,35 +53,6 @@ def test_latched_topics_held_the_last_message_before(bag, seconds, value):
 
 def test_at_the_start_nothing_was_latched_yet(bag):
     assert latest(bag, list(TOPICS), bag.start_ns) == []
-
-
-def test_how_topics_were_offered_is_read_back(bag):
-    found = {name: offered_qos(info.offered_qos) for name, info in bag.topics.items()}
-    assert found == {name: one.qos for name, one in TOPICS.items()}
-
-
-@pytest.mark.parametrize(
-    ('text', 'expected'),
-    [
-        ('', None),
-        ('[]', None),
-        ('{', None),
-        ('7', None),
-        ('- depth: many', None),
-        # Before version 9 of the format, and what two publishers have in common.
-        (
-            '- {history: 1, depth: 5, reliability: 1, durability: 1}\n'
-            '- {history: 1, depth: 7, reliability: 1, durability: 2}',
-            OfferedQos(reliable=True, transient_local=False, depth=7),
-        ),
-        (
-            '- {history: keep_all, depth: 0, reliability: best_effort, durability: volatile}',
-            OfferedQos(reliable=False, transient_local=False, depth=1),
-        ),
-    ],
-)
-def test_qualities_of_service_of_other_recorders_are_understood(text, expected):
-    assert offered_qos(text) == expected
 
 
 def test_the_metadata_are_what_ros2_bag_of_jazzy_reads(bag):
