@@ -18,7 +18,13 @@ OURS = ('rate', 'bag', 'loop')
 
 def test_a_file_may_hold_what_other_nodes_read_but_no_name_that_none_has(monkeypatch):
     monkeypatch.setattr(sys, 'argv', ['bag_player', '--ros-args', '--params-file', 'all.yaml'])
-    of_others = ('cooling.probability', 'simulation.tray', 'scene.noise', 'trays', 'use_sim_time')
+    of_others = (
+        'cooling.probability',
+        'simulation.tray',
+        'scene.noise',
+        'dashboard_port',
+        'use_sim_time',
+    )
     assert unknown_parameters(of_others, OURS) == []
     assert unknown_parameters(('qos_overrides./x.publisher.depth',), OURS) == []
     assert unknown_parameters(('cooling.probabilty', 'rat'), OURS) == [
