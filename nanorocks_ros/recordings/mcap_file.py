@@ -15,6 +15,7 @@ from nanorocks_ros.recordings.mcap_blocks import (
     load,
 )
 from nanorocks_ros.recordings.mcap_index import McapIndex, read_index, scan
+from nanorocks_ros.recordings.qos import recorded_qos
 from nanorocks_ros.recordings.storage import BagMessage, TopicInfo
 
 if TYPE_CHECKING:
@@ -183,6 +184,6 @@ def _topics(index: McapIndex) -> dict[str, TopicInfo]:
             encoding=channel.message_encoding,
             definition=schema.data.decode('utf-8', 'replace') if schema else '',
             definition_format=schema.encoding if schema else '',
-            offered_qos=channel.metadata.get('offered_qos_profiles', ''),
+            qos=recorded_qos(channel.metadata.get('offered_qos_profiles', '')),
         )
     return topics

@@ -236,7 +236,7 @@ def _merged_topics(files: Sequence[StorageFile]) -> dict[str, TopicInfo]:
                 encoding=before.encoding,
                 definition=before.definition or info.definition,
                 definition_format=before.definition_format,
-                offered_qos=before.offered_qos,
+                qos=before.qos or info.qos,
             )
     return merged
 

@@ -7,6 +7,7 @@ from contextlib import closing
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.recordings.qos import recorded_qos
 from nanorocks_ros.recordings.storage import BagMessage, TopicInfo
 
 if TYPE_CHECKING:
@@ -129,10 +130,9 @@ def _topics(database: sqlite3.Connection) -> tuple[dict[int, str], dict[str, Top
     numbers: dict[int, str] = {}
     topics: dict[str, TopicInfo] = {}
     columns = {row[1] for row in database.execute('PRAGMA table_info(topics)')}
-    # The first version of the format did not keep it.
-    qos = 'offered_qos_profiles' if 'offered_qos_profiles' in columns else "''"
-    for number, name, kind, encoding, offered in database.execute(
-        f'SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id'
+    qos_column = 'offered_qos_profiles' if 'offered_qos_profiles' in columns else "''"
+    for number, name, kind, encoding, qos in database.execute(
+        f'SELECT id, name, type, serialization_format, {qos_column} FROM topics ORDER BY id'
     ):
         numbers[number] = name
         before = topics.get(name)
@@ -144,6 +144,6 @@ def _topics(database: sqlite3.Connection) -> tuple[dict[int, str], dict[str, Top
             encoding=encoding,
             definition=text,
             definition_format=form,
-            offered_qos=offered or '',
+            qos=recorded_qos(qos or ''),
         )
     return numbers, topics

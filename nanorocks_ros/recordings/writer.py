@@ -17,15 +17,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import zstandard
-from rosbags.interfaces import (
-    Connection,
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.rosbag2.errors import WriterError
 from rosbags.rosbag2.storage_mcap import McapWriter
@@ -34,52 +25,21 @@ from rosbags.typesys import TypesysError
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.message_types import register, standard_types
+from nanorocks_ros.recordings.qos import OfferedQos
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from types import TracebackType
     from typing import Literal, Self
 
-# What ROS 2 calls an infinite duration.
-_FOREVER = QosTime(9223372036, 854775807)
+    from rosbags.interfaces import Connection
+
+__all__ = ['BagWriter', 'OfferedQos', 'OfferedTopic']
+
 _CHUNK_NS = 1_000_000_000
 # Pictures are compressed already: a higher level takes time and saves nothing.
 _LEVEL = 1
 _UNFIT = (SerdeError, AttributeError, TypeError, ValueError, LookupError, AssertionError)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OfferedQos:
-    """How a topic was, or would be, offered.
-
-    Parameters
-    ----------
-    reliable : bool
-        Else best effort.
-    transient_local : bool
-        A late subscriber still gets the last messages; else volatile.
-    depth : int, >= 1
-        Messages kept.
-    """
-
-    reliable: bool = True
-    transient_local: bool = False
-    depth: int = 10
-
-    def profile(self) -> Qos:
-        """The profile that recordings keep and players offer again."""
-        durability = QosDurability.TRANSIENT_LOCAL if self.transient_local else None
-        return Qos(
-            history=QosHistory.KEEP_LAST,
-            depth=self.depth,
-            reliability=QosReliability.RELIABLE if self.reliable else QosReliability.BEST_EFFORT,
-            durability=durability or QosDurability.VOLATILE,
-            deadline=_FOREVER,
-            lifespan=_FOREVER,
-            liveliness=QosLiveliness.AUTOMATIC,
-            liveliness_lease_duration=_FOREVER,
-            avoid_ros_namespace_conventions=False,
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
