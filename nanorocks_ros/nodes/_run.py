@@ -105,6 +105,7 @@ def _spin(name, interrupts):
         return 0
     interrupts.at_once = True
     node = getattr(module, f'{name.title().replace("_", "")}Node')()
+    node.refuse_unknown_parameters()
     interrupts.at_once = False
     executor = SingleThreadedExecutor()
     executor.add_node(node)

@@ -45,7 +45,7 @@ class _Kind(NamedTuple):
 _KINDS = (
     _Kind('simulator'),
     _Kind('simulator', ('whole_scene:=true',), 'with `whole_scene`'),
-    _Kind('bag_player', (f'bag:={_SAMPLE}',), 'besides each topic of the bag'),
+    _Kind('bag_player', (f'bag:={_SAMPLE}',), f'with `bag:={_SAMPLE}`'),
     _Kind('preprocessor'),
     _Kind('preprocessor', ('transport:=compressed',), 'with `transport:=compressed`'),
     _Kind('speed_estimator'),

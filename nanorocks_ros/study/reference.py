@@ -63,8 +63,14 @@ _GROUPS = (
     ('`simulator`', '', st.FilmSettings()),
     ('`simulator`, `bag_player`, `pipeline`', '', st.PacingSettings()),
     ('`bag_player`, `pipeline`', '', st.BagSettings()),
+    (
+        '`bag_player`',
+        '`position` and `rate` can be set while it plays; see [replay.md](replay.md).',
+        st.PlayerSettings(),
+    ),
     ('`preprocessor`, `pipeline`', '', st.CameraSettings()),
     ('`pipeline`', '', st.SourceSettings()),
+    ('`pipeline`', 'See [replay.md](replay.md#record).', st.RecordSettings()),
 )
 
 
