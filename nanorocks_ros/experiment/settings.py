@@ -663,6 +663,46 @@ class RecordSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DashboardSettings:
+    """Where and how the live page is served."""
+
+    host: str = _setting(
+        '127.0.0.1',
+        'address to listen on; one that other machines can reach is served with a token only',
+    )
+    port: int = _setting(8321, 'port to listen on; 0: any that is free', low=0, high=65535)
+    token: str = _setting(
+        '',
+        'what a browser must know, 12 characters or more; empty: that of the environment variable '
+        'NANOROCKS_DASHBOARD_TOKEN, else none on a loopback address, and elsewhere one that is '
+        'made up and printed',
+    )
+    picture_rate: float = _setting(
+        8.0, 'pictures of a tray a browser gets at most', '1/s', low=0.1, high=30.0
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DashboardGraphSettings:
+    """What the live page has to know of the graph that it shows."""
+
+    trays_file: str = _setting('', 'YAML file of trays; empty: the trays that were flown')
+    parent: int = _setting(
+        0,
+        'number of the process that started it, and that it ends with; 0: none',
+        low=0,
+        high=2**31 - 1,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LivePageSettings:
+    """Whether the pipeline serves the live page."""
+
+    dashboard: bool = _setting(False, 'serve the live page, from a process of its own')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SettingRow:
     """One setting, as the documentation, the ROS parameter and the flag need it."""
 

@@ -16,6 +16,7 @@ NODES = (
     'cluster_autocorrelator',
     'haff_fitter',
     'pipeline',
+    'dashboard',
     'demo',
 )
 

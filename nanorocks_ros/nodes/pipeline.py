@@ -11,6 +11,7 @@ from nanorocks_ros.nodes import _sources
 from nanorocks_ros.nodes._background import Background
 from nanorocks_ros.nodes._camera import Camera
 from nanorocks_ros.nodes._epoch import Epoch
+from nanorocks_ros.nodes._live_page import LivePage
 from nanorocks_ros.nodes._node import RESULT_TOPICS, NanorocksNode
 from nanorocks_ros.nodes._pacing import Pacer
 from nanorocks_ros.nodes._recorder import GraphRecorder, provenance
@@ -42,7 +43,10 @@ class PipelineNode(NanorocksNode):
         self._pacing = self.declare(st.PacingSettings())
         camera = self.declare(st.CameraSettings())
         record = self.declare(st.RecordSettings())
+        page = self.declare(st.DashboardSettings(), prefix='dashboard_')
+        shown = self.declare(st.LivePageSettings()).dashboard
         self.refuse_unknown_parameters()
+        self._page = LivePage(self, page, self._settings.trays_file) if shown else None
         self._epoch = Epoch(self, may_set=True, follow=self._source == 'topic')
         self._recorded = None
         self._where = self._source
@@ -80,6 +84,7 @@ class PipelineNode(NanorocksNode):
 
     def _offer_everything(self):
         self.offer((topics.EPOCH,))
+        # A camera that others publish has one publisher, theirs.
         if self._source != 'topic':
             self.offer((topics.RAW,))
             self.alone_on(topics.RAW.name)
@@ -193,4 +198,6 @@ class PipelineNode(NanorocksNode):
         self._background.close()
         if self.recorder is not None:
             self.recorder.close()
+        if self._page is not None:
+            self._page.close()
         super().destroy_node()

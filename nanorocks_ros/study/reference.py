@@ -71,6 +71,14 @@ _GROUPS = (
     ('`preprocessor`, `pipeline`', '', st.CameraSettings()),
     ('`pipeline`', '', st.SourceSettings()),
     ('`pipeline`', 'See [replay.md](replay.md#record).', st.RecordSettings()),
+    ('`pipeline`, the live page', '', st.LivePageSettings()),
+    (
+        '`dashboard`, `pipeline` under `dashboard_`, and `nanorocks dashboard`',
+        'The port of the page that the pipeline serves is `dashboard_port`; on the command line '
+        'it is `--port`.',
+        st.DashboardSettings(),
+    ),
+    ('`dashboard`', '', st.DashboardGraphSettings()),
 )
 
 
