@@ -51,6 +51,7 @@ _KINDS = (
     _Kind('speed_estimator'),
     _Kind('cluster_autocorrelator'),
     _Kind('haff_fitter'),
+    _Kind('dashboard', ('port:=0',), 'before any tray is published'),
     _Kind('pipeline', (), 'with `source:=simulator`, the default'),
     _Kind('pipeline', ('source:=topic',), 'with `source:=topic`'),
     _Kind('pipeline', ('source:=bag', f'bag:={_SAMPLE}'), 'with `source:=bag`'),
