@@ -28,6 +28,7 @@ def build_parser() -> argparse.ArgumentParser:
         calibrate_area,
         cluster_curve,
         dashboard,
+        doctor,
         figure,
         library,
         look,
@@ -50,6 +51,7 @@ def build_parser() -> argparse.ArgumentParser:
     calibrate_area.add_parser(commands)
     cluster_curve.add_parser(commands)
     dashboard.add_parser(commands)
+    doctor.add_parser(commands)
     figure.add_parser(commands)
     library.add_parser(commands)
     look.add_parser(commands)
