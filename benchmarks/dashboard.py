@@ -21,6 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.live import listener, spin, start_node
+
 _SECONDS = float(os.environ.get('DASHBOARD_SECONDS', '20'))
 _PAUSE_S = 4.0
 _SETTLE_S = 120.0
@@ -101,16 +103,6 @@ async def _one(session, url: str, seconds: float) -> tuple[float, float]:
     return steps / seconds, pictures / seconds
 
 
-def _start(*arguments: str, **options) -> subprocess.Popen:
-    return subprocess.Popen([sys.executable, '-m', 'nanorocks_ros.nodes', *arguments], **options)
-
-
-def _spin(executor, seconds: float, stop=lambda: False) -> None:
-    end = time.monotonic() + seconds
-    while time.monotonic() < end and not stop():
-        executor.spin_once(timeout_sec=0.1)
-
-
 def _cpu(process: subprocess.Popen | None) -> float:
     if process is None:
         return 0.0
@@ -130,10 +122,10 @@ def _measure(executor, frames, pipeline, page, port, quick, slow) -> _Stage:
     if quick or slow:
         call = _BROWSERS.format(port, quick, slow, _SECONDS + 2 * _PAUSE_S)
         browsers = subprocess.Popen([sys.executable, '-c', call], stdout=subprocess.PIPE)
-    _spin(executor, _PAUSE_S)
+    spin(executor, _PAUSE_S)
     frames.clear()
     before, start = [_cpu(pipeline), _cpu(page)], time.monotonic()
-    _spin(executor, _SECONDS)
+    spin(executor, _SECONDS)
     used = np.subtract([_cpu(pipeline), _cpu(page)], before) / (time.monotonic() - start)
     late = [1e3 * (frames.done[k] - at) for k, at in frames.sent.items() if k in frames.done]
     memory = _memory_mb(page)
@@ -146,25 +138,21 @@ def _measure(executor, frames, pipeline, page, port, quick, slow) -> _Stage:
 
 def report() -> None:
     """Run all stages and print them beside the first."""
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    os.environ['ROS_DOMAIN_ID'] = _DOMAIN
-    import rclpy
-    from rclpy.executors import SingleThreadedExecutor
+    with listener(_DOMAIN) as (node, executor):
+        _print(_stages(node, executor))
 
-    from nanorocks_ros.nodes._node import NanorocksNode
 
-    rclpy.init()
-    node = NanorocksNode('benchmark')
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
+def _stages(node, executor) -> dict[str, _Stage]:
     frames = _Frames(node)
-    pipeline = _start(
+    pipeline = start_node(
         'pipeline', '--ros-args', '-p', 'simulation.restitution:=1.0',
         '-p', 'simulation.wall_restitution:=1.0', '-p', 'simulation.shake_period:=3600.0',
     )  # fmt: skip
-    _spin(executor, _SETTLE_S, lambda: len(frames.done) > 60)
+    spin(executor, _SETTLE_S, lambda: len(frames.done) > 60)
     stages = {'no page': _measure(executor, frames, pipeline, None, 0, 0, 0)}
-    page = _start('dashboard', '--ros-args', '-p', 'port:=0', stdout=subprocess.PIPE, text=True)
+    page = start_node(
+        'dashboard', '--ros-args', '-p', 'port:=0', stdout=subprocess.PIPE, text=True
+    )
     port = int(re.findall(r':(\d+)/', page.stdout.readline())[0])
     for name, quick, slow in (
         ('no browser', 0, 0),
@@ -176,10 +164,7 @@ def report() -> None:
     stages['no page again'] = _last(executor, frames, pipeline, page)
     pipeline.send_signal(2)
     pipeline.wait(10)
-    executor.shutdown()
-    node.destroy_node()
-    rclpy.shutdown()
-    _print(stages)
+    return stages
 
 
 def _last(executor, frames, pipeline, page) -> _Stage:
