@@ -43,9 +43,9 @@ export class Cards {
   }
 
   drawOne(one, number, tray, silent) {
-    const [state, words] = trayState(tray, silent);
+    const [state, words, few] = trayState(tray, silent);
     one.state.dataset.state = state;
-    one.state.textContent = words;
+    one.state.textContent = few;
     const cor = tray.latest.cor;
     const now = tray.latest.speed?.mean_projected_speed;
     const last = tray.finals[tray.finals.length - 1];
@@ -57,7 +57,7 @@ export class Cards {
       one.small.textContent = ` in cycle ${last[0]}`;
     } else {
       one.value.firstChild.textContent = known(now) ? speed(now) : '–';
-      one.small.textContent = known(now) ? ' mm/s, no COR yet' : ' no COR yet';
+      one.small.textContent = known(now) ? ' mm/s' : ' no COR yet';
     }
     one.line.setAttribute('points', spark(tray.rows.speed));
     one.card.setAttribute('aria-label', `Tray ${number}, ${words}, ${one.value.textContent}`);

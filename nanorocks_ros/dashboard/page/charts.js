@@ -24,8 +24,15 @@ function aligned(curves) {
 const column = (rows, index, change = (value) => value) =>
   rows.map((row) => (known(row[index]) ? change(row[index], row) : null));
 
+// A line of one point would not be seen.
+const few = (plot) => plot.data[0].length < 4;
+
 const line = (name, more = {}) => ({
-  stroke: () => colour(name), width: 2, spanGaps: true, points: { show: false }, ...more,
+  stroke: () => colour(name),
+  width: 2,
+  spanGaps: true,
+  points: { show: few, size: 6, fill: () => colour(name) },
+  ...more,
 });
 
 const edge = { stroke: 'transparent', width: 0, spanGaps: true, points: { show: false } };

@@ -57,13 +57,16 @@ export function sticking(cluster) {
   }
 }
 
-/** What a tray does at present: a state for its colour, and words. */
+/** What a tray does at present: a state for its colour, words, and fewer words. */
 export function trayState(tray, silentFor) {
   const shaken = tray.start !== null && tray.start !== undefined;
-  if (Object.keys(tray.latest).length === 0) return ['waiting', 'nothing measured yet'];
-  if (silentFor > 4) return ['warning', `silent for ${duration(silentFor)}`];
-  if (!shaken && !tray.latest.cor) return ['waiting', 'no shaking event yet'];
+  if (Object.keys(tray.latest).length === 0) return ['waiting', 'nothing measured yet', 'waiting'];
+  if (silentFor > 4) {
+    const text = `silent for ${duration(silentFor)}`;
+    return ['warning', text, text];
+  }
+  if (!shaken && !tray.latest.cor) return ['waiting', 'no shaking event yet', 'not shaken yet'];
   const status = tray.latest.cor?.status;
-  if (status === 'final') return ['ok', `cycle ${tray.cycle}, over`];
-  return ['ok', `cycle ${tray.cycle}, cooling`];
+  if (status === 'final') return ['ok', `cycle ${tray.cycle}, over`, 'over'];
+  return ['ok', `cycle ${tray.cycle}, cooling`, 'cooling'];
 }
