@@ -63,6 +63,7 @@ _GROUPS = (
     ('`bag_player`, `pipeline`', '', st.BagSettings()),
     ('`preprocessor`, `pipeline`', '', st.CameraSettings()),
     ('`pipeline`', '', st.SourceSettings()),
+    ('`pipeline`', '', st.WorkSettings()),
 )
 
 
