@@ -12,6 +12,7 @@ pytest.importorskip('rclpy')
 
 import itertools
 import os
+import signal
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
