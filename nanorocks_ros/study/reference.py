@@ -79,6 +79,7 @@ _GROUPS = (
         st.DashboardSettings(),
     ),
     ('`dashboard`', '', st.DashboardGraphSettings()),
+    ('`pipeline`', '', st.WorkSettings()),
 )
 
 
