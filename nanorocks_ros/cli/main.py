@@ -28,6 +28,7 @@ def build_parser() -> argparse.ArgumentParser:
         calibrate_area,
         cluster_curve,
         figure,
+        import_video,
         library,
         look,
         reproduce,
@@ -49,6 +50,7 @@ def build_parser() -> argparse.ArgumentParser:
     calibrate_area.add_parser(commands)
     cluster_curve.add_parser(commands)
     figure.add_parser(commands)
+    import_video.add_parser(commands)
     library.add_parser(commands)
     look.add_parser(commands)
     reproduce.add_parser(commands)
