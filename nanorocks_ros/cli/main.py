@@ -30,6 +30,7 @@ def build_parser() -> argparse.ArgumentParser:
         dashboard,
         doctor,
         figure,
+        import_video,
         library,
         look,
         reproduce,
@@ -53,6 +54,7 @@ def build_parser() -> argparse.ArgumentParser:
     dashboard.add_parser(commands)
     doctor.add_parser(commands)
     figure.add_parser(commands)
+    import_video.add_parser(commands)
     library.add_parser(commands)
     look.add_parser(commands)
     reproduce.add_parser(commands)

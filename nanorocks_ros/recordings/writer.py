@@ -105,7 +105,7 @@ class BagWriter:
             self._writer = Writer(self.path, version=9, storage_plugin=StoragePlugin.MCAP)
             self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
             for key, value in self._metadata.items():
-                self._writer.set_custom_data(key, value)
+                self._writer.set_custom_data(key, _encodable(value))
             self._writer.open()
         except WriterError as error:
             raise self._exists() from error
@@ -133,6 +133,10 @@ class BagWriter:
             if error is None:
                 raise self._unwritable(failure) from failure
         return False
+
+    def remark(self, key: str, value: str) -> None:
+        """Add to the provenance what was not known at the start, or replace what was."""
+        self._writer.set_custom_data(key, _encodable(value))
 
     def write(self, topic: str, stamp_ns: int, message: object) -> None:
         """Write a message given as an object.
@@ -276,3 +280,8 @@ def _sync_folder(path: Path) -> None:
         os.fsync(number)
     finally:
         os.close(number)
+
+
+def _encodable(text: str) -> str:
+    """The text without what UTF-8 cannot hold, as in names of files of another encoding."""
+    return text.encode('utf-8', 'backslashreplace').decode('utf-8')
