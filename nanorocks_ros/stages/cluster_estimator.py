@@ -22,6 +22,8 @@ from nanorocks_ros.stages.shaking import NS
 from nanorocks_ros.stages.sticking import StickingMeter
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.inference.sticking import StickingCycle, StickingEstimate
@@ -80,6 +82,10 @@ class ClusterEstimator:
     def cycles(self) -> tuple[StickingCycle, ...]:
         """Merges and speeds of the cycles since time last went back."""
         return self._sticking.seen()
+
+    def together(self, cycles: Sequence[StickingCycle]) -> StickingEstimate | None:
+        """What cycles of this tray say of the sticking speed, also such of other recordings."""
+        return self._sticking.together(cycles)
 
     def push(
         self, record: TrayImage | SpeedEstimate | BodyEstimate | Merge

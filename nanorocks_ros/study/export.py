@@ -12,7 +12,7 @@ from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.settings import rows
 from nanorocks_ros.recordings.messages import float_array_message, time_message
-from nanorocks_ros.recordings.results import write_csv
+from nanorocks_ros.recordings.results import RESULTS_MARK, write_csv
 from nanorocks_ros.recordings.writer import BagWriter
 from nanorocks_ros.records import ClusterEstimate, CorEstimate, CorStatus
 from nanorocks_ros.study.results_bag import offered
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.study.offline import Analysis, TrayResults
 
 BAG_NAME = 'results_bag'
-RESULTS_MARK = '.nanorocks_results'
 
 
 def _known(value: float) -> float | None:
