@@ -121,8 +121,10 @@ def _is_bag(folder: Path) -> bool:
     """A rosbag2 folder, or what a crash left of one: files of one name and their numbers."""
     if (folder / _METADATA).exists():
         return True
-    stems = {_SPLIT.sub('', p.stem) for p in folder.iterdir() if p.suffix in STORAGE_SUFFIXES}
-    return len(stems) == 1
+    inside = list(folder.iterdir())
+    stems = {_SPLIT.sub('', one.stem) for one in inside if one.suffix in STORAGE_SUFFIXES}
+    # Beside recordings in folders, a file is a recording of its own.
+    return len(stems) == 1 and not any((one / _METADATA).exists() for one in inside)
 
 
 def _is_storage(path: Path) -> bool:

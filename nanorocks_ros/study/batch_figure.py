@@ -11,6 +11,7 @@ import numpy as np
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.study.cycles import read_cycles
 from nanorocks_ros.study.output_files import whole_file
+from nanorocks_ros.study.shown import counted
 
 mpl.use('Agg')
 from matplotlib.collections import LineCollection
@@ -102,7 +103,7 @@ def _draw(axes: Axes, means: TrayMeans, cycles: Sequence[CycleSpeeds]) -> None:
     axes.autoscale_view()
     axes.set_ylabel('mean speed [mm/s]')
     some = '' if len(cycles) >= means.cycles else f', {len(cycles)} of them drawn'
-    axes.set_title(f'Tray {means.tray}: {means.cycles} cycles{some}', fontsize=10)
+    axes.set_title(f'Tray {means.tray}: {counted(means.cycles, "cycle")}{some}', fontsize=10)
     axes.grid(alpha=0.25)
     axes.legend(frameon=False, fontsize=8)
 
