@@ -40,7 +40,8 @@ def is_batch(options: argparse.Namespace) -> bool:
     """Whether many recordings are meant."""
     from nanorocks_ros.recordings.find_bags import is_collection, is_pattern
 
-    if len(options.bags) > 1 or any((options.workers, options.scheduler, options.format)):
+    asked = options.workers, options.scheduler, options.format
+    if len(options.bags) > 1 or any(one is not None for one in asked):
         return True
     return is_pattern(options.bags[0]) or is_collection(Path(options.bags[0]))
 

@@ -1,4 +1,4 @@
-"""Many recordings, and results as `nanorocks analyse` writes them, made up so that all is known."""
+"""Results of many recordings as `nanorocks analyse` writes them, all known; and recordings."""
 
 from __future__ import annotations
 
