@@ -12,7 +12,7 @@ from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.settings import rows
 from nanorocks_ros.recordings.messages import float_array_message, time_message
-from nanorocks_ros.recordings.results import write_csv
+from nanorocks_ros.recordings.results import RESULTS_MARK, write_csv
 from nanorocks_ros.recordings.writer import BagWriter
 from nanorocks_ros.records import ClusterEstimate, CorEstimate, CorStatus
 from nanorocks_ros.study.results_bag import offered
@@ -20,13 +20,12 @@ from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import NS, ArrayRecord, layout, to_array
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.study.offline import Analysis, TrayResults
 
 BAG_NAME = 'results_bag'
-_MARK = '.nanorocks_results'
 
 
 def _known(value: float) -> float | None:
@@ -167,7 +166,11 @@ def _truth_as_json(analysis: Analysis, results: TrayResults) -> dict[str, Any] |
 
 
 def write_results(
-    analysis: Analysis, folder: Path, source: Path, settings: PipelineSettings
+    analysis: Analysis,
+    folder: Path,
+    source: Path,
+    settings: PipelineSettings,
+    more: Callable[[Path], None] | None = None,
 ) -> None:
     """CSV tables and a results bag in a folder of their own, complete or not at all.
 
@@ -180,13 +183,15 @@ def write_results(
     source : Path
         The bag that was analysed, for the provenance.
     settings : PipelineSettings
+    more : callable, optional
+        Called with the folder when the rest is in it, to add to it.
 
     Raises
     ------
     RecordingError
         When the folder cannot be written, or holds something else.
     """
-    if folder.exists() and not (folder / _MARK).is_file():
+    if folder.exists() and not (folder / RESULTS_MARK).is_file():
         raise RecordingError(
             str(folder), 'exists and holds no results of ours', 'pass another --output'
         )
@@ -195,10 +200,12 @@ def write_results(
         with TemporaryDirectory(prefix=f'.{folder.name}.', dir=folder.parent) as scratch:
             fresh = Path(scratch) / 'fresh'
             fresh.mkdir()
-            (fresh / _MARK).touch()
+            (fresh / RESULTS_MARK).touch()
             for number, results in analysis.trays.items():
                 _write_tables(analysis, results, fresh, number)
             _write_bag(analysis, fresh / BAG_NAME, _provenance(source, settings))
+            if more is not None:
+                more(fresh)
             if folder.exists():
                 folder.rename(Path(scratch) / 'earlier')
             fresh.rename(folder)

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from nanorocks_ros.experiment.settings import PipelineSettings
+    from nanorocks_ros.inference.evidence import Evidence
+    from nanorocks_ros.inference.sticking import StickingCycle
 
 NS = 1_000_000_000
 Progress = Callable[[int, int], None]
@@ -49,7 +51,11 @@ _GAP = 1.5
 
 @dataclass(slots=True, kw_only=True)
 class TrayResults:
-    """Everything that was measured in one tray, in order of time."""
+    """Everything that was measured in one tray, in order of time.
+
+    Beside the records stands what its cycles say of restitutions and sticking, so that those of
+    other recordings can be added: `evidence`, `sticking`.
+    """
 
     speeds: list[SpeedEstimate] = field(default_factory=list)
     clusters: list[ClusterEstimate] = field(default_factory=list)
@@ -59,6 +65,8 @@ class TrayResults:
     bodies: list[BodyEstimate] = field(default_factory=list)
     merges: list[Merge] = field(default_factory=list)
     truth: list[GroundTruth] = field(default_factory=list)
+    evidence: Evidence | None = None
+    sticking: tuple[StickingCycle, ...] = ()
 
 
 @dataclass(slots=True, kw_only=True)
@@ -80,6 +88,8 @@ class Analysis:
         Why the first of the frames that could not be used could not; the others were.
     refused : int
         Frames that could not be used.
+    metadata : dict of str to str
+        Provenance that the recording holds.
     """
 
     epoch_ns: int
@@ -89,6 +99,7 @@ class Analysis:
     complete: bool = True
     error: FrameError | None = None
     refused: int = 0
+    metadata: dict[str, str] = field(default_factory=dict)
 
     @property
     def frames(self) -> int:
@@ -157,6 +168,7 @@ def analyse(
         epoch_ns=epoch_ns,
         trays={n: TrayResults(truth=truth.get(n, [])) for n in settings.trays},
         complete=bag.reader.complete,
+        metadata=bag.reader.metadata,
     )
     for number, frame in enumerate(bag.frames(), start=1):
         try:
@@ -178,6 +190,9 @@ def analyse(
         result.complete = False
     for record in pipeline.flush():
         getattr(result.trays[record.tray], _LISTS[type(record)]).append(record)
+    for number, stages in pipeline.trays.items():
+        result.trays[number].evidence = stages.cooling.evidence
+        result.trays[number].sticking = stages.clusters.cycles
     # Known only after reading: where a damaged bag ends.
     result.notices[:0] = bag.reader.notices
     result.complete = result.complete and bag.reader.complete
