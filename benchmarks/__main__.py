@@ -10,6 +10,7 @@ ALL = (
     'batch',
     'live',
     'live_plate',
+    'dashboard',
     'preprocess',
     'scene',
     'tracking',

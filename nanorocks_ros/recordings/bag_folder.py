@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
@@ -12,6 +11,7 @@ import yaml
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings import mcap_blocks, sqlite_file
 from nanorocks_ros.recordings.mcap_file import McapFile
+from nanorocks_ros.recordings.names import natural
 from nanorocks_ros.recordings.sqlite_file import SqliteFile
 from nanorocks_ros.recordings.storage import StorageFile
 
@@ -140,12 +140,7 @@ def _names(path: Path, information: dict[str, Any]) -> list[str]:
     if any((path / name).is_file() for name in names):
         return names
     found = (p.name for p in path.iterdir() if p.suffix in STORAGE_SUFFIXES and p.is_file())
-    return sorted(found, key=by_number)
-
-
-def by_number(name: str) -> list[tuple[int, str]]:
-    """Sorts `run_10.mcap` behind `run_9.mcap`."""
-    return [(int(part), '') if part.isdigit() else (-1, part) for part in re.split(r'(\d+)', name)]
+    return sorted(found, key=natural)
 
 
 def _refuse_compressed_files(path: Path, information: dict[str, Any]) -> None:

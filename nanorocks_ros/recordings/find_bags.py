@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.recordings.bag_folder import ROS1_MAGIC, STORAGE_SUFFIXES, by_number
+from nanorocks_ros.recordings.bag_folder import ROS1_MAGIC, STORAGE_SUFFIXES
 from nanorocks_ros.recordings.mcap_blocks import MAGIC
+from nanorocks_ros.recordings.names import natural
 from nanorocks_ros.recordings.results import RESULTS_MARK
 from nanorocks_ros.recordings.sqlite_file import MAGIC as SQLITE_MAGIC
 
@@ -146,4 +147,4 @@ def _each_once(paths: Iterable[Path]) -> list[Path]:
 
 
 def _in_order(path: Path) -> list[list[tuple[int, str]]]:
-    return [by_number(part) for part in path.parts]
+    return [natural(part) for part in path.parts]

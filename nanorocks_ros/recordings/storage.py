@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
     from pathlib import Path
 
+    from nanorocks_ros.recordings.qos import OfferedQos
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TopicInfo:
@@ -27,6 +29,8 @@ class TopicInfo:
         Text of the message definition kept in the recording; empty where there is none.
     definition_format : str
         ``ros2msg`` or ``ros2idl``.
+    qos : OfferedQos or None
+        How it was offered; None where the recording does not say.
     """
 
     name: str
@@ -35,6 +39,7 @@ class TopicInfo:
     encoding: str = 'cdr'
     definition: str = ''
     definition_format: str = 'ros2msg'
+    qos: OfferedQos | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,5 +94,10 @@ class StorageFile(Protocol):
     def messages_lost(self) -> int:
         """Messages known to be lost, so far."""
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
-        """The messages of some topics, or all, in order of log time."""
+    def messages(
+        self,
+        topics: Collection[str] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+    ) -> Iterator[BagMessage]:
+        """The messages of some topics and of some time, or all, in order of log time."""

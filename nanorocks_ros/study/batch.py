@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.recordings.bag_folder import by_number
 from nanorocks_ros.recordings.content import file_states, total_size
+from nanorocks_ros.recordings.names import natural
 from nanorocks_ros.stages.pipeline import Pipeline
 from nanorocks_ros.study.batch_store import BatchStore, Entry
 from nanorocks_ros.study.batch_task import (
@@ -233,7 +233,7 @@ def _gathered(plan: BatchPlan, store: BatchStore) -> Batch:
     batch = Batch()
     for text, error in plan.bags.missing.items():
         batch.failed.append(Failure(name=shown(text), reason=shown(str(error))))
-    entries = sorted(store.entries.values(), key=lambda one: by_number(str(one.path)))
+    entries = sorted(store.entries.values(), key=lambda one: natural(str(one.path)))
     found: list[tuple[Entry, dict[str, Any]]] = []
     for entry in entries:
         outcome = entry.outcome
