@@ -21,6 +21,7 @@ from nanorocks_ros.experiment.settings import (
     SimulationSettings,
 )
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.recordings.content import content_hash, file_states, total_size
 from nanorocks_ros.recordings.find_bags import find_bags
 from nanorocks_ros.recordings.messages import compressed_image_message, time_message
 from nanorocks_ros.recordings.reader import open_bag
@@ -39,9 +40,9 @@ _SECONDS = 20.0
 _NS = 1_000_000_000
 _CAMERA = topics.RAW_COMPRESSED.absolute()
 # Bags on each number of cores, of how many films one after the other; rounds.
-_BAGS, _LOOPS, _ROUNDS = 8, 2, 2
+_BAGS, _LOOPS, _ROUNDS = 8, 1, 2
 # Lengths of which memory is compared, in films.
-_SHORT, _LONG = 2, 30
+_SHORT, _LONG = 3, 30
 _PLATE_SECONDS = 5.0
 _CAMPAIGN, _FILMS = 178, 4
 
@@ -77,7 +78,8 @@ class _Quiet:
         self._over.set()
 
 
-def _film(path: Path, seed: int, seconds: float) -> Path:
+def short_film(path: Path, seed: int, seconds: float) -> Path:
+    """A bag of tray 1, shaken after 0.3 s."""
     film_into_bag(
         path,
         SimulationSettings(seed=seed, first_shake=0.3),
@@ -156,6 +158,10 @@ def _memory(folder: Path, film: Path) -> None:
         summary = batch.results[0].summary
         cycles = len(summary['trays']['1']['cycles'])
         print(f'| tray | 1 | {summary["seconds"]:.0f} | {cycles} | {peak:.0f} |', flush=True)
+    size = total_size(file_states(place / 'bags' / 'run'))
+    start = time.perf_counter()
+    content_hash(place / 'bags' / 'run')
+    rate = size / (time.perf_counter() - start)
     plate = folder / 'plate'
     scene = SceneSettings(trays=tuple(sorted(load_trays())))
     recorder = SceneRecorder(SimulationSettings(first_shake=0.5), scene, _PLATE_SECONDS)
@@ -164,24 +170,30 @@ def _memory(folder: Path, film: Path) -> None:
     batch, _, peak = _run(plate / 'results', plate / 'bags', plate_settings(), workers=1)
     summary = batch.results[0].summary
     cycles = max(len(one['cycles']) for one in summary['trays'].values())
-    print(f'| plate, 1080p | 8 | {summary["seconds"]:.0f} | {cycles} | {peak:.0f} |')
+    print(f'| plate, 1080p | 8 | {summary["seconds"]:.0f} | {cycles} | {peak:.0f} |\n')
+    print(f'content hashed at {rate / 1e6:.0f} MB/s', flush=True)
+
+
+def broken_bags(folder: Path, film: Path) -> None:
+    """One of each kind; those cut short and with flipped bits can be analysed in part."""
+    content = next(film.glob('*.mcap')).read_bytes()
+    (folder / 'truncated.mcap').write_bytes(content[: len(content) * 3 // 5])
+    (folder / 'empty.mcap').touch()
+    (folder / 'wrong_magic.mcap').write_bytes(b'RIFF' + content[4:])
+    flipped = bytearray(content)
+    for place in range(len(content) // 3, len(content) // 2, 500):
+        flipped[place] ^= 0x10
+    (folder / 'flipped.mcap').write_bytes(flipped)
+    with BagWriter(folder / 'no_camera', {'/chatter': offered(topics.EPOCH)}, metadata={}) as bag:
+        bag.write('/chatter', START_NS, time_message(START_NS))
 
 
 def _campaign(folder: Path) -> None:
     bags = folder / 'bags'
-    films = [_film(folder / f'film_{k}', k, 6.0) for k in range(_FILMS)]
+    films = [short_film(folder / f'film_{k}', k, 6.0) for k in range(_FILMS)]
     for number in range(_CAMPAIGN - 5):
         shutil.copytree(films[number % _FILMS], bags / f'run_{number}')
-    content = next(films[0].glob('*.mcap')).read_bytes()
-    (bags / 'truncated.mcap').write_bytes(content[: len(content) * 3 // 5])
-    (bags / 'empty.mcap').touch()
-    (bags / 'wrong_magic.mcap').write_bytes(b'RIFF' + content[4:])
-    flipped = bytearray(content)
-    for place in range(len(content) // 3, len(content) // 2, 500):
-        flipped[place] ^= 0x10
-    (bags / 'flipped.mcap').write_bytes(flipped)
-    with BagWriter(bags / 'no_camera', {'/chatter': offered(topics.EPOCH)}, metadata={}) as bag:
-        bag.write('/chatter', START_NS, time_message(START_NS))
+    broken_bags(bags, films[0])
     settings = PipelineSettings()
     batch, seconds, peak = _run(folder / 'results', bags)
     start = time.perf_counter()
@@ -207,7 +219,7 @@ def report() -> None:
     """Print all of it."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        film = _film(folder / 'film', 1, _SECONDS)
+        film = short_film(folder / 'film', 1, _SECONDS)
         _cores(folder / 'cores', film)
         _memory(folder / 'memory', film)
         _campaign(folder / 'campaign')
