@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 
 from benchmarks.batch import broken_bags, short_film
-
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.settings import PipelineSettings, with_values
