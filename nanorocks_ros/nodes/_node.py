@@ -102,6 +102,8 @@ class NanorocksNode(Node):
         self.state = {}
         # Whoever wants to keep what is sent.
         self.recorder = None
+        # What is wrong, but keeps nothing from going on.
+        self.trouble = ''
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._last_report = (time.monotonic(), 0)
         self.create_timer(1.0, self._report, clock=self.steady_clock)
@@ -356,6 +358,8 @@ class NanorocksNode(Node):
         level, text = DiagnosticStatus.OK, 'working'
         if missing:
             level, text = DiagnosticStatus.WARN, f'no publisher on {", ".join(missing)}'
+        if self.trouble:
+            level, text = DiagnosticStatus.WARN, self.trouble
         if self.counts['refused']:
             level, text = DiagnosticStatus.ERROR, self.state['last refusal']
         status = DiagnosticStatus(level=level, name=self.get_fully_qualified_name(), message=text)
