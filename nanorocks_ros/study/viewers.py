@@ -377,7 +377,8 @@ def plotjuggler() -> str:
     ElementTree.SubElement(tabbed, 'currentTabIndex', {'index': '0'})
     _plotjuggler_streamer(root, trays)
     ElementTree.indent(root, ' ')
-    return ElementTree.tostring(root, encoding='unicode', xml_declaration=True) + '\n'
+    # The declaration that Python writes differs between its releases.
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ElementTree.tostring(root, "unicode")}\n'
 
 
 def _plotjuggler_chart(parent: ElementTree.Element, tray: int, chart: Chart) -> None:
