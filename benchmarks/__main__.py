@@ -7,6 +7,7 @@ from importlib import import_module
 
 ALL = (
     'offline',
+    'batch',
     'live',
     'live_plate',
     'dashboard',

@@ -19,6 +19,7 @@ from nanorocks_ros.study.campaign_cycles import SIZE_MEASURES, CycleSummary, cyc
 from nanorocks_ros.study.export import as_json, write_results
 from nanorocks_ros.study.offline import Analysis, analyse
 from nanorocks_ros.study.shown import shown
+from nanorocks_ros.study.spool import SpoolError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -29,15 +30,6 @@ SUMMARY, EVIDENCE, TROUBLE = 'bag.json', 'evidence.npz', 'trouble.txt'
 DONE, PARTIAL, FAILED, UNWRITTEN = 'done', 'partial', 'failed', 'unwritten'
 # How far a recording has come is said so often, [s].
 _NOTE = 1.0
-_SERIES = (
-    'time',
-    'mean_projected_speed',
-    'mean_projected_speed_error',
-    'first_species_speed',
-    'second_species_speed',
-    'method',
-    'quality',
-)
 # Provenance kept of a recording: so many entries, each so long.
 _MOST_ENTRIES, _LONGEST = 100, 500
 
@@ -105,6 +97,8 @@ def analyse_bag(task: BagTask) -> BagOutcome:
     cv2.setNumThreads(1)
     try:
         return _analysed(task)
+    except SpoolError as error:
+        return BagOutcome(state=UNWRITTEN, reason=shown(str(error)))
     except NanorocksError as error:
         return BagOutcome(state=FAILED, reason=shown(str(error)))
     except MemoryError:
@@ -139,7 +133,11 @@ def _analysed(task: BagTask) -> BagOutcome:
             other = '' if folder == task.folder else folder.name
             return replace(_outcome(known, files), folder=other)
     analysis = analyse(
-        task.path, task.settings, image_topic=task.image_topic, progress=_noting(task.note)
+        task.path,
+        task.settings,
+        image_topic=task.image_topic,
+        progress=_noting(task.note),
+        scratch=task.folder.parent,
     )
     if file_states(task.path) != files:
         raise RecordingError(
@@ -200,12 +198,7 @@ def _noting(note: Path) -> Any:
 
 
 def _summary(analysis: Analysis) -> dict[str, Any]:
-    found = as_json(analysis)
-    for tray in found['trays'].values():
-        for name in _SERIES:
-            del tray[name]
-        if tray['truth'] is not None:
-            tray['truth'] = {k: v for k, v in tray['truth'].items() if not isinstance(v, list)}
+    found = as_json(analysis, series=False)
     error = analysis.error
     return {
         **found,

@@ -24,8 +24,10 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.stages.pipeline import Pipeline
 from nanorocks_ros.study.bag_frames import BagFrames
+from nanorocks_ros.study.spool import Spool, SpoolFile
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
     from nanorocks_ros.experiment.settings import PipelineSettings
@@ -57,13 +59,13 @@ class TrayResults:
     other recordings can be added: `evidence`, `sticking`.
     """
 
-    speeds: list[SpeedEstimate] = field(default_factory=list)
-    clusters: list[ClusterEstimate] = field(default_factory=list)
-    cors: list[CorEstimate] = field(default_factory=list)
-    rebounds: list[Rebound] = field(default_factory=list)
-    collisions: list[PairCollision] = field(default_factory=list)
-    bodies: list[BodyEstimate] = field(default_factory=list)
-    merges: list[Merge] = field(default_factory=list)
+    speeds: list[SpeedEstimate] | Spool[SpeedEstimate] = field(default_factory=list)
+    clusters: list[ClusterEstimate] | Spool[ClusterEstimate] = field(default_factory=list)
+    cors: list[CorEstimate] | Spool[CorEstimate] = field(default_factory=list)
+    rebounds: list[Rebound] | Spool[Rebound] = field(default_factory=list)
+    collisions: list[PairCollision] | Spool[PairCollision] = field(default_factory=list)
+    bodies: list[BodyEstimate] | Spool[BodyEstimate] = field(default_factory=list)
+    merges: list[Merge] | Spool[Merge] = field(default_factory=list)
     truth: list[GroundTruth] = field(default_factory=list)
     evidence: Evidence | None = None
     sticking: tuple[StickingCycle, ...] = ()
@@ -131,6 +133,7 @@ def analyse(
     *,
     image_topic: str = '',
     progress: Progress | None = None,
+    scratch: Path | None = None,
 ) -> Analysis:
     """Push every frame of a bag through the pipeline.
 
@@ -142,6 +145,8 @@ def analyse(
         Where the bag's camera has another name than the graph's.
     progress : callable, optional
         Called with the frames done and the frames there are.
+    scratch : Path, optional
+        Folder on a disk with room for the records, which are kept in memory otherwise.
 
     Returns
     -------
@@ -166,7 +171,7 @@ def analyse(
     truth = bag.truth(epoch_ns)
     result = Analysis(
         epoch_ns=epoch_ns,
-        trays={n: TrayResults(truth=truth.get(n, [])) for n in settings.trays},
+        trays=_empty(settings.trays, truth, scratch),
         complete=bag.reader.complete,
         metadata=bag.reader.metadata,
     )
@@ -197,6 +202,21 @@ def analyse(
     result.notices[:0] = bag.reader.notices
     result.complete = result.complete and bag.reader.complete
     return result
+
+
+def _empty(
+    trays: Iterable[int], truth: Mapping[int, list[GroundTruth]], scratch: Path | None
+) -> dict[int, TrayResults]:
+    """A place for the records of each tray."""
+    if scratch is None:
+        return {n: TrayResults(truth=truth.get(n, [])) for n in trays}
+    file = SpoolFile(scratch)
+    found = {}
+    for n in trays:
+        found[n] = TrayResults(truth=truth.get(n, []))
+        for name in _LISTS.values():
+            setattr(found[n], name, Spool(file))
+    return found
 
 
 def _remarks(pipeline: Pipeline, where: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Results of many recordings as `nanorocks analyse` writes them, all known; and recordings."""
+"""Results of many recordings as `nanorocks analyse` writes them, made up so that all is known."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import math
 
 import numpy as np
 
-from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.recordings.results import write_csv
-from nanorocks_ros.study.film_bag import film_into_bag
 
 PERIOD, SIZE, PEAK = 60.0, 6e-4, 0.008
 TIMES = np.concatenate((np.linspace(0.1, 3.0, 10), np.linspace(5.0, 59.0, 20)))
@@ -48,15 +46,3 @@ def write_recording(folder, trays, cycles, sizes, *, peaks=None, bodies=False, s
                 names = fields.split()
                 write_csv(folder / f'tray_{number}_{name}.csv', names, ['1'] * len(names), rows)
     return folder
-
-
-def film(path, seed, seconds=7.0):
-    """A bag of tray 1, shaken after 0.3 s."""
-    film_into_bag(
-        path,
-        SimulationSettings(seed=seed, first_shake=0.3),
-        duration=seconds,
-        quality=80,
-        progress=lambda *_: None,
-    )
-    return path

@@ -16,21 +16,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaigns import film  # a short film of tray 1 with one decay
 
+from benchmarks.batch import broken_bags, short_film
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.settings import PipelineSettings, with_values
 from nanorocks_ros.recordings.find_bags import find_bags
-from nanorocks_ros.recordings.messages import time_message
-from nanorocks_ros.recordings.writer import BagWriter
 from nanorocks_ros.study.batch import BagResults, BatchPlan, run_batch
 from nanorocks_ros.study.combined import combined
 from nanorocks_ros.study.offline import analyse
 from nanorocks_ros.study.result_tables import read_columns
-from nanorocks_ros.study.results_bag import offered
 from nanorocks_ros.study.tasks import Workers
-from nanorocks_ros.wire import topics
 
 HOSTILE = '<img src=x onerror=alert(1)>'
 
@@ -60,13 +56,13 @@ class Watcher:
 def films(tmp_path_factory):
     """Two bags with a decay each."""
     folder = tmp_path_factory.mktemp('films')
-    return [film(folder / f'run_{seed}', seed) for seed in (1, 2)]
+    return [short_film(folder / f'run_{seed}', seed, 7.0) for seed in (1, 2)]
 
 
 @pytest.fixture(scope='module')
 def tiny(tmp_path_factory):
     """A bag that is analysed in no time, for what is not about results."""
-    return film(tmp_path_factory.mktemp('tiny') / 'tiny', 3, seconds=0.4)
+    return short_film(tmp_path_factory.mktemp('tiny') / 'tiny', 3, 0.4)
 
 
 def batch_of(folder, *inputs, watcher=None, workers=1, settings=None):
@@ -79,29 +75,13 @@ def batch_of(folder, *inputs, watcher=None, workers=1, settings=None):
     return run_batch(plan, Workers(processes=workers), watcher), watcher
 
 
-def broken_bags(folder, good):
-    """One of each kind; only that cut short can be used in part."""
-    folder.mkdir()
-    (file,) = good.glob('*.mcap')
-    content = file.read_bytes()
-    (folder / 'cut.mcap').write_bytes(content[: len(content) * 3 // 5])
-    (folder / 'empty.mcap').touch()
-    (folder / 'wrong.mcap').write_bytes(b'RIFF' + content[4:])
-    flipped = bytearray(content)
-    for place in range(len(content) // 3, len(content) // 2, 500):
-        flipped[place] ^= 0x10
-    (folder / 'flipped.mcap').write_bytes(flipped)
-    chatter = topics.EPOCH.absolute()
-    with BagWriter(folder / 'no_camera', {chatter: offered(topics.EPOCH)}, metadata={}) as bag:
-        bag.write(chatter, 1, time_message(1))
-    return folder
-
-
 @pytest.fixture(scope='module')
 def done(films, tmp_path_factory):
     """Good bags and broken ones, by the command: its folder, what it prints, its exit code."""
     folder = tmp_path_factory.mktemp('batch')
-    bags = broken_bags(folder / 'bags', film(folder / 'spoilt', 3, seconds=2.0))
+    bags = folder / 'bags'
+    bags.mkdir()
+    broken_bags(bags, short_film(folder / 'spoilt', 3, 2.0))
     for one in films:
         shutil.copytree(one, bags / one.name)
     out, err, results = io.StringIO(), io.StringIO(), folder / 'results'
@@ -115,16 +95,16 @@ def test_bad_bags_are_told_in_the_end_with_their_reasons(done):
     assert code == 1
     assert 'Traceback' not in errors
     failed = {Path(one['bag']).name: one['reason'] for one in found['failed']}
-    assert set(failed) == {'empty.mcap', 'wrong.mcap', 'no_camera'}
+    assert set(failed) == {'empty.mcap', 'wrong_magic.mcap', 'no_camera'}
     assert 'is empty (0 bytes)' in failed['empty.mcap']
-    assert 'is not an MCAP file' in failed['wrong.mcap']
+    assert 'is not an MCAP file' in failed['wrong_magic.mcap']
     assert 'no topic' in failed['no_camera']
     last = errors.strip().splitlines()[-1]
     assert '3 of 7 recordings failed' in last
     assert 'run the same command again' in last
     bags = {Path(one['bag']).name: one for one in found['bags']}
-    assert set(bags) == {'run_1', 'run_2', 'cut.mcap', 'flipped.mcap'}
-    for name in ('cut.mcap', 'flipped.mcap'):
+    assert set(bags) == {'run_1', 'run_2', 'truncated.mcap', 'flipped.mcap'}
+    for name in ('truncated.mcap', 'flipped.mcap'):
         assert not bags[name]['complete']
         assert 0 < bags[name]['frames'] < bags['run_1']['frames']
         assert bags[name]['notices']
