@@ -7,8 +7,10 @@ from importlib import import_module
 
 ALL = (
     'offline',
+    'batch',
     'live',
     'live_plate',
+    'dashboard',
     'preprocess',
     'scene',
     'tracking',

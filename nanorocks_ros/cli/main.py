@@ -27,7 +27,10 @@ def build_parser() -> argparse.ArgumentParser:
         calibrate,
         calibrate_area,
         cluster_curve,
+        dashboard,
+        doctor,
         figure,
+        import_video,
         library,
         look,
         reproduce,
@@ -48,7 +51,10 @@ def build_parser() -> argparse.ArgumentParser:
     calibrate.add_parser(commands)
     calibrate_area.add_parser(commands)
     cluster_curve.add_parser(commands)
+    dashboard.add_parser(commands)
+    doctor.add_parser(commands)
     figure.add_parser(commands)
+    import_video.add_parser(commands)
     library.add_parser(commands)
     look.add_parser(commands)
     reproduce.add_parser(commands)

@@ -78,8 +78,8 @@ class Block:
     ----------
     offset, length : int
         Of the records in the file, [bytes].
-    start_ns : int, [ns]
-        No message in it is earlier.
+    start_ns, end_ns : int, [ns]
+        No message in it is earlier or later.
     channels : frozenset of int, or None
         The channels that have messages in it; None when that is not known.
     indexed_bytes : int
@@ -91,6 +91,7 @@ class Block:
     offset: int
     length: int
     start_ns: int
+    end_ns: int
     channels: frozenset[int] | None
     indexed_bytes: int = 0
     cut: bool = False
@@ -207,8 +208,19 @@ def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMes
         else:
             _gather(raw, catalogue, found, cut=False)
     except UNREADABLE as error:
+        _gather_names(raw, catalogue)
         raise DamagedError(str(error)) from error
     return found
+
+
+def _gather_names(raw: memoryview, catalogue: Catalogue) -> None:
+    """The channels and schemas at the front of a damaged chunk, which others rely on."""
+    try:
+        chunk = Chunk.read(stream_of(raw[RECORD.size :]))
+        for opcode, content in walk(memoryview(_decompressed_so_far(chunk)), cut=True):
+            catalogue.note(opcode, content)
+    except UNREADABLE:
+        return
 
 
 def indexed_messages(content: memoryview) -> int:

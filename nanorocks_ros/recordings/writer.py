@@ -4,26 +4,19 @@ How much a crash can cost: messages reach the file in chunks, compressed one by 
 viewers can seek. The chunk that is open when the process is killed is lost, which is at most
 one second of recorded time or 1 MiB, whichever is less, and the last message; `flush` shortens
 that. A killed recording has neither index nor ``metadata.yaml``; `reader.open_bag` reads it all
-the same. Nothing is forced to the disk: a power cut costs what the system had not yet written.
+the same. Only `sync` forces anything to the disk: otherwise a power cut costs what the system had
+not yet written.
 """
 
 from __future__ import annotations
 
+import os
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import zstandard
-from rosbags.interfaces import (
-    Connection,
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.rosbag2.errors import WriterError
 from rosbags.rosbag2.storage_mcap import McapWriter
@@ -32,52 +25,21 @@ from rosbags.typesys import TypesysError
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.message_types import register, standard_types
+from nanorocks_ros.recordings.qos import OfferedQos
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from types import TracebackType
     from typing import Literal, Self
 
-# What ROS 2 calls an infinite duration.
-_FOREVER = QosTime(9223372036, 854775807)
+    from rosbags.interfaces import Connection
+
+__all__ = ['BagWriter', 'OfferedQos', 'OfferedTopic']
+
 _CHUNK_NS = 1_000_000_000
 # Pictures are compressed already: a higher level takes time and saves nothing.
 _LEVEL = 1
 _UNFIT = (SerdeError, AttributeError, TypeError, ValueError, LookupError, AssertionError)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OfferedQos:
-    """How a topic was, or would be, offered.
-
-    Parameters
-    ----------
-    reliable : bool
-        Else best effort.
-    transient_local : bool
-        A late subscriber still gets the last messages; else volatile.
-    depth : int, >= 1
-        Messages kept.
-    """
-
-    reliable: bool = True
-    transient_local: bool = False
-    depth: int = 10
-
-    def profile(self) -> Qos:
-        """The profile that recordings keep and players offer again."""
-        durability = QosDurability.TRANSIENT_LOCAL if self.transient_local else None
-        return Qos(
-            history=QosHistory.KEEP_LAST,
-            depth=self.depth,
-            reliability=QosReliability.RELIABLE if self.reliable else QosReliability.BEST_EFFORT,
-            durability=durability or QosDurability.VOLATILE,
-            deadline=_FOREVER,
-            lifespan=_FOREVER,
-            liveliness=QosLiveliness.AUTOMATIC,
-            liveliness_lease_duration=_FOREVER,
-            avoid_ros_namespace_conventions=False,
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,6 +96,7 @@ class BagWriter:
         self._metadata = dict(metadata)
         self._store = standard_types()
         self._connections: dict[str, Connection] = {}
+        self._folder_is_safe = False
 
     def __enter__(self) -> Self:
         if self.path.exists():
@@ -142,7 +105,7 @@ class BagWriter:
             self._writer = Writer(self.path, version=9, storage_plugin=StoragePlugin.MCAP)
             self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
             for key, value in self._metadata.items():
-                self._writer.set_custom_data(key, value)
+                self._writer.set_custom_data(key, _encodable(value))
             self._writer.open()
         except WriterError as error:
             raise self._exists() from error
@@ -170,6 +133,10 @@ class BagWriter:
             if error is None:
                 raise self._unwritable(failure) from failure
         return False
+
+    def remark(self, key: str, value: str) -> None:
+        """Add to the provenance what was not known at the start, or replace what was."""
+        self._writer.set_custom_data(key, _encodable(value))
 
     def write(self, topic: str, stamp_ns: int, message: object) -> None:
         """Write a message given as an object.
@@ -226,6 +193,29 @@ class BagWriter:
         except OSError as error:
             raise self._unwritable(error) from error
 
+    def sync(self) -> None:
+        """Hand everything written so far to the disk, so that it survives a power cut.
+
+        Raises
+        ------
+        RecordingError
+            When the disk is full or fails.
+        """
+        self.flush()
+        try:
+            os.fsync(self._storage.bio.fileno())
+            if not self._folder_is_safe:
+                for folder in (self.path, self.path.parent):
+                    _sync_folder(folder)
+                self._folder_is_safe = True
+        except OSError as error:
+            raise self._unwritable(error) from error
+
+    def abandon(self) -> None:
+        """End without an index, after a failure: what reached the file before stays readable."""
+        with suppress(OSError):
+            self._writer.abort()
+
     def _append(self, connection: Connection, stamp_ns: int, cdr: bytes | memoryview) -> None:
         if stamp_ns < 0:
             raise RecordingError(
@@ -281,3 +271,17 @@ class BagWriter:
             f'cannot be written ({error.strerror})',
             'pass another path, or make room there',
         )
+
+
+def _sync_folder(path: Path) -> None:
+    """Make the entries of a folder survive a power cut, not only what stands in its files."""
+    number = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)
+
+
+def _encodable(text: str) -> str:
+    """The text without what UTF-8 cannot hold, as in names of files of another encoding."""
+    return text.encode('utf-8', 'backslashreplace').decode('utf-8')
