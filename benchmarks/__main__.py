@@ -15,6 +15,7 @@ ALL = (
     'scene',
     'tracking',
     'plate_cost',
+    'recorder',
     'speed_trays',
     'speed_accuracy',
     'area_calibration',
