@@ -4,8 +4,8 @@
 same one all along. `dashboard` and the browsers, which all look at the tray with its tracks and
 what moves, are in processes of their own. A browser takes every step and acknowledges it; a slow
 one opens the connection, asks for pictures, and takes nothing. Everything is measured in one run,
-stage after stage; ratios are to the mean of the first and the last stage, which have no page. CPU of
-the pipeline is told per frame, since a machine with other work makes up for late frames later.
+stage after stage; ratios are to the mean of the first and the last stage, which have no page. CPU
+of the pipeline is told per frame, since a machine with other work makes up for late frames later.
 """
 
 from __future__ import annotations
@@ -178,8 +178,8 @@ def _print(stages: dict[str, _Stage]) -> None:
     per_frame = {name: 1e3 * one.cpu / one.frames for name, one in stages.items()}
     alone = 0.5 * (per_frame['no page'] + per_frame['no page again'])
     print(
-        '| stage | frames/s | latency, median [ms] | p99 [ms] | CPU of the pipeline per frame [ms] '
-        '| ratio | CPU of the page [cores] | memory of the page [MB] | steps/s | pictures/s |'
+        '| stage | frames/s | latency, median [ms] | p99 [ms] '
+        '| CPU of the pipeline per frame [ms] | ratio | CPU of the page [cores] | memory of the page [MB] | steps/s | pictures/s |'
     )
     print('|' + ' --- |' * 10)
     for name, one in stages.items():
