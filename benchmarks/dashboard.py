@@ -178,8 +178,8 @@ def _print(stages: dict[str, _Stage]) -> None:
     per_frame = {name: 1e3 * one.cpu / one.frames for name, one in stages.items()}
     alone = 0.5 * (per_frame['no page'] + per_frame['no page again'])
     print(
-        '| stage | frames/s | latency, median [ms] | p99 [ms] '
-        '| CPU of the pipeline per frame [ms] | ratio | CPU of the page [cores] | memory of the page [MB] | steps/s | pictures/s |'
+        '| stage | frames/s | latency, median [ms] | p99 [ms] | CPU of the pipeline per frame '
+        '[ms] | ratio | CPU of the page [cores] | memory of the page [MB] | steps/s | pictures/s |'
     )
     print('|' + ' --- |' * 10)
     for name, one in stages.items():
