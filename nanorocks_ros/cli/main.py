@@ -29,9 +29,11 @@ def build_parser() -> argparse.ArgumentParser:
         cluster_curve,
         figure,
         import_video,
+        info,
         library,
         look,
         reproduce,
+        salvage,
         simulate,
         speeds,
         sweep,
@@ -51,9 +53,11 @@ def build_parser() -> argparse.ArgumentParser:
     cluster_curve.add_parser(commands)
     figure.add_parser(commands)
     import_video.add_parser(commands)
+    info.add_parser(commands)
     library.add_parser(commands)
     look.add_parser(commands)
     reproduce.add_parser(commands)
+    salvage.add_parser(commands)
     simulate.add_parser(commands)
     speeds.add_parser(commands)
     sweep.add_parser(commands)
