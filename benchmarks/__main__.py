@@ -9,6 +9,7 @@ ALL = (
     'offline',
     'live',
     'live_plate',
+    'recordings',
     'preprocess',
     'scene',
     'tracking',

@@ -27,6 +27,12 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         '-o', '--output', help='folder for tables and results bag; default BAG_results'
     )
+    parser.add_argument(
+        '--format',
+        choices=('csv', 'parquet'),
+        default='csv',
+        help='of the tables; parquet needs pyarrow; default csv',
+    )
     parser.add_argument('--no-output', action='store_true', help='write no files')
     parser.set_defaults(run=run)
 
@@ -35,10 +41,11 @@ def run(options: argparse.Namespace) -> int:
     """Analyse the bag, print, write; the exit code."""
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.study.export import as_json, write_results
+    from nanorocks_ros.study.export import as_json, check_format, write_results
     from nanorocks_ros.study.offline import analyse
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
+    check_format(options.format)
     source = Path(options.bag)
     with Progress('analysing') as progress:
         analysis = analyse(
@@ -52,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
         _print(analysis)
     if not options.no_output:
         folder = Path(options.output or f'{str(source).rstrip("/")}_results')
-        write_results(analysis, folder, source, settings)
+        write_results(analysis, folder, source, settings, options.format)
         print(f'nanorocks: results in {folder}', file=sys.stderr)
     if analysis.error is not None:
         raise analysis.error
