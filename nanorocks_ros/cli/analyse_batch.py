@@ -255,8 +255,8 @@ class _Watch:
         left_s = seconds * (1.0 / part - 1.0) if part > 0.0 else math.inf
         when = f'{math.ceil(left_s / 60.0)} min left' if part > 0.0 else 'starting'
         failed = f', {self._failed} failed' if self._failed else ''
-        done = f'{self._done} of {self._all} recordings'
-        return part, f'{done}, {frames / seconds:.0f} frames/s, {when}{failed}'
+        standing = f'{self._done} of {self._all} recordings'
+        return part, f'{standing}, {frames / seconds:.0f} frames/s, {when}{failed}'
 
     def __exit__(self, *_: object) -> None:
         self._over.set()
