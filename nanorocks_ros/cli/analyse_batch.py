@@ -108,7 +108,7 @@ def _end(batch: Batch) -> int:
 def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> dict[str, Any]:
     from nanorocks_ros.study.combined import means_as_json
 
-    shown_keys = 'state', 'frames', 'frames_lost', 'seconds', 'complete', 'notices', 'trays'
+    shown_keys = 'state', 'frames', 'frames_lost', 'seconds', 'complete', 'notices'
     return {
         'bags': [
             {
@@ -116,6 +116,10 @@ def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> di
                 'results': shown(one.folder),
                 'same_as': one.twin or None,
                 **{key: one.summary[key] for key in shown_keys},
+                'trays': {
+                    number: {'cycles': tray['cycles'], 'truth': tray['truth']}
+                    for number, tray in one.summary['trays'].items()
+                },
             }
             for one in batch.results
         ],
