@@ -36,6 +36,8 @@ class Contents:
         What is wrong with the folder.
     complete : bool
         No file is missing.
+    expected : int or None
+        Messages that the recorder counted; None where it does not say.
     """
 
     files: tuple[StorageFile, ...]
@@ -43,6 +45,7 @@ class Contents:
     compressed_messages: bool
     notices: tuple[str, ...]
     complete: bool
+    expected: int | None = None
 
 
 def contents(path: Path) -> Contents:
@@ -66,10 +69,12 @@ def contents(path: Path) -> Contents:
             raise RecordingError(str(path), 'does not exist', f'pass {_KINDS}')
         if path.is_dir():
             return _folder(path)
+        file = _open_file(path)
+        information = _recorder_notes([file])
         return Contents(
-            files=(_open_file(path),),
-            metadata={},
-            compressed_messages=False,
+            files=(file,),
+            metadata=_provenance(information),
+            compressed_messages=_are_messages_compressed(information),
             notices=(),
             complete=True,
         )
@@ -109,15 +114,37 @@ def _folder(path: Path) -> Contents:
         )
     _refuse_compressed_files(path, information)
     files = _open_files(path, names, notices)
-    mode = str(information.get('compression_mode') or '').lower()
-    custom = information.get('custom_data') or {}
+    count = information.get('message_count')
+    information = information or _recorder_notes(files)
     return Contents(
         files=tuple(files),
-        metadata={str(k): str(v) for k, v in custom.items()} if isinstance(custom, dict) else {},
-        compressed_messages=mode == 'message',
+        metadata=_provenance(information),
+        compressed_messages=_are_messages_compressed(information),
         notices=tuple(notices),
         complete=len(files) == len(names),
+        expected=count if isinstance(count, int) else None,
     )
+
+
+def _provenance(information: dict[str, Any]) -> dict[str, str]:
+    custom = information.get('custom_data') or {}
+    return {str(k): str(v) for k, v in custom.items()} if isinstance(custom, dict) else {}
+
+
+def _are_messages_compressed(information: dict[str, Any]) -> bool:
+    return str(information.get('compression_mode') or '').lower() == 'message'
+
+
+def _recorder_notes(files: list[StorageFile]) -> dict[str, Any]:
+    """What the files say themselves, where metadata.yaml says nothing."""
+    for file in files:
+        try:
+            notes = yaml.safe_load(file.recorder_notes)
+        except (yaml.YAMLError, ValueError, RecursionError):
+            continue
+        if isinstance(notes, dict):
+            return notes
+    return {}
 
 
 def _information(path: Path, notices: list[str]) -> dict[str, Any]:
@@ -128,7 +155,7 @@ def _information(path: Path, notices: list[str]) -> dict[str, Any]:
         return dict(information)
     except FileNotFoundError:
         notices.append(f'{path}: has no metadata.yaml, as after a crash; it is read without')
-    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError):
+    except (yaml.YAMLError, KeyError, TypeError, ValueError, RecursionError):
         notices.append(f'{place}: cannot be understood; the bag is read without')
     return {}
 

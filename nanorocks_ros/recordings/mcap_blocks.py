@@ -208,8 +208,19 @@ def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMes
         else:
             _gather(raw, catalogue, found, cut=False)
     except UNREADABLE as error:
+        _gather_names(raw, catalogue)
         raise DamagedError(str(error)) from error
     return found
+
+
+def _gather_names(raw: memoryview, catalogue: Catalogue) -> None:
+    """The channels and schemas at the front of a damaged chunk, which others rely on."""
+    try:
+        chunk = Chunk.read(stream_of(raw[RECORD.size :]))
+        for opcode, content in walk(memoryview(_decompressed_so_far(chunk)), cut=True):
+            catalogue.note(opcode, content)
+    except UNREADABLE:
+        return
 
 
 def indexed_messages(content: memoryview) -> int:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
+import struct
 import zlib
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from mcap.opcode import Opcode
-from mcap.records import ChunkIndex, Footer, Statistics
+from mcap.records import ChunkIndex, Footer, Metadata, MetadataIndex, Statistics
 
 from nanorocks_ros.recordings.mcap_blocks import (
     MAGIC,
@@ -27,11 +29,18 @@ from nanorocks_ros.recordings.mcap_blocks import (
 if TYPE_CHECKING:
     from typing import BinaryIO
 
+_ROSBAG2 = 'rosbag2'
 _FOOTER_BYTES = RECORD.size + 20
 # Messages outside chunks are read in runs of about this many bytes.
 _RUN_BYTES = 1 << 20
 _LAST_OPCODE = 0x0F
 _FIRST_PRIVATE_OPCODE = 0x80
+# Where messages, chunks or indexes of messages begin that are shorter than 4 GB.
+_RECORD_START = re.compile(rb'[\x05\x06\x07][\s\S]{4}\x00{4}')
+_IN_A_ROW = 3
+# Times, size and checksum in the head of a chunk, and the length of the name of its compression.
+_CHUNK_HEAD = struct.Struct('<QQQII')
+_LONGEST_NAME = 16
 # What may stand at the top of a file besides chunks and messages, and is not needed here.
 _END_OF_DATA = (Opcode.DATA_END, Opcode.FOOTER)
 
@@ -54,6 +63,8 @@ class McapIndex:
         The file has the end that it was meant to have.
     bytes_unread : int
         At the end of a file cut short, holding no whole message.
+    metadata_at : list of (int, int)
+        Offset and length of what rosbag2 says of the recording, [bytes].
     """
 
     blocks: list[Block] = field(default_factory=list)
@@ -64,6 +75,7 @@ class McapIndex:
     lost: dict[int, int] = field(default_factory=dict)
     ended: bool = False
     bytes_unread: int = 0
+    metadata_at: list[tuple[int, int]] = field(default_factory=list)
 
     def count(self, messages: list[StoredMessage]) -> None:
         """Take messages into account."""
@@ -117,6 +129,10 @@ def _from_summary(summary: memoryview, size: int) -> McapIndex | None:
     for opcode, content in walk(summary):
         if opcode == Opcode.CHUNK_INDEX:
             index.blocks.append(_block_of(ChunkIndex.read(stream_of(content))))
+        elif opcode == Opcode.METADATA_INDEX:
+            place = MetadataIndex.read(stream_of(content))
+            if place.name == _ROSBAG2:
+                index.metadata_at.append((place.offset, place.length))
         elif opcode == Opcode.STATISTICS:
             statistics = Statistics.read(stream_of(content))
         else:
@@ -136,6 +152,23 @@ def _from_summary(summary: memoryview, size: int) -> McapIndex | None:
         index.start_ns = statistics.message_start_time
         index.end_ns = statistics.message_end_time
     return index
+
+
+def recorder_notes(stream: BinaryIO, index: McapIndex) -> str:
+    """What rosbag2 keeps in a whole file: a copy of its ``metadata.yaml``; empty without one."""
+    size = stream.seek(0, 2)
+    for offset, length in index.metadata_at:
+        if offset + length > size:
+            continue
+        stream.seek(offset)
+        try:
+            for opcode, content in walk(memoryview(stream.read(length))):
+                if opcode == Opcode.METADATA:
+                    notes = Metadata.read(stream_of(content)).metadata
+                    return str(notes.get('serialized_metadata', ''))
+        except UNREADABLE:
+            continue
+    return ''
 
 
 def _block_of(entry: ChunkIndex) -> Block:
@@ -167,7 +200,14 @@ class _Scan:
             opcode, length = RECORD.unpack(self._stream.read(RECORD.size))
             end = position + RECORD.size + length
             if not _plausible(opcode) or end > self._size:
-                break
+                resumed = self._resumed(position, opcode, length)
+                if resumed is None:
+                    break
+                self._end_run()
+                self._damaged = position
+                self.index.lost[position] = 0
+                position = resumed
+                continue
             if opcode in _END_OF_DATA:
                 self._end_run()
                 self.index.ended = self._has_footer()
@@ -176,6 +216,44 @@ class _Scan:
             position = end
         self._end_run()
         self._end_early(min(position, self._size))
+
+    def _resumed(self, position: int, opcode: int, length: int) -> int | None:
+        """Where records go on behind one whose head is damaged; None where none do."""
+        if opcode == Opcode.CHUNK and self._is_cut(position, length):
+            return None
+        window = position + 1
+        while window < self._size:
+            self._stream.seek(window)
+            data = self._stream.read(_RUN_BYTES)
+            for found in _RECORD_START.finditer(data):
+                if self._goes_on(window + found.start()):
+                    return window + found.start()
+            window += max(1, len(data) - RECORD.size)
+        return None
+
+    def _is_cut(self, position: int, length: int) -> bool:
+        """Whether the lengths in a chunk agree: then the file ends in it."""
+        self._stream.seek(position + RECORD.size)
+        head = self._stream.read(_CHUNK_HEAD.size + _LONGEST_NAME)
+        if len(head) < _CHUNK_HEAD.size + _LONGEST_NAME:
+            return True
+        name = int(_CHUNK_HEAD.unpack_from(head)[-1])
+        if name > _LONGEST_NAME - 8:
+            return False
+        (records,) = struct.unpack_from('<Q', head, _CHUNK_HEAD.size + name)
+        return bool(_CHUNK_HEAD.size + name + 8 + records == length)
+
+    def _goes_on(self, position: int) -> bool:
+        """Whether records follow one another from here."""
+        for _ in range(_IN_A_ROW):
+            if position + RECORD.size > self._size:
+                return False
+            self._stream.seek(position)
+            opcode, length = RECORD.unpack(self._stream.read(RECORD.size))
+            position += RECORD.size + length
+            if not 0 < opcode <= _LAST_OPCODE or position > self._size:
+                return False
+        return True
 
     def _has_footer(self) -> bool:
         self._stream.seek(self._size - len(MAGIC))

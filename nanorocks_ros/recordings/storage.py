@@ -69,6 +69,8 @@ class StorageFile(Protocol):
     topics : dict of str to TopicInfo
     start_ns, end_ns : int, [ns]
         Log times of the first and last message; both 0 when there is none.
+    recorder_notes : str
+        A copy of ``metadata.yaml`` that some recorders keep in the file; empty without one.
     complete : bool
         Nothing is known to be missing, so far.
     notices : tuple of str
@@ -81,6 +83,7 @@ class StorageFile(Protocol):
     topics: dict[str, TopicInfo]
     start_ns: int
     end_ns: int
+    recorder_notes: str
 
     @property
     def complete(self) -> bool:

@@ -59,7 +59,7 @@ function take(number, told) {
       rows[name].push(...told[name].rows);
     }
   }
-  trays.set(number, { ...told, rows, heardAt: performance.now() - 1e3 * told.age });
+  trays.set(number, { finals: before?.finals ?? [], ...told, rows, heardAt: performance.now() - 1e3 * told.age });
 }
 
 const silentFor = (tray) => (performance.now() - tray.heardAt) / 1e3;
@@ -86,8 +86,7 @@ function draw() {
 
 function drawTray(tray) {
   const [state, text] = words.trayState(tray, silentFor(tray));
-  const quality = tray.latest.speed?.quality ?? [];
-  const flagged = quality.length ? `, ${quality.map((one) => one.replaceAll('_', ' ')).join(', ')}` : '';
+  const flagged = words.flags(tray.latest).map((one) => `, ${one}`).join('');
   at('title').textContent = `Tray ${chosen}`;
   at('about').textContent = tray.description;
   at('state').dataset.state = flagged && state === 'ok' ? 'warning' : state;
@@ -99,7 +98,7 @@ function drawTray(tray) {
   clusters.draw(tray);
   drawFinals(tray);
   for (const one of document.querySelectorAll('.only-truth')) one.hidden = !tray.latest.truth;
-  sayNow(tray, text);
+  sayNow(tray, text.replace(/ for \d+ s$/, ''));
 }
 
 /** A number with what is to be said of it below; or only that, while there is no number. */

@@ -1,6 +1,6 @@
 // All trays at a glance.
 
-import { interval, known, restitution, saysSomething, speed, trayState } from './words.js';
+import { flags, interval, known, restitution, saysSomething, speed, trayState } from './words.js';
 
 const SVG = 'http://www.w3.org/2000/svg';
 const POINTS = 60;
@@ -44,8 +44,9 @@ export class Cards {
 
   drawOne(one, number, tray, silent) {
     const [state, words, few] = trayState(tray, silent);
-    one.state.dataset.state = state;
-    one.state.textContent = few;
+    const [flag] = flags(tray.latest);
+    one.state.dataset.state = flag && state === 'ok' ? 'warning' : state;
+    one.state.textContent = flag ?? few;
     const cor = tray.latest.cor;
     const now = tray.latest.speed?.mean_projected_speed;
     const last = tray.finals[tray.finals.length - 1];

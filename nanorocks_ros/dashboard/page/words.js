@@ -33,8 +33,12 @@ const COR_STATES = {
 
 export const corState = (cor) => COR_STATES[cor.status] ?? String(cor.status);
 
-/** Whether an estimate says more than that nothing is known. */
-export const saysSomething = (cor) => !!cor && known(cor.restitution) && cor.status !== 'no_decay';
+/** Whether an estimate is one, and not only what is probable before anything is known. */
+export const saysSomething = (cor) => !!cor && known(cor.restitution) && ['cooling', 'final'].includes(cor.status);
+
+/** What is wrong with the pictures of a tray, or with what was made of them. */
+export const flags = ({ speed: now, cor }) =>
+  [...new Set([...(now?.quality ?? []), ...(cor?.quality ?? [])])].map((one) => one.replaceAll('_', ' '));
 
 /** The value of a sticking speed, and what is to be said of it. */
 export function sticking(cluster) {
@@ -68,5 +72,7 @@ export function trayState(tray, silentFor) {
   if (!shaken && !tray.latest.cor) return ['waiting', 'no shaking event yet', 'not shaken yet'];
   const status = tray.latest.cor?.status;
   if (status === 'final') return ['ok', `cycle ${tray.cycle}, over`, 'over'];
-  return ['ok', `cycle ${tray.cycle}, cooling`, 'cooling'];
+  const last = tray.rows.speed[tray.rows.speed.length - 1];
+  const since = shaken && last ? ` for ${Math.floor(last[0] - tray.start)} s` : '';
+  return ['ok', `cycle ${tray.cycle}, cooling${since}`, 'cooling'];
 }
