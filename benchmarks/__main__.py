@@ -11,6 +11,7 @@ ALL = (
     'live',
     'live_plate',
     'dashboard',
+    'recordings',
     'preprocess',
     'scene',
     'tracking',
