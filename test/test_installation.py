@@ -26,6 +26,8 @@ from nanorocks_ros.wire.layouts import layout
 
 print(nanorocks_ros.__file__)
 print(len(load_trays()), layout(CorEstimate).fields[0].name)
+page = resources.files('nanorocks_ros.dashboard').joinpath('page')
+print(*sorted(one.name for one in page.iterdir()))
 """
 
 
@@ -63,7 +65,9 @@ def test_an_executable_runs_the_node_of_its_name(name):
 
 def test_shared_files_are_installed_as_files(monkeypatch):
     share = installed_prefix(monkeypatch) / 'share' / 'nanorocks_ros'
-    sources = [ROOT / 'package.xml', *(ROOT / 'config').iterdir(), *LAUNCH_FILES]
+    sources = [ROOT / 'package.xml', *LAUNCH_FILES]
+    for folder in ('config', 'foxglove', 'rviz', 'plotjuggler'):
+        sources += (ROOT / folder).iterdir()
     for source in sources:
         installed = share / source.relative_to(ROOT)
         assert not installed.is_symlink()
@@ -116,8 +120,10 @@ def test_a_plain_installation_holds_its_package_data(source_copy, tmp_path):
         timeout=300,
     )
     assert result.returncode == 0, result.stderr
-    module, data = result.stdout.splitlines()
+    module, data, page = result.stdout.splitlines()
     assert Path(module).is_relative_to(packages)
     assert data == '8 time'
+    source = ROOT / 'nanorocks_ros' / 'dashboard' / 'page'
+    assert page.split() == sorted(one.name for one in source.iterdir())
     for name in EXECUTABLES:
         assert os.access(tmp_path / 'lib' / 'nanorocks_ros' / name, os.X_OK)

@@ -19,11 +19,20 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from std_msgs.msg import Header
 
 from nanorocks_ros.errors import ConfigurationError, FrameError, NanorocksError
 from nanorocks_ros.experiment.settings import rows, with_values
+from nanorocks_ros.nodes._names import unknown_parameters
 from nanorocks_ros.nodes._now_and_then import NowAndThen
-from nanorocks_ros.nodes._shell import array_message, image_message, message_class, qos_of
+from nanorocks_ros.nodes._shell import (
+    array_message,
+    image_message,
+    message_class,
+    qos_of,
+    time_message,
+)
+from nanorocks_ros.nodes._watch import Watch
 from nanorocks_ros.records import (
     Autocorrelation,
     BodyEstimate,
@@ -70,8 +79,8 @@ _OVERRIDABLE = QoSOverridingOptions(
     )
 )
 _BUILT_AROUND = {'trays', 'trays_file'}
-_PATIENCE_S = 5.0
 _THROTTLE_S = 5.0
+_CONNECTED_S = 0.1
 # Acknowledgements come with heartbeats, every 3 s.
 _FAREWELL_S = 3.5
 
@@ -86,15 +95,19 @@ class NanorocksNode(Node):
         self._events = NowAndThen()
         self._declared = {}
         self._refused = {}
-        self._watched = []
         self.done = False
         self.exit_code = 0
         self.counts = {'received': 0, 'published': 0, 'refused': 0}
         self.busy_s = []
         self.state = {}
+        # Whoever wants to keep what is sent.
+        self.recorder = None
+        # What is wrong, but keeps nothing from going on.
+        self.trouble = ''
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._last_report = (time.monotonic(), 0)
         self.create_timer(1.0, self._report, clock=self.steady_clock)
+        self.watch = Watch(self)
 
     # Parameters
 
@@ -118,6 +131,23 @@ class NanorocksNode(Node):
         checked = with_values(settings, values, f'node {self.get_name()}')
         self._declared.update({prefix + row.name: row for row in rows(settings)})
         return checked
+
+    def refuse_unknown_parameters(self):
+        """Refuse a name that nobody reads, rather than go on without what was meant.
+
+        A file may serve the whole graph: what other nodes read may stand in it.
+
+        Raises
+        ------
+        ConfigurationError
+            With the name that comes nearest.
+        """
+        given = [name for name in self._parameter_overrides if not self.has_parameter(name)]
+        problems = unknown_parameters(given, self._declared)
+        if problems:
+            raise ConfigurationError(
+                f'node {self.get_name()}', '; '.join(problems), 'see docs/parameters.md'
+            )
 
     def _declare_one(self, name, row, read_only):
         # Typed by the default, but 13500 in a YAML file has to do for 13500.0.
@@ -181,13 +211,14 @@ class NanorocksNode(Node):
         """The publisher of a topic, made once."""
         name = topic.of(tray)
         if name not in self._outputs:
-            self._outputs[name] = self.create_publisher(
-                message_class(topic.type),
-                name,
-                qos_of(topic),
-                callback_group=self._events,
-                qos_overriding_options=_OVERRIDABLE,
-            )
+            self.publisher(message_class(topic.type), name, qos_of(topic))
+        return self._outputs[name]
+
+    def publisher(self, kind, name, qos):
+        """Make the publisher of a topic under any name, offered in any way."""
+        self._outputs[name] = self.create_publisher(
+            kind, name, qos, callback_group=self._events, qos_overriding_options=_OVERRIDABLE
+        )
         return self._outputs[name]
 
     def offer(self, offered, tray=0):
@@ -207,6 +238,8 @@ class NanorocksNode(Node):
         """Publish and count."""
         self.output(topic, tray).publish(message)
         self.counts['published'] += 1
+        if self.recorder is not None:
+            self.recorder.result(topic, message, tray)
 
     def publish_result(self, record, epoch_ns):
         """Publish what came out of a stage on the topics it belongs to."""
@@ -236,6 +269,29 @@ class NanorocksNode(Node):
             name = f'tray {record.tray} COR'
             self.state[name] = f'{record.restitution:.4f} {record.status.name.lower()}'
 
+    def tell_what_is_taken(self, inputs):
+        """Offer `camera/taken` once all inputs are connected: then this node can be counted on.
+
+        Parameters
+        ----------
+        inputs : list of rclpy.subscription.Subscription
+        """
+
+        def look():
+            if all(one.get_publisher_count() for one in inputs):
+                timer.cancel()
+                self.offer((topics.TAKEN,))
+
+        timer = self.create_timer(_CONNECTED_S, look, clock=self.steady_clock)
+
+    def taken(self, stamp_ns):
+        """Tell who waits for it that this node is done with a frame."""
+        if topics.TAKEN.name in self._outputs and self.wanted(topics.TAKEN):
+            message = Header(
+                stamp=time_message(stamp_ns), frame_id=self.get_fully_qualified_name()
+            )
+            self.send(topics.TAKEN, message)
+
     def listen(self, topic, callback, tray=0, required=True):
         """Subscribe; say so when nobody publishes, or not with a matching quality of service."""
         subscription = self.create_subscription(
@@ -244,12 +300,12 @@ class NanorocksNode(Node):
             partial(self.timed, callback),
             qos_of(topic),
             event_callbacks=SubscriptionEventCallbacks(
-                incompatible_qos=partial(self._mismatch, topic.of(tray))
+                incompatible_qos=partial(self.watch.mismatch, topic.of(tray))
             ),
             qos_overriding_options=_OVERRIDABLE,
         )
         if required:
-            self._watch(subscription.topic_name)
+            self.watch.expect(subscription.topic_name)
         return subscription
 
     def timed(self, work, message):
@@ -281,39 +337,11 @@ class NanorocksNode(Node):
             self.get_logger().error(text)
         self.state['last refusal'] = text
 
-    def _watch(self, topic_name):
-        self._watched.append(topic_name)
-        timer = self.create_timer(
-            _PATIENCE_S, lambda: self._check_publishers(topic_name, timer), clock=self.steady_clock
-        )
-
-    def _check_publishers(self, topic_name, timer):
-        timer.cancel()
-        if self.count_publishers(topic_name) == 0:
-            self.get_logger().warning(
-                f'{topic_name}: no publisher within {_PATIENCE_S:g} s; start one, remap the '
-                'topic, or check the namespace and ROS_DOMAIN_ID'
-            )
-
-    def _mismatch(self, topic_name, event):
-        policy = QoSPolicyKind(event.last_policy_kind).name.lower()
-        offers = [
-            getattr(info.qos_profile, policy, None)
-            for info in self.get_publishers_info_by_topic(self.resolve_topic_name(topic_name))
-        ]
-        offered = ', '.join(sorted({getattr(one, 'name', str(one)) for one in offers}))
-        mine = self.get_subscriptions_info_by_topic(self.resolve_topic_name(topic_name))
-        asked = ', '.join(sorted({getattr(i.qos_profile, policy).name for i in mine}))
-        self.get_logger().warning(
-            f'{self.resolve_topic_name(topic_name)}: no data, since the publisher offers '
-            f'{policy} {offered} and I ask for {asked}; set '
-            f'qos_overrides.{self.resolve_topic_name(topic_name)}.subscription.{policy}'
-        )
-
     # Diagnostics
 
     def _report(self):
         self._events.open()
+        self.watch.look()
         now = time.monotonic()
         since, received = self._last_report
         rate = (self.counts['received'] - received) / max(now - since, 1e-9)
@@ -326,10 +354,12 @@ class NanorocksNode(Node):
             'processing, longest [ms]': f'{1e3 * max(busy):.2f}' if busy else '',
             **self.state,
         }
-        missing = [name for name in self._watched if self.count_publishers(name) == 0]
+        missing = self.watch.missing()
         level, text = DiagnosticStatus.OK, 'working'
         if missing:
             level, text = DiagnosticStatus.WARN, f'no publisher on {", ".join(missing)}'
+        if self.trouble:
+            level, text = DiagnosticStatus.WARN, self.trouble
         if self.counts['refused']:
             level, text = DiagnosticStatus.ERROR, self.state['last refusal']
         status = DiagnosticStatus(level=level, name=self.get_fully_qualified_name(), message=text)

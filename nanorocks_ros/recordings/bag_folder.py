@@ -16,10 +16,10 @@ from nanorocks_ros.recordings.sqlite_file import SqliteFile
 from nanorocks_ros.recordings.storage import StorageFile
 
 _KINDS = 'a rosbag2 folder or an .mcap file'
-_ROS1_MAGIC = b'#ROSBAG V'
+ROS1_MAGIC = b'#ROSBAG V'
+STORAGE_SUFFIXES = frozenset({'.mcap', '.db3'})
 # Ten times as fast where PyYAML was built with it.
 _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-_STORAGE_SUFFIXES = frozenset({'.mcap', '.db3'})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +93,7 @@ def _open_file(path: Path) -> StorageFile:
         raise RecordingError(
             str(path), 'is empty (0 bytes)', 'record it again or pass another bag'
         )
-    if start.startswith(_ROS1_MAGIC):
+    if start.startswith(ROS1_MAGIC):
         raise RecordingError(
             str(path),
             'is a ROS 1 bag',
@@ -168,7 +168,7 @@ def _names(path: Path, information: dict[str, Any]) -> list[str]:
     names = [PurePath(str(name)).name for name in listed] if isinstance(listed, list) else []
     if any((path / name).is_file() for name in names):
         return names
-    found = (p.name for p in path.iterdir() if p.suffix in _STORAGE_SUFFIXES and p.is_file())
+    found = (p.name for p in path.iterdir() if p.suffix in STORAGE_SUFFIXES and p.is_file())
     return sorted(found, key=natural)
 
 
