@@ -51,7 +51,7 @@ def add_parser(commands: Any) -> None:
         '--format',
         choices=('csv', 'parquet'),
         default='csv',
-        help='of the tables (with many bags, of those of all cycles); parquet needs pyarrow; default csv',
+        help='of the tables (of many bags: of those of all cycles); default csv',
     )
     parser.add_argument('--no-output', action='store_true', help='write no files')
     add_options(parser)
