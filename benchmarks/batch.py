@@ -44,7 +44,7 @@ _BAGS, _LOOPS, _ROUNDS = 8, 1, 2
 # Lengths of which memory is compared, in films.
 _SHORT, _LONG = 3, 30
 _PLATE_SECONDS = 5.0
-_CAMPAIGN, _FILMS = 178, 4
+_CAMPAIGN, _FILMS, _SHORT_SECONDS = 178, 4, 3.5
 
 
 class _Quiet:
@@ -190,7 +190,7 @@ def broken_bags(folder: Path, film: Path) -> None:
 
 def _campaign(folder: Path) -> None:
     bags = folder / 'bags'
-    films = [short_film(folder / f'film_{k}', k, 6.0) for k in range(_FILMS)]
+    films = [short_film(folder / f'film_{k}', k, _SHORT_SECONDS) for k in range(_FILMS)]
     for number in range(_CAMPAIGN - 5):
         shutil.copytree(films[number % _FILMS], bags / f'run_{number}')
     broken_bags(bags, films[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from pathlib import Path
@@ -31,16 +32,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group('many recordings')
     group.add_argument('--workers', type=int, help='processes; default: one for each core')
     group.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
-    group.add_argument(
-        '--format', choices=('csv', 'parquet'), help='of the tables of all cycles; default csv'
-    )
 
 
 def is_batch(options: argparse.Namespace) -> bool:
     """Whether many recordings are meant."""
     from nanorocks_ros.recordings.find_bags import is_collection, is_pattern
 
-    asked = options.workers, options.scheduler, options.format
+    asked = options.workers, options.scheduler
     if len(options.bags) > 1 or any(one is not None for one in asked):
         return True
     return is_pattern(options.bags[0]) or is_collection(Path(options.bags[0]))
@@ -59,9 +57,8 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
             '--output', 'is where results of many recordings are kept', 'pass -o RESULTS'
         )
     workers = Workers(processes=options.workers, scheduler=options.scheduler)
-    kind = options.format or 'csv'
     folder = Path(options.output)
-    check_format(folder, kind)
+    check_format(folder, options.format)
     found = find_bags(options.bags)
     for text in found.left_out:
         _notice(f'{shown(text)}; left out')
@@ -81,7 +78,7 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
     together = combined(batch.counted, settings)
     for text in together.notices:
         _notice(text)
-    report = write_batch(folder, batch, together, settings, kind)
+    report = write_batch(folder, batch, together, settings, options.format)
     if options.json:
         print(json.dumps(_as_json(batch, together, folder, report), allow_nan=False))
     else:
@@ -107,7 +104,7 @@ def _end(batch: Batch) -> int:
 def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> dict[str, Any]:
     from nanorocks_ros.study.combined import means_as_json
 
-    shown_keys = 'state', 'frames', 'frames_lost', 'seconds', 'complete', 'notices', 'trays'
+    shown_keys = 'state', 'frames', 'frames_lost', 'seconds', 'complete', 'notices'
     return {
         'bags': [
             {
@@ -115,6 +112,10 @@ def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> di
                 'results': shown(one.folder),
                 'same_as': one.twin or None,
                 **{key: one.summary[key] for key in shown_keys},
+                'trays': {
+                    number: {'cycles': tray['cycles'], 'truth': tray['truth']}
+                    for number, tray in one.summary['trays'].items()
+                },
             }
             for one in batch.results
         ],
@@ -210,7 +211,7 @@ class _Watch:
             total=1.0,
             disable=None,
             leave=False,
-            bar_format='{desc} |{bar}| {postfix}',
+            bar_format='{desc} |{bar}|',
         )
         self._watcher = Thread(target=self._watch, daemon=True)
         self._watcher.start()
@@ -237,13 +238,11 @@ class _Watch:
         last = time.monotonic()
         while not self._over.wait(_LOOK):
             part, text = self._standing()
-            self._bar.set_description_str(f'{self._done} of {self._all} recordings', refresh=False)
-            self._bar.set_postfix_str(text, refresh=False)
-            self._bar.update(part - self._bar.n)
-            self._bar.refresh()
+            self._bar.n = part
+            self._bar.set_description_str(text)
             if self._bar.disable and time.monotonic() - last >= _LINE:
                 last = time.monotonic()
-                _notice(f'{self._done} of {self._all} recordings, {text}')
+                _notice(text)
 
     def _standing(self) -> tuple[float, str]:
         frames, left = self._frames, dict(self._left)
@@ -253,9 +252,11 @@ class _Watch:
                 left[name] = round(left[name] * (1.0 - done / max(total, done, 1)))
         part = 1.0 - sum(left.values()) / max(self._bytes, 1)
         seconds = time.monotonic() - self._start
+        left_s = seconds * (1.0 / part - 1.0) if part > 0.0 else math.inf
+        when = f'{math.ceil(left_s / 60.0)} min left' if part > 0.0 else 'starting'
         failed = f', {self._failed} failed' if self._failed else ''
-        minutes = f'{seconds * (1.0 / part - 1.0) / 60.0:.0f}' if part > 0.0 else '?'
-        return part, f'{frames / seconds:.0f} frames/s, {minutes} min left{failed}'
+        standing = f'{self._done} of {self._all} recordings'
+        return part, f'{standing}, {frames / seconds:.0f} frames/s, {when}{failed}'
 
     def __exit__(self, *_: object) -> None:
         self._over.set()

@@ -17,7 +17,7 @@ from concurrent.futures import (
 )
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing, contextmanager
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from nanorocks_ros.errors import NanorocksError
 
@@ -129,38 +129,64 @@ def finished_apart(
     ------
     key, result
     """
-    waiting = deque(tasks.items())
-    busy: dict[Future[Result], tuple[str, ExitStack, ProcessPoolExecutor]] = {}
     with ExitStack() as everything:
+        lanes = _Lanes(function, tasks, everything)
+        for _ in range(min(processes, len(tasks))):
+            lanes.open()
+        while lanes.busy:
+            for future in wait(lanes.busy, return_when=FIRST_COMPLETED).done:
+                yield lanes.collect(future, lost)
 
-        def hand_over(lane: ExitStack, pool: ProcessPoolExecutor) -> None:
-            key, argument = waiting.popleft()
+
+class _Lanes(Generic[Argument, Result]):
+    """Pools of one worker each: when one breaks, it is known over what."""
+
+    def __init__(
+        self,
+        function: Callable[[Argument], Result],
+        tasks: Mapping[str, Argument],
+        everything: ExitStack,
+    ) -> None:
+        self._function = function
+        self._waiting = deque(tasks.items())
+        self._everything = everything
+        self.busy: dict[Future[Result], tuple[str, ExitStack, ProcessPoolExecutor]] = {}
+
+    def open(self) -> None:
+        """Start a worker on the next task, if there is one."""
+        if self._waiting:
+            lane = self._everything.enter_context(ExitStack())
+            self._hand_over(lane, lane.enter_context(_pool(1)))
+
+    def _hand_over(self, lane: ExitStack, pool: ProcessPoolExecutor) -> None:
+        key, argument = self._waiting[0]
+        try:
             with _born_quiet():
-                busy[pool.submit(_work, function, argument)] = key, lane, pool
+                future = pool.submit(_work, self._function, argument)
+        except BrokenProcessPool:
+            # Killed with nothing in hand: nobody's fault.
+            lane.close()
+            self.open()
+            return
+        self._waiting.popleft()
+        self.busy[future] = key, lane, pool
 
-        def new_lane() -> None:
-            # A pool of one worker: when it breaks, it is known over what.
-            lane = everything.enter_context(ExitStack())
-            hand_over(lane, lane.enter_context(_pool(1)))
-
-        for _ in range(min(processes, len(waiting))):
-            new_lane()
-        while busy:
-            for future in wait(busy, return_when=FIRST_COMPLETED).done:
-                key, lane, pool = busy.pop(future)
-                try:
-                    result = future.result()
-                except BrokenProcessPool:
-                    lane.close()
-                    if waiting:
-                        new_lane()
-                    result = lost(key, _DIED)
-                else:
-                    if waiting:
-                        hand_over(lane, pool)
-                    else:
-                        lane.close()
-                yield key, result
+    def collect(
+        self, future: Future[Result], lost: Callable[[str, str], Result]
+    ) -> tuple[str, Result]:
+        """What came of a task; its worker takes the next, or another one does."""
+        key, lane, pool = self.busy.pop(future)
+        try:
+            result = future.result()
+        except BrokenProcessPool:
+            lane.close()
+            self.open()
+            return key, lost(key, _DIED)
+        if self._waiting:
+            self._hand_over(lane, pool)
+        else:
+            lane.close()
+        return key, result
 
 
 @contextmanager
