@@ -47,6 +47,12 @@ def add_parser(commands: Any) -> None:
         '--output',
         help='folder for tables and results bag; default BAG_results, needed for many bags',
     )
+    parser.add_argument(
+        '--format',
+        choices=('csv', 'parquet'),
+        default='csv',
+        help='of the tables (of many bags: of those of all cycles); default csv',
+    )
     parser.add_argument('--no-output', action='store_true', help='write no files')
     add_options(parser)
     parser.set_defaults(run=run)
@@ -65,9 +71,10 @@ def run(options: argparse.Namespace) -> int:
 
 def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.study.export import as_json, write_results
+    from nanorocks_ros.study.export import as_json, check_format, write_results
     from nanorocks_ros.study.offline import analyse
 
+    check_format(options.format)
     source = Path(options.bags[0])
     with Progress('analysing') as progress:
         analysis = analyse(
@@ -81,7 +88,7 @@ def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
         _print(analysis)
     if not options.no_output:
         folder = Path(options.output or f'{str(source).rstrip("/")}_results')
-        write_results(analysis, folder, source, settings)
+        write_results(analysis, folder, source, settings, options.format)
         print(f'nanorocks: results in {folder}', file=sys.stderr)
     if analysis.error is not None:
         raise analysis.error

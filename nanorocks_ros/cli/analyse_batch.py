@@ -32,16 +32,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group('many recordings')
     group.add_argument('--workers', type=int, help='processes; default: one for each core')
     group.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
-    group.add_argument(
-        '--format', choices=('csv', 'parquet'), help='of the tables of all cycles; default csv'
-    )
 
 
 def is_batch(options: argparse.Namespace) -> bool:
     """Whether many recordings are meant."""
     from nanorocks_ros.recordings.find_bags import is_collection, is_pattern
 
-    asked = options.workers, options.scheduler, options.format
+    asked = options.workers, options.scheduler
     if len(options.bags) > 1 or any(one is not None for one in asked):
         return True
     return is_pattern(options.bags[0]) or is_collection(Path(options.bags[0]))
@@ -60,9 +57,8 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
             '--output', 'is where results of many recordings are kept', 'pass -o RESULTS'
         )
     workers = Workers(processes=options.workers, scheduler=options.scheduler)
-    kind = options.format or 'csv'
     folder = Path(options.output)
-    check_format(folder, kind)
+    check_format(folder, options.format)
     found = find_bags(options.bags)
     for text in found.left_out:
         _notice(f'{shown(text)}; left out')
@@ -82,7 +78,7 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
     together = combined(batch.counted, settings)
     for text in together.notices:
         _notice(text)
-    report = write_batch(folder, batch, together, settings, kind)
+    report = write_batch(folder, batch, together, settings, options.format)
     if options.json:
         print(json.dumps(_as_json(batch, together, folder, report), allow_nan=False))
     else:

@@ -31,9 +31,11 @@ def build_parser() -> argparse.ArgumentParser:
         doctor,
         figure,
         import_video,
+        info,
         library,
         look,
         reproduce,
+        salvage,
         simulate,
         speeds,
         sweep,
@@ -55,9 +57,11 @@ def build_parser() -> argparse.ArgumentParser:
     doctor.add_parser(commands)
     figure.add_parser(commands)
     import_video.add_parser(commands)
+    info.add_parser(commands)
     library.add_parser(commands)
     look.add_parser(commands)
     reproduce.add_parser(commands)
+    salvage.add_parser(commands)
     simulate.add_parser(commands)
     speeds.add_parser(commands)
     sweep.add_parser(commands)

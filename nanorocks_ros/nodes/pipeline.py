@@ -93,7 +93,7 @@ class PipelineNode(NanorocksNode):
         # A camera that others publish has one publisher, theirs.
         if self._source != 'topic':
             self.offer((topics.RAW,))
-            self.alone_on(topics.RAW.name)
+            self.watch.alone_on(topics.RAW.name)
         for tray in self._settings.trays:
             self.offer(RESULT_TOPICS, tray)
 

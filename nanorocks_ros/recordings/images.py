@@ -111,6 +111,12 @@ def frame_from_compressed(message: Any, where: str) -> Frame:
     image = _decoded(data) if whole else None
     if image is None:
         what = 'cannot be decoded' if whole else 'ends too early'
+        if picture_kind(message) in _FILMS:
+            raise FrameError(
+                where,
+                f"holds '{picture_kind(message)}', a film whose pictures need each other",
+                'record JPEG or PNG, or write a video of it and run nanorocks import',
+            )
         raise FrameError(
             where,
             f"the picture at {stamp_ns} ns ({data.size} bytes, format '{message.format}') {what}",
@@ -166,3 +172,33 @@ def decoded_gray(content: bytes) -> NDArray[np.uint8]:
     """The brightness of a compressed picture, (height, width); empty when it is none."""
     image = _decoded(_bytes_of(content), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
     return np.empty((0, 0), dtype=np.uint8) if image is None else image
+
+
+_FILMS = frozenset({'h264', 'h265', 'hevc', 'vp9', 'av1'})
+_STARTS = {
+    _JPEG_START: 'jpeg',
+    b'\x89PNG': 'png',
+    b'BM': 'bmp',
+    b'RIFF': 'webp',
+    b'II*\x00': 'tiff',
+    b'MM\x00*': 'tiff',
+    # Units of H.264 and H.265 follow a start code; the first is told by what it holds.
+    b'\x00\x00\x00\x01': 'h264',
+    b'\x00\x00\x01': 'h264',
+}
+
+
+def picture_kind(message: Any) -> str:
+    """How a camera message holds its picture: ``jpeg``, ``h264``, ``bgr8``.
+
+    Parameters
+    ----------
+    message : sensor_msgs/Image or sensor_msgs/CompressedImage
+    """
+    if not hasattr(message, 'format'):
+        return str(message.encoding)
+    start = _bytes_of(message.data)[:4].tobytes()
+    for mark, kind in _STARTS.items():
+        if start.startswith(mark):
+            return kind
+    return str(message.format)

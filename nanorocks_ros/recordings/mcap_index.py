@@ -20,6 +20,7 @@ from nanorocks_ros.recordings.mcap_blocks import (
     Catalogue,
     DamagedError,
     StoredMessage,
+    gather_names,
     indexed_messages,
     load,
     stream_of,
@@ -35,8 +36,10 @@ _FOOTER_BYTES = RECORD.size + 20
 _RUN_BYTES = 1 << 20
 _LAST_OPCODE = 0x0F
 _FIRST_PRIVATE_OPCODE = 0x80
-# Where messages, chunks or indexes of messages begin that are shorter than 4 GB.
-_RECORD_START = re.compile(rb'[\x05\x06\x07][\s\S]{4}\x00{4}')
+# Where chunks and indexes of messages begin that are shorter than 4 GB; messages only in files
+# that have them outside of chunks: inside, compression may have put bytes of its own into them.
+_CHUNK_START = re.compile(rb'[\x06\x07][\s\S]{4}\x00{4}')
+_MESSAGE_START = re.compile(rb'[\x05\x06\x07][\s\S]{4}\x00{4}')
 _IN_A_ROW = 3
 # Times, size and checksum in the head of a chunk, and the length of the name of its compression.
 _CHUNK_HEAD = struct.Struct('<QQQII')
@@ -191,6 +194,10 @@ class _Scan:
         self._size = size
         self._run: tuple[int, int] | None = None
         self._damaged: int | None = None
+        # Messages read that the indexes behind them have not counted yet.
+        self._uncounted = 0
+        # Messages were met outside of chunks.
+        self._loose = False
         self.index = McapIndex()
 
     def go(self) -> None:
@@ -206,6 +213,7 @@ class _Scan:
                 self._end_run()
                 self._damaged = position
                 self.index.lost[position] = 0
+                gather_names(self._stream, position, resumed, self.index.catalogue)
                 position = resumed
                 continue
             if opcode in _END_OF_DATA:
@@ -221,11 +229,12 @@ class _Scan:
         """Where records go on behind one whose head is damaged; None where none do."""
         if opcode == Opcode.CHUNK and self._is_cut(position, length):
             return None
+        starts = _MESSAGE_START if self._loose and opcode != Opcode.CHUNK else _CHUNK_START
         window = position + 1
         while window < self._size:
             self._stream.seek(window)
             data = self._stream.read(_RUN_BYTES)
-            for found in _RECORD_START.finditer(data):
+            for found in starts.finditer(data):
                 if self._goes_on(window + found.start()):
                     return window + found.start()
             window += max(1, len(data) - RECORD.size)
@@ -263,7 +272,7 @@ class _Scan:
         if opcode == Opcode.MESSAGE_INDEX:
             self._count_lost(position, end)
             return
-        self._damaged = None
+        self._loose = self._loose or opcode == Opcode.MESSAGE
         if opcode in (Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL):
             start = self._run[0] if self._run else position
             self._run = (start, end)
@@ -287,9 +296,11 @@ class _Scan:
             messages = load(self._stream, place, self.index.catalogue)
         except DamagedError:
             if not cut:
-                self._damaged = start
+                self._damaged, self._uncounted = start, 0
                 self.index.lost[start] = 0
             return
+        self._uncounted = len(messages)
+        self._damaged = None
         if not messages:
             return
         self.index.count(messages)
@@ -309,9 +320,11 @@ class _Scan:
         self._stream.seek(position + RECORD.size)
         content = memoryview(self._stream.read(end - position - RECORD.size))
         try:
-            self.index.lost[self._damaged] += indexed_messages(content)
+            count = indexed_messages(content)
         except UNREADABLE:
             return
+        self.index.lost[self._damaged] += max(0, count - self._uncounted)
+        self._uncounted = max(0, self._uncounted - count)
 
     def _end_early(self, position: int) -> None:
         self.index.bytes_unread = self._size - position

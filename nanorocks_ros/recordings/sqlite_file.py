@@ -29,7 +29,7 @@ _ROWS = (
 )
 _ONE = 'SELECT data FROM messages WHERE id = ?'
 # Rows of a damaged file that are asked for together, and how often there may be none.
-_BATCH, _MISSES = 256, 64
+_BATCH, _MISSES = 256, 8
 
 
 class SqliteFile:

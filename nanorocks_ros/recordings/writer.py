@@ -39,6 +39,8 @@ __all__ = ['BagWriter', 'OfferedQos', 'OfferedTopic']
 _CHUNK_NS = 1_000_000_000
 # Pictures are compressed already: a higher level takes time and saves nothing.
 _LEVEL = 1
+# Of a type whose definition is not understood.
+_UNKNOWN_DIGEST = f'RIHS01_{"0" * 64}'
 _UNFIT = (SerdeError, AttributeError, TypeError, ValueError, LookupError, AssertionError)
 
 
@@ -55,12 +57,18 @@ class OfferedTopic:
         Text of the message definition, for types that are not part of ROS 2 Jazzy.
     definition_format : str
         ``ros2msg`` or ``ros2idl``.
+    encoding : str
+        Of its messages.
+    verbatim : bool
+        The definition is kept as it is, understood or not: for copies.
     """
 
     msgtype: str
     qos: OfferedQos
     definition: str = ''
     definition_format: str = 'ros2msg'
+    encoding: str = 'cdr'
+    verbatim: bool = False
 
 
 class BagWriter:
@@ -247,6 +255,8 @@ class BagWriter:
 
     def _new_connection(self, topic: str, offered: OfferedTopic) -> Connection:
         kind, text = offered.msgtype, offered.definition
+        if offered.verbatim:
+            return self._copied_connection(topic, offered)
         try:
             if text:
                 register(self._store, kind, text, offered.definition_format)
@@ -259,6 +269,21 @@ class BagWriter:
                 f"type '{kind}' is not part of ROS 2 Jazzy and has no usable definition",
                 'give its definition',
             ) from error
+
+    def _copied_connection(self, topic: str, offered: OfferedTopic) -> Connection:
+        """As it was recorded; only a definition that is missing is looked up."""
+        kind, text, digest = offered.msgtype, offered.definition, _UNKNOWN_DIGEST
+        if kind in self._store.fielddefs:
+            digest = self._store.hash_rihs01(kind)
+            text = text or self._store.generate_msgdef(kind, ros_version=2)[0]
+        return self._writer.add_connection(
+            topic,
+            kind,
+            msgdef=text,
+            rihs01=digest,
+            serialization_format=offered.encoding,
+            offered_qos_profiles=[offered.qos.profile()],
+        )
 
     def _exists(self) -> RecordingError:
         return RecordingError(

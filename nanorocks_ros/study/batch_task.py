@@ -158,7 +158,7 @@ def _analysed(task: BagTask) -> BagOutcome:
         write_whole(folder / SUMMARY, json.dumps(summary, allow_nan=False).encode())
 
     try:
-        write_results(analysis, task.folder, task.path, task.settings, more)
+        write_results(analysis, task.folder, task.path, task.settings, more=more)
     except RecordingError as error:
         return BagOutcome(state=UNWRITTEN, reason=shown(str(error)))
     return replace(_outcome(summary, files), frames=analysis.frames)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import heapq
 import itertools
+import json
 import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
@@ -16,6 +19,7 @@ from nanorocks_ros.recordings.messages import float_array_message, time_message
 from nanorocks_ros.recordings.results import RESULTS_MARK, write_csv
 from nanorocks_ros.recordings.writer import BagWriter
 from nanorocks_ros.records import ClusterEstimate, CorEstimate, CorStatus
+from nanorocks_ros.study.parquet import Column, check_parquet, write_parquet
 from nanorocks_ros.study.results_bag import offered
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import NS, ArrayRecord, layout, to_array
@@ -201,14 +205,30 @@ def _truth_as_json(
     }
 
 
+FORMATS = ('csv', 'parquet')
+"""Forms of the tables of results; the first unless another is asked for."""
+
+
+def check_format(form: str) -> None:
+    """Refuse a form of tables that nothing here can write, before the work.
+
+    Raises
+    ------
+    ConfigurationError
+        When pyarrow, which writes Parquet, is not installed.
+    """
+    check_parquet(Path(f'--format.{form}'))
+
+
 def write_results(
     analysis: Analysis,
     folder: Path,
     source: Path,
     settings: PipelineSettings,
+    form: str = FORMATS[0],
     more: Callable[[Path], None] | None = None,
 ) -> None:
-    """CSV tables and a results bag in a folder of their own, complete or not at all.
+    """Tables and a results bag in a folder of their own, complete or not at all.
 
     Earlier results in the same folder are replaced, once the new ones are complete.
 
@@ -219,11 +239,15 @@ def write_results(
     source : Path
         The bag that was analysed, for the provenance.
     settings : PipelineSettings
+    form : str
+        Of the tables, one of `FORMATS`.
     more : callable, optional
         Called with the folder when the rest is in it, to add to it.
 
     Raises
     ------
+    ConfigurationError
+        When pyarrow, which writes Parquet, is not installed.
     RecordingError
         When the folder cannot be written, or holds something else.
     """
@@ -237,9 +261,13 @@ def write_results(
             fresh = Path(scratch) / 'fresh'
             fresh.mkdir()
             (fresh / RESULTS_MARK).touch()
+            provenance = _provenance(source, settings)
             for number, results in analysis.trays.items():
-                _write_tables(analysis, results, fresh, number)
-            _write_bag(analysis, fresh / BAG_NAME, _provenance(source, settings))
+                for name, records in _tables(results).items():
+                    if records:
+                        path = fresh / f'tray_{number}_{name}.{form}'
+                        _write_table(path, records, analysis.epoch_ns, provenance)
+            _write_bag(analysis, fresh / BAG_NAME, provenance)
             if more is not None:
                 more(fresh)
             if folder.exists():
@@ -251,8 +279,8 @@ def write_results(
         ) from error
 
 
-def _write_tables(analysis: Analysis, results: TrayResults, folder: Path, number: int) -> None:
-    tables: dict[str, Sequence[ArrayRecord]] = {
+def _tables(results: TrayResults) -> dict[str, Sequence[ArrayRecord]]:
+    return {
         'speed': results.speeds,
         'cluster': results.clusters,
         'cor': results.cors,
@@ -261,16 +289,24 @@ def _write_tables(analysis: Analysis, results: TrayResults, folder: Path, number
         'bodies': results.bodies,
         'merge': results.merges,
     }
-    for name, records in tables.items():
-        if not records:
-            continue
-        fields = layout(type(records[0])).fields
-        write_csv(
-            folder / f'tray_{number}_{name}.csv',
-            [field.name for field in fields],
-            [field.unit for field in fields],
-            (to_array(one, analysis.epoch_ns).tolist() for one in records),
-        )
+
+
+def _write_table(
+    path: Path, records: Sequence[ArrayRecord], epoch_ns: int, provenance: dict[str, str]
+) -> None:
+    fields = layout(type(records[0])).fields
+    values = (to_array(one, epoch_ns) for one in records)
+    if path.suffix == '.csv':
+        names, units = zip(*((field.name, field.unit) for field in fields), strict=True)
+        write_csv(path, names, units, (row.tolist() for row in values))
+        return
+    table = np.array([np.asarray(row, dtype=np.float64) for row in values])
+    write_parquet(
+        path,
+        [Column(name=field.name, kind='f8', unit=field.unit) for field in fields],
+        [{field.name: table[:, place] for place, field in enumerate(fields)}],
+        json.dumps(provenance),
+    )
 
 
 def _provenance(source: Path, settings: PipelineSettings) -> dict[str, str]:

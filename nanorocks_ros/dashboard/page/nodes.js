@@ -10,6 +10,7 @@ const RATES = [
   ['rate [1/s]', (value) => `${value} messages/s`],
   ['processing, mean [ms]', (value) => `${value} ms each`],
   ['refused', (value) => (value === '0' ? '' : `${value} refused`)],
+  ['picture, since the camera took it [ms]', (value) => `pictures ${value} ms old`],
   [WAITING, (value) => `${value} frames waiting`],
 ];
 
