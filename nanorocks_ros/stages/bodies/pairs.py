@@ -124,7 +124,8 @@ class Pairs:
         added = _new_rows(time, beads, keys[fresh], first[fresh], second[fresh])
         rows = np.concatenate([kept, added])
         self._rows = rows[np.argsort(rows['key'], kind='stable')]
-        return self._bonds(time, largest), [_ids(one) for one in rows['key'][self._fall(time)]]
+        bonds = self._bonds(time, largest)
+        return bonds, [_ids(one) for one in self._rows['key'][self._fall(time)]]
 
     def pending(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Pairs that may yet turn out to be bodies, (n, 2), and the chance that free beads do so.
