@@ -21,7 +21,10 @@ _TOLERANCE = 3.0
 # Jitter alone makes it this part of that.
 _LEAST_RANGE = 0.25
 # Of a body that is known, before it is called broken, and for how long, [s].
-_BROKEN, _BROKEN_TIME = 2.0, 0.3
+_BROKEN, _BROKEN_TIME = 2.0, 0.7
+# A track that jumps to a neighbour in its cluster moves on with it: so long, [s], without leaving
+# the range of a body, no further than so many sums of radii.
+_STEADY, _STEADY_REACH = 0.3, 2.0
 # Over which places are smoothed, and the separation of a body follows a slow turn, [s].
 _SMOOTH, _FOLLOW = 0.1, 2.0
 # No body is younger, [s].
@@ -179,6 +182,8 @@ class Pairs:
         now['speed'][again] = usual[again]
         away = np.abs(now['smooth'] - now['offset']).max(axis=1)
         stays = away < _BROKEN * now['tolerance']
+        near = np.hypot(*apart.T) < _STEADY_REACH * (beads.radii[i] + beads.radii[j])
+        stays |= _settled(now, stays, apart, time) & near
         now['stayed'][stays] = time
         now['offset'] += np.where(
             stays[:, None], (apart - now['offset']) * -np.expm1(-step / _FOLLOW)[:, None], 0.0
@@ -290,6 +295,33 @@ def _restart(
     rows['way'][which] = 0.0
     rows['start'][which] = time
     rows['stayed'][which] = time
+
+
+def _settled(
+    rows: NDArray[np.void],
+    stays: NDArray[np.bool_],
+    apart: NDArray[np.float64],
+    time: float,
+) -> NDArray[np.bool_]:
+    """Bodies whose beads are apart as they were not before, and stay so: a track has jumped."""
+    _begin(rows, rows['bonded'] & stays, rows['smooth'], time)
+    moved = (rows['high'] - rows['low'] > 2.0 * rows['tolerance'][:, None]).any(axis=1)
+    _begin(rows, rows['bonded'] & moved, apart, time)
+    settled = rows['bonded'] & ~stays & (time - rows['start'] >= _STEADY)
+    rows['offset'][settled] = rows['smooth'][settled]
+    return np.asarray(settled)
+
+
+def _begin(
+    rows: NDArray[np.void],
+    which: NDArray[np.bool_],
+    apart: NDArray[np.float64],
+    time: float,
+) -> None:
+    """Follow how far a separation goes from now on."""
+    for name in ('smooth', 'low', 'high'):
+        rows[name][which] = apart[which]
+    rows['start'][which] = time
 
 
 def _parts(keys: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
