@@ -16,6 +16,7 @@ from nanorocks_ros.inference.persistence import (
 )
 from nanorocks_ros.records import BodyEstimate, Merge
 from nanorocks_ros.stages.bodies.births import Births
+from nanorocks_ros.stages.bodies.clinging import Clinging
 from nanorocks_ros.stages.bodies.ghosts import Ghosts
 from nanorocks_ros.stages.bodies.pairs import Beads, Bond, Pairs
 from nanorocks_ros.stages.bodies.sizes import bodies_of, size_fields
@@ -47,13 +48,14 @@ _ENERGY_SHARE = 0.2
 
 
 class _Picture(NamedTuple):
-    """One of the last pictures: beads seen, and all that are known to be there."""
+    """One of the last pictures: beads seen, all that are known to be there, who clings to whom."""
 
     time: float
     stamp_ns: int
     ids: NDArray[np.int64]
     places: NDArray[np.float64]
     known: frozenset[int]
+    clinging: tuple[tuple[int, int], ...]
 
 
 class BodyCounter:
@@ -86,6 +88,7 @@ class BodyCounter:
         self._births.next_cycle()
         self._pairs.clear()
         self._ghosts = Ghosts()
+        self._clinging = Clinging()
         self._bonds: dict[tuple[int, int], Bond] = {}
         self._doubted: list[Bond] = []
         self._first_merge: int | None = None
@@ -218,7 +221,9 @@ class BodyCounter:
 
     def _keep(self, time: float, tracks: Tracks, beads: Beads, ids: NDArray[np.int64]) -> None:
         known = frozenset(ids.tolist()) | self._ghosts.hidden
-        picture = _Picture(time, tracks.stamp_ns, beads.ids, beads.places, known)
+        members = {one for pair in self._bonds for one in pair}
+        clinging = self._clinging.push(tracks, ids, members)
+        picture = _Picture(time, tracks.stamp_ns, beads.ids, beads.places, known, clinging)
         self._pictures.append(picture)
         while time - self._pictures[0].time > _LOOK_BACK:
             self._pictures.popleft()
@@ -240,7 +245,7 @@ class BodyCounter:
 
     def _merge(self, bond: Bond, known_ns: int) -> Merge:
         start = self._since(bond)
-        joined = bodies_of(bond.ids, self._bonds)
+        joined = bodies_of(bond.ids, [*self._bonds, *self._pictures[-1].clinging])
         self._bonds[bond.ids] = bond._replace(start=start)
         stamp_ns = self._first_ns + round(start * _NS)
         if self._first_merge is None or stamp_ns < self._first_merge:
@@ -282,7 +287,7 @@ class BodyCounter:
 
     def _count(self, picture: _Picture) -> BodyEstimate:
         bonds = [ids for ids, one in self._bonds.items() if one.start <= picture.time]
-        body = bodies_of(picture.known, bonds)
+        body = bodies_of(picture.known, [*bonds, *picture.clinging])
         sizes = Counter(body.values())
         first = self._first_merge
         return BodyEstimate(
