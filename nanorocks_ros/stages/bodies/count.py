@@ -17,6 +17,7 @@ from nanorocks_ros.inference.persistence import (
 from nanorocks_ros.records import BodyEstimate, Merge
 from nanorocks_ros.stages.bodies.births import Births
 from nanorocks_ros.stages.bodies.clinging import Clinging
+from nanorocks_ros.stages.bodies.companions import Companions
 from nanorocks_ros.stages.bodies.ghosts import Ghosts
 from nanorocks_ros.stages.bodies.pairs import Beads, Bond, Pairs
 from nanorocks_ros.stages.bodies.sizes import bodies_of, size_fields
@@ -89,6 +90,7 @@ class BodyCounter:
         self._pairs.clear()
         self._ghosts = Ghosts()
         self._clinging = Clinging()
+        self._companions = Companions(partial(chance, rate=self._rate))
         self._bonds: dict[tuple[int, int], Bond] = {}
         self._doubted: list[Bond] = []
         self._first_merge: int | None = None
@@ -126,11 +128,28 @@ class BodyCounter:
         bonds, broken = self._pairs.push(time, beads, self._allowed())
         for ids_of in broken:
             self._bonds.pop(ids_of, None)
+        bonds += self._as_one(time, tracks, beads)
         due = self._due(tracks.stamp_ns)
         if self._unclear():
             return found
         merges = [self._merge(bond, tracks.stamp_ns) for bond in self._believed(bonds)]
         return (*found, *merges, *due)
+
+    def _as_one(self, time: float, tracks: Tracks, beads: Beads) -> list[Bond]:
+        """Bodies that move as one. Of two single beads only their own separation tells."""
+        if self._first_merge is None:
+            return []
+        picture = self._pictures[-1]
+        body = bodies_of(picture.known, [*self._bonds, *picture.clinging])
+        sizes = Counter(body.values())
+        # All bodies have the same energy on average, and each bead its share of the whole.
+        mean = len(body) / len(sizes)
+        own = np.array([sizes[body[one]] for one in beads.ids.tolist()])
+        free = beads._replace(variances=self._usual * mean / own)
+        hidden = beads.ids.size < self._tray.count
+        bonds = self._companions.push(time, free, body, hidden, self._allowed())
+        self._pairs.adopt(time, beads, bonds)
+        return bonds
 
     def _believed(self, bonds: list[Bond]) -> list[Bond]:
         """Those that are two beads: one of a pair that appeared over the other may be the same.
@@ -163,6 +182,7 @@ class BodyCounter:
         self._learn(tracks)
         seen = np.flatnonzero(tracks.seen)
         seen = seen[np.argsort(ids[seen], kind='stable')]
+        self._usual = (self._energies[tracks.species] / _masses(tracks))[seen]
         return Beads(
             ids=ids[seen],
             places=tracks.positions[seen],

@@ -24,7 +24,7 @@ _LEAST_RANGE = 0.25
 _BROKEN, _BROKEN_TIME = 2.0, 0.7
 # A track that jumps to a neighbour in its cluster moves on with it: so long, [s], without leaving
 # the range of a body, no further than so many sums of radii.
-_STEADY, _STEADY_REACH = 0.3, 2.0
+_STEADY, _STEADY_REACH = 0.3, 2.5
 # Over which places are smoothed, and the separation of a body follows a slow turn, [s].
 _SMOOTH, _FOLLOW = 0.1, 2.0
 # No body is younger, [s].
@@ -129,6 +129,22 @@ class Pairs:
         self._rows = rows[np.argsort(rows['key'], kind='stable')]
         bonds = self._bonds(time, largest)
         return bonds, [_ids(one) for one in self._rows['key'][self._fall(time)]]
+
+    def adopt(self, time: float, beads: Beads, bonds: list[Bond]) -> None:
+        """Follow pairs that are bodies for other reasons, until they come apart."""
+        if not bonds:
+            return
+        keys = np.array([one.ids[0] << _SHIFT | one.ids[1] for one in bonds], dtype=np.int64)
+        where = [np.searchsorted(beads.ids, part) for part in _parts(keys)]
+        fresh = ~np.isin(keys, self._rows['key'])
+        first, second = (one[fresh] for one in where)
+        added = _new_rows(time, beads, keys[fresh], first, second)
+        rows = np.concatenate([self._rows, added])
+        self._rows = rows[np.argsort(rows['key'], kind='stable')]
+        own = np.isin(self._rows['key'], keys)
+        self._rows['bonded'] |= own
+        self._rows['stayed'][own] = time
+        self._rows['offset'][own] = self._rows['smooth'][own]
 
     def pending(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Pairs that may yet turn out to be bodies, (n, 2), and the chance that free beads do so.
