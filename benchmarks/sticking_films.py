@@ -2,8 +2,8 @@
 
 Plates of eight cells, four like tray 1 and four like tray 3 or 5, JPEG 85, 26 s after a shaking
 event at 10 mm/s, restitutions 0.89 and 0.97; sizes are by tracks. In a sticking film each of the
-four has its own sticking speed; in a control nothing sticks. Films are kept as those of
-`cor_films` are.
+four has its own sticking speed; in a control nothing sticks. Tracks are kept as the films of
+`cor_films` are, and bodies counted in them anew.
 """
 
 from __future__ import annotations
@@ -28,19 +28,22 @@ from nanorocks_ros.inference.sticking import StickingCycle, sticking_cycle, stic
 from nanorocks_ros.physics.paper_clusters import paper_onset
 from nanorocks_ros.physics.sticking import slow_contacts
 from nanorocks_ros.records import (
+    BodyEstimate,
     ClusterEstimate,
     Frame,
     Merge,
     SpeedEstimate,
+    Tracks,
     TrayImage,
 )
 from nanorocks_ros.simulation.scene.film import SceneFilm
+from nanorocks_ros.stages.bodies.count import BodyCounter
 from nanorocks_ros.stages.pipeline import TrayStages
 from nanorocks_ros.stages.preprocess import Preprocessor
 from nanorocks_ros.study.tasks import Workers, run_tasks
 
 _STICKING = (1e-3, 3e-3, 5e-3, 10.4e-3)
-_FILMS, _CONTROLS = 6, 4
+_FILMS, _CONTROLS = 6, 7
 _SECONDS, _SHAKE = 26.5, 0.5
 _RATE, _SCALE, _QUALITY = 30.0, 12500.0, 85
 _NS = 1e9
@@ -52,22 +55,27 @@ class Filmed:
 
     Parameters
     ----------
-    tray : int
-        Whose beads and sides they were.
+    like : int
+        The tray whose beads and sides they were.
+    cell : Tray
+        The same under the number of the cell.
     sticking : float, [m/s]
-    clusters : tuple of ClusterEstimate
+    tracks : tuple of (int, Tracks)
+        With the number of the cycle.
     speeds : tuple of SpeedEstimate
-    merges : tuple of Merge
+    areas : ndarray (n, 2)
+        Times, [s], and level areas of the autocorrelation.
     time : ndarray (n,), [s]
     bodies, weighted_size : ndarray (n,)
         True.
     """
 
-    tray: int
+    like: int
+    cell: Tray
     sticking: float
-    clusters: tuple[ClusterEstimate, ...]
+    tracks: tuple[tuple[int, Tracks], ...]
     speeds: tuple[SpeedEstimate, ...]
-    merges: tuple[Merge, ...]
+    areas: np.ndarray
     time: np.ndarray
     bodies: np.ndarray
     weighted_size: np.ndarray
@@ -79,14 +87,32 @@ class Filmed:
         return float(self.time[fallen[0]]) if fallen.size else math.nan
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Counted:
+    """One cell and the bodies that were counted in it.
+
+    Parameters
+    ----------
+    film : Filmed
+        Without its tracks.
+    counts : tuple of BodyEstimate
+    merges : tuple of Merge
+    """
+
+    film: Filmed
+    counts: tuple[BodyEstimate, ...]
+    merges: tuple[Merge, ...]
+
+
 def report() -> None:
     """Print the tables."""
-    films = {f'sticking_{k}.pickle': (k, True) for k in range(_FILMS)}
-    films |= {f'control_{k}.pickle': (k, False) for k in range(_CONTROLS)}
+    films = {_name(k, sticks=True): (k, True) for k in range(_FILMS)}
+    films |= {_name(k, sticks=False): (k, False) for k in range(_CONTROLS)}
     missing = {name: one for name, one in films.items() if not (folder() / name).exists()}
     run_tasks(_make, missing, Workers())
-    cells = [one for name in films for one in pickle.loads((folder() / name).read_bytes())]
-    _report_controls([one for one in cells if one.sticking == 0.0])
+    counted = run_tasks(_counted, {name: name for name in films}, Workers())
+    cells = [one for film in counted for one in film]
+    _report_controls([one for one in cells if one.film.sticking == 0.0])
     print(
         '\n| tray, sticking speed | cells | error of bodies: mean (rms) | of size: mean (rms) '
         '| first merge found later by: mean (largest) [s] | paper: onset [s], true '
@@ -95,20 +121,41 @@ def report() -> None:
     print('| --- ' * 9 + '|')
     for tray in (1, 3, 5):
         for speed in _STICKING:
-            own = [one for one in cells if (one.tray, one.sticking) == (tray, speed)]
+            own = [one for one in cells if (one.film.like, one.film.sticking) == (tray, speed)]
             if own:
                 print(_row(tray, speed, own), flush=True)
 
 
-def _report_controls(cells: list[Filmed]) -> None:
+def _name(number: int, *, sticks: bool) -> str:
+    return f'{"sticking" if sticks else "control"}_tracks_{number}.pickle'
+
+
+def _counted(name: str) -> list[Counted]:
+    """The bodies in the tracks of a film."""
+    found = []
+    for film in pickle.loads((folder() / name).read_bytes()):
+        counter = BodyCounter(PipelineSettings(), film.cell)
+        records = [one for cycle, tracks in film.tracks for one in counter.push(tracks, cycle)]
+        own = [one for one in (*records, *counter.flush()) if one.cycle == 1]
+        found.append(
+            Counted(
+                film=replace(film, tracks=()),
+                counts=tuple(one for one in own if isinstance(one, BodyEstimate)),
+                merges=tuple(one for one in own if isinstance(one, Merge)),
+            )
+        )
+    return found
+
+
+def _report_controls(cells: list[Counted]) -> None:
     print(
         '| tray | controls | with a merge | paper: onset found in | at [s] |\n'
         + '| --- ' * 5
         + '|'
     )
     for tray in (1, 3, 5):
-        own = [one for one in cells if one.tray == tray]
-        onsets = np.array([_paper_onset(one) for one in own])
+        own = [one for one in cells if one.film.like == tray]
+        onsets = np.array([_paper_onset(one.film) for one in own])
         print(
             f'| {tray} | {len(own)} | {sum(bool(one.merges) for one in own)} '
             f'| {np.isfinite(onsets).sum()} | {np.nanmedian(onsets):.1f} |'
@@ -116,18 +163,18 @@ def _report_controls(cells: list[Filmed]) -> None:
 
 
 def _paper_onset(one: Filmed) -> float:
-    times = np.array([each.stamp_ns / _NS for each in one.clusters])
-    areas = np.array([each.level_area for each in one.clusters])
-    return paper_onset(times, areas, _SHAKE) - _SHAKE
+    return paper_onset(*one.areas.T, _SHAKE) - _SHAKE
 
 
-def _row(tray: int, speed: float, cells: list[Filmed]) -> str:
+def _row(tray: int, speed: float, cells: list[Counted]) -> str:
     bodies, sizes = (np.concatenate(part) for part in zip(*map(_errors, cells), strict=True))
     late = [
-        min(each.stamp_ns for each in one.merges) / _NS - one.first for one in cells if one.merges
+        min(each.stamp_ns for each in one.merges) / _NS - one.film.first
+        for one in cells
+        if one.merges
     ]
-    onset = np.nanmean([_paper_onset(one) for one in cells])
-    true = np.nanmean([one.first - _SHAKE for one in cells])
+    onset = np.nanmean([_paper_onset(one.film) for one in cells])
+    true = np.nanmean([one.film.first - _SHAKE for one in cells])
     beads = load_trays()[tray].count
     contacts = slow_contacts(load_trays()[tray])
     cycles = [_cycle(one, beads) for one in cells]
@@ -146,18 +193,19 @@ def _row(tray: int, speed: float, cells: list[Filmed]) -> str:
     )
 
 
-def _errors(one: Filmed) -> tuple[np.ndarray, np.ndarray]:
+def _errors(one: Counted) -> tuple[np.ndarray, np.ndarray]:
     """Of the number of bodies, and of the size over the true one, where they are told."""
-    known = [each for each in one.clusters if each.cycle == 1 and math.isfinite(each.bodies)]
+    known = [each for each in one.counts if math.isfinite(each.bodies)]
+    film = one.film
     times = np.array([each.stamp_ns / _NS for each in known])
-    at = np.searchsorted(one.time, times - 0.5 / _RATE)
-    bodies = np.array([each.bodies for each in known]) - one.bodies[at]
-    size = np.array([each.weighted_size for each in known]) / one.weighted_size[at] - 1.0
+    at = np.searchsorted(film.time, times - 0.5 / _RATE)
+    bodies = np.array([each.bodies for each in known]) - film.bodies[at]
+    size = np.array([each.weighted_size for each in known]) / film.weighted_size[at] - 1.0
     return bodies, size
 
 
-def _cycle(one: Filmed, beads: int) -> StickingCycle:
-    speeds = [each for each in one.speeds if each.cycle == 1]
+def _cycle(one: Counted, beads: int) -> StickingCycle:
+    speeds = [each for each in one.film.speeds if each.cycle == 1]
     return sticking_cycle(
         beads,
         one.merges,
@@ -193,10 +241,10 @@ def _make(task: tuple[int, bool]) -> None:
     }
     found = _film(cells, gases)
     kept = [
-        Filmed(tray=like[cell], sticking=gases[cell].sticking_speed, **values)
+        Filmed(like=like[cell], cell=cells[cell], sticking=gases[cell].sticking_speed, **values)
         for cell, values in found.items()
     ]
-    path = folder() / f'{"sticking" if sticks else "control"}_{number}.pickle'
+    path = folder() / _name(number, sticks=sticks)
     unfinished = path.with_suffix('.part')
     unfinished.write_bytes(pickle.dumps(kept))
     unfinished.replace(path)
@@ -214,6 +262,9 @@ def _film(cells: dict[int, Tray], gases: dict[int, SimulationSettings]) -> dict[
     settings = with_values(PipelineSettings(), names, 'benchmark')
     stage = Preprocessor(settings, cells, 'film', View(camera=scene.camera.geometry.camera))
     stages = {cell: TrayStages(settings, tray) for cell, tray in cells.items()}
+    for each in stages.values():
+        each.speed.emit_tracks = True
+    tracks: dict[int, list[tuple[int, Tracks]]] = {cell: [] for cell in cells}
     records: dict[int, list] = {cell: [] for cell in cells}
     truth: dict[int, list[tuple[float, float, float]]] = {cell: [] for cell in cells}
     for moment in scene.moments(round(_SECONDS * _RATE)):
@@ -227,17 +278,22 @@ def _film(cells: dict[int, Tray], gases: dict[int, SimulationSettings]) -> dict[
         frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
         for record in stage.push(frame):
             if isinstance(record, TrayImage):
-                records[record.tray] += stages[record.tray].push(record)
-    found = {}
+                found = stages[record.tray].push(record)
+                followed = [one for one in found if isinstance(one, Tracks)]
+                tracks[record.tray] += [(record.cycle or 0, one) for one in followed]
+                wanted = (ClusterEstimate, SpeedEstimate)
+                records[record.tray] += [one for one in found if isinstance(one, wanted)]
+    kept = {}
     for cell, tray in stages.items():
         own = [*records[cell], *tray.flush()]
         time, bodies, weighted = np.array(truth[cell]).T
-        found[cell] = {
-            'clusters': tuple(one for one in own if isinstance(one, ClusterEstimate)),
+        clusters = [one for one in own if isinstance(one, ClusterEstimate)]
+        kept[cell] = {
+            'tracks': tuple(tracks[cell]),
             'speeds': tuple(one for one in own if isinstance(one, SpeedEstimate)),
-            'merges': tuple(one for one in own if isinstance(one, Merge) and one.cycle == 1),
+            'areas': np.array([(one.stamp_ns / _NS, one.level_area) for one in clusters]),
             'time': time,
             'bodies': bodies,
             'weighted_size': weighted,
         }
-    return found
+    return kept

@@ -101,14 +101,15 @@ class Companions:
             members.setdefault(body[one], []).append(row)
         self._rows = self._kept(body, nearest)
         bonds = []
-        for pair, (first, second) in nearest.items():
+        for pair, (near, other) in nearest.items():
             row = self._rows.get(pair)
             if row is None:
                 self._rows[pair] = _begun(time, beads, members, pair)
-            elif self._follows(row, time, beads, members, pair):
-                if self._is_one(row, time, largest):
-                    del self._rows[pair]
-                    bonds.append(_bond(row, beads, first, second))
+                continue
+            stays = self._follows(row, time, beads, members, pair)
+            if stays and self._is_one(row, time, largest):
+                del self._rows[pair]
+                bonds.append(_bond(row, beads, near, other))
         return bonds
 
     def _kept(

@@ -36,6 +36,8 @@ _LOOK_BACK = 10.0
 # before the first.
 _BELIEVED = 0.1
 _UNSEEN_MERGES = 0.5
+# Bodies that touch nowhere in sight are believed to be one when that is so much less by chance.
+_SURER = 0.3
 # So many beads make the surroundings of one; they are not taken for colder than this, against
 # the gas, since beads that stick together move alike.
 _NEIGHBOURS = 12
@@ -93,6 +95,7 @@ class BodyCounter:
         self._companions = Companions(partial(chance, rate=self._rate))
         self._bonds: dict[tuple[int, int], Bond] = {}
         self._doubted: list[Bond] = []
+        self._joins = 0
         self._first_merge: int | None = None
         self._pictures: deque[_Picture] = deque()
         self._waiting: deque[_Picture] = deque()
@@ -147,7 +150,7 @@ class BodyCounter:
         own = np.array([sizes[body[one]] for one in beads.ids.tolist()])
         free = beads._replace(variances=self._usual * mean / own)
         hidden = beads.ids.size < self._tray.count
-        bonds = self._companions.push(time, free, body, hidden, self._allowed())
+        bonds = self._companions.push(time, free, body, hidden, _SURER * self._allowed())
         self._pairs.adopt(time, beads, bonds)
         return bonds
 
@@ -265,8 +268,9 @@ class BodyCounter:
 
     def _merge(self, bond: Bond, known_ns: int) -> Merge:
         start = self._since(bond)
-        joined = bodies_of(bond.ids, [*self._bonds, *self._pictures[-1].clinging])
         self._bonds[bond.ids] = bond._replace(start=start)
+        fewer = self._free() < self._tray.count - self._joins
+        self._joins += fewer
         stamp_ns = self._first_ns + round(start * _NS)
         if self._first_merge is None or stamp_ns < self._first_merge:
             self._first_merge = stamp_ns
@@ -276,8 +280,14 @@ class BodyCounter:
             tray=self._tray.number,
             cycle=self._cycle,
             tracks=np.array(bond.ids, dtype=np.int32),
-            joins=joined[bond.ids[0]] != joined[bond.ids[1]],
+            joins=fewer,
         )
+
+    def _free(self) -> int:
+        """Bodies now, at most: beads that nobody knows of are free."""
+        picture = self._pictures[-1]
+        body = bodies_of(picture.known, [*self._bonds, *picture.clinging])
+        return len(set(body.values())) + max(self._tray.count - len(body), 0)
 
     def _since(self, bond: Bond) -> float:
         """Since when the separation has been what it is now: a jump in a track is no beginning."""
