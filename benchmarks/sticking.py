@@ -177,10 +177,10 @@ def _cycle(one: Course, beads: int, merges: list[Merge]) -> StickingCycle:
     return sticking_cycle(beads, merges, stamps, one.speeds[1:], 0)
 
 
-def _true_merges(one: Course) -> list[Merge]:
-    """As if all had been found."""
-    fallen = -np.diff(one.bodies, prepend=one.counts[0].beads)
-    stamps = np.rint(np.repeat(one.times, fallen.astype(np.int64)) * _NS).astype(np.int64)
+def true_merges(times: np.ndarray, bodies: np.ndarray, beads: int) -> list[Merge]:
+    """As if all had been found: of the times and numbers of bodies, (n,)."""
+    fallen = -np.diff(bodies, prepend=beads)
+    stamps = np.rint(np.repeat(times, fallen.astype(np.int64)) * _NS).astype(np.int64)
     fields = {'tray': 0, 'cycle': 1, 'tracks': np.zeros(2, dtype=np.int32), 'joins': True}
     return [Merge(stamp_ns=int(at), known_ns=int(at), **fields) for at in stamps]
 
@@ -190,7 +190,9 @@ def threshold_row(number: int, speed: float, cycles: list[Course], measure: str)
     tray = load_trays()[number]
     contacts = slow_contacts(tray)
     given = [_cycle(one, tray.count, one.merges) for one in cycles]
-    true = [_cycle(one, tray.count, _true_merges(one)) for one in cycles]
+    true = [
+        _cycle(one, tray.count, true_merges(one.times, one.bodies, tray.count)) for one in cycles
+    ]
     each = [sticking_estimate([one], contacts, tray.count, measure=measure) for one in given]
     ratios = np.array([one.sticking_speed for one in each]) / speed
     covered = sum(one.lower <= speed <= one.upper for one in each)

@@ -97,8 +97,8 @@ class Companions:
         self._next = time + _INTERVAL
         nearest = _neighbours(beads, body, hidden)
         members: dict[int, list[int]] = {}
-        for row, one in enumerate(beads.ids.tolist()):
-            members.setdefault(body[one], []).append(row)
+        for place, one in enumerate(beads.ids.tolist()):
+            members.setdefault(body[one], []).append(place)
         self._rows = self._kept(body, nearest)
         bonds = []
         for pair, (near, other) in nearest.items():
