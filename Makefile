@@ -44,11 +44,14 @@ test: venv ## Run all tests, then those of the core with the oldest dependencies
 	@$(RUN) python -m pytest $(ALONE) $(PYTEST_ARGS)
 	@$(MAKE) test-oldest
 
-# Published values are compared once: the engine is the same, bit by bit, with all dependencies.
+# What takes minutes and only goes through, once more, what other tests go through. The engine is the
+# same, bit by bit, with all dependencies: published values and the reference are compared once.
+ONCE := test/validation test/simulation/reference test/simulation/engine \
+        test/study/test_reproduce.py test/cli/test_figure_cor.py test/dashboard/test_page.py
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 PATH="$(CURDIR)/$(OLDEST)/bin:$$PATH" python -m pytest \
-	    $(SIDE_BY_SIDE) --ignore=test/validation $(PYTEST_ARGS)
+	    $(SIDE_BY_SIDE) $(patsubst %,--ignore=%,$(ONCE)) $(PYTEST_ARGS)
 
 lint: venv ## Check style, format, types and which module may import which
 	@$(RUN) ruff check .
@@ -61,6 +64,7 @@ bench: venv ## Measure against the limits and against peers
 
 docs: venv ## Renew the pages of docs/ that are made from the code
 	@$(RUN) python -m nanorocks_ros.study.reference
+	@$(RUN) python -m nanorocks_ros.nodes.reference
 
 venv: ## Set up the environment that all of these use
 	@case '$(ROS_DISTRO)' in ''|jazzy) ;; *) \

@@ -6,7 +6,7 @@ from os.path import isfile
 from setuptools import Distribution, setup
 
 PACKAGE = 'nanorocks_ros'
-SHARED_FOLDERS = ('config', 'launch', 'foxglove')
+SHARED_FOLDERS = ('config', 'launch', 'foxglove', 'rviz', 'plotjuggler')
 
 
 def files(pattern):

@@ -44,3 +44,7 @@ class FitError(NanorocksError):
 
 class SimulationError(NanorocksError):
     """A gas that cannot be prepared or followed."""
+
+
+class DashboardError(NanorocksError):
+    """A live page that cannot be served: its address, its port."""

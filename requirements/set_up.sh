@@ -106,8 +106,7 @@ if [ "$(stored dependencies)" != "$wanted" ]; then
 fi
 
 # The code itself runs from the source tree; copied are the metadata and what goes to lib/ and share/.
-installed='setup.py setup.cfg pyproject.toml package.xml nanorocks_ros/__init__.py resource scripts launch config'
-[ ! -d foxglove ] || installed="$installed foxglove"
+installed='setup.py setup.cfg pyproject.toml package.xml nanorocks_ros/__init__.py resource scripts launch config foxglove rviz plotjuggler'
 # shellcheck disable=SC2086  # a list of words
 wanted=$(find $installed ! -type d | LC_ALL=C sort | xargs cksum)
 if [ "$(stored package)" != "$wanted" ] || [ ! -d "$folder/lib/nanorocks_ros" ]; then

@@ -1,5 +1,6 @@
 """What several tests need."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -7,6 +8,18 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 NOT_PACKAGED = ('.*', '__pycache__', '*.egg-info', 'build', 'install', 'log', 'dist')
+
+_BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
+# No word to anybody but us.
+_SWITCHES = (
+    '--no-sandbox',
+    '--disable-gpu',
+    '--disable-quic',
+    '--no-first-run',
+    '--disable-background-networking',
+    '--disable-component-update',
+    '--disable-sync',
+)
 
 
 @pytest.fixture(scope='session')
@@ -22,3 +35,50 @@ def source_copy(tmp_path_factory):
     unneeded = shutil.ignore_patterns(*NOT_PACKAGED, 'bags', 'benchmarks', 'docs', 'test')
     shutil.copytree(ROOT, copy, symlinks=True, ignore=unneeded)
     return copy
+
+
+@pytest.fixture(scope='module')
+def browser():
+    """A real browser without a window."""
+    path = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    if path is None:
+        remedy = 'no browser: apt-get install -y --no-install-recommends chromium'
+        if os.environ.get('CI') == 'true':
+            pytest.fail(remedy)
+        pytest.skip(remedy)
+    playwright = pytest.importorskip('playwright.sync_api')
+    with playwright.sync_playwright() as driver:
+        one = driver.chromium.launch(executable_path=path, args=list(_SWITCHES))
+        yield one
+        one.close()
+
+
+@pytest.fixture
+def look(browser):
+    """Open pages; whatever one complains of fails the test."""
+    contexts, complaints = [], []
+
+    def open_page(url, **options):
+        context = browser.new_context(**{'viewport': {'width': 1440, 'height': 900}, **options})
+        contexts.append(context)
+        page = context.new_page()
+        page.on('pageerror', lambda error: complaints.append(str(error)))
+        page.on(
+            'console',
+            lambda said: (
+                said.type == 'error'
+                # What the browser says of a server that is gone, or lets nobody in.
+                and 'Failed to load resource' not in said.text
+                and 'WebSocket connection' not in said.text
+                and complaints.append(said.text)
+            ),
+        )
+        page.on('dialog', lambda dialog: complaints.append(f'dialog: {dialog.message}'))
+        page.set_default_timeout(10_000)
+        page.goto(url)
+        return page
+
+    yield open_page
+    for one in contexts:
+        one.close()
+    assert complaints == []

@@ -63,7 +63,9 @@ def test_an_executable_runs_the_node_of_its_name(name):
 
 def test_shared_files_are_installed_as_files(monkeypatch):
     share = installed_prefix(monkeypatch) / 'share' / 'nanorocks_ros'
-    sources = [ROOT / 'package.xml', *(ROOT / 'config').iterdir(), *LAUNCH_FILES]
+    sources = [ROOT / 'package.xml', *LAUNCH_FILES]
+    for folder in ('config', 'foxglove', 'rviz', 'plotjuggler'):
+        sources += (ROOT / folder).iterdir()
     for source in sources:
         installed = share / source.relative_to(ROOT)
         assert not installed.is_symlink()

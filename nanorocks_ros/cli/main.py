@@ -27,6 +27,8 @@ def build_parser() -> argparse.ArgumentParser:
         calibrate,
         calibrate_area,
         cluster_curve,
+        dashboard,
+        doctor,
         figure,
         library,
         look,
@@ -48,6 +50,8 @@ def build_parser() -> argparse.ArgumentParser:
     calibrate.add_parser(commands)
     calibrate_area.add_parser(commands)
     cluster_curve.add_parser(commands)
+    dashboard.add_parser(commands)
+    doctor.add_parser(commands)
     figure.add_parser(commands)
     library.add_parser(commands)
     look.add_parser(commands)

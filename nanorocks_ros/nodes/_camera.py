@@ -9,7 +9,7 @@ from sensor_msgs.msg import CameraInfo
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.nodes._shell import qos_of
-from nanorocks_ros.recordings.images import frame_from_compressed, frame_from_image
+from nanorocks_ros.recordings.images import frame_from_compressed, frame_from_image, stamp_ns_of
 from nanorocks_ros.recordings.lens import info_from_message, view_from_message
 from nanorocks_ros.wire import topics
 
@@ -25,10 +25,15 @@ class Camera:
     node : NanorocksNode
     settings : CameraSettings
     take : callable
-        Called with each Frame.
+        Called with each Frame; `message` is what it came in.
     look : callable, optional
         Called when the lens becomes known or changes; `view` is the new View. Without it the
         lens is not asked for.
+
+    Attributes
+    ----------
+    message, lens_message : sensor_msgs messages or None
+        The last of each that was handed on.
     """
 
     def __init__(self, node, settings, take, look=None):
@@ -42,6 +47,8 @@ class Camera:
         self._last = None
         self._started = False
         self.view = None
+        self.lens_message = None
+        self.message = None
         self.topic = node.resolve_topic_name(topic.name)
         self._info_topic = node.resolve_topic_name(topics.CAMERA_INFO.name)
         if look is not None:
@@ -54,7 +61,9 @@ class Camera:
                     qos_of(replace(topics.CAMERA_INFO, latched=latched)),
                     event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
                 )
-        node.listen(topic, self._message)
+        node.offer((topics.TAKEN,))
+        node.alone_on(topic.name)
+        node.listen(topic, self._take_message)
 
     def _lens(self, message):
         info = info_from_message(message)
@@ -63,6 +72,7 @@ class Camera:
         self._info, self._refusal = info, None
         try:
             self.view = view_from_message(message, self._info_topic)
+            self.lens_message = message
         except FrameError as error:
             # Frames that are not straight would give wrong numbers, so they are refused too.
             self._refusal = error
@@ -72,6 +82,12 @@ class Camera:
             self._node.get_logger().info(f'{self._info_topic}: a new lens; starting afresh')
         self._look()
         self._release()
+
+    def _take_message(self, message):
+        try:
+            self._message(message)
+        finally:
+            self._node.taken(stamp_ns_of(message))
 
     def _message(self, message):
         waiting = self._look is not None and self._info is None and not self._started
@@ -99,5 +115,5 @@ class Camera:
         frame = self._read(message, self.topic)
         # The last frame is let go only now that there is the next one: otherwise its 6 MB go back
         # to the system each time, and to get them again took as long as decoding.
-        self._last = frame
+        self._last, self.message = frame, message
         self._take(frame)

@@ -19,11 +19,20 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from std_msgs.msg import Header
 
 from nanorocks_ros.errors import ConfigurationError, FrameError, NanorocksError
 from nanorocks_ros.experiment.settings import rows, with_values
+from nanorocks_ros.nodes._names import unknown_parameters
 from nanorocks_ros.nodes._now_and_then import NowAndThen
-from nanorocks_ros.nodes._shell import array_message, image_message, message_class, qos_of
+from nanorocks_ros.nodes._quality import mismatches
+from nanorocks_ros.nodes._shell import (
+    array_message,
+    image_message,
+    message_class,
+    qos_of,
+    time_message,
+)
 from nanorocks_ros.records import (
     Autocorrelation,
     BodyEstimate,
@@ -70,6 +79,7 @@ _OVERRIDABLE = QoSOverridingOptions(
     )
 )
 _BUILT_AROUND = {'trays', 'trays_file'}
+_ONE_CAMERA = 'end all but one, or give each a namespace of its own (-r __ns:=/NAME)'
 _PATIENCE_S = 5.0
 _THROTTLE_S = 5.0
 # Acknowledgements come with heartbeats, every 3 s.
@@ -87,14 +97,20 @@ class NanorocksNode(Node):
         self._declared = {}
         self._refused = {}
         self._watched = []
+        self._alone = {}
         self.done = False
         self.exit_code = 0
         self.counts = {'received': 0, 'published': 0, 'refused': 0}
         self.busy_s = []
         self.state = {}
+        # Whoever wants to keep what is sent.
+        self.recorder = None
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._last_report = (time.monotonic(), 0)
         self.create_timer(1.0, self._report, clock=self.steady_clock)
+        self._clock_timer = self.create_timer(
+            _PATIENCE_S, self._check_clock, clock=self.steady_clock
+        )
 
     # Parameters
 
@@ -118,6 +134,23 @@ class NanorocksNode(Node):
         checked = with_values(settings, values, f'node {self.get_name()}')
         self._declared.update({prefix + row.name: row for row in rows(settings)})
         return checked
+
+    def refuse_unknown_parameters(self):
+        """Refuse a name that nobody reads, rather than go on without what was meant.
+
+        A file may serve the whole graph: what other nodes read may stand in it.
+
+        Raises
+        ------
+        ConfigurationError
+            With the name that comes nearest.
+        """
+        given = [name for name in self._parameter_overrides if not self.has_parameter(name)]
+        problems = unknown_parameters(given, self._declared)
+        if problems:
+            raise ConfigurationError(
+                f'node {self.get_name()}', '; '.join(problems), 'see docs/parameters.md'
+            )
 
     def _declare_one(self, name, row, read_only):
         # Typed by the default, but 13500 in a YAML file has to do for 13500.0.
@@ -181,13 +214,14 @@ class NanorocksNode(Node):
         """The publisher of a topic, made once."""
         name = topic.of(tray)
         if name not in self._outputs:
-            self._outputs[name] = self.create_publisher(
-                message_class(topic.type),
-                name,
-                qos_of(topic),
-                callback_group=self._events,
-                qos_overriding_options=_OVERRIDABLE,
-            )
+            self.publisher(message_class(topic.type), name, qos_of(topic))
+        return self._outputs[name]
+
+    def publisher(self, kind, name, qos):
+        """Make the publisher of a topic under any name, offered in any way."""
+        self._outputs[name] = self.create_publisher(
+            kind, name, qos, callback_group=self._events, qos_overriding_options=_OVERRIDABLE
+        )
         return self._outputs[name]
 
     def offer(self, offered, tray=0):
@@ -207,6 +241,8 @@ class NanorocksNode(Node):
         """Publish and count."""
         self.output(topic, tray).publish(message)
         self.counts['published'] += 1
+        if self.recorder is not None:
+            self.recorder.result(topic, message, tray)
 
     def publish_result(self, record, epoch_ns):
         """Publish what came out of a stage on the topics it belongs to."""
@@ -235,6 +271,18 @@ class NanorocksNode(Node):
         if isinstance(record, CorEstimate):
             name = f'tray {record.tray} COR'
             self.state[name] = f'{record.restitution:.4f} {record.status.name.lower()}'
+
+    def alone_on(self, name, remedy=_ONE_CAMERA):
+        """Say so when more than one node publishes a topic: what they send would be mixed."""
+        self._alone[name] = remedy
+
+    def taken(self, stamp_ns):
+        """Tell who waits for it that this node is done with a frame."""
+        if self.wanted(topics.TAKEN):
+            message = Header(
+                stamp=time_message(stamp_ns), frame_id=self.get_fully_qualified_name()
+            )
+            self.send(topics.TAKEN, message)
 
     def listen(self, topic, callback, tray=0, required=True):
         """Subscribe; say so when nobody publishes, or not with a matching quality of service."""
@@ -295,25 +343,47 @@ class NanorocksNode(Node):
                 'topic, or check the namespace and ROS_DOMAIN_ID'
             )
 
-    def _mismatch(self, topic_name, event):
-        policy = QoSPolicyKind(event.last_policy_kind).name.lower()
-        offers = [
-            getattr(info.qos_profile, policy, None)
-            for info in self.get_publishers_info_by_topic(self.resolve_topic_name(topic_name))
+    def _check_clock(self):
+        self._clock_timer.cancel()
+        clock = self.get_clock()
+        if clock.ros_time_is_active and clock.now().nanoseconds == 0:
+            self.get_logger().warning(
+                f'/clock: nothing within {_PATIENCE_S:g} s, though use_sim_time is set, and time '
+                'stands still; start bag_player (or ros2 bag play --clock), or set '
+                'use_sim_time:=false'
+            )
+
+    def _check_alone(self):
+        for name, remedy in list(self._alone.items()):
+            if self.count_publishers(name) > 1:
+                del self._alone[name]
+                infos = self.get_publishers_info_by_topic(self.resolve_topic_name(name))
+                nodes = sorted(f'{one.node_namespace}/{one.node_name}' for one in infos)
+                self.get_logger().warning(
+                    f'{self.resolve_topic_name(name)}: {" and ".join(nodes)} publish it, and what '
+                    f'they send is mixed; {remedy}'
+                )
+
+    def _mismatch(self, topic_name, _):
+        name = self.resolve_topic_name(topic_name)
+        offers = self.get_publishers_info_by_topic(name)
+        asked = [
+            one.qos_profile
+            for one in self.get_subscriptions_info_by_topic(name)
+            if one.node_name == self.get_name()
         ]
-        offered = ', '.join(sorted({getattr(one, 'name', str(one)) for one in offers}))
-        mine = self.get_subscriptions_info_by_topic(self.resolve_topic_name(topic_name))
-        asked = ', '.join(sorted({getattr(i.qos_profile, policy).name for i in mine}))
+        found = mismatches([one.qos_profile for one in offers], asked)
+        said = ', '.join(f'{policy} {have} and I ask for {want}' for policy, have, want in found)
+        remedies = ', '.join(f'qos_overrides.{name}.subscription.{one[0]}' for one in found)
         self.get_logger().warning(
-            f'{self.resolve_topic_name(topic_name)}: no data, since the publisher offers '
-            f'{policy} {offered} and I ask for {asked}; set '
-            f'qos_overrides.{self.resolve_topic_name(topic_name)}.subscription.{policy}'
+            f'{name}: no data, since the publisher offers {said}; set {remedies}'
         )
 
     # Diagnostics
 
     def _report(self):
         self._events.open()
+        self._check_alone()
         now = time.monotonic()
         since, received = self._last_report
         rate = (self.counts['received'] - received) / max(now - since, 1e-9)

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import time
 
-from nanorocks_ros.wire import topics
+from nanorocks_ros.nodes._takers import Takers
 
 _TICK_S = 0.002
+# Then others have their turn: services, timers.
+_SLICE_S = 0.005
+# Until those who are known know their publishers as well: the first frames were lost otherwise.
+_SETTLE_S = 1.0
 NS = 1_000_000_000
 
 
@@ -24,42 +28,127 @@ class Pacer:
     pacing : PacingSettings
     finished : callable
         Called once after the last moment.
+    paused : bool
+        Wait for `resume`.
+
+    Attributes
+    ----------
+    takers : Takers
+        Who is waited for.
+    paused : bool
+    rate : float
     """
 
-    def __init__(self, node, moments, emit, pacing, finished):
-        self._node = node
+    def __init__(self, node, moments, emit, pacing, finished, paused=False):
         self._moments = moments
         self._emit = emit
         self._pacing = pacing
         self._finished = finished
         self._next = next(moments, None)
-        self._origin = None
+        self._first_ns = self._next[0] if self._next is not None else 0
+        self._position_ns = self._first_ns
+        self._since = None
+        self._started = False
+        self._complete = None
+        self.rate = pacing.rate
+        self.paused = paused
+        self.takers = Takers(node)
+        self.set_rate(pacing.rate)
         self._timer = node.create_timer(_TICK_S, self._tick, clock=node.steady_clock)
 
+    @property
+    def now_ns(self):
+        """What time it is in the recording."""
+        if self._since is None or self.rate == 0.0:
+            return self._position_ns
+        passed_ns = round((time.monotonic() - self._since) * self.rate * NS)
+        ahead_ns = self._next[0] if self._next is not None else self._position_ns
+        return max(self._position_ns, min(self._position_ns + passed_ns, ahead_ns))
+
+    def pause(self):
+        """Hold the time of the recording."""
+        self._anchor(self.now_ns)
+        self.paused = True
+
+    def resume(self):
+        """Go on."""
+        self.paused = False
+        self._anchor(self.now_ns)
+
+    def set_rate(self, rate):
+        """Go on at another rate."""
+        position_ns = self.now_ns
+        self.rate = rate
+        self._anchor(position_ns)
+        if rate == 0.0:
+            self.takers.listen()
+
+    def restart(self, moments, position_ns):
+        """Go on elsewhere.
+
+        Parameters
+        ----------
+        moments : iterator of (int, object)
+        position_ns : int, [ns]
+            What time it is there.
+        """
+        self._moments = moments
+        self._next = next(moments, None)
+        self._anchor(position_ns)
+
+    def step(self, last):
+        """Emit moments up to the first for which `last` holds; whether there was any."""
+        while self._next is not None:
+            moment = self._next[1]
+            self._advance()
+            if last(moment):
+                return True
+        return False
+
+    def _anchor(self, position_ns):
+        self._position_ns = position_ns
+        self._since = time.monotonic() if self._started and not self.paused else None
+
     def _tick(self):
-        if self._next is None:
+        if not self._started:
+            if self.paused or not self._all_listen():
+                return
+            self._started = True
+            self._anchor(self._position_ns)
+        end = time.monotonic() + _SLICE_S
+        while self._is_due():
+            self._advance()
+            if time.monotonic() >= end:
+                break
+        if self._next is None and not self.paused:
             self._timer.cancel()
             self._finished()
-            return
-        if self._origin is None and self._listeners() < self._pacing.listeners:
-            return
-        stamp_ns, moment = self._next
+
+    def _all_listen(self):
+        wanted = self._pacing.listeners
+        if self.takers.count() < wanted:
+            self._complete = None
+            return False
         now = time.monotonic()
-        if self._origin is None:
-            self._origin = (stamp_ns, now)
-        elapsed = (stamp_ns - self._origin[0]) / NS
-        if 0.0 < self._pacing.duration <= elapsed:
+        self._complete = now if self._complete is None else self._complete
+        return now - self._complete >= (_SETTLE_S if wanted else 0.0)
+
+    def _is_due(self):
+        if self._next is None or self.paused:
+            return False
+        stamp_ns = self._next[0]
+        if 0.0 < self._pacing.duration <= (stamp_ns - self._first_ns) / NS:
             self._next = None
-            return
-        if self._pacing.rate > 0.0 and now < self._origin[1] + elapsed / self._pacing.rate:
-            return
+            return False
+        if self.rate == 0.0:
+            return self.takers.ready()
+        due = self._since + (stamp_ns - self._position_ns) / NS / self.rate
+        return stamp_ns < self._position_ns or time.monotonic() >= due
+
+    def _advance(self):
+        stamp_ns, moment = self._next
         self._emit(stamp_ns, moment)
         self._next = next(self._moments, None)
-        if self._next is not None and self._next[0] < stamp_ns:
-            self._origin = (self._next[0], now)
-
-    def _listeners(self):
-        return sum(
-            self._node.output(topic).get_subscription_count()
-            for topic in (topics.RAW, topics.RAW_COMPRESSED)
-        )
+        back = stamp_ns < self._position_ns
+        if back or self.rate == 0.0 or self._since is None:
+            self._anchor(stamp_ns)

@@ -16,6 +16,7 @@ NODES = (
     'cluster_autocorrelator',
     'haff_fitter',
     'pipeline',
+    'dashboard',
     'demo',
 )
 
@@ -65,7 +66,7 @@ def run(name):
     # What the core has to say while it works; of others, warnings only.
     logging.basicConfig(format=f'{name}: %(message)s')
     logging.getLogger('nanorocks_ros').setLevel(logging.INFO)
-    _use_large_segments()
+    use_large_segments()
     import rclpy
     from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
     from rclpy.exceptions import NameValidationException
@@ -86,7 +87,7 @@ def run(name):
         rclpy.try_shutdown()
 
 
-def _use_large_segments():
+def use_large_segments():
     """On a graph that stays on this host, hand 1080p frames over in shared memory.
 
     With Fast DDS's own segment of 0.5 MB they go in fragments over UDP, of which some are lost
@@ -105,6 +106,7 @@ def _spin(name, interrupts):
         return 0
     interrupts.at_once = True
     node = getattr(module, f'{name.title().replace("_", "")}Node')()
+    node.refuse_unknown_parameters()
     interrupts.at_once = False
     executor = SingleThreadedExecutor()
     executor.add_node(node)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from nanorocks_ros.errors import ConfigurationError, FrameError
+from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.nodes._shell import image_message
+from nanorocks_ros.recordings.replay import played_part
 from nanorocks_ros.simulation.film import film
 from nanorocks_ros.study.bag_frames import BagFrames
 from nanorocks_ros.wire import topics
@@ -43,14 +44,13 @@ class Simulated:
         return tuple(replace(one, stamp_ns=one.stamp_ns + self._start_ns) for one in moment)
 
 
-def recorded_moments(bag, loop):
-    """Stamp and (frame, None) of each frame of a bag."""
+def recorded_moments(bag, settings, duration):
+    """Log time and (frame, None, its message) of each frame of the part that is played."""
+    part = played_part(bag.reader, settings.start, duration)
     while True:
-        last = 0
-        for frame in bag.frames():
-            last = last if isinstance(frame, FrameError) else frame.stamp_ns
-            yield last, (frame, None)
-        if not loop:
+        for message, frame in bag.recorded_frames(*part):
+            yield message.log_time_ns, (frame, None, message)
+        if not settings.loop:
             return
 
 
@@ -64,6 +64,19 @@ def publish_moment(node, moment, epoch_ns):
         node.publish_result(truth, epoch_ns)
 
 
+def path_of_bag(settings):
+    """The bag that the settings name.
+
+    Raises
+    ------
+    ConfigurationError
+        When they name none.
+    """
+    if not settings.bag:
+        raise ConfigurationError('parameter bag', 'is empty', 'give the path of a bag')
+    return settings.bag
+
+
 def opened_bag(settings):
     """The frames of the bag that the settings name.
 
@@ -74,6 +87,4 @@ def opened_bag(settings):
     RecordingError
         When it cannot be used.
     """
-    if not settings.bag:
-        raise ConfigurationError('parameter bag', 'is empty', 'give the path of a bag')
-    return BagFrames(settings.bag)
+    return BagFrames(path_of_bag(settings))

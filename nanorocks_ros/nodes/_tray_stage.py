@@ -48,6 +48,8 @@ class TrayStageNode(NanorocksNode):
             warm_up_speed()
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
+        self._joined_ns = dict.fromkeys(self._settings.trays, 0)
+        self.offer((topics.TAKEN,))
         self._joiners = {tray: TrayJoiner(tray) for tray in self._settings.trays}
         for tray in self._settings.trays:
             self.offer(outputs, tray)
@@ -67,7 +69,7 @@ class TrayStageNode(NanorocksNode):
         if self.count_publishers(topics.STATE.of(tray)) == 0:
             # Somebody's own crops, of which nothing more is known.
             image = TrayImage(stamp_ns=frame.stamp_ns, tray=tray, gray=frame.image)
-            self._epoch.when_known(frame.stamp_ns, self._push, image)
+            self._push_all(frame.stamp_ns, (image,))
             return
         self._push_all(frame.stamp_ns, self._joiners[tray].gray(frame))
 
@@ -90,6 +92,10 @@ class TrayStageNode(NanorocksNode):
     def _push_all(self, stamp_ns, images):
         for image in images:
             self._epoch.when_known(stamp_ns, self._push, image)
+            self._joined_ns[image.tray] = image.stamp_ns
+            # Done with a frame is who is done with all its trays.
+            if len(set(self._joined_ns.values())) == 1:
+                self.taken(image.stamp_ns)
 
     def _push(self, image):
         stage = self._stages[image.tray]

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
 
-from nanorocks_ros.experiment.settings import BagSettings, PacingSettings
+from nanorocks_ros.experiment.settings import BagSettings, PacingSettings, PlayerSettings, rows
+from nanorocks_ros.experiment.settings import problem as wrong_with
 from nanorocks_ros.nodes._node import NanorocksNode
-from nanorocks_ros.nodes._pacing import Pacer
+from nanorocks_ros.nodes._pacing import NS, Pacer
+from nanorocks_ros.nodes._playback import Playback, stamp_in
 from nanorocks_ros.nodes._shell import image_message, time_message
-from nanorocks_ros.nodes._sources import opened_bag
+from nanorocks_ros.nodes._sources import path_of_bag
 from nanorocks_ros.recordings.images import frame_from_compressed
+from nanorocks_ros.recordings.reader import open_bag
+from nanorocks_ros.recordings.replay import latest, played_part
+from nanorocks_ros.study.bag_frames import BagFrames
 from nanorocks_ros.wire import topics
 
-_KNOWN = {one.name.format(tray=k): (one, k) for one in topics.TOPICS for k in range(1, 9)}
+_CLOCK_S = 0.025
+_CAMERA = (topics.RAW.absolute(), topics.RAW_COMPRESSED.absolute())
+_WORK_IT_OUT_AGAIN = 'set results:=false for bag_player, or end the other'
 
 
 class BagPlayerNode(NanorocksNode):
@@ -21,50 +32,167 @@ class BagPlayerNode(NanorocksNode):
 
     def __init__(self):
         super().__init__('bag_player')
-        settings = self.declare(BagSettings())
-        self._bag = opened_bag(settings)
-        for notice in self._bag.reader.notices:
+        self._settings = self.declare(BagSettings())
+        player = self.declare(PlayerSettings(), fixed=False)
+        pacing = self.declare(PacingSettings(), fixed=False)
+        self.refuse_unknown_parameters()
+        self._reader = open_bag(path_of_bag(self._settings))
+        for notice in self._reader.notices:
             self.get_logger().warning(notice)
-        self._loop = settings.loop
+        self._reader.require_topic(list(self._reader.topics))
+        self._part = played_part(self._reader, self._settings.start, pacing.duration)
         self._last = None
+        self._clock_ns = None
         self._clock_output = self.create_publisher(Clock, '/clock', QoSProfile(depth=10))
-        epoch_ns = self._bag.epoch_ns()
-        self.send(topics.EPOCH, time_message(epoch_ns))
+        self._playback = Playback(self, self._reader, player.results)
+        self._camera = [name for name in _CAMERA if self._has_messages(name)]
+        self._epoch_ns = BagFrames(self._reader.path).epoch_ns() if self._camera else None
+        self._expect_to_be_alone()
+        self._tell_latched(self._part[0])
         self._pacer = Pacer(
-            self, self._moments(), self._emit, self.declare(PacingSettings()), self.finish
+            self,
+            self._moments(self._part[0]),
+            self._emit,
+            replace(pacing, duration=0.0),
+            self.finish,
+            player.paused,
         )
+        self.create_timer(_CLOCK_S, self._tell_time, clock=self.steady_clock)
+        self._take_orders()
 
-    def _moments(self):
-        reader = self._bag.reader
-        known = {name: _KNOWN[self._relative(name)] for name in reader.topics if self._knows(name)}
-        known.pop(topics.EPOCH.absolute(), None)
+    def _has_messages(self, name):
+        return name in self._playback.names and self._reader.topics[name].count > 0
+
+    def _expect_to_be_alone(self):
+        for topic in (topics.RAW, topics.RAW_COMPRESSED):
+            self.offer((topic,))
+            self.alone_on(topic.name)
+        for name in self._playback.results:
+            self.alone_on(name, _WORK_IT_OUT_AGAIN)
+
+    # What is played
+
+    def _moments(self, first_ns):
         while True:
-            for message in reader.messages(list(known)):
-                yield message.log_time_ns, (message, *known[message.topic])
-            if not self._loop:
+            for message in self._reader.messages(self._playback.names, first_ns, self._part[1]):
+                yield message.log_time_ns, message
+            if not self._settings.loop:
                 return
+            first_ns = self._part[0]
+            # Between the last message and the first.
+            yield first_ns, None
 
-    @staticmethod
-    def _relative(name):
-        return name.removeprefix(f'{topics.NAMESPACE}/')
-
-    def _knows(self, name):
-        known = self._relative(name) in _KNOWN
-        if not known:
-            self.get_logger().warning(f'{name}: not a topic of the graph; it is not played')
-        return known
-
-    def _emit(self, stamp_ns, moment):
-        message, topic, tray = moment
-        self._clock_output.publish(Clock(clock=time_message(stamp_ns)))
-        self.send(topic, message.cdr, tray)
-        if topic is topics.RAW_COMPRESSED and self.wanted(topics.RAW):
+    def _emit(self, stamp_ns, message):
+        self._tell_time(stamp_ns)
+        if message is None:
+            self._tell_latched(stamp_ns)
+            return
+        self._playback.send(message)
+        if message.topic not in self._camera:
+            return
+        self._pacer.takers.sent(stamp_in(message.cdr))
+        if self._camera == [_CAMERA[1]] and self.wanted(topics.RAW):
             self.timed(self._decoded, message)
 
     def _decoded(self, message):
-        content = self._bag.reader.deserialize(message)
+        content = self._reader.deserialize(message)
         frame = frame_from_compressed(content, message.topic)
         image = image_message(frame.stamp_ns, 'camera', frame.image)
         self.send(topics.RAW, image)
         # Let go only when there is the next one, see _camera.py.
         self._last = frame, image
+
+    def _tell_latched(self, stamp_ns):
+        """Publish what latched topics held at a time."""
+        if self._epoch_ns is not None:
+            self.send(topics.EPOCH, time_message(self._epoch_ns))
+        for message in latest(self._reader, self._playback.latched, stamp_ns):
+            self._playback.send(message)
+
+    def _tell_time(self, stamp_ns=None):
+        """Publish the clock: steadily, and whenever a message moves it on."""
+        now_ns = self._pacer.now_ns if stamp_ns is None else stamp_ns
+        if stamp_ns is None or stamp_ns != self._clock_ns:
+            self._clock_output.publish(Clock(clock=time_message(now_ns)))
+        self._clock_ns = now_ns
+        self.state['position [s]'] = f'{self._seconds(now_ns):.3f}'
+        self.state['paused'] = str(self._pacer.paused).lower()
+
+    def _seconds(self, stamp_ns):
+        return (stamp_ns - self._reader.start_ns) / NS
+
+    # What it is told to do
+
+    def _take_orders(self):
+        orders = {
+            'pause': self._pause,
+            'resume': self._resume,
+            'toggle_paused': self._toggle,
+            'is_paused': self._tell_paused,
+            'play_next': self._play_next,
+        }
+        for name, order in orders.items():
+            self.create_service(Trigger, f'~/{name}', order)
+        self.add_on_set_parameters_callback(self._check)
+        self.add_post_set_parameters_callback(self._changed)
+
+    def _answer(self, response, success=True):
+        response.success = success
+        where = f'{self._seconds(self._pacer.now_ns):.3f} s'
+        response.message = f'{"paused" if self._pacer.paused else "playing"} at {where}'
+        return response
+
+    def _pause(self, _, response):
+        self._pacer.pause()
+        return self._answer(response)
+
+    def _resume(self, _, response):
+        self._pacer.resume()
+        return self._answer(response)
+
+    def _toggle(self, request, response):
+        turn = self._resume if self._pacer.paused else self._pause
+        return turn(request, response)
+
+    def _tell_paused(self, _, response):
+        return self._answer(response, self._pacer.paused)
+
+    def _play_next(self, _, response):
+        """Play up to the next frame of the camera, or the next message where there is none."""
+        if not self._pacer.paused:
+            response.message = 'playing; pause first'
+            return response
+        held = self._camera
+        found = self._pacer.step(lambda m: m is not None and (not held or m.topic in held))
+        return self._answer(response, found)
+
+    def _check(self, parameters):
+        known = {one.name: one for one in (*rows(PlayerSettings()), *rows(PacingSettings()))}
+        for one in parameters:
+            text = wrong_with(known[one.name], one.value) if one.name in known else None
+            if text is None and one.name == 'position':
+                text = self._wrong_with_position(one.value)
+            if text is None and one.name in known and one.name not in ('rate', 'position'):
+                text = 'takes effect at the start only'
+            if text is not None:
+                return SetParametersResult(successful=False, reason=f'{one.name}: {text}')
+        return SetParametersResult(successful=True)
+
+    def _wrong_with_position(self, seconds):
+        first, last = (self._seconds(stamp_ns) for stamp_ns in self._part)
+        if not first <= seconds <= last:
+            return f'{seconds:g} s is not in the part that is played, {first:g} to {last:g} s'
+        return None
+
+    def _changed(self, parameters):
+        for one in parameters:
+            if one.name == 'rate':
+                self._pacer.set_rate(float(one.value))
+            if one.name == 'position':
+                self._seek(self._reader.start_ns + round(one.value * NS))
+
+    def _seek(self, stamp_ns):
+        self._pacer.restart(self._moments(stamp_ns), stamp_ns)
+        self._tell_time(stamp_ns)
+        self._tell_latched(stamp_ns)
+        self.get_logger().info(f'went to {self._seconds(stamp_ns):.3f} s')

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.experiment import settings as st
 from nanorocks_ros.experiment.calibration_file import calibrated
@@ -9,8 +11,10 @@ from nanorocks_ros.nodes import _sources
 from nanorocks_ros.nodes._background import Background
 from nanorocks_ros.nodes._camera import Camera
 from nanorocks_ros.nodes._epoch import Epoch
+from nanorocks_ros.nodes._live_page import LivePage
 from nanorocks_ros.nodes._node import RESULT_TOPICS, NanorocksNode
 from nanorocks_ros.nodes._pacing import Pacer
+from nanorocks_ros.nodes._recorder import GraphRecorder, provenance
 from nanorocks_ros.nodes._tracks import TracksPicture
 from nanorocks_ros.records import Tracks, TrayImage
 from nanorocks_ros.stages.pipeline import Pipeline
@@ -38,8 +42,13 @@ class PipelineNode(NanorocksNode):
         self._bag = self.declare(st.BagSettings())
         self._pacing = self.declare(st.PacingSettings())
         camera = self.declare(st.CameraSettings())
+        record = self.declare(st.RecordSettings())
+        page = self.declare(st.DashboardSettings(), prefix='dashboard_')
+        shown = self.declare(st.LivePageSettings()).dashboard
+        self.refuse_unknown_parameters()
+        self._page = LivePage(self, page, self._settings.trays_file) if shown else None
         self._epoch = Epoch(self, may_set=True, follow=self._source == 'topic')
-        self._reader = None
+        self._recorded = None
         self._where = self._source
         self._camera, self._view = None, None
         self._offer_everything()
@@ -59,9 +68,26 @@ class PipelineNode(NanorocksNode):
             self._play_simulated()
         else:
             self._play_recorded()
+        # Last, so that nothing is left behind where the rest cannot start.
+        if record.record:
+            self._start_recording(record)
+
+    def _start_recording(self, record):
+        of_source = {'simulator': (self._simulation,), 'bag': (self._bag,), 'topic': ()}
+        kept = provenance(self._source, self._settings, *of_source[self._source])
+        # Who plays as fast as it goes waits for the disk as well.
+        patient = self._source != 'topic' and self._pacing.rate == 0.0
+        self.recorder = GraphRecorder(self, record, kept, self._settings.trays, patient)
+        lens = self._recorded.lens_message() if self._recorded is not None else None
+        if lens is not None:
+            self.recorder.lens(lens)
 
     def _offer_everything(self):
-        self.offer((topics.EPOCH, topics.RAW))
+        self.offer((topics.EPOCH,))
+        # A camera that others publish has one publisher, theirs.
+        if self._source != 'topic':
+            self.offer((topics.RAW,))
+            self.alone_on(topics.RAW.name)
         for tray in self._settings.trays:
             self.offer(RESULT_TOPICS, tray)
 
@@ -76,6 +102,8 @@ class PipelineNode(NanorocksNode):
     def _straighten(self):
         self._background.drain()
         self._view = self._camera.view
+        if self.recorder is not None:
+            self.recorder.lens(self._camera.lens_message)
         self._pipeline = self._build(self._settings)
 
     def _name_source(self, where, view=None):
@@ -95,27 +123,37 @@ class PipelineNode(NanorocksNode):
     def _play_recorded(self):
         bag = _sources.opened_bag(self._bag)
         self._name_source(bag.where, bag.view())
-        self._reader = bag.reader
+        self._recorded = bag
         self._epoch.set(bag.epoch_ns())
-        self._play(_sources.recorded_moments(bag, self._bag.loop), tuple)
+        moments = _sources.recorded_moments(bag, self._bag, self._pacing.duration)
+        self._pacing = replace(self._pacing, duration=0.0)
+        self._play(moments, tuple)
 
     def _play(self, moments, dated):
         def emit(_, moment):
-            frame, truth = dated(moment)
+            frame, truth, *received = dated(moment)
             if isinstance(frame, FrameError):
                 self.refuse(frame)
                 return
             if self._epoch.ns is None:
                 self._epoch.set(frame.stamp_ns)
+            self._record(frame, *received)
             _sources.publish_moment(self, (frame, truth), self._epoch.ns)
             self.timed(self._push, frame)
 
         self._pacer = Pacer(self, moments, emit, self._pacing, self._finish)
 
+    def _record(self, frame, message=None):
+        if self.recorder is not None:
+            self.recorder.frame(frame, message)
+
     def _take(self, frame):
+        self._record(frame, self._camera.message)
         self._epoch.when_known(frame.stamp_ns, self._push, frame)
 
     def _push(self, frame):
+        if self.recorder is not None:
+            self.recorder.epoch(self._epoch.ns)
         wanted = {
             number: (
                 self.wanted(topics.MOTION, number),
@@ -146,14 +184,20 @@ class PipelineNode(NanorocksNode):
 
     def _finish(self):
         self._background.drain()
-        if self._reader is not None:
-            for notice in self._reader.notices:
+        if self._recorded is not None:
+            for notice in self._recorded.reader.notices:
                 self.get_logger().warning(notice)
         for record in self._pipeline.flush():
             self.publish_result(record, self._epoch.ns)
+        if self.recorder is not None:
+            self.recorder.close()
         self.finish()
 
     def destroy_node(self):
-        """End the thread before what it works for is gone."""
+        """End the threads before what they work for is gone."""
         self._background.close()
+        if self.recorder is not None:
+            self.recorder.close()
+        if self._page is not None:
+            self._page.close()
         super().destroy_node()

@@ -27,6 +27,7 @@ class SimulatorNode(NanorocksNode):
         scene = self.declare(SceneSettings(), 'scene.')
         self._epoch = Epoch(self, may_set=True, follow=False)
         self.offer((topics.EPOCH, topics.RAW))
+        self.alone_on(topics.RAW.name)
         if chosen.whole_scene:
             self._simulated = SimulatedScene(self, settings, scene, chosen.effects)
         else:
@@ -40,6 +41,7 @@ class SimulatorNode(NanorocksNode):
         if self._epoch.ns is None:
             self._epoch.set(dated[0].stamp_ns)
         self._publish(dated, self._epoch.ns)
+        self._pacer.takers.sent(dated[0].stamp_ns)
 
     def _publish_tray(self, moment, epoch_ns):
         publish_moment(self, moment, epoch_ns)

@@ -78,8 +78,8 @@ class Block:
     ----------
     offset, length : int
         Of the records in the file, [bytes].
-    start_ns : int, [ns]
-        No message in it is earlier.
+    start_ns, end_ns : int, [ns]
+        No message in it is earlier or later.
     channels : frozenset of int, or None
         The channels that have messages in it; None when that is not known.
     indexed_bytes : int
@@ -91,6 +91,7 @@ class Block:
     offset: int
     length: int
     start_ns: int
+    end_ns: int
     channels: frozenset[int] | None
     indexed_bytes: int = 0
     cut: bool = False

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from typing import BinaryIO
 
 NS = 1_000_000_000
+# Log times have 64 bits.
+_FOREVER = 2**64
 
 
 class McapFile:
@@ -97,23 +99,32 @@ class McapFile:
             f'{self._index.bytes_unread} bytes at the end hold no whole record'
         )
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
+    def messages(
+        self,
+        topics: Collection[str] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+    ) -> Iterator[BagMessage]:
         """The messages of some topics, or all, in order of log time; damage is skipped.
 
         Parameters
         ----------
         topics : collection of str, optional
+        start_ns, end_ns : int, optional, [ns]
+            Log times of the first and last message wanted; what lies wholly outside is not read.
 
         Yields
         ------
         BagMessage
         """
         wanted = None if topics is None else frozenset(topics)
+        first = 0 if start_ns is None else start_ns
+        last = _FOREVER if end_ns is None else end_ns
         # Blocks and messages in one queue: a block is opened when its first message is due.
         queue: list[tuple[int, int, int, Block | StoredMessage]] = [
             (block.start_ns, block.offset, -1, block)
             for block in self._index.blocks
-            if self._concerns(block, wanted)
+            if block.start_ns <= last and block.end_ns >= first and self._concerns(block, wanted)
         ]
         heapq.heapify(queue)
         with self.path.open('rb') as stream:
@@ -123,7 +134,8 @@ class McapFile:
                     yield self._message(item)
                     continue
                 for number, message in enumerate(self._load(stream, item)):
-                    if self._is_wanted(message.channel, wanted):
+                    timely = first <= message.log_time_ns <= last
+                    if timely and self._is_wanted(message.channel, wanted):
                         entry = (message.log_time_ns, offset, number, message)
                         heapq.heappush(queue, entry)
 
@@ -171,5 +183,6 @@ def _topics(index: McapIndex) -> dict[str, TopicInfo]:
             encoding=channel.message_encoding,
             definition=schema.data.decode('utf-8', 'replace') if schema else '',
             definition_format=schema.encoding if schema else '',
+            offered_qos=channel.metadata.get('offered_qos_profiles', ''),
         )
     return topics

@@ -143,6 +143,7 @@ def _block_of(entry: ChunkIndex) -> Block:
         offset=entry.chunk_start_offset,
         length=entry.chunk_length,
         start_ns=entry.message_start_time,
+        end_ns=entry.message_end_time,
         # Writers may leave the message indexes out: then any channel may be inside.
         channels=frozenset(entry.message_index_offsets) or None,
         indexed_bytes=entry.message_index_length,
@@ -201,7 +202,9 @@ class _Scan:
             self._block(*run)
 
     def _block(self, start: int, end: int, *, cut: bool = False) -> None:
-        place = Block(offset=start, length=end - start, start_ns=0, channels=None, cut=cut)
+        place = Block(
+            offset=start, length=end - start, start_ns=0, end_ns=0, channels=None, cut=cut
+        )
         try:
             messages = load(self._stream, place, self.index.catalogue)
         except DamagedError:
@@ -216,6 +219,7 @@ class _Scan:
             offset=start,
             length=end - start,
             start_ns=min(message.log_time_ns for message in messages),
+            end_ns=max(message.log_time_ns for message in messages),
             channels=frozenset(message.channel for message in messages),
             cut=cut,
         )

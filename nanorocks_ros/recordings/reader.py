@@ -101,18 +101,27 @@ class BagReader:
         """Messages known to be lost, so far; how many lie beyond a cut is not known."""
         return self._undone + sum(file.messages_lost for file in self._contents.files)
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
+    def messages(
+        self,
+        topics: Collection[str] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+    ) -> Iterator[BagMessage]:
         """The messages of some topics, or all, in order of log time.
 
         Parameters
         ----------
         topics : collection of str, optional
+        start_ns, end_ns : int, optional, [ns]
+            Log times of the first and last message wanted; what lies wholly outside is not read.
 
         Yields
         ------
         BagMessage
         """
-        found = _in_turn(self._contents.files, topics)
+        files = self._contents.files
+        streams = [file.messages(topics, start_ns, end_ns) for file in files]
+        found = _in_turn(files, streams)
         return self._decompressed(found) if self._contents.compressed_messages else found
 
     def _decompressed(self, messages: Iterator[BagMessage]) -> Iterator[BagMessage]:
@@ -227,17 +236,19 @@ def _merged_topics(files: Sequence[StorageFile]) -> dict[str, TopicInfo]:
                 encoding=before.encoding,
                 definition=before.definition or info.definition,
                 definition_format=before.definition_format,
+                offered_qos=before.offered_qos,
             )
     return merged
 
 
-def _in_turn(files: Sequence[StorageFile], topics: Collection[str] | None) -> Iterator[BagMessage]:
+def _in_turn(
+    files: Sequence[StorageFile], streams: Sequence[Iterator[BagMessage]]
+) -> Iterator[BagMessage]:
     """Messages of all files in order; a file is opened when its first message is due."""
     queue: list[tuple[int, int, BagMessage | None]] = [
         (file.start_ns, number, None) for number, file in enumerate(files) if _count(file)
     ]
     heapq.heapify(queue)
-    streams = {number: file.messages(topics) for number, file in enumerate(files)}
     while queue:
         _, number, message = heapq.heappop(queue)
         if message is not None:

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 MAGIC = b'SQLite format 3\x00'
+# SQLite's integers have 64 bits, one of them for the sign.
+_FOREVER = 2**63 - 1
 
 
 class SqliteFile:
@@ -71,12 +73,19 @@ class SqliteFile:
         """Always 0: SQLite does not tell how much lies behind the damage."""
         return 0
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
+    def messages(
+        self,
+        topics: Collection[str] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+    ) -> Iterator[BagMessage]:
         """The messages of some topics, or all, in order of log time, up to any damage.
 
         Parameters
         ----------
         topics : collection of str, optional
+        start_ns, end_ns : int, optional, [ns]
+            Log times of the first and last message wanted; what lies wholly outside is not read.
 
         Yields
         ------
@@ -90,11 +99,15 @@ class SqliteFile:
         marks = ','.join('?' * len(wanted))
         query = (
             'SELECT topic_id, timestamp, data FROM messages '
-            f'WHERE topic_id IN ({marks}) ORDER BY timestamp, id'
+            f'WHERE topic_id IN ({marks}) AND timestamp BETWEEN ? AND ? ORDER BY timestamp, id'
+        )
+        span = (
+            -_FOREVER if start_ns is None else max(start_ns, -_FOREVER),
+            _FOREVER if end_ns is None else min(end_ns, _FOREVER),
         )
         try:
             with closing(self._connect()) as database:
-                for number, log_time_ns, data in database.execute(query, tuple(wanted)):
+                for number, log_time_ns, data in database.execute(query, (*wanted, *span)):
                     info = self.topics[wanted[number]]
                     yield BagMessage(
                         topic=info.name, type=info.type, log_time_ns=log_time_ns, cdr=data
@@ -115,8 +128,11 @@ def _topics(database: sqlite3.Connection) -> tuple[dict[int, str], dict[str, Top
     counts = dict(database.execute('SELECT topic_id, count(*) FROM messages GROUP BY topic_id'))
     numbers: dict[int, str] = {}
     topics: dict[str, TopicInfo] = {}
-    for number, name, kind, encoding in database.execute(
-        'SELECT id, name, type, serialization_format FROM topics ORDER BY id'
+    columns = {row[1] for row in database.execute('PRAGMA table_info(topics)')}
+    # The first version of the format did not keep it.
+    qos = 'offered_qos_profiles' if 'offered_qos_profiles' in columns else "''"
+    for number, name, kind, encoding, offered in database.execute(
+        f'SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id'
     ):
         numbers[number] = name
         before = topics.get(name)
@@ -128,5 +144,6 @@ def _topics(database: sqlite3.Connection) -> tuple[dict[int, str], dict[str, Top
             encoding=encoding,
             definition=text,
             definition_format=form,
+            offered_qos=offered or '',
         )
     return numbers, topics

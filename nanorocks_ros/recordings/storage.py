@@ -27,6 +27,8 @@ class TopicInfo:
         Text of the message definition kept in the recording; empty where there is none.
     definition_format : str
         ``ros2msg`` or ``ros2idl``.
+    offered_qos : str
+        How its publishers offered it, as the storage keeps it (YAML).
     """
 
     name: str
@@ -35,6 +37,7 @@ class TopicInfo:
     encoding: str = 'cdr'
     definition: str = ''
     definition_format: str = 'ros2msg'
+    offered_qos: str = ''
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,5 +92,10 @@ class StorageFile(Protocol):
     def messages_lost(self) -> int:
         """Messages known to be lost, so far."""
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
-        """The messages of some topics, or all, in order of log time."""
+    def messages(
+        self,
+        topics: Collection[str] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+    ) -> Iterator[BagMessage]:
+        """The messages of some topics and of some time, or all, in order of log time."""

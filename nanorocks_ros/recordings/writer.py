@@ -4,11 +4,13 @@ How much a crash can cost: messages reach the file in chunks, compressed one by 
 viewers can seek. The chunk that is open when the process is killed is lost, which is at most
 one second of recorded time or 1 MiB, whichever is less, and the last message; `flush` shortens
 that. A killed recording has neither index nor ``metadata.yaml``; `reader.open_bag` reads it all
-the same. Nothing is forced to the disk: a power cut costs what the system had not yet written.
+the same. Only `sync` forces anything to the disk: otherwise a power cut costs what the system had
+not yet written.
 """
 
 from __future__ import annotations
 
+import os
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -134,6 +136,7 @@ class BagWriter:
         self._metadata = dict(metadata)
         self._store = standard_types()
         self._connections: dict[str, Connection] = {}
+        self._folder_is_safe = False
 
     def __enter__(self) -> Self:
         if self.path.exists():
@@ -226,6 +229,29 @@ class BagWriter:
         except OSError as error:
             raise self._unwritable(error) from error
 
+    def sync(self) -> None:
+        """Hand everything written so far to the disk, so that it survives a power cut.
+
+        Raises
+        ------
+        RecordingError
+            When the disk is full or fails.
+        """
+        self.flush()
+        try:
+            os.fsync(self._storage.bio.fileno())
+            if not self._folder_is_safe:
+                for folder in (self.path, self.path.parent):
+                    _sync_folder(folder)
+                self._folder_is_safe = True
+        except OSError as error:
+            raise self._unwritable(error) from error
+
+    def abandon(self) -> None:
+        """End without an index, after a failure: what reached the file before stays readable."""
+        with suppress(OSError):
+            self._writer.abort()
+
     def _append(self, connection: Connection, stamp_ns: int, cdr: bytes | memoryview) -> None:
         if stamp_ns < 0:
             raise RecordingError(
@@ -281,3 +307,12 @@ class BagWriter:
             f'cannot be written ({error.strerror})',
             'pass another path, or make room there',
         )
+
+
+def _sync_folder(path: Path) -> None:
+    """Make the entries of a folder survive a power cut, not only what stands in its files."""
+    number = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)

@@ -84,16 +84,23 @@ class BagFrames:
         RecordingError
             When it cannot be used.
         """
+        message = self.lens_message()
+        if message is None:
+            return None
+        where = f'{self.reader.path}: {message.topic}'
+        if message.type != topics.CAMERA_INFO.type:
+            raise RecordingError(where, f'holds {message.type}', 'record a CameraInfo')
+        try:
+            return view_from_message(self.reader.deserialize(message), where)
+        except FrameError as error:
+            raise RecordingError(error.where, error.what, error.do) from error
+
+    def lens_message(self) -> BagMessage | None:
+        """The first camera_info: that beside the camera topic, or that of the graph."""
         base = self.topic.removesuffix('/compressed').rpartition('/')[0]
         for name in (f'{base}/camera_info', topics.CAMERA_INFO.absolute()):
             for message in self._first(name):
-                where = f'{self.reader.path}: {name}'
-                if message.type != topics.CAMERA_INFO.type:
-                    raise RecordingError(where, f'holds {message.type}', 'record a CameraInfo')
-                try:
-                    return view_from_message(self.reader.deserialize(message), where)
-                except FrameError as error:
-                    raise RecordingError(error.where, error.what, error.do) from error
+                return message
         return None
 
     def frames(self) -> Iterator[Frame | FrameError]:
@@ -102,12 +109,25 @@ class BagFrames:
         In the place of a frame that cannot be used stands the reason: an encoding that is
         not supported, a picture that cannot be decoded.
         """
+        for _, frame in self.recorded_frames():
+            yield frame
+
+    def recorded_frames(
+        self, start_ns: int | None = None, end_ns: int | None = None
+    ) -> Iterator[tuple[BagMessage, Frame | FrameError]]:
+        """Each frame with its message as it was recorded.
+
+        Parameters
+        ----------
+        start_ns, end_ns : int, optional, [ns]
+            Log times of the first and last one.
+        """
         read = frame_from_compressed if self._compressed else frame_from_image
-        for message in self.reader.messages([self.topic]):
+        for message in self.reader.messages([self.topic], start_ns, end_ns):
             try:
-                yield read(self.reader.deserialize(message), self.where)
+                yield message, read(self.reader.deserialize(message), self.where)
             except FrameError as error:
-                yield error
+                yield message, error
 
     def truth(self, epoch_ns: int) -> dict[int, list[GroundTruth]]:
         """What the simulator knew, by tray; empty for a real recording."""

@@ -1,4 +1,4 @@
-"""The generated pages of the documentation: what is on the wire, and every parameter.
+"""What is generated: the pages on the wire, on parameters and viewers, and the viewers' layouts.
 
 ``python -m nanorocks_ros.study.reference`` writes them; a test fails when they are stale.
 """
@@ -21,6 +21,8 @@ from nanorocks_ros.records import (
     SpeedEstimate,
     TrayState,
 )
+from nanorocks_ros.study.viewers import LAYOUTS
+from nanorocks_ros.study.viewers_page import viewers_page
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.beads import beads_layout
 from nanorocks_ros.wire.layouts import layout
@@ -61,8 +63,22 @@ _GROUPS = (
     ('`simulator`', '', st.FilmSettings()),
     ('`simulator`, `bag_player`, `pipeline`', '', st.PacingSettings()),
     ('`bag_player`, `pipeline`', '', st.BagSettings()),
+    (
+        '`bag_player`',
+        '`position` and `rate` can be set while it plays; see [replay.md](replay.md).',
+        st.PlayerSettings(),
+    ),
     ('`preprocessor`, `pipeline`', '', st.CameraSettings()),
     ('`pipeline`', '', st.SourceSettings()),
+    ('`pipeline`', 'See [replay.md](replay.md#record).', st.RecordSettings()),
+    ('`pipeline`, the live page', '', st.LivePageSettings()),
+    (
+        '`dashboard`, `pipeline` under `dashboard_`, and `nanorocks dashboard`',
+        'The port of the page that the pipeline serves is `dashboard_port`; on the command line '
+        'it is `--port`.',
+        st.DashboardSettings(),
+    ),
+    ('`dashboard`', '', st.DashboardGraphSettings()),
 )
 
 
@@ -169,14 +185,21 @@ def _range(row: st.SettingRow) -> str:
     return f'{row.bounds.low:g} to {row.bounds.high:g}'
 
 
-PAGES = {'topics.md': topics_page, 'parameters.md': parameters_page}
+FILES = {
+    'docs/topics.md': topics_page,
+    'docs/parameters.md': parameters_page,
+    'docs/viewers.md': lambda: _NOTE + viewers_page(),
+    **LAYOUTS,
+}
 
 
-def write(folder: Path) -> None:
-    """Write the pages into a folder."""
-    for name, page in PAGES.items():
-        (folder / name).write_text(page(), encoding='utf-8')
+def write(root: Path) -> None:
+    """Write everything that is generated into a source tree."""
+    for name, content in FILES.items():
+        path = root / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(content(), encoding='utf-8')
 
 
 if __name__ == '__main__':
-    write(Path(sys.argv[1] if len(sys.argv) > 1 else 'docs'))
+    write(Path(sys.argv[1] if len(sys.argv) > 1 else '.'))

@@ -9,6 +9,7 @@ IMAGE = 'sensor_msgs/msg/Image'
 COMPRESSED = 'sensor_msgs/msg/CompressedImage'
 INFO = 'sensor_msgs/msg/CameraInfo'
 ARRAY = 'std_msgs/msg/Float32MultiArray'
+HEADER = 'std_msgs/msg/Header'
 TIME = 'builtin_interfaces/msg/Time'
 
 NAMESPACE = '/nanorocks'
@@ -110,6 +111,12 @@ CAMERA_INFO = Topic(
     latched=True,
     doc='the lens: equidistant, 4 coefficients',
 )
+TAKEN = Topic(
+    name='camera/taken',
+    type=HEADER,
+    depth=100,
+    doc='stamp of the last frame that node `frame_id` is done with, for `bag_player` at rate 0',
+)
 EPOCH = Topic(name='epoch', type=TIME, depth=1, latched=True, doc='what `time` counts from')
 
 TOPICS = (
@@ -131,6 +138,7 @@ TOPICS = (
     TRUTH,
     BEADS,
     CAMERA_INFO,
+    TAKEN,
     EPOCH,
 )
 

@@ -106,6 +106,59 @@ def write_times(path, stamps, **options):
     return path
 
 
+# --- a part of it ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('plugin', list(StoragePlugin))
+@pytest.mark.parametrize(('start', 'end', 'expected'), [
+    (None, None, [1, 2, 3]),
+    (2, None, [2, 3]),
+    (None, 2, [1, 2]),
+    (2, 2, [2]),
+    (3, 1, []),
+    (4, None, []),
+    (-(2**70), 2**70, [1, 2, 3]),
+])  # fmt: skip
+def test_of_a_stretch_of_time_both_ends_are_given(tmp_path, plugin, start, end, expected):
+    bag = open_bag(write_with_rosbags(tmp_path / 'run', plugin))
+    found = bag.messages(['/time'], start_ns=start, end_ns=end)
+    assert [m.log_time_ns for m in found] == expected
+
+
+@pytest.mark.parametrize('cut', [None, -30])
+def test_to_seek_only_the_chunks_of_that_time_are_read(tmp_path, record, monkeypatch, cut):
+    path = record(tmp_path / 'run', frames=400)
+    file = path / 'run.mcap'
+    file.write_bytes(file.read_bytes()[:cut])
+    bag = open_bag(path)
+    everything = list(bag.messages())
+    start, end = everything[300].log_time_ns, everything[420].log_time_ns
+    loaded = 0
+
+    def counting(stream, block, catalogue):
+        nonlocal loaded
+        messages = load(stream, block, catalogue)
+        loaded += len(messages)
+        return messages
+
+    monkeypatch.setattr(mcap_file, 'load', counting)
+    found = list(bag.messages(start_ns=start, end_ns=end))
+    assert found == [m for m in everything if start <= m.log_time_ns <= end]
+    assert len(found) <= loaded < len(everything) / 2
+
+
+def test_seeking_in_a_split_recording_skips_whole_files(tmp_path, record):
+    folder = tmp_path / 'split'
+    folder.mkdir()
+    for number in range(3):
+        part = record(tmp_path / f'part_{number}', frames=4, first=4 * number)
+        (part / f'part_{number}.mcap').rename(folder / f'split_{number}.mcap')
+    bag = open_bag(folder)
+    everything = list(bag.messages([SPEED]))
+    start, end = everything[6].log_time_ns, everything[8].log_time_ns
+    assert list(bag.messages([SPEED], start, end)) == everything[6:9]
+
+
 # --- cut short ------------------------------------------------------------------------------
 
 

@@ -1,16 +1,18 @@
-"""The generated pages of the documentation are those that the code generates."""
+"""What is generated from the code is what the code generates."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from nanorocks_ros.study.reference import PAGES
-
-DOCS = Path(__file__).parents[2] / 'docs'
+from nanorocks_ros.study.reference import FILES, write
 
 
-@pytest.mark.parametrize('name', sorted(PAGES))
-def test_a_generated_page_is_not_stale(name):
-    assert (DOCS / name).read_text(encoding='utf-8') == PAGES[name](), 'run `make docs`'
+@pytest.mark.parametrize('name', sorted(FILES))
+def test_a_generated_file_is_not_stale(name, root):
+    assert (root / name).read_text(encoding='utf-8') == FILES[name](), 'run `make docs`'
+
+
+def test_everything_is_written_into_an_empty_tree(tmp_path):
+    write(tmp_path)
+    written = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob('*') if path.is_file()}
+    assert written == set(FILES)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.stages.bodies.pairs import Beads
+    from nanorocks_ros.stages.bodies.pair_table import Beads
 
 # Bodies are compared so often, [s].
 _INTERVAL = 0.1

@@ -7,7 +7,6 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from nanorocks_ros.inference.persistence import (
     chance,
@@ -19,8 +18,10 @@ from nanorocks_ros.stages.bodies.births import Births
 from nanorocks_ros.stages.bodies.clinging import Clinging
 from nanorocks_ros.stages.bodies.companions import Companions
 from nanorocks_ros.stages.bodies.ghosts import Ghosts
-from nanorocks_ros.stages.bodies.pairs import Beads, Bond, Pairs
+from nanorocks_ros.stages.bodies.pair_table import Beads
+from nanorocks_ros.stages.bodies.pairs import Bond, Pairs
 from nanorocks_ros.stages.bodies.sizes import bodies_of, size_fields
+from nanorocks_ros.stages.bodies.warmth import energies, variances
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,10 +39,6 @@ _BELIEVED = 0.1
 _UNSEEN_MERGES = 0.5
 # Bodies that touch nowhere in sight are believed to be one when that is so much less by chance.
 _SURER = 0.3
-# So many beads make the surroundings of one; they are not taken for colder than this, against
-# the gas, since beads that stick together move alike.
-_NEIGHBOURS = 12
-_COLDEST = 0.1
 # Tracks break off this often at most, of each bead on average, [s]: where they break more often,
 # nobody can tell who stays beside whom. Of films without sticking 7 to 100 s in trays 1, 3 and 5,
 # where none of what stays together is one bead found twice; 1 to 3 s in trays 4 and 7.
@@ -185,7 +182,7 @@ class BodyCounter:
         self._learn(tracks)
         seen = np.flatnonzero(tracks.seen)
         seen = seen[np.argsort(ids[seen], kind='stable')]
-        self._usual = (self._energies[tracks.species] / _masses(tracks))[seen]
+        self._usual = (self._energies[tracks.species] / tracks.radii**3)[seen]
         return Beads(
             ids=ids[seen],
             places=tracks.positions[seen],
@@ -206,41 +203,36 @@ class BodyCounter:
 
         Of a species of many sizes the large ones are slow: two of them seem to stay together.
         """
-        square = 0.5 * np.sum(np.square(tracks.velocities), axis=1)
-        speed = np.nan_to_num(np.sqrt(2.0 * square[tracks.seen]))
-        if self._pictures and speed.size:
+        known, speed, means = energies(
+            tracks.velocities,
+            tracks.velocity_errors,
+            tracks.radii,
+            tracks.species,
+            tracks.seen,
+            self._energies.size,
+        )
+        if self._pictures and tracks.seen.any():
             step = (tracks.stamp_ns - self._pictures[-1].stamp_ns) / _NS
-            self._way += float(speed.mean()) * step
-        known = tracks.seen & np.isfinite(square) & np.isfinite(tracks.velocity_errors)
-        excess = (square - np.square(tracks.velocity_errors)) * _masses(tracks)
-        for species in range(self._energies.size):
-            own = excess[known & (tracks.species == species)]
-            if own.size:
-                mean = max(float(own.mean()), 0.0)
-                last = self._energies[species]
-                share = _ENERGY_SHARE if last > 0.0 else 1.0
-                self._energies[species] = last + share * (mean - last)
+            self._way += speed * step
+        for species in np.flatnonzero(known).tolist():
+            last = self._energies[species]
+            share = _ENERGY_SHARE if last > 0.0 else 1.0
+            self._energies[species] = last + share * (max(means[species], 0.0) - last)
 
     def _variances(self, tracks: Tracks) -> NDArray[np.float64]:
         """Mean square of a component of the velocity that a bead has in this gas, there.
 
         A gas of inelastic beads is cold where it is dense, and there beads stay together.
         """
-        own = self._energies[tracks.species]
-        square = 0.5 * np.sum(np.square(tracks.velocities), axis=1)
-        ratio = (
-            (square - np.square(tracks.velocity_errors))
-            * _masses(tracks)
-            / np.where(own > 0.0, own, np.inf)
+        return variances(
+            self._energies,
+            tracks.positions,
+            tracks.velocities,
+            tracks.velocity_errors,
+            tracks.radii,
+            tracks.species,
+            tracks.seen,
         )
-        known = tracks.seen & np.isfinite(ratio)
-        everybody = own / _masses(tracks)
-        if np.count_nonzero(known) <= _NEIGHBOURS:
-            return np.asarray(everybody)
-        tree = cKDTree(tracks.positions[known])
-        near = tree.query(tracks.positions, k=_NEIGHBOURS)[1]
-        around = ratio[known][near].mean(axis=1)
-        return np.asarray(everybody * np.clip(around, _COLDEST, 1.0))
 
     def _keep(self, time: float, tracks: Tracks, beads: Beads, ids: NDArray[np.int64]) -> None:
         known = frozenset(ids.tolist()) | self._ghosts.hidden
@@ -347,8 +339,3 @@ class BodyCounter:
                 key = min(body[first], body[second]), max(body[first], body[second])
                 found[key] = max(found.get(key, 0.0), odds / (odds + one))
         return [(sizes[a], sizes[b], one) for (a, b), one in found.items()]
-
-
-def _masses(tracks: Tracks) -> NDArray[np.float64]:
-    """Up to the density, which beads of a species share, [m^3]."""
-    return np.asarray(tracks.radii**3)

@@ -42,15 +42,16 @@ class Ghosts:
         bonds : mapping
             By the numbers of both beads.
         """
-        present = set(tracks.ids.tolist())
-        self._names = {new: old for new, old in self._names.items() if new in present}
-        for row, number in enumerate(tracks.ids.tolist()):
-            if number not in self._names:
-                self._names[number] = self._back(tracks, row, number)
-            self._species[self._names[number]] = int(tracks.species[row])
-        ids = np.array([self._names[one] for one in tracks.ids.tolist()], dtype=np.int64)
-        places = dict(zip(ids.tolist(), tracks.positions, strict=True))
-        self._wanted = _places_of_hidden(places, bonds)
+        present = tracks.ids.tolist()
+        fresh = [row for row, number in enumerate(present) if number not in self._names]
+        if len(self._names) + len(fresh) > len(present):
+            there = set(present)
+            self._names = {new: old for new, old in self._names.items() if new in there}
+        for row in fresh:
+            name = self._names[present[row]] = self._back(tracks, row, present[row])
+            self._species[name] = int(tracks.species[row])
+        ids = np.array([self._names[one] for one in present], dtype=np.int64)
+        self._wanted = _places_of_hidden(ids, tracks.positions, bonds) if bonds else {}
         self.hidden = frozenset(self._wanted)
         return ids
 
@@ -65,9 +66,12 @@ class Ghosts:
 
 
 def _places_of_hidden(
-    places: Mapping[int, NDArray[np.float64]], bonds: Mapping[tuple[int, int], Bond]
+    ids: NDArray[np.int64],
+    positions: NDArray[np.float64],
+    bonds: Mapping[tuple[int, int], Bond],
 ) -> dict[int, NDArray[np.float64]]:
     """Where beads of bodies should be that are not followed, by their partners."""
+    places = dict(zip(ids.tolist(), positions, strict=True))
     found: dict[int, NDArray[np.float64]] = {}
     for (first, second), bond in bonds.items():
         if first in places and second not in places:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.records import PairCollision, Rebound
 from nanorocks_ros.stages.contacts.checks import FAR, LEAST_SIGNAL, only_these_two
-from nanorocks_ros.stages.contacts.flights import Line, Meeting, meeting
-from nanorocks_ros.stages.contacts.history import LONGEST, Kink, TrackHistory
+from nanorocks_ros.stages.contacts.flights import Meeting, when_met
+from nanorocks_ros.stages.contacts.history import LONGEST, Histories, Kink
 from nanorocks_ros.stages.contacts.surroundings import Surroundings
 from nanorocks_ros.stages.contacts.waiting import Waiting
 
@@ -29,20 +29,12 @@ LATEST_NS = 2_000_000_000
 # while it was not seen is not used.
 _GAP = 3.5
 _CONTACT_GAP = 1.5
-# Of grains with corners a collision says nothing of the kind.
-_NOT_ROUND = ('JSC-1',)
-# Flights from which the scatter of places is learnt, their fewest places, and how far they lead
-# in errors of a place: beads at rest are always misplaced alike.
-_FLIGHTS, _FEWEST_PLACES, _LEAST_WAY = 200, 8, 8.0
-_FEWEST_FLIGHTS = 10
 # Flights used are as straight as chance leaves all but one in a thousand.
 _STRAIGHT = 4.0
 # How far off the wall a rebound may be seen, in radii; and in sums of radii, how close or far
 # two beads: less is one over the other, whose places are not good then.
 _WALL_SLACK = 0.15
 _NEAREST, _FURTHEST = 0.9, 1.05
-# Error of a measured radius, over it, that outlines leave besides the stated one.
-_OUTLINE = 0.02
 # Part of an interval by which the contact may lie outside the pictures around it.
 _EARLY = 0.3
 
@@ -57,17 +49,14 @@ class ContactFinder:
 
     def __init__(self, tray: Tray) -> None:
         self._tray = tray
-        self._round = [one.material not in _NOT_ROUND for one in tray.species]
         self._restart()
 
     def _restart(self) -> None:
         self._first_ns = 0
         self._last_ns: int | None = None
-        self._histories: dict[int, TrackHistory] = {}
+        self._histories = Histories(self._tray)
         self._around = Surroundings(3 * LONGEST)
-        self._waiting: list[Waiting] = []
-        self._scatter: list[deque[float]] = [deque(maxlen=_FLIGHTS) for _ in self._round]
-        self._variances = [1.0 for _ in self._round]
+        self._waiting = Waiting()
 
     def push(self, tracks: Tracks) -> tuple[Rebound | PairCollision, ...]:
         """Take the next picture; a contact is known when the flights after it are.
@@ -81,81 +70,31 @@ class ContactFinder:
         self._last_ns = tracks.stamp_ns
         time = (tracks.stamp_ns - self._first_ns) / _NS
         self._around.push(time, tracks)
-        kinks = self._kinks(time, tracks)
-        horizon = time - 2 * LONGEST * self._around.interval
-        self._waiting = [one for one in self._waiting if one.when.time > horizon]
+        kinks = self._histories.push(time, tracks, _GAP * self._around.interval)
+        self._waiting.forget(time - 2 * LONGEST * self._around.interval)
         return tuple(found for kink in kinks for found in self._contact(kink))
 
     def flush(self) -> tuple[Rebound | PairCollision, ...]:
         """The contacts whose flights afterwards end with the recording."""
-        ends = [
-            one.finish(self._variances[one.species]) for _, one in sorted(self._histories.items())
-        ]
-        self._histories = {}
-        return tuple(found for kink in ends if kink for found in self._contact(kink))
-
-    def _kinks(self, time: float, tracks: Tracks) -> list[Kink]:
-        found = []
-        gap = _GAP * self._around.interval
-        places = tracks.positions + tracks.displacement
-        columns = (tracks.ids.tolist(), tracks.species.tolist(), tracks.position_errors.tolist())
-        for row, (number, species, error) in enumerate(zip(*columns, strict=True)):
-            if not (tracks.seen[row] and self._round[species]):
-                continue
-            history = self._histories.get(number)
-            if history is None:
-                history = self._histories[number] = TrackHistory(number, species)
-            self._measure(history, float(tracks.radii[row]), float(tracks.radius_errors[row]))
-            kink, flight = history.push(time, places[row], error, self._variances[species], gap)
-            if kink is not None:
-                found.append(kink)
-            if flight is not None:
-                self._learn(species, flight)
-        for number in self._histories.keys() - set(columns[0]):
-            history = self._histories.pop(number)
-            kink = history.finish(self._variances[history.species])
-            if kink is not None:
-                found.append(kink)
-        return found
-
-    def _measure(self, history: TrackHistory, radius: float, error: float) -> None:
-        one = self._tray.species[history.species]
-        history.radius, history.radius_error = radius, math.hypot(error, _OUTLINE * radius)
-        if one.diameter_low == one.diameter_high:
-            history.radius, history.radius_error = 0.5 * one.diameter, 0.0
+        kinks = self._histories.flush()
+        return tuple(found for kink in kinks for found in self._contact(kink))
 
     def _mass(self, kink: Kink) -> float:
         return self._tray.species[kink.species].density * 4.0 / 3.0 * math.pi * kink.radius**3
 
-    def _learn(self, species: int, flight: Line) -> None:
-        """Scatter of places over what their errors say; those hold what pictures share, too."""
-        if flight.used < _FEWEST_PLACES:
-            return
-        way = math.hypot(*flight.velocity) / math.sqrt(flight.velocity_variance)
-        if way < _LEAST_WAY:
-            return
-        known = self._scatter[species]
-        known.append(flight.chi_square / (2 * flight.used - 4))
-        if len(known) >= _FEWEST_FLIGHTS:
-            self._variances[species] = float(np.median(known))
-
     def _contact(self, kink: Kink) -> tuple[Rebound | PairCollision, ...]:
-        when = meeting([(kink.before, kink.after)])
-        if not (_straight(kink) and self._between(kink, when)):
+        when = Meeting(*when_met(kink.lines[None]))
+        if not (_straight(kink.lines) and self._between(kink, when)):
             return ()
         rebound = self._rebound(kink, when)
         if rebound is not None:
             return (rebound,)
-        this = Waiting.of(kink, when)
-        for other in self._waiting:
-            # Hundreds wait: a quick look at each.
-            soon = abs(other.when.time - when.time) < this.slack + other.slack
-            near = soon and other.near(this, when.time) and self._together(when, other.when)
-            pair = self._pair((other.kink, kink)) if near else None
+        for other in self._waiting.partners(kink, when, self._around.interval):
+            pair = self._pair((other, kink))
             if pair is not None:
-                self._waiting = [one for one in self._waiting if one is not other]
+                self._waiting.remove(other)
                 return (pair,)
-        self._waiting.append(this._replace(slack=this.slack + self._around.interval))
+        self._waiting.add(kink, when, self._around.interval)
         return ()
 
     def _between(self, kink: Kink, when: Meeting) -> bool:
@@ -165,24 +104,21 @@ class ContactFinder:
             return False
         return kink.last - slack < when.time < kink.first + slack
 
-    def _together(self, one: Meeting, other: Meeting) -> bool:
-        slack = self._around.interval + FAR * math.hypot(one.error, other.error)
-        return abs(one.time - other.time) < slack
-
     def _stamp_ns(self, time: float) -> int:
         return self._first_ns + round(time * _NS)
 
     def _rebound(self, kink: Kink, when: Meeting) -> Rebound | None:
-        place, variance = _place(kink, when.time)
+        x, y, variance = _place(kink.lines, when.time)
+        shift_x, shift_y = self._around.displacement(when.time)
+        place = x - shift_x, y - shift_y
         slack = _WALL_SLACK * kink.radius + FAR * math.sqrt(variance)
-        place = place - self._around.displacement(when.time)
         for wall in range(4):
             axis, high = divmod(wall, 2)
             room = self._tray.dimensions[axis] - place[axis] if high else place[axis]
             if abs(room - kink.radius) < slack:
-                change = float(kink.after.velocity[1 - axis] - kink.before.velocity[1 - axis])
+                change = float(kink.lines[1, 4 - axis] - kink.lines[0, 4 - axis])
                 if abs(change) < FAR * math.hypot(*_errors(kink)) and self._alone(when, [kink]):
-                    return self._rebound_from(wall, kink, when, place)
+                    return self._rebound_from(wall, kink, when, np.array(place))
         return None
 
     def _rebound_from(
@@ -214,22 +150,18 @@ class ContactFinder:
         return found if found.incoming > signal and found.outgoing > 0.0 else None
 
     def _alone(self, when: Meeting, kinks: list[Kink]) -> bool:
-        beads = [
-            (
-                one.track,
-                _place(one, when.time)[0],
-                one.radius,
-                max(math.hypot(*one.before.velocity), math.hypot(*one.after.velocity)),
-            )
-            for one in kinks
-        ]
-        return self._around.alone(when.time, beads)
+        beads = np.empty((len(kinks), 4))
+        for bead, one in zip(beads, kinks, strict=True):
+            speed = max(math.hypot(*line[3:5]) for line in one.lines.tolist())
+            bead[:] = *_place(one.lines, when.time)[:2], one.radius, speed
+        return self._around.alone(when.time, [one.track for one in kinks], beads)
 
     def _pair(self, kinks: tuple[Kink, Kink]) -> PairCollision | None:
-        when = meeting([(one.before, one.after) for one in kinks])
+        when = Meeting(*when_met(np.array([one.lines for one in kinks])))
         if not all(self._between(one, when) for one in kinks):
             return None
-        distance = math.hypot(*(_place(kinks[1], when.time)[0] - _place(kinks[0], when.time)[0]))
+        (x, y, _), (its_x, its_y, _) = (_place(one.lines, when.time) for one in kinks)
+        distance = math.hypot(its_x - x, its_y - y)
         reach = kinks[0].radius + kinks[1].radius
         if (
             not _NEAREST * reach < distance < _FURTHEST * reach
@@ -241,7 +173,8 @@ class ContactFinder:
         return found if only_these_two(found) else None
 
     def _collision(self, kinks: tuple[Kink, Kink], when: Meeting) -> PairCollision:
-        (here, variance), (there, its) = (_place(one, when.time) for one in kinks)
+        places = [_place(one.lines, when.time) for one in kinks]
+        here, there = (np.array(one[:2]) for one in places)
         before = np.array([one.before.velocity for one in kinks])
         approach = before[1] - before[0]
         shared = sum(one.shared_error**2 for one in kinks)
@@ -261,29 +194,35 @@ class ContactFinder:
             before_errors=errors[:, 0],
             after_errors=errors[:, 1],
             separation=there - here,
-            separation_error=math.sqrt(variance + its + shared + mistimed),
+            separation_error=math.sqrt(sum(one[2] for one in places) + shared + mistimed),
             temperatures=np.array(temperatures),
             height=self._tray.dimensions[2],
-            place=here - self._around.displacement(when.time),
+            place=here - np.array(self._around.displacement(when.time)),
         )
 
 
-def _place(kink: Kink, time: float) -> tuple[NDArray[np.float64], float]:
+@compiled
+def _place(lines: NDArray[np.float64], time: float) -> tuple[float, float, float]:
     """Where the bead was at the contact, by both flights, and the variance of a coordinate."""
-    before, after = kink.before.variance_at(time), kink.after.variance_at(time)
-    share = after / (before + after)
-    place = share * kink.before.at(time) + (1.0 - share) * kink.after.at(time)
-    return place, share * before
+    before, after = lines[0], lines[1]
+    since, to = time - before[0], time - after[0]
+    variance = before[5] + before[6] * since * since
+    its = after[5] + after[6] * to * to
+    share = its / (variance + its)
+    x = share * (before[1] + before[3] * since) + (1.0 - share) * (after[1] + after[3] * to)
+    y = share * (before[2] + before[4] * since) + (1.0 - share) * (after[2] + after[4] * to)
+    return x, y, share * variance
 
 
 def _errors(kink: Kink) -> tuple[float, float]:
     """Of a component of the velocities before and after, [m/s]."""
-    return math.sqrt(kink.before.velocity_variance), math.sqrt(kink.after.velocity_variance)
+    return math.sqrt(kink.lines[0, 6]), math.sqrt(kink.lines[1, 6])
 
 
-def _straight(kink: Kink) -> bool:
-    for line in (kink.before, kink.after):
-        freedom = 2 * line.used - 4
-        if line.chi_square > freedom + _STRAIGHT * math.sqrt(2.0 * freedom):
+@compiled
+def _straight(lines: NDArray[np.float64]) -> bool:
+    for k in range(2):
+        freedom = 2.0 * lines[k, 8] - 4.0
+        if lines[k, 7] > freedom + _STRAIGHT * math.sqrt(2.0 * freedom):
             return False
     return True

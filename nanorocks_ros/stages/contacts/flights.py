@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from nanorocks_ros.physics.compiled import compiled
 
 _SUMS = 8
+LINE = 10
+"""Numbers of a line in an array, in the order of the fields of `Line`."""
 
 
 class Line(NamedTuple):
@@ -40,6 +42,19 @@ class Line(NamedTuple):
     used: int
     duration: float
 
+    @classmethod
+    def of(cls, row: NDArray[np.float64]) -> Line:
+        """The line whose numbers are in an array, (LINE,)."""
+        *_, place, velocity, chi_square, used, duration = row.tolist()
+        return cls(
+            float(row[0]), row[1:3], row[3:5], place, velocity, chi_square, int(used), duration
+        )
+
+    @property
+    def row(self) -> NDArray[np.float64]:
+        """Its numbers in an array, (LINE,)."""
+        return np.hstack(self)
+
     def at(self, time: float) -> NDArray[np.float64]:
         """Place at a time, (2,), [m]."""
         return self.place + self.velocity * (time - self.time)
@@ -47,29 +62,6 @@ class Line(NamedTuple):
     def variance_at(self, time: float) -> float:
         """Variance of a coordinate of that place, [m^2]."""
         return self.place_variance + self.velocity_variance * (time - self.time) ** 2
-
-    def with_errors(self, variance: float, drift: float, length: float) -> Line:
-        """The same with other errors of its places.
-
-        Parameters
-        ----------
-        variance : float
-            Of what scatters from place to place, over what was said.
-        drift : float, [m]
-            Standard error that is another one further on.
-        length : float, [m]
-            How far on; along a shorter way before and after a contact it tilts both lines alike,
-            which their ratio does not feel.
-        """
-        square = float(self.velocity @ self.velocity) * self.duration**2
-        apart = square / (square + length**2)
-        return self._replace(
-            place_variance=variance * self.place_variance,
-            # Slopes feel the ends most: one whole wave along a flight tilts it by nearly this.
-            velocity_variance=variance * self.velocity_variance
-            + apart * 4.0 * (drift / self.duration) ** 2,
-            chi_square=self.chi_square / variance,
-        )
 
 
 @compiled
@@ -131,28 +123,72 @@ def best_break(
     return first, _chi_square(sums, 0, n) - least
 
 
+@compiled
+def line_through(
+    times: NDArray[np.float64],
+    places: NDArray[np.float64],
+    errors: NDArray[np.float64],
+    row: NDArray[np.float64],
+) -> None:
+    """The line through places (n, 2), n >= 2, weighted by their errors, into an array (LINE,)."""
+    total, time, x, y = 0.0, 0.0, 0.0, 0.0
+    for k in range(times.size):
+        weight = 1.0 / (errors[k] * errors[k])
+        total += weight
+        time += weight * times[k]
+        x += weight * places[k, 0]
+        y += weight * places[k, 1]
+    time, x, y = time / total, x / total, y / total
+    spread, u, v = 0.0, 0.0, 0.0
+    for k in range(times.size):
+        weight = (times[k] - time) / (errors[k] * errors[k])
+        spread += weight * (times[k] - time)
+        u += weight * (places[k, 0] - x)
+        v += weight * (places[k, 1] - y)
+    u, v = u / spread, v / spread
+    chi_square = 0.0
+    for k in range(times.size):
+        dx = places[k, 0] - x - u * (times[k] - time)
+        dy = places[k, 1] - y - v * (times[k] - time)
+        chi_square += (dx * dx + dy * dy) / (errors[k] * errors[k])
+    row[0], row[1], row[2], row[3], row[4] = time, x, y, u, v
+    row[5], row[6], row[7] = 1.0 / total, 1.0 / spread, chi_square
+    row[8], row[9] = times.size, times[-1] - times[0]
+
+
+@compiled
+def set_errors(row: NDArray[np.float64], variance: float, drift: float, length: float) -> None:
+    """Give a line other errors of its places.
+
+    Parameters
+    ----------
+    row : ndarray (LINE,)
+        Changed.
+    variance : float
+        Of what scatters from place to place, over what was said.
+    drift : float, [m]
+        Standard error that is another one further on.
+    length : float, [m]
+        How far on; along a shorter way before and after a contact it tilts both lines alike,
+        which their ratio does not feel.
+    """
+    duration = row[9]
+    square = (row[3] * row[3] + row[4] * row[4]) * duration * duration
+    apart = square / (square + length * length)
+    tilt = drift / duration
+    row[5] *= variance
+    # Slopes feel the ends most: one whole wave along a flight tilts it by nearly this.
+    row[6] = variance * row[6] + apart * 4.0 * tilt * tilt
+    row[7] /= variance
+
+
 def fit_line(
     times: NDArray[np.float64], places: NDArray[np.float64], errors: NDArray[np.float64]
 ) -> Line:
     """The line through places (n, 2), n >= 2, weighted by their errors."""
-    weights = 1.0 / np.square(errors)
-    total = float(weights.sum())
-    time = float(weights @ times) / total
-    place = weights @ places / total
-    since = times - time
-    spread = float(weights @ np.square(since))
-    velocity = (weights * since) @ (places - place) / spread
-    residuals = places - place - np.outer(since, velocity)
-    return Line(
-        time=time,
-        place=place,
-        velocity=velocity,
-        place_variance=1.0 / total,
-        velocity_variance=1.0 / spread,
-        chi_square=float(weights @ np.square(residuals).sum(axis=1)),
-        used=times.size,
-        duration=float(times[-1] - times[0]),
-    )
+    row = np.empty(LINE)
+    line_through(times, places, errors, row)
+    return Line.of(row)
 
 
 class Meeting(NamedTuple):
@@ -170,21 +206,34 @@ class Meeting(NamedTuple):
     chi_square: float
 
 
-def meeting(pairs: list[tuple[Line, Line]]) -> Meeting:
-    """The instant at which the lines before and after agree best on where the beads are."""
-    time = 0.5 * sum(before.time + after.time for before, after in pairs) / len(pairs)
-    found = Meeting(time, math.inf, 0.0)
+@compiled
+def when_met(lines: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Time, error and chi square of a `Meeting` of lines, (beads, 2, LINE)."""
+    beads = lines.shape[0]
+    time = 0.0
+    for k in range(beads):
+        time += lines[k, 0, 0] + lines[k, 1, 0]
+    time *= 0.5 / beads
+    error, chi_square = np.inf, 0.0
     # The errors of the lines depend on the instant; two rounds are enough.
     for _ in range(2):
-        top = bottom = rest = 0.0
-        for before, after in pairs:
-            weight = 1.0 / (before.variance_at(time) + after.variance_at(time))
-            apart = after.at(time) - before.at(time)
-            turn = after.velocity - before.velocity
-            top -= weight * float(apart @ turn)
-            bottom += weight * float(turn @ turn)
-            rest += weight * float(apart @ apart)
+        top, bottom, rest = 0.0, 0.0, 0.0
+        for k in range(beads):
+            before, after = lines[k, 0], lines[k, 1]
+            since, to = time - before[0], time - after[0]
+            variance = before[5] + before[6] * since * since + after[5] + after[6] * to * to
+            x = after[1] + after[3] * to - before[1] - before[3] * since
+            y = after[2] + after[4] * to - before[2] - before[4] * since
+            u, v = after[3] - before[3], after[4] - before[4]
+            top -= (x * u + y * v) / variance
+            bottom += (u * u + v * v) / variance
+            rest += (x * x + y * y) / variance
         step = top / bottom
-        found = Meeting(time + step, bottom**-0.5, max(rest - top * step, 0.0))
         time += step
-    return found
+        error, chi_square = 1.0 / math.sqrt(bottom), max(rest - top * step, 0.0)
+    return time, error, chi_square
+
+
+def meeting(pairs: list[tuple[Line, Line]]) -> Meeting:
+    """The instant at which the lines before and after agree best on where the beads are."""
+    return Meeting(*when_met(np.array([[before.row, after.row] for before, after in pairs])))

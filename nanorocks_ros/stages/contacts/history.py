@@ -1,4 +1,4 @@
-"""The way of one bead, cut into straight flights, and the kinks between them."""
+"""The ways of the beads of a tray, cut into straight flights, and the kinks between them."""
 
 from __future__ import annotations
 
@@ -6,30 +6,22 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from nanorocks_ros.stages.contacts.flights import Line, best_break, fit_line
+from nanorocks_ros.stages.contacts.flights import LINE, Line
+from nanorocks_ros.stages.contacts.ways import KINK, LONGEST, Scatter, Ways, begin, finish, follow
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.records import Tracks
 
-LONGEST = 48
-"""Places of a flight that are used at most."""
+__all__ = ['LONGEST', 'Histories', 'Kink']
 
-FEWEST = 4
-"""Places of a flight below which it says nothing of being straight."""
-
-_ROOM = 4 * LONGEST
-# On each side of a break that is looked for; two lines through fewer would fit anything.
-_FEWEST_BREAK = 2
-# What a break must gain in chi square: chance reaches 30 once in some ten thousand flights.
-_GAIN = 30.0
-# Scatter that is believed at least, over the stated variance: errors that a bead keeps for some
-# pixels bend its way a little, and would cut it into pieces.
-_LEAST_VARIANCE = 0.25
-# Way over which light, shadow and outline misplace a bead alike, in radii.
-_SAME = 0.5
-# Places that the best break may move when all of the flight behind it is known.
-_MOVED = 2
+# Of grains with corners a collision says nothing of the kind.
+_NOT_ROUND = ('JSC-1',)
+# Error of a measured radius, over it, that outlines leave besides the stated one.
+_OUTLINE = 0.02
+_SLOTS = 64
 
 
 class Kink(NamedTuple):
@@ -39,8 +31,8 @@ class Kink(NamedTuple):
     ----------
     track, species : int
     radius, radius_error : float, [m]
-    before, after : Line
-        Through places past the camera.
+    lines : ndarray (2, LINE)
+        Numbers of the flights before and after, through places past the camera.
     last, first : float, [s]
         Times of the last picture before and of the first after.
     shared_error : float, [m]
@@ -51,133 +43,124 @@ class Kink(NamedTuple):
     species: int
     radius: float
     radius_error: float
-    before: Line
-    after: Line
+    lines: NDArray[np.float64]
     last: float
     first: float
     shared_error: float
 
+    @property
+    def before(self) -> Line:
+        """The flight before."""
+        return Line.of(self.lines[0])
 
-class TrackHistory:
-    """The last flights of one track.
+    @property
+    def after(self) -> Line:
+        """The flight after."""
+        return Line.of(self.lines[1])
+
+
+class Histories:
+    """The last flights of all tracks of a tray that are of round beads.
 
     Parameters
     ----------
-    track, species : int
+    tray : Tray
     """
 
-    def __init__(self, track: int, species: int) -> None:
-        self.track = track
-        self.species = species
-        self.radius = self.radius_error = 0.0
-        self._times = np.empty(_ROOM)
-        self._places = np.empty((_ROOM, 2))
-        self._errors = np.empty(_ROOM)
-        self._end = 0
-        # First place of this flight and of the one before; -1 when that is not known.
-        self._first = 0
-        self._before = -1
+    def __init__(self, tray: Tray) -> None:
+        species = tray.species
+        self._round = np.array([one.material not in _NOT_ROUND for one in species])
+        alike = [one.diameter_low == one.diameter_high for one in species]
+        self._known_radii = np.array(
+            [0.5 * one.diameter if same else math.nan
+             for one, same in zip(species, alike, strict=True)]
+        )  # fmt: skip
+        self._scatter = Scatter.unknown(len(species))
+        self._slots: dict[int, int] = {}
+        self._free = list(range(_SLOTS))[::-1]
+        self._ways = Ways.empty(_SLOTS)
+        # Of each slot.
+        self._species = np.zeros(_SLOTS, dtype=np.int32)
+        self._sizes = np.zeros((_SLOTS, 2))
 
-    def push(
-        self, time: float, place: NDArray[np.float64], error: float, variance: float, gap: float
-    ) -> tuple[Kink | None, Line | None]:
-        """Take the next place.
+    def push(self, time: float, tracks: Tracks, gap: float) -> list[Kink]:
+        """Take the next picture, at a time in s.
 
         Parameters
         ----------
         time : float, [s]
-        place : ndarray (2,), [m]
-            Past the camera.
-        error : float, [m]
-            Of a coordinate.
-        variance : float
-            What variances of places of this species are, over what their errors say.
+        tracks : Tracks
         gap : float, [s]
-            Without a place for longer, what happened is not known.
+            Without a place for longer, what happened to a bead is not known.
 
         Returns
         -------
-        kink : Kink or None
-            One whose flights before and after are both known now.
-        flight : Line or None
-            One that ended now.
+        list of Kink
+            Those of which the flights before and after are both known now.
         """
-        kink = None
-        if self._end and time - self._times[self._end - 1] > gap:
-            kink = self.finish(variance)
-            self._end = self._first = 0
-            self._before = -1
-        if self._end == _ROOM:
-            self._make_room()
-        self._times[self._end], self._errors[self._end] = time, error
-        self._places[self._end] = place
-        self._end += 1
-        if kink is not None:
-            return kink, None
-        return self._cut(variance)
-
-    def finish(self, variance: float) -> Kink | None:
-        """The kink before this flight, which ends here."""
-        return self._kink(self._end, variance)
-
-    def _cut(self, variance: float) -> tuple[Kink | None, Line | None]:
-        here = slice(self._first, self._end)
-        first, gain = best_break(
-            self._times[here], self._places[here], self._errors[here], _FEWEST_BREAK
+        rows = np.flatnonzero(tracks.seen & self._round[tracks.species])
+        species, numbers = tracks.species[rows], tracks.ids[rows].tolist()
+        slots = np.array([self._slot(one) for one in numbers], dtype=np.int64)
+        self._species[slots] = species
+        sizes = self._measured(species, tracks.radii[rows], tracks.radius_errors[rows])
+        self._sizes[slots] = sizes
+        lines = np.empty((rows.size, KINK))
+        places = (tracks.positions + tracks.displacement)[rows]
+        errors = tracks.position_errors[rows]
+        radii = sizes[:, 0].copy()
+        turned = follow(
+            self._ways, self._scatter, time, gap, slots, species, places, errors, radii, lines
         )
-        # The first place after a turn alone would take the last one before it along.
-        settled = self._first + first + _FEWEST_BREAK < self._end
-        if settled and gain > _GAIN * max(variance, _LEAST_VARIANCE):
-            end = self._first + first
-            flight = self._line(self._first, end)
-            kink = self._kink(end, variance)
-            self._before, self._first = self._first, end
-            return kink, flight
-        if self._end - self._first <= LONGEST:
-            return None, None
-        kink = self._kink(self._end, variance)
-        self._before = -1
-        self._first += 1
-        return kink, None if kink is None else self._line(self._first, self._end)
+        found = [self._kink(numbers[k], lines[k].copy()) for k in np.flatnonzero(turned).tolist()]
+        gone = self._slots.keys() - set(tracks.ids.tolist())
+        return found + self._finished(sorted(gone))
 
-    def _line(self, first: int, end: int) -> Line:
-        here = slice(first, end)
-        return fit_line(self._times[here], self._places[here], self._errors[here])
+    def flush(self) -> list[Kink]:
+        """The kinks whose flights afterwards end with the recording."""
+        return self._finished(sorted(self._slots))
 
-    def _kink(self, end: int, variance: float) -> Kink | None:
-        """The kink where this flight began, when it ends at a place."""
-        if self._before < 0:
-            return None
-        start = max(self._before, self._first - LONGEST)
-        here = slice(start, end)
-        first = (
-            start
-            + best_break(self._times[here], self._places[here], self._errors[here], _FEWEST_BREAK)[
-                0
+    def _slot(self, number: int) -> int:
+        slot = self._slots.get(number)
+        if slot is None:
+            if not self._free:
+                self._grow()
+            slot = self._slots[number] = self._free.pop()
+            begin(self._ways, slot)
+        return slot
+
+    def _grow(self) -> None:
+        slots = self._species.size
+        self._ways = self._ways.larger()
+        self._species = np.concatenate([self._species, np.zeros_like(self._species)])
+        self._sizes = np.concatenate([self._sizes, np.zeros_like(self._sizes)])
+        self._free = list(range(slots, 2 * slots))[::-1]
+
+    def _measured(
+        self, species: NDArray[np.int32], radii: NDArray[np.float64], errors: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Radii and their errors, (n, 2); those of a species that are alike are known."""
+        known = self._known_radii[species]
+        alike = ~np.isnan(known)
+        return np.column_stack(
+            [
+                np.where(alike, known, radii),
+                np.where(alike, 0.0, np.hypot(errors, _OUTLINE * radii)),
             ]
         )
-        self._before = -1
-        if min(first - start, end - first) < FEWEST or abs(first - self._first) > _MOVED:
-            return None
-        # What places share for some pixels differs between the ends of a flight.
-        shared = math.sqrt(max(1.0 - variance, 0.0)) * float(np.mean(self._errors[here]))
-        before, after = self._line(start, first), self._line(first, end)
-        return Kink(
-            self.track,
-            self.species,
-            self.radius,
-            self.radius_error,
-            before.with_errors(variance, shared, _SAME * self.radius),
-            after.with_errors(variance, shared, _SAME * self.radius),
-            float(self._times[first - 1]),
-            float(self._times[first]),
-            shared,
-        )
 
-    def _make_room(self) -> None:
-        keep = self._before if self._before >= 0 else self._first
-        keep = max(keep, self._first - LONGEST)
-        for values in (self._times, self._places, self._errors):
-            values[: self._end - keep] = values[keep : self._end].copy()
-        self._first, self._end = self._first - keep, self._end - keep
-        self._before = 0 if self._before >= 0 else -1
+    def _kink(self, number: int, row: NDArray[np.float64]) -> Kink:
+        slot = self._slots[number]
+        radius, error = self._sizes[slot].tolist()
+        lines, rest = row[: 2 * LINE].reshape(2, LINE), row[2 * LINE :].tolist()
+        return Kink(number, int(self._species[slot]), radius, error, lines, *rest)
+
+    def _finished(self, numbers: list[int]) -> list[Kink]:
+        """The last kinks of tracks that have ended."""
+        found = []
+        for number in numbers:
+            slot, row = self._slots[number], np.empty(KINK)
+            variance = float(self._scatter.variances[self._species[slot]])
+            if finish(self._ways, slot, variance, float(self._sizes[slot, 0]), row):
+                found.append(self._kink(number, row))
+            self._free.append(self._slots.pop(number))
+        return found

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+from nanorocks_ros.physics.compiled import compiled
 
+if TYPE_CHECKING:
     from nanorocks_ros.records import Tracks
 
 # Pictures on each side from which the motion of a tray is measured when it swings or rests, and
@@ -46,26 +46,47 @@ class Surroundings:
     """
 
     def __init__(self, pictures: int) -> None:
+        self._pictures = pictures
         self._records: deque[Tracks] = deque(maxlen=pictures)
-        self._times: deque[float] = deque(maxlen=pictures)
-        self._displacements: deque[NDArray[np.float64]] = deque(maxlen=pictures)
+        # Twice as many fit in: what is kept is moved to the front now and then.
+        self._all_times = np.empty(2 * pictures)
+        self._all_displacements = np.empty((2 * pictures, 2))
         # Of each species: sum of the squares of known velocities, and how many these are.
-        self._squares: deque[NDArray[np.float64]] = deque(maxlen=pictures)
+        self._all_squares = np.empty((2 * pictures, 0, 2))
+        self._end = 0
         self.interval = math.inf
+
+    @property
+    def _kept(self) -> slice:
+        return slice(max(self._end - self._pictures, 0), self._end)
+
+    @property
+    def _times(self) -> NDArray[np.float64]:
+        return self._all_times[self._kept]
+
+    @property
+    def _displacements(self) -> NDArray[np.float64]:
+        return self._all_displacements[self._kept]
 
     def push(self, time: float, tracks: Tracks) -> None:
         """Take the next picture, at a time in s."""
-        if self._times:
-            recent = np.diff([*list(self._times)[-_WARM:], time])
-            self.interval = float(np.median(recent))
-        self._times.append(time)
+        if self._end == 2 * self._pictures:
+            for values in (self._all_times, self._all_displacements, self._all_squares):
+                values[: self._pictures] = values[self._pictures :]
+            self._end = self._pictures
+        if self._all_squares.shape[1] != tracks.expected.size:
+            self._all_squares = np.zeros((2 * self._pictures, tracks.expected.size, 2))
+        end, self._end = self._end, self._end + 1
+        self._all_times[end] = time
+        self._all_displacements[end] = tracks.displacement
+        _add_squares(tracks.velocities, tracks.species, self._all_squares[end])
         self._records.append(tracks)
-        self._displacements.append(tracks.displacement)
-        self._squares.append(_squares(tracks))
+        if end:
+            steps = np.diff(self._all_times[max(end - _WARM, self._kept.start) : self._end])
+            self.interval = _median(steps)
 
     def _around(self, time: float, pictures: int) -> slice:
-        times = np.array(self._times)
-        middle = int(np.searchsorted(times, time))
+        middle = int(np.searchsorted(self._times, time))
         return slice(max(middle - pictures, 0), middle + pictures)
 
     def motion(self, time: float) -> tuple[NDArray[np.float64], float]:
@@ -77,8 +98,8 @@ class Surroundings:
         error : float, [m/s]
         """
         wide, narrow = self._around(time, _WIDE), self._around(time, _NARROW)
-        times = np.array(self._times) - time
-        places = np.array(self._displacements)
+        times = self._times - time
+        places = self._displacements
         if times[wide].size < _FEWEST:
             return np.zeros(2), math.inf
         noise = float(np.sqrt(np.mean(np.diff(places[wide], 4, axis=0) ** 2) / _FOURTH))
@@ -95,40 +116,102 @@ class Surroundings:
         other = _slope(_powers(times[narrow], 3), places[narrow])
         return other.velocity, _LASTING * noise * other.factor
 
-    def displacement(self, time: float) -> NDArray[np.float64]:
-        """Of the tray at a time, (2,), [m]; the jitter of its registration is in it."""
-        times, places = np.array(self._times), np.array(self._displacements)
-        return np.array([np.interp(time, times, one) for one in places.T])
+    def displacement(self, time: float) -> tuple[float, float]:
+        """Of the tray at a time, [m]; the jitter of its registration is in it."""
+        return _between(time, self._times, self._displacements)
 
     def temperature(self, time: float, species: int) -> float:
         """Mean square of a horizontal component of velocity of a species, [m^2/s^2]."""
-        known = list(self._squares)[self._around(time, _WARM)]
-        sums = np.sum([one[species] for one in known], axis=0)
+        known = self._all_squares[self._kept][self._around(time, _WARM)]
+        sums = np.sum(known[:, species], axis=0)
         return 0.5 * float(sums[0] / sums[1]) if sums[1] else math.nan
 
-    def alone(
-        self,
-        time: float,
-        beads: Sequence[tuple[int, NDArray[np.float64], float, float]],
-    ) -> bool:
+    def alone(self, time: float, own: list[int], beads: NDArray[np.float64]) -> bool:
         """Whether nobody else can have hit some beads between the pictures around a time.
 
         Parameters
         ----------
         time : float, [s]
-        beads : sequence of (track, place, radius, speed)
-            Places past the camera.
+        own : list of int
+            Their tracks.
+        beads : ndarray (k, 4)
+            Place past the camera, radius [m] and speed [m/s] of each.
         """
-        own = [bead[0] for bead in beads]
-        for record in list(self._records)[self._around(time, 1)]:
-            others = ~np.isin(record.ids, own)
-            places = record.positions[others] + record.displacement
-            speeds = np.nan_to_num(np.hypot(*record.velocities[others].T))
-            for _, place, radius, speed in beads:
-                reach = radius + record.radii[others] + self.interval * (speed + speeds)
-                if (np.hypot(*(places - place).T) < reach).any():
-                    return False
-        return True
+        here = self._around(time, 1)
+        last = min(here.stop, len(self._records))
+        return all(
+            _nobody_near(
+                np.array(own),
+                beads,
+                record.ids,
+                record.positions,
+                record.displacement,
+                record.velocities,
+                record.radii,
+                self.interval,
+            )
+            for record in (self._records[k] for k in range(here.start, last))
+        )
+
+
+@compiled
+def _nobody_near(
+    own: NDArray[np.int64],
+    beads: NDArray[np.float64],
+    ids: NDArray[np.int32],
+    positions: NDArray[np.float64],
+    displacement: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    interval: float,
+) -> bool:
+    for k in range(ids.size):
+        if (own == ids[k]).any():
+            continue
+        u, v = velocities[k]
+        speed = math.sqrt(u * u + v * v)
+        if speed != speed:
+            speed = 0.0
+        for j in range(beads.shape[0]):
+            reach = beads[j, 2] + radii[k] + interval * (beads[j, 3] + speed)
+            x = positions[k, 0] + displacement[0] - beads[j, 0]
+            y = positions[k, 1] + displacement[1] - beads[j, 1]
+            if math.sqrt(x * x + y * y) < reach:
+                return False
+    return True
+
+
+@compiled
+def _median(values: NDArray[np.float64]) -> float:
+    return float(np.median(values))
+
+
+@compiled
+def _between(
+    time: float, times: NDArray[np.float64], places: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Place at a time, straight between two that are known; the last one after it."""
+    k = int(np.searchsorted(times, time))
+    if k == 0 or k == times.size:
+        k = min(k, times.size - 1)
+        return places[k, 0], places[k, 1]
+    share = (time - times[k - 1]) / (times[k] - times[k - 1])
+    x = places[k - 1, 0] + share * (places[k, 0] - places[k - 1, 0])
+    y = places[k - 1, 1] + share * (places[k, 1] - places[k - 1, 1])
+    return x, y
+
+
+@compiled
+def _add_squares(
+    velocities: NDArray[np.float64], species: NDArray[np.int32], sums: NDArray[np.float64]
+) -> None:
+    """Of each species, sum of the squares of the velocities and their number, (species, 2)."""
+    sums[:] = 0.0
+    for k in range(species.size):
+        square = velocities[k, 0] * velocities[k, 0] + velocities[k, 1] * velocities[k, 1]
+        if square < np.inf:
+            sums[species[k], 0] += square
+            sums[species[k], 1] += 1.0
 
 
 class _Slope(NamedTuple):
@@ -176,14 +259,3 @@ def _swing(times: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[n
     explained = projected * (np.linalg.pinv(turned @ terms, hermitian=True) @ projected)
     best: NDArray[np.float64] = terms[np.argmax(explained.sum(axis=(1, 2)))]
     return best
-
-
-def _squares(tracks: Tracks) -> NDArray[np.float64]:
-    """Of each species, sum of the squares of the velocities and their number, (species, 2)."""
-    squares = np.sum(np.square(tracks.velocities), axis=1)
-    known = np.isfinite(squares)
-    sums = [
-        np.bincount(tracks.species[known], weights, minlength=tracks.expected.size)
-        for weights in (squares[known], None)
-    ]
-    return np.column_stack(sums)

@@ -1,0 +1,91 @@
+"""``nanorocks doctor``: what is wrong with this machine, or with the graph that runs, and why."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import argparse
+
+    from nanorocks_ros.study.doctor.findings import Finding
+
+_CODE_OF_A_PROBLEM = 1
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        'doctor', help='examine this machine, its ROS and its libraries, and say what to do'
+    )
+    parser.add_argument(
+        '--graph',
+        action='store_true',
+        help='examine the nodes that run instead: who hears whom, and who cannot',
+    )
+    parser.add_argument(
+        '--seconds', type=float, default=5.0, help='with --graph: time to listen; default 5'
+    )
+    parser.add_argument('--json', action='store_true', help='print one JSON object')
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Examine and print; 1 where the graph cannot be used."""
+    from nanorocks_ros.study.doctor.findings import Status, worst
+
+    findings = _of_graph(options) if options.graph else _of_machine(options)
+    verdict = worst(findings)
+    if options.json:
+        checks = [
+            {
+                'name': one.name,
+                'status': one.status.value,
+                'found': one.found,
+                'remedy': one.remedy or None,
+            }
+            for one in findings
+        ]
+        print(json.dumps({'status': verdict.value, 'checks': checks}))
+    else:
+        counts = [sum(one.status is status for one in findings) for status in Status]
+        print(f'{counts[0]} ok, {counts[1]} warnings, {counts[2]} problems')
+    return _CODE_OF_A_PROBLEM if verdict is Status.PROBLEM else 0
+
+
+def _of_machine(options: argparse.Namespace) -> list[Finding]:
+    from nanorocks_ros.study.doctor.examine import examine
+
+    findings = []
+    for one in examine(_announce):
+        findings.append(one)
+        if not options.json:
+            _print(one)
+    return findings
+
+
+def _of_graph(options: argparse.Namespace) -> list[Finding]:
+    from nanorocks_ros.errors import ConfigurationError
+    from nanorocks_ros.study.doctor.children import graph
+    from nanorocks_ros.study.doctor.examine import examine_graph
+
+    if not 0.0 < options.seconds <= 10.0:
+        raise ConfigurationError('--seconds', f'{options.seconds:g}', 'give 0.1 to 10')
+    _announce('listening')
+    findings = examine_graph(graph(options.seconds))
+    if not options.json:
+        for one in findings:
+            _print(one)
+    return findings
+
+
+def _announce(text: str) -> None:
+    if sys.stderr.isatty():
+        print(f'nanorocks: {text} ...', file=sys.stderr)
+
+
+def _print(finding: Finding) -> None:
+    print(f'{finding.status.value:8} {finding.name}: {finding.found}', flush=True)
+    if finding.remedy:
+        print(f'{"":8}   {finding.remedy}', flush=True)

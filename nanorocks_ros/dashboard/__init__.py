@@ -1,0 +1,1 @@
+"""The live page: what is measured, in a browser."""

@@ -1,0 +1,135 @@
+"""Who may see the page: this machine alone, or whoever knows the token."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import ipaddress
+import secrets
+import socket
+import time
+from collections import deque
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+from nanorocks_ros.errors import ConfigurationError, DashboardError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+SHORTEST_TOKEN = 12
+# Wrong tokens within a minute, from everybody, before nobody is asked any more.
+_MOST_FAILURES, _PER_S = 30, 60.0
+
+
+class Access:
+    """Decides on every request.
+
+    Parameters
+    ----------
+    host : str
+        Address to listen on.
+    token : str
+        Empty: none on a loopback address, elsewhere one is made up.
+
+    Raises
+    ------
+    ConfigurationError
+        For a token that can be guessed.
+    DashboardError
+        For a host that has no address.
+    """
+
+    def __init__(self, host: str, token: str) -> None:
+        if token and (len(token) < SHORTEST_TOKEN or not token.isascii() or ' ' in token):
+            raise ConfigurationError(
+                'token',
+                f'has {len(token)} characters' if token.isascii() else 'is not plain ASCII',
+                f'choose {SHORTEST_TOKEN} or more letters and digits, or leave it empty',
+            )
+        self.host = host
+        self.is_local = is_loopback(host)
+        self.token = token or ('' if self.is_local else secrets.token_urlsafe(18))
+        self._failures: deque[float] = deque(maxlen=_MOST_FAILURES)
+
+    @property
+    def cookie(self) -> str:
+        """What a browser keeps in place of the token; outlives a restart with the same token."""
+        return hashlib.sha256(f'nanorocks {self.token}'.encode()).hexdigest()
+
+    def host_is_ours(self, host: str) -> bool:
+        """Whether a request was meant for us.
+
+        A page elsewhere can let its own name point to a loopback address, and so read what is
+        served there without a token; the name in the request gives it away.
+        """
+        if not self.is_local:
+            # The cookie belongs to the name it was set under, and without it nothing is served.
+            return True
+        name = _hostname(f'//{host}')
+        return name in ('localhost', self.host.lower()) or _is_loopback_number(name)
+
+    def origin_is_ours(self, origin: str | None, host: str) -> bool:
+        """Whether a request comes from our own page, or from no page at all."""
+        if origin is None:
+            return True
+        try:
+            return urlsplit(origin).netloc.lower() == host.lower()
+        except ValueError:
+            return False
+
+    def is_token(self, text: str) -> bool:
+        """Whether a text is the token; one that is not counts as an attempt."""
+        right = bool(self.token) and _same(text, self.token)
+        if not right:
+            self._failures.append(time.monotonic())
+        return right
+
+    def is_known(self, headers: Mapping[str, str], cookie: str) -> bool:
+        """Whether a request brings the cookie, or the token in a header."""
+        if not self.token or _same(cookie, self.cookie):
+            return True
+        kind, _, given = headers.get('Authorization', '').partition(' ')
+        return kind == 'Bearer' and not self.is_tired and self.is_token(given)
+
+    @property
+    def is_tired(self) -> bool:
+        """Whether too many wrong tokens were given lately."""
+        full = len(self._failures) == _MOST_FAILURES
+        return full and time.monotonic() - self._failures[0] < _PER_S
+
+
+def is_loopback(host: str) -> bool:
+    """Whether an address can be reached from this machine only.
+
+    Raises
+    ------
+    DashboardError
+        For a name without an address.
+    """
+    try:
+        found = socket.getaddrinfo(host or None, 0, flags=socket.AI_PASSIVE)
+    except (OSError, UnicodeError) as error:
+        raise DashboardError(
+            f'host {host!r}', 'has no address here', 'name one of this machine, or 127.0.0.1'
+        ) from error
+    return all(_is_loopback_number(str(address[0])) for *_, address in found)
+
+
+def _same(given: str, right: str) -> bool:
+    # In a time that does not tell how much of it is right.
+    return hmac.compare_digest(given.encode('utf-8', 'replace'), right.encode())
+
+
+def _hostname(url: str) -> str:
+    try:
+        return (urlsplit(url).hostname or '').lower()
+    except ValueError:
+        return ''
+
+
+def _is_loopback_number(text: str) -> bool:
+    try:
+        return ipaddress.ip_address(text.partition('%')[0]).is_loopback
+    except ValueError:
+        return False

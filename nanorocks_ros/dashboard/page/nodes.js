@@ -1,0 +1,107 @@
+// How every node is, in its own words.
+
+import { duration } from './words.js';
+
+const SILENT_S = 3.5;
+const RATES = [
+  ['rate [1/s]', (value) => `${value} messages/s`],
+  ['processing, mean [ms]', (value) => `${value} ms each`],
+  ['refused', (value) => (value === '0' ? '' : `${value} refused`)],
+  ['frames waiting for the trays', (value) => `${value} frames waiting`],
+];
+
+function element(name, className) {
+  const one = document.createElement(name);
+  if (className) one.className = className;
+  return one;
+}
+
+export class Nodes {
+  constructor(list, note, health) {
+    Object.assign(this, { list, note, health });
+    this.shown = new Map();
+    this.nodes = [];
+    this.heardAt = 0;
+  }
+
+  /** A server that was started again knows of other nodes. */
+  forget() {
+    this.nodes = [];
+  }
+
+  take(nodes) {
+    this.nodes = nodes;
+    this.heardAt = performance.now();
+  }
+
+  draw() {
+    const since = (performance.now() - this.heardAt) / 1e3;
+    const states = this.nodes.map((node) => {
+      const age = node.age + since;
+      return age > SILENT_S ? ['silent', age] : [node.level, age];
+    });
+    this.nodes.forEach((node, index) => this.drawOne(node, ...states[index]));
+    for (const [name, one] of this.shown) {
+      if (!this.nodes.some((node) => node.name === name)) {
+        one.item.remove();
+        this.shown.delete(name);
+      }
+    }
+    this.note.hidden = this.nodes.length > 0;
+    this.drawHealth(states.map(([state]) => state));
+  }
+
+  drawHealth(states) {
+    const count = (state) => states.filter((one) => one === state).length;
+    const bad = ['error', 'warning', 'silent'].filter((state) => count(state) > 0);
+    const words = bad.map((state) => `${count(state)} ${state}`);
+    this.health.dataset.state = bad[0] === 'silent' ? 'warning' : bad[0] ?? (states.length ? 'ok' : 'waiting');
+    const well = states.length === 1 ? '1 node, well' : `${states.length} nodes, all well`;
+    const text = states.length ? words.join(', ') || well : 'no node heard yet';
+    if (this.health.textContent !== text) this.health.textContent = text;
+  }
+
+  drawOne(node, state, age) {
+    const one = this.shown.get(node.name) ?? this.make(node.name);
+    one.level.dataset.state = state === 'silent' ? 'warning' : state;
+    const words = { ok: 'well', silent: `silent for ${duration(age)}` };
+    one.level.textContent = words[state] ?? state;
+    one.text.textContent = state === 'ok' && node.text === 'working' ? '' : node.text;
+    const values = new Map(node.values);
+    one.rates.textContent = RATES.filter(([key]) => values.get(key))
+      .map(([key, show]) => show(values.get(key)))
+      .filter(Boolean)
+      .join(' · ');
+    if (one.details.open || one.values.childElementCount === 0) {
+      one.values.replaceChildren(
+        ...node.values.flatMap(([key, value]) => {
+          const term = element('dt');
+          const definition = element('dd');
+          term.textContent = key;
+          definition.textContent = value || '–';
+          return [term, definition];
+        }),
+      );
+    }
+  }
+
+  make(name) {
+    const one = {
+      item: element('li', 'node'),
+      details: element('details'),
+      level: element('b'),
+      name: element('span', 'name'),
+      text: element('span', 'text'),
+      rates: element('span', 'rates'),
+      values: element('dl'),
+    };
+    const summary = element('summary');
+    one.name.textContent = name;
+    summary.append(one.name, one.level, one.text, one.rates);
+    one.details.append(summary, one.values);
+    one.item.append(one.details);
+    this.list.append(one.item);
+    this.shown.set(name, one);
+    return one;
+  }
+}

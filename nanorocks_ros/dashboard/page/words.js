@@ -1,0 +1,69 @@
+// Numbers and states as people read them.
+
+export const known = (value) => typeof value === 'number' && Number.isFinite(value);
+
+export const fixed = (value, digits) => (known(value) ? value.toFixed(digits) : '–');
+
+export const restitution = (value) => fixed(value, 3);
+
+export const interval = (lower, upper, show) =>
+  known(lower) && known(upper) ? `[${show(lower)}, ${show(upper)}]` : '';
+
+/** One standard error, where it is known. */
+export const give = (value, show, more = '') => (known(value) ? `± ${show(value)}${more}` : '');
+
+/** Millimetres a second with the digits that mean something. */
+export function speed(value) {
+  if (!known(value)) return '–';
+  const mm = 1e3 * value;
+  return mm >= 10 ? mm.toFixed(1) : mm >= 1 ? mm.toFixed(2) : mm.toFixed(3);
+}
+
+export function duration(seconds) {
+  if (seconds < 90) return `${Math.round(seconds)} s`;
+  return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${Math.round(seconds / 3600)} h`;
+}
+
+const COR_STATES = {
+  cooling: 'provisional, while the gas cools',
+  final: 'final for this cycle',
+  no_decay: 'no decay seen yet',
+  undetermined: 'the decay tells too little yet',
+};
+
+export const corState = (cor) => COR_STATES[cor.status] ?? String(cor.status);
+
+/** Whether an estimate says more than that nothing is known. */
+export const saysSomething = (cor) => !!cor && known(cor.restitution) && cor.status !== 'no_decay';
+
+/** The value of a sticking speed, and what is to be said of it. */
+export function sticking(cluster) {
+  const between = interval(cluster.sticking_speed_lower, cluster.sticking_speed_upper, speed);
+  switch (cluster.sticking_status) {
+    case 'measured':
+      return [`${speed(cluster.sticking_speed)} mm/s`, between];
+    case 'no_merge':
+      return known(cluster.sticking_speed_upper)
+        ? [`< ${speed(cluster.sticking_speed_upper)} mm/s`, 'no beads stick yet']
+        : ['', 'no beads stick yet'];
+    case 'no_upper_limit':
+      return known(cluster.sticking_speed_lower)
+        ? [`> ${speed(cluster.sticking_speed_lower)} mm/s`, 'no upper limit']
+        : ['', 'no upper limit'];
+    case 'stuck_from_the_start':
+      return ['', 'beads stick from the start'];
+    default:
+      return ['', 'not known yet'];
+  }
+}
+
+/** What a tray does at present: a state for its colour, and words. */
+export function trayState(tray, silentFor) {
+  const shaken = tray.start !== null && tray.start !== undefined;
+  if (Object.keys(tray.latest).length === 0) return ['waiting', 'nothing measured yet'];
+  if (silentFor > 4) return ['warning', `silent for ${duration(silentFor)}`];
+  if (!shaken && !tray.latest.cor) return ['waiting', 'no shaking event yet'];
+  const status = tray.latest.cor?.status;
+  if (status === 'final') return ['ok', `cycle ${tray.cycle}, over`];
+  return ['ok', `cycle ${tray.cycle}, cooling`];
+}

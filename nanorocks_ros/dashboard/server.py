@@ -1,0 +1,201 @@
+"""Serves the page and what is new on it, from a thread of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros import __version__
+from nanorocks_ros.dashboard.access import Access
+from nanorocks_ros.dashboard.clients import Client, Look, Pictures
+from nanorocks_ros.dashboard.process import TOKEN_VARIABLE
+from nanorocks_ros.errors import DashboardError
+
+try:
+    from aiohttp import WSMsgType, web
+
+    from nanorocks_ros.dashboard.site import make_site
+except ImportError as error:
+    raise DashboardError(
+        'the live page', 'needs aiohttp', "install it: pip install 'nanorocks_ros[dashboard]'"
+    ) from error
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from concurrent.futures import Future
+
+    from nanorocks_ros.dashboard.board import Board, Shown
+    from nanorocks_ros.experiment.settings import DashboardSettings
+
+_MOST_CLIENTS = 64
+_MOST_SAID_BYTES = 4096
+# A browser that does not answer within half of that is gone.
+_HEARTBEAT_S = 20.0
+_FAREWELL_S = 1.0
+
+
+class PageServer:
+    """The live page.
+
+    All but the two properties may be used from any thread; the board belongs to ours.
+
+    Parameters
+    ----------
+    settings : DashboardSettings
+    board : Board
+    namespace : str
+        Of the graph, for the page.
+    """
+
+    def __init__(self, settings: DashboardSettings, board: Board, namespace: str) -> None:
+        self._settings, self._board = settings, board
+        self._greeting = {'namespace': namespace, 'version': __version__}
+        token = settings.token or os.environ.get(TOKEN_VARIABLE, '')
+        self._access = Access(settings.host, token)
+        self._pictures = Pictures()
+        self._clients: set[Client] = set()
+        self._loop = asyncio.new_event_loop()
+        self._runner: web.AppRunner | None = None
+        self._thread = threading.Thread(target=self._run, name='live page', daemon=True)
+        self._port = settings.port
+        self.wanted: frozenset[Look] = frozenset()
+
+    @property
+    def port(self) -> int:
+        """Where it is served."""
+        return self._port
+
+    @property
+    def clients(self) -> int:
+        """Browsers that look."""
+        return len(self._clients)
+
+    @property
+    def url(self) -> str:
+        """What to open in a browser, the token included."""
+        host = self._settings.host
+        if host in ('0.0.0.0', '::'):
+            host = socket.gethostname()
+        shown = f'[{host}]' if ':' in host else host
+        query = f'?token={self._access.token}' if self._access.token else ''
+        return f'http://{shown}:{self._port}/{query}'
+
+    def start(self) -> None:
+        """Listen.
+
+        Raises
+        ------
+        DashboardError
+            When the port cannot be used.
+        """
+        self._thread.start()
+        try:
+            asyncio.run_coroutine_threadsafe(self._open(), self._loop).result()
+        except OSError as error:
+            self.stop()
+            raise DashboardError(
+                f'port {self._port} of {self._settings.host}',
+                # What asyncio says begins with the address again.
+                os.strerror(error.errno) if error.errno else str(error),
+                'choose another port, 0 for any that is free, or end who has it',
+            ) from error
+
+    def stop(self) -> None:
+        """Tell the browsers, and end the thread."""
+        if self._loop.is_closed():
+            return
+        farewell: Future[None] = asyncio.run_coroutine_threadsafe(self._close(), self._loop)
+        try:
+            farewell.result(3 * _FAREWELL_S)
+        except TimeoutError:
+            farewell.cancel()
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(_FAREWELL_S)
+
+    def expect(self, tray: int) -> None:
+        """Show that a tray is there."""
+        self._soon(self._board.expect, tray, time.monotonic())
+
+    def take(self, record: Shown) -> None:
+        """Show a result."""
+        self._soon(self._board.take, record, time.monotonic())
+
+    def diagnose(
+        self, statuses: Sequence[tuple[str, int, str, Sequence[tuple[str, str]]]]
+    ) -> None:
+        """Show what nodes say of themselves: name, level, text, names and values."""
+        self._soon(self._board.diagnose, statuses, time.monotonic())
+
+    def show(self, look: Look, content: bytes) -> None:
+        """Show a picture that somebody looks at."""
+        self._soon(self._pictures.put, look, content)
+
+    def _soon(self, work: Callable[..., None], *arguments: Any) -> None:
+        def do() -> None:
+            work(*arguments)
+            for client in self._clients:
+                client.changed.set()
+
+        self._loop.call_soon_threadsafe(do)
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        self._loop.run_forever()
+        self._loop.close()
+
+    async def _open(self) -> None:
+        application = make_site(self._access, self._port, self._live)
+        self._runner = web.AppRunner(
+            application, access_log=None, shutdown_timeout=_FAREWELL_S, handle_signals=False
+        )
+        await self._runner.setup()
+        site = web.TCPSite(self._runner, self._settings.host, self._port)
+        await site.start()
+        self._port = self._runner.addresses[0][1]
+
+    async def _close(self) -> None:
+        await asyncio.gather(*(one.close() for one in self._clients), return_exceptions=True)
+        if self._runner is not None:
+            await self._runner.cleanup()
+
+    async def _live(self, request: web.Request) -> web.StreamResponse:
+        if len(self._clients) >= _MOST_CLIENTS:
+            return web.Response(status=503, text=f'{_MOST_CLIENTS} browsers look already\n')
+        connection = web.WebSocketResponse(
+            heartbeat=_HEARTBEAT_S,
+            max_msg_size=_MOST_SAID_BYTES,
+            compress=False,
+            timeout=_FAREWELL_S,
+        )
+        await connection.prepare(request)
+        pause_s = 1.0 / self._settings.picture_rate
+        client = Client(connection, self._board, self._pictures, pause_s)
+        self._clients.add(client)
+        sender = asyncio.ensure_future(client.run(self._greeting))
+        # When the server ends, it is by an exception in here.
+        try:
+            await self._hear(connection, client)
+        finally:
+            sender.cancel()
+            self._clients.discard(client)
+            self._note_looks()
+        return connection
+
+    async def _hear(self, connection: web.WebSocketResponse, client: Client) -> None:
+        async for message in connection:
+            try:
+                if message.type is not WSMsgType.TEXT:
+                    raise ValueError('no text')
+                client.hear(message.data)
+            except (ValueError, KeyError, TypeError, RecursionError):
+                await connection.close(code=1008, message=b'not what the page says')
+                return
+            self._note_looks()
+
+    def _note_looks(self) -> None:
+        self.wanted = frozenset[Look]().union(*(one.looks for one in self._clients))
+        self._pictures.keep(self.wanted)

@@ -1,0 +1,154 @@
+"""What there is to ask for: the page, its files, the way in, and the live connection."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+from importlib import resources
+from typing import TYPE_CHECKING
+
+from aiohttp import web
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
+    from nanorocks_ros.dashboard.access import Access
+
+    Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+_TYPES = {
+    '.html': 'text/html',
+    '.js': 'text/javascript',
+    '.css': 'text/css',
+    '.svg': 'image/svg+xml',
+    '.LICENSE': 'text/plain',
+}
+_HEADERS = {
+    'Content-Security-Policy': (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
+        "connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
+    ),
+    'X-Content-Type-Options': 'nosniff',
+    'X-Frame-Options': 'DENY',
+    # Without any, the origin of the form that gives the token would not be told either.
+    'Referrer-Policy': 'same-origin',
+    'Cross-Origin-Opener-Policy': 'same-origin',
+    'Cross-Origin-Resource-Policy': 'same-origin',
+    'Cache-Control': 'no-cache',
+    'Server': 'nanorocks',
+}
+_MOST_POSTED_BYTES = 4096
+_YEAR_S = 365 * 86400
+# What somebody who is not let in yet may see.
+_IN_FRONT = frozenset(('/login', '/style.css', '/icon.svg'))
+_AFTER_A_WRONG_TOKEN_S = 0.5
+
+
+def make_site(access: Access, port: int, live: Handler) -> web.Application:
+    """The routes, behind the checks of who asks.
+
+    Parameters
+    ----------
+    access : Access
+    port : int
+        Tells the cookies of two pages on one host apart.
+    live : coroutine function
+        Takes the live connection.
+    """
+    entrance = _Entrance(access, f'nanorocks_{port}')
+    site = web.Application(middlewares=[entrance.check], client_max_size=_MOST_POSTED_BYTES)
+    site.on_response_prepare.append(_add_headers)
+    site.router.add_get('/', entrance.page)
+    site.router.add_get('/live', live)
+    site.router.add_get('/login', entrance.ask)
+    site.router.add_post('/login', entrance.log_in)
+    for name, content, kind in _files():
+        site.router.add_get(f'/{name}', _served(content, kind))
+    return site
+
+
+def _files() -> list[tuple[str, bytes, str]]:
+    folder = resources.files(__package__).joinpath('page')
+    return [
+        (one.name, one.read_bytes(), _TYPES[f'.{one.name.rpartition(".")[2]}'])
+        for one in folder.iterdir()
+        if f'.{one.name.rpartition(".")[2]}' in _TYPES
+    ]
+
+
+def _served(content: bytes, kind: str) -> Handler:
+    tag = f'"{hashlib.sha256(content).hexdigest()[:32]}"'
+
+    async def serve(request: web.Request) -> web.StreamResponse:
+        if request.headers.get('If-None-Match') == tag:
+            return web.Response(status=304, headers={'ETag': tag})
+        return web.Response(
+            body=content, content_type=kind, charset='utf-8', headers={'ETag': tag}
+        )
+
+    return serve
+
+
+async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
+    response.headers.update(_HEADERS)
+
+
+class _Entrance:
+    """Lets in who may see the page."""
+
+    def __init__(self, access: Access, cookie: str) -> None:
+        self._access, self._cookie = access, cookie
+        files = {name: _served(content, kind) for name, content, kind in _files()}
+        self._page, self._form = files['index.html'], files['login.html']
+
+    @web.middleware
+    async def check(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        """Refuse who came by another name, from another page, or without the token."""
+        if not self._access.host_is_ours(request.host):
+            return _refused(421, 'not served under this name; open it as http://127.0.0.1')
+        origin = request.headers.get('Origin')
+        if not self._access.origin_is_ours(origin, request.host):
+            return _refused(403, 'asked for by a page of somebody else')
+        known = self._access.is_known(request.headers, request.cookies.get(self._cookie, ''))
+        if known or request.path in _IN_FRONT:
+            return await handler(request)
+        if request.path == '/':
+            return await self._first_visit(request)
+        return _refused(401, 'the token is missing')
+
+    async def _first_visit(self, request: web.Request) -> web.StreamResponse:
+        given = request.query.get('token')
+        if given is None:
+            return web.Response(status=303, headers={'Location': '/login'})
+        return await self._answer(given)
+
+    async def page(self, request: web.Request) -> web.StreamResponse:
+        """The page; without the token in its address, which would be kept and passed on."""
+        if 'token' in request.query:
+            return await self._first_visit(request)
+        return await self._page(request)
+
+    async def ask(self, request: web.Request) -> web.StreamResponse:
+        """The form that asks for the token."""
+        return await self._form(request)
+
+    async def log_in(self, request: web.Request) -> web.StreamResponse:
+        """Take the token from the form."""
+        given = (await request.post()).get('token', '')
+        return await self._answer(given.strip() if isinstance(given, str) else '')
+
+    async def _answer(self, given: str) -> web.StreamResponse:
+        if not self._access.token:
+            return web.Response(status=303, headers={'Location': '/'})
+        if self._access.is_tired or not self._access.is_token(given):
+            await asyncio.sleep(_AFTER_A_WRONG_TOKEN_S)
+            return web.Response(status=303, headers={'Location': '/login#wrong'})
+        response = web.Response(status=303, headers={'Location': '/'})
+        response.set_cookie(
+            self._cookie, self._access.cookie, httponly=True, samesite='Strict', max_age=_YEAR_S
+        )
+        return response
+
+
+def _refused(status: int, why: str) -> web.Response:
+    return web.Response(status=status, text=f'{why}\n')

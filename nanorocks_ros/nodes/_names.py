@@ -1,0 +1,64 @@
+"""Which parameters there are, and which of those given nobody reads."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import itertools
+import sys
+
+from nanorocks_ros.experiment import settings
+
+_OVERRIDES = 'qos_overrides.'
+_PREFIXES = ('', 'simulation.', 'scene.')
+_FLAGS = ('-p', '--param')
+
+
+def unknown_parameters(given, declared):
+    """What is wrong with the names of parameters that a node did not declare.
+
+    Parameters
+    ----------
+    given : iterable of str
+        Names that were given to it and that it does not have.
+    declared : iterable of str
+        Names that it has.
+
+    Returns
+    -------
+    list of str
+        A sentence for each name that is not known; a name in a file is known if any node has it,
+        one on the command line if this node has it.
+    """
+    anywhere = _of_all_nodes()
+    direct = _on_the_command_line(sys.argv)
+    wrong = [
+        name
+        for name in sorted(given)
+        if not name.startswith(_OVERRIDES) and (name in direct or name not in anywhere)
+    ]
+    return [_sentence(name, declared) for name in wrong]
+
+
+def _sentence(name, declared):
+    near = difflib.get_close_matches(name, list(declared), n=1)
+    guess = f' (did you mean {near[0]!r}?)' if near else ''
+    return f'no parameter {name!r}{guess}'
+
+
+def _of_all_nodes():
+    groups = [one for _, one in inspect.getmembers(settings, inspect.isclass)]
+    names = {
+        row.name
+        for one in groups
+        if one.__module__ == settings.__name__ and one.__name__.endswith('Settings')
+        for row in settings.rows(one())
+    }
+    return {prefix + name for prefix in _PREFIXES for name in names} | {'use_sim_time'}
+
+
+def _on_the_command_line(arguments):
+    """Names set by ``-p NAME:=VALUE`` or ``-p NODE:NAME:=VALUE``."""
+    after = itertools.pairwise(arguments)
+    rules = (rule.split(':=', 1)[0] for flag, rule in after if flag in _FLAGS)
+    return {name.rsplit(':', 1)[-1] for name in rules}

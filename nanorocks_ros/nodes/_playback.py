@@ -1,0 +1,104 @@
+"""A bag on its way to the topics: what is played, under which names and how offered."""
+
+from __future__ import annotations
+
+import struct
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from nanorocks_ros.nodes._node import RESULT_TOPICS
+from nanorocks_ros.nodes._shell import message_class, qos_of
+from nanorocks_ros.recordings.replay import offered_qos
+from nanorocks_ros.wire import topics
+
+NS = 1_000_000_000
+_TRAYS = range(1, 9)
+_OURS = {
+    one.absolute(tray): one for one in topics.TOPICS if one is not topics.TAKEN for tray in _TRAYS
+}
+_WORKED_OUT = tuple(one for one in RESULT_TOPICS if one is not topics.TRUTH)
+_RESULTS = {one.absolute(tray) for one in _WORKED_OUT for tray in _TRAYS}
+# Of a message that begins with a header: after 4 bytes that tell the order of bytes.
+_STAMP = '{}iI'
+
+
+class Playback:
+    """The publishers for the topics of a bag.
+
+    Topics under ``/nanorocks`` move with the namespace of the node, others keep their names. They
+    are offered as they were when they were recorded; those of the graph at least as well as its
+    nodes ask for.
+
+    Parameters
+    ----------
+    node : NanorocksNode
+    reader : BagReader
+    with_results : bool
+
+    Attributes
+    ----------
+    names : list of str
+        Of the topics that are played, as the bag has them.
+    latched : list of str
+        Those of them that keep their last message for who comes late.
+    results : list of str
+        Those of them that are results, as they are named now.
+    """
+
+    def __init__(self, node, reader, with_results):
+        self._node = node
+        self._publishers = {}
+        self.latched = []
+        self.results = []
+        for name, info in sorted(reader.topics.items()):
+            # The clock is that of the player.
+            if name != '/clock' and (with_results or name not in _RESULTS):
+                self._offer(name, info)
+        self.names = list(self._publishers)
+
+    def _offer(self, name, info):
+        ours = _OURS.get(name)
+        if ours is not None and ours.type != info.type:
+            ours = None
+        try:
+            kind = message_class(info.type)
+        except (ImportError, AttributeError, ValueError):
+            self._node.get_logger().warning(
+                f'{name}: type {info.type} is not installed here; it is not played'
+            )
+            return
+        recorded = offered_qos(info.offered_qos)
+        qos = qos_of(ours) if ours is not None else QoSProfile(depth=10)
+        if recorded is not None:
+            _adapt(qos, recorded, at_least=ours is not None)
+        published = name.removeprefix(f'{topics.NAMESPACE}/')
+        self._publishers[name] = self._node.publisher(kind, published, qos)
+        if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+            self.latched.append(name)
+        if ours in _WORKED_OUT:
+            self.results.append(published)
+
+    def send(self, message):
+        """Publish a message of the bag."""
+        self._publishers[message.topic].publish(message.cdr)
+        self._node.counts['published'] += 1
+
+
+def _adapt(qos, recorded, at_least):
+    """Make a quality of service what it was, or, of a topic of the graph, at least that."""
+    latched = recorded.transient_local
+    if at_least:
+        latched = latched or qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        qos.depth = max(qos.depth, recorded.depth)
+    else:
+        qos.depth = recorded.depth
+        best = ReliabilityPolicy.RELIABLE if recorded.reliable else ReliabilityPolicy.BEST_EFFORT
+        qos.reliability = best
+    qos.durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+
+
+def stamp_in(cdr):
+    """The stamp [ns] in the header with which a serialised message begins."""
+    order = '<' if cdr[1] & 1 else '>'
+    seconds, nanoseconds = struct.unpack_from(_STAMP.format(order), cdr, 4)
+    return seconds * NS + nanoseconds

@@ -1,0 +1,47 @@
+"""``nanorocks doctor`` where there is no ROS."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+WITHOUT_ROS = """
+import importlib.util
+import sys
+
+found = importlib.util.find_spec
+importlib.util.find_spec = lambda name, *rest: None if name == 'rclpy' else found(name, *rest)
+from nanorocks_ros.cli.main import main
+
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def doctor(*arguments):
+    return subprocess.run(
+        [sys.executable, '-c', WITHOUT_ROS, 'doctor', *arguments],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+def test_without_ros_it_examines_the_rest_and_says_so():
+    finished = doctor('--json')
+    assert finished.returncode == 1, finished.stderr
+    answer = json.loads(finished.stdout)
+    checks = {one['name']: one for one in answer['checks']}
+    assert answer['status'] == 'problem'
+    assert checks['libraries']['status'] == 'ok'
+    assert checks['ROS 2']['status'] == 'problem'
+    assert 'the offline commands can' in checks['ROS 2']['found']
+    assert 'jazzy' in checks['ROS 2']['remedy']
+    assert 'frames over loopback' not in checks
+
+
+def test_a_time_to_listen_that_cannot_be_is_a_wrong_call():
+    finished = doctor('--graph', '--seconds', '-1')
+    assert finished.returncode == 2
+    assert '--seconds' in finished.stderr
+    assert 'Traceback' not in finished.stderr

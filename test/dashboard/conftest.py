@@ -1,0 +1,52 @@
+"""The live page fed with what the sample bag holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from nanorocks_ros.dashboard.board import Board
+from nanorocks_ros.dashboard.server import PageServer
+from nanorocks_ros.experiment.settings import DashboardSettings, PipelineSettings
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.study.offline import analyse
+
+SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
+
+
+@dataclass
+class Results:
+    """What was measured in the sample bag, in the order in which it came."""
+
+    speeds: tuple
+    clusters: tuple
+    cors: tuple
+
+    @property
+    def all(self):
+        return (*self.speeds, *self.clusters, *self.cors)
+
+
+@pytest.fixture(scope='session')
+def results():
+    tray = analyse(SAMPLE, PipelineSettings()).trays[1]
+    return Results(tuple(tray.speeds), tuple(tray.clusters), tuple(tray.cors))
+
+
+@pytest.fixture
+def serve():
+    """Start servers; they end with the test."""
+    started = []
+
+    def start(namespace='/nanorocks', trays=None, **settings):
+        settings = DashboardSettings(**{'port': 0, 'picture_rate': 30.0, **settings})
+        server = PageServer(settings, Board(trays or load_trays()), namespace)
+        started.append(server)
+        server.start()
+        return server
+
+    yield start
+    for one in started:
+        one.stop()

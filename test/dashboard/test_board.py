@@ -1,0 +1,172 @@
+"""What a client is told, whenever it asks."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from nanorocks_ros.dashboard.board import MOST_POINTS, Board, Cursor, clean
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.records import (
+    ClusterEstimate,
+    CorEstimate,
+    CorRelation,
+    CorStatus,
+    Quality,
+    SpeedEstimate,
+    SpeedMethod,
+)
+
+NS = 1_000_000_000
+
+
+def speed(seconds, cycle=1, value=0.005, start=1.0):
+    return SpeedEstimate(
+        stamp_ns=round(seconds * NS),
+        tray=1,
+        cycle=cycle,
+        cycle_start_ns=round(start * NS),
+        mean_projected_speed=value,
+        mean_projected_speed_error=0.1 * value,
+        window=0.1,
+        method=SpeedMethod.TRACKING,
+        quality=Quality.GLARE,
+    )
+
+
+def cor(seconds, cycle=1, status=CorStatus.COOLING, value=0.9):
+    return CorEstimate(
+        stamp_ns=round(seconds * NS),
+        tray=1,
+        cycle=cycle,
+        status=status,
+        relation=CorRelation.LIBRARY,
+        restitution=value,
+        restitution_lower=value - 0.02,
+        restitution_upper=value + 0.02,
+        window_end=seconds - 1.0,
+    )
+
+
+@pytest.fixture
+def board():
+    return Board(load_trays())
+
+
+def follow(board, cursor, rows):
+    """What a page makes of the news: points of the curve of the speed."""
+    told = board.news(cursor, 0.0)['trays']['1']['speed']
+    return rows[: told['from']] + told['rows']
+
+
+def test_a_client_that_asks_seldom_has_the_same_curve_in_the_end(board):
+    often, seldom = Cursor(), Cursor()
+    rows = []
+    for k in range(20):
+        board.take(speed(1.0 + 0.1 * k, value=0.001 * (k + 1)), 0.0)
+        rows = follow(board, often, rows)
+    assert rows == follow(board, seldom, [])
+    assert [row[1] for row in rows] == pytest.approx([0.001 * (k + 1) for k in range(20)])
+
+
+def test_nobody_is_told_anything_twice(board):
+    cursor = Cursor()
+    board.take(speed(2.0), 0.0)
+    board.diagnose([('/n', 0, 'working', [])], 0.0)
+    assert set(board.news(cursor, 0.0)) == {'trays', 'nodes'}
+    assert board.news(cursor, 0.0) == {}
+
+
+def test_a_long_curve_is_thinned_and_told_anew(board):
+    cursor, rows = Cursor(), []
+    for k in range(3 * MOST_POINTS):
+        board.take(speed(2.0 + 0.1 * k), 0.0)
+        if k % 500 == 0:
+            rows = follow(board, cursor, rows)
+    rows = follow(board, cursor, rows)
+    times = [row[0] for row in rows]
+    assert len(rows) <= MOST_POINTS
+    assert times == sorted(times)
+    assert times[-1] == pytest.approx(2.0 + 0.1 * (3 * MOST_POINTS - 1))
+    assert times[0] == 2.0
+
+
+def test_a_new_cycle_begins_with_an_empty_curve_and_the_last_stays_as_a_number(board):
+    cursor = Cursor()
+    board.take(speed(2.0), 0.0)
+    board.take(cor(2.0), 0.0)
+    board.news(cursor, 0.0)
+    board.take(speed(62.0, cycle=2, start=61.0), 0.0)
+    board.take(cor(60.0, status=CorStatus.FINAL, value=0.88), 0.0)
+    told = board.news(cursor, 0.0)['trays']['1']
+    assert (told['cycle'], told['start']) == (2, 61.0)
+    assert told['cor'] == {'from': 0, 'rows': []}
+    assert [row[0] for row in told['speed']['rows']] == [62.0]
+    assert 'cor' not in told['latest']
+    assert told['finals'] == [[1, 0.88, 0.86, 0.9]]
+
+
+def test_what_is_late_of_the_cycle_before_is_not_shown_in_this_one(board):
+    board.take(speed(62.0, cycle=2), 0.0)
+    late = ClusterEstimate(
+        stamp_ns=60 * NS, tray=1, cycle=1, level_area=1e-6, correlation_length=1e-3
+    )
+    board.take(late, 0.0)
+    told = board.news(Cursor(), 0.0)['trays']['1']
+    assert (told['cycle'], told['cluster']['rows']) == (2, [])
+
+
+def test_a_source_that_starts_again_starts_the_page_again(board):
+    for k in range(5):
+        board.take(speed(50.0 + k), 0.0)
+    board.take(cor(54.0, status=CorStatus.FINAL), 0.0)
+    board.take(speed(2.0), 0.0)
+    told = board.news(Cursor(), 0.0)['trays']['1']
+    assert [row[0] for row in told['speed']['rows']] == [2.0]
+    assert told['finals'] == []
+
+
+def test_whoever_hears_estimates_before_speeds_knows_when_the_tray_was_shaken(board):
+    board.take(cor(5.0), 0.0)
+    assert board.news(Cursor(), 0.0)['trays']['1']['start'] == pytest.approx(1.0)
+
+
+def test_what_is_not_known_is_null_and_states_are_words(board):
+    board.take(speed(2.0), 0.0)
+    board.take(replace(cor(2.0), haff_time=float('inf')), 0.0)
+    told = json.loads(json.dumps(board.news(Cursor(), 0.0), allow_nan=False))['trays']['1']
+    assert told['latest']['cor']['haff_time'] is None
+    assert told['latest']['cor']['wall_restitution'] is None
+    assert told['latest']['cor']['status'] == 'cooling'
+    assert told['latest']['speed']['quality'] == ['glare']
+    assert told['description'] == '15 acrylic 2 mm'
+
+
+def test_a_tray_is_shown_before_anything_is_measured(board):
+    board.expect(3, 7.0)
+    told = board.news(Cursor(), 9.0)['trays']['3']
+    assert (told['age'], told['latest'], told['start']) == (2.0, {}, None)
+
+
+def test_nodes_that_are_gone_are_forgotten_and_too_many_are_not_kept(board):
+    board.diagnose([(f'/n{k}', 0, '', []) for k in range(1000)], 0.0)
+    cursor = Cursor()
+    kept = [one['name'] for one in board.news(cursor, 5.0)['nodes']]
+    assert len(kept) == 64
+    board.diagnose([('/n0', 3, 'hm', [('k', 'v')])], 100.0)
+    (only,) = board.news(cursor, 101.0)['nodes']
+    assert only == {
+        'name': '/n0',
+        'level': 'silent',
+        'text': 'hm',
+        'values': [['k', 'v']],
+        'age': 1.0,
+    }
+
+
+def test_texts_from_outside_are_cut_and_cannot_turn_others_around():
+    assert clean('a' * 500, 10) == 'a' * 9 + '…'
+    assert clean('ok\u202egnorw\n\x00', 99) == 'ok\ufffdgnorw\ufffd\ufffd'
+    assert clean('<b>Säule</b>', 99) == '<b>Säule</b>'
