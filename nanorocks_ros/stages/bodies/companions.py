@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from nanorocks_ros.inference.persistence import chance
 from nanorocks_ros.stages.bodies.pairs import Bond
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
@@ -53,15 +54,12 @@ class Companions:
 
     Parameters
     ----------
-    chance : callable
-        Of ways (n,) and ranges (n,), the chance that free bodies do the same.
+    rate : float, [1/m]
+        Encounters of a bead per way, from `encounter_rate`.
     """
 
-    def __init__(
-        self,
-        chance: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
-    ) -> None:
-        self._chance = chance
+    def __init__(self, rate: float) -> None:
+        self._rate = rate
         self._rows: dict[tuple[int, int], _Row] = {}
         self._next = 0.0
 
@@ -164,7 +162,7 @@ class Companions:
         if time - row.start < _YOUNGEST:
             return False
         ranged = max(0.5 * float((row.high - row.low).max()), _LEAST_RANGE * row.tolerance)
-        return bool(self._chance(np.array([row.way]), np.array([ranged]))[0] < largest)
+        return float(chance(row.way, ranged, self._rate)) < largest
 
 
 def _begun(

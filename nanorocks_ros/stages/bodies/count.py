@@ -89,7 +89,7 @@ class BodyCounter:
         self._pairs.clear()
         self._ghosts = Ghosts()
         self._clinging = Clinging()
-        self._companions = Companions(partial(chance, rate=self._rate))
+        self._companions = Companions(self._rate)
         self._bonds: dict[tuple[int, int], Bond] = {}
         self._doubted: list[Bond] = []
         self._joins = 0

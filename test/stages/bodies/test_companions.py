@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.persistence import chance, encounter_rate
+from nanorocks_ros.inference.persistence import encounter_rate
 from nanorocks_ros.records import Tracks
 from nanorocks_ros.stages.bodies.clinging import Clinging
 from nanorocks_ros.stages.bodies.companions import Companions
@@ -23,7 +21,7 @@ PLACES = np.array([(0.0, 0.0), (1e-3, 0.0), (2.8e-3, 0.0), (3.8e-3, 0.0)])
 
 def _joined(drift, *, hidden):
     """Bonds found in three seconds at 1 mm/s, the bodies drifting apart at some speed."""
-    companions = Companions(partial(chance, rate=encounter_rate(TRAY)))
+    companions = Companions(encounter_rate(TRAY))
     rng = np.random.default_rng(1)
     found = []
     for k in range(90):
