@@ -7,12 +7,16 @@ from importlib import import_module
 
 ALL = (
     'offline',
+    'batch',
     'live',
     'live_plate',
+    'dashboard',
+    'recordings',
     'preprocess',
     'scene',
     'tracking',
     'plate_cost',
+    'recorder',
     'speed_trays',
     'speed_accuracy',
     'area_calibration',

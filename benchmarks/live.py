@@ -12,6 +12,7 @@ import resource
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -37,45 +38,60 @@ class _Tally:
         self.latencies[stamp_ns] = 1e-9 * (time.time_ns() - stamp_ns)
 
 
-def _start(*arguments: str) -> subprocess.Popen:
-    return subprocess.Popen([sys.executable, '-m', 'nanorocks_ros.nodes', *arguments])
+def start_node(*arguments: str, **options) -> subprocess.Popen:
+    """Start a node in a process of its own."""
+    return subprocess.Popen([sys.executable, '-m', 'nanorocks_ros.nodes', *arguments], **options)
 
 
-def _spin(executor, seconds: float, stop=lambda: False) -> None:
+def spin(executor, seconds: float, stop=lambda: False) -> None:
+    """Listen for so long, or until `stop`."""
     end = time.monotonic() + seconds
     while time.monotonic() < end and not stop():
         executor.spin_once(timeout_sec=0.1)
 
 
-def report() -> None:
-    """Run the graph and print what arrived."""
+@contextmanager
+def listener(domain: str):
+    """A node on a domain of its own on this host, and what spins it."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    os.environ['ROS_DOMAIN_ID'] = _DOMAIN
+    os.environ['ROS_DOMAIN_ID'] = domain
     import rclpy
     from rclpy.executors import SingleThreadedExecutor
 
     from nanorocks_ros.nodes._node import NanorocksNode
-    from nanorocks_ros.wire import topics
 
     rclpy.init()
     node = NanorocksNode('benchmark')
     executor = SingleThreadedExecutor()
     executor.add_node(node)
+    yield node, executor
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.try_shutdown()
+
+
+def report() -> None:
+    """Run the graph and print what arrived."""
+    with listener(_DOMAIN) as (node, executor):
+        _measure(node, executor)
+
+
+def _measure(node, executor) -> None:
+    from nanorocks_ros.wire import topics
+
     tally = _Tally(node)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    pipeline = _start('pipeline', '--ros-args', '-p', 'source:=topic')
+    pipeline = start_node('pipeline', '--ros-args', '-p', 'source:=topic')
     camera = topics.RAW.absolute()
-    _spin(executor, _SETTLE_S, lambda: node.count_subscribers(camera) > 0)
-    simulator = _start(
+    spin(executor, _SETTLE_S, lambda: node.count_subscribers(camera) > 0)
+    simulator = start_node(
         'simulator', '--ros-args', '-p', 'listeners:=1', '-p', f'duration:={_SECONDS}'
     )
-    _spin(executor, _SETTLE_S + 2 * _SECONDS, lambda: simulator.poll() is not None)
-    _spin(executor, 1.0)
+    spin(executor, _SETTLE_S + 2 * _SECONDS, lambda: simulator.poll() is not None)
+    spin(executor, 1.0)
     pipeline.send_signal(2)
     pipeline.wait(10)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    node.destroy_node()
-    rclpy.shutdown()
     _print(tally, (after.ru_utime + after.ru_stime) - (before.ru_utime + before.ru_stime))
 
 

@@ -1,15 +1,22 @@
-"""Live graph of the whole plate: eight trays, 1080p, 30 Hz, 60 s: what arrives, and how late.
+"""Live graph of the whole plate: eight trays, 1080p, 30 Hz: what arrives, and how late.
 
 A film of the plate with all effects is recorded first (LIVE_PLATE_BAG names one that exists:
 `nanorocks simulate --scene --bag BAG --duration 65 --first-shake 0.5`). `bag_player` and
-`pipeline` run in processes of their own and talk over DDS, once compressed and once raw. A third
-process, this one, listens to the truth of a tray (one message a frame sent) and to the state of
-each tray (one message a tray image processed) and compares when they came.
+`pipeline` run in processes of their own and talk over DDS. A third process, this one, listens to
+the truth of a tray (one message a frame sent) and to the state of each tray (one message a tray
+image processed) and compares when they came.
+
+The film is played once compressed, once raw, and once compressed with everything on: the pipeline
+records camera and results, and serves the live page to ten browsers that look at a tray each, with
+its tracks and what moves. LIVE_PLATE_RUNS chooses among `compressed raw everything`,
+LIVE_PLATE_SECONDS how long (60), LIVE_PLATE_BROWSERS how many (10).
 """
 
 from __future__ import annotations
 
+import json
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -19,10 +26,20 @@ from pathlib import Path
 
 import numpy as np
 
-_SECONDS = 60.0
+from nanorocks_ros.study.bag_frames import BagFrames
+
+_SECONDS = float(os.environ.get('LIVE_PLATE_SECONDS', '60'))
+_RUNS = os.environ.get('LIVE_PLATE_RUNS', 'compressed raw everything').split()
+_BROWSERS = int(os.environ.get('LIVE_PLATE_BROWSERS', '10'))
 _SETTLE_S = 60.0
 _RATE = 30.0
 _TRAYS = tuple(range(1, 9))
+PLATE = {
+    'trays': _TRAYS,
+    'preprocess.layout': 'plate',
+    'preprocess.pixels_per_metre': 12500.0,
+}
+"""Settings of the plate as it is filmed."""
 _DOMAIN = '53'
 _TICKS = os.sysconf('SC_CLK_TCK')
 _CLI = 'import sys; from nanorocks_ros.cli.main import main; sys.exit(main())'
@@ -63,15 +80,15 @@ class _Tally:
         return count
 
 
-def _film(folder: str) -> Path:
-    known = os.environ.get('LIVE_PLATE_BAG')
+def filmed_plate(folder: str, seconds: float, known: str) -> Path:
+    """A film of the plate with all effects: one that is known, or a new one."""
     if known:
         return Path(known)
     bag = Path(folder) / 'plate'
-    print(f'filming {_SECONDS:g} s ...', file=sys.stderr, flush=True)
+    print(f'filming {seconds:g} s ...', file=sys.stderr, flush=True)
     subprocess.run(
         [sys.executable, '-c', _CLI, 'simulate', '--scene', '--bag', str(bag), '--json',
-         '--duration', str(_SECONDS + 5.0), '--first-shake', '0.5', '--effects', 'all'],
+         '--duration', str(seconds), '--first-shake', '0.5', '--effects', 'all'],
         check=True,
         stdout=subprocess.DEVNULL,
     )  # fmt: skip
@@ -90,15 +107,38 @@ def _spin(executor, seconds: float, stop=lambda: False) -> None:
 
 
 def _cpu(process: subprocess.Popen) -> float:
-    """Processor time that a process has used, [s]."""
+    """Processor time that a process and its children have used, [s]."""
+    return sum(_cpu_of(one) for one in _family(process.pid))
+
+
+def _family(pid: int) -> list[int]:
     try:
-        fields = Path(f'/proc/{process.pid}/stat').read_text().rpartition(')')[2].split()
+        children = Path(f'/proc/{pid}/task/{pid}/children').read_text().split()
+    except OSError:
+        children = []
+    return [pid, *(one for child in children for one in _family(int(child)))]
+
+
+def _cpu_of(pid: int) -> float:
+    try:
+        fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
     except OSError:
         return float('nan')
     return (int(fields[11]) + int(fields[12])) / _TICKS
 
 
-def _run(bag: Path, transport: str) -> None:
+def _free_port() -> int:
+    with socket.socket() as one:
+        one.bind(('127.0.0.1', 0))
+        return int(one.getsockname()[1])
+
+
+def _browsers(port: int) -> subprocess.Popen:
+    call = f'from benchmarks.dashboard import browse; browse({port}, {_BROWSERS}, 0, {_SECONDS})'
+    return subprocess.Popen([sys.executable, '-c', call], stdout=subprocess.PIPE)
+
+
+def _run(bag: Path, run: str, folder: str) -> None:
     import rclpy
     from rclpy.executors import SingleThreadedExecutor
 
@@ -110,13 +150,17 @@ def _run(bag: Path, transport: str) -> None:
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     tally = _Tally(node)
+    everything, record, port = run == 'everything', f'{folder}/recorded', _free_port()
+    transport = 'compressed' if everything else run
+    more = ['-p', f'record:={record}', '-p', 'dashboard:=true', '-p', f'dashboard_port:={port}']
     pipeline = _start(
         'pipeline', '--ros-args', '-p', 'source:=topic', '-p', f'transport:={transport}',
         '-p', f'trays:={list(_TRAYS)}', '-p', 'preprocess.layout:=plate',
-        '-p', 'preprocess.pixels_per_metre:=12500.0',
+        '-p', 'preprocess.pixels_per_metre:=12500.0', *(more if everything else ()),
     )  # fmt: skip
     camera = topics.RAW_COMPRESSED if transport == 'compressed' else topics.RAW
     _spin(executor, _SETTLE_S, lambda: node.count_subscribers(camera.absolute()) > 0)
+    browsers = _browsers(port) if everything else None
     player = _start(
         'bag_player', '--ros-args', '-p', f'bag:={bag}', '-p', 'listeners:=2',
         '-p', f'duration:={_SECONDS}',
@@ -135,14 +179,18 @@ def _run(bag: Path, transport: str) -> None:
     _spin(executor, _SETTLE_S, lambda: player.poll() is not None)
     _spin(executor, 1.0)
     pipeline.send_signal(2)
-    pipeline.wait(10)
+    pipeline.wait(20)
     executor.shutdown()
     node.destroy_node()
     rclpy.try_shutdown()
-    _print(tally, used, transport)
+    _print(tally, used, run)
+    if browsers is not None:
+        steps, pictures = json.loads(browsers.communicate()[0])
+        print(f'each of {_BROWSERS} browsers: {steps:.1f} steps/s, {pictures:.1f} pictures/s')
+        print(f'frames recorded: {BagFrames(record).count}')
 
 
-def _print(tally: _Tally, used, transport: str) -> None:
+def _print(tally: _Tally, used, run: str) -> None:
     done = {tray: len(tally.sent.keys() & frames.keys()) for tray, frames in tally.done.items()}
     late = [
         1e3 * (max(frames[k] for frames in tally.done.values()) - sent)
@@ -150,7 +198,7 @@ def _print(tally: _Tally, used, transport: str) -> None:
         if all(k in frames for frames in tally.done.values())
     ]
     counts = ', '.join(f'{tray}: {count}' for tray, count in done.items())
-    print(f'\n{transport}: frames sent {len(tally.sent)}, all trays done {len(late)}, '
+    print(f'\n{run}: frames sent {len(tally.sent)}, all trays done {len(late)}, '
           f'dropped {len(tally.sent) - len(late)}')  # fmt: skip
     print(f'tray images done, by tray: {counts}')
     for name in ('speed', 'cluster', 'cor'):
@@ -172,7 +220,7 @@ def report() -> None:
     import rclpy
 
     with tempfile.TemporaryDirectory() as folder:
-        bag = _film(folder)
-        for transport in ('compressed', 'raw'):
+        bag = filmed_plate(folder, _SECONDS + 5.0, os.environ.get('LIVE_PLATE_BAG', ''))
+        for run in _RUNS:
             rclpy.init()
-            _run(bag, transport)
+            _run(bag, run, folder)

@@ -1,22 +1,38 @@
-"""Frames per second of the offline analyser, beside decoding the same frames alone.
+"""Frames per second of the offline analyser on one core, beside decoding the same frames alone.
 
-1080p JPEG frames with one tray; one thread; best of three, decode and analysis in turn.
+1080p JPEG frames, of one tray and of the whole plate with eight trays and everything on; by the
+processor time of one thread, so that what else a machine does counts little. Decode and analysis
+in turn; of one tray the best of three. OFFLINE_PLATE_BAG names a film of the plate that exists:
+`nanorocks simulate --scene --bag BAG --duration 60 --first-shake 0.5`.
 """
 
 from __future__ import annotations
 
+import json
+import os
+import resource
+import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
 
 import cv2
 
-from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings
+from benchmarks.live_plate import PLATE, filmed_plate
+from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings, with_values
+from nanorocks_ros.stages.warm_up import (
+    warm_up,
+    warm_up_clusters,
+    warm_up_cooling,
+    warm_up_speed,
+)
 from nanorocks_ros.study.bag_frames import BagFrames
 from nanorocks_ros.study.film_bag import film_into_bag
 from nanorocks_ros.study.offline import analyse
 
 _SECONDS = 10.0
+_PLATE_SECONDS = 60.0
 _ROUNDS = 3
 
 
@@ -25,29 +41,73 @@ def _decode(path: Path) -> int:
 
 
 def _timed(work) -> float:
-    start = time.perf_counter()
+    start = time.process_time()
     work()
-    return time.perf_counter() - start
+    return time.process_time() - start
+
+
+def _warm() -> None:
+    cv2.setNumThreads(1)
+    for one in (warm_up, warm_up_speed, warm_up_clusters, warm_up_cooling):
+        one()
+
+
+def _peak_mb() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def measure_plate(path: str) -> None:
+    """Print what decoding and analysing a film of the plate takes, as JSON."""
+    _warm()
+    peaks: dict[int, float] = {}
+
+    def note(done: int, frames: int) -> None:
+        peaks[round(3 * done / frames, 9)] = _peak_mb()
+
+    decode = _timed(lambda: _decode(Path(path)))
+    settings = with_values(PipelineSettings(), PLATE, 'benchmark')
+    before = _peak_mb()
+    whole = _timed(lambda: analyse(path, settings, progress=note))
+    third = min(at for at in peaks if at >= 1.0)
+    frames = BagFrames(path).count
+    print(json.dumps([frames, decode, whole, before, peaks[third], _peak_mb()]))
 
 
 def report() -> None:
-    """Print the ratio."""
-    cv2.setNumThreads(1)
+    """Print the ratios."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / 'run'
-        filmed = film_into_bag(
-            path, SimulationSettings(), duration=_SECONDS, quality=90, progress=lambda *_: None
-        )
-        frames = filmed['frames']
-        pairs = [
-            (
-                _timed(lambda: _decode(path)),
-                _timed(lambda: analyse(path, PipelineSettings())),
-            )
-            for _ in range(_ROUNDS)
-        ]
-    decode = min(one for one, _ in pairs)
-    whole = min(one for _, one in pairs)
-    print(f'decode only   {frames / decode:7.1f} frames/s')
-    print(f'whole analysis{frames / whole:7.1f} frames/s')
-    print(f'ratio         {decode / whole:7.2f}  (1: the analysis costs nothing)')
+        _print_tray(Path(folder) / 'run')
+        bag = filmed_plate(folder, _PLATE_SECONDS, os.environ.get('OFFLINE_PLATE_BAG', ''))
+        _print_plate(bag)
+
+
+def _print_tray(path: Path) -> None:
+    _warm()
+    filmed = film_into_bag(
+        path, SimulationSettings(), duration=_SECONDS, quality=90, progress=lambda *_: None
+    )
+    pairs = [
+        (_timed(lambda: _decode(path)), _timed(lambda: analyse(path, PipelineSettings())))
+        for _ in range(_ROUNDS)
+    ]
+    print('one tray')
+    _print(filmed['frames'], min(one for one, _ in pairs), min(one for _, one in pairs))
+
+
+def _print_plate(bag: Path) -> None:
+    # In a process of its own, whose memory is that of the analysis.
+    call = f'from benchmarks.offline import measure_plate; measure_plate({str(bag)!r})'
+    done = subprocess.run([sys.executable, '-c', call], check=True, stdout=subprocess.PIPE)
+    frames, decode, whole, before, third, peak = json.loads(done.stdout)
+    print(f'\neight trays, everything on, {frames / 30.0:.0f} s')
+    _print(frames, decode, whole)
+    print(
+        f'peak memory    {peak:7.0f} MB  ({before:.0f} MB before the first frame, {third:.0f} MB '
+        'after a third of them)'
+    )
+
+
+def _print(frames: int, decode: float, whole: float) -> None:
+    print(f'decode only    {frames / decode:7.1f} frames/s')
+    print(f'whole analysis {frames / whole:7.1f} frames/s')
+    print(f'ratio          {decode / whole:7.2f}  (1: the analysis costs nothing)')

@@ -73,6 +73,13 @@ def look(browser):
                 and complaints.append(said.text)
             ),
         )
+        page.on(
+            'request',
+            lambda asked: (
+                asked.url.startswith(('http://127.0.0.1:', 'blob:http://127.0.0.1:'))
+                or complaints.append(f'asked for {asked.url}')
+            ),
+        )
         page.on('dialog', lambda dialog: complaints.append(f'dialog: {dialog.message}'))
         page.set_default_timeout(10_000)
         page.goto(url)

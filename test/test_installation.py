@@ -26,6 +26,8 @@ from nanorocks_ros.wire.layouts import layout
 
 print(nanorocks_ros.__file__)
 print(len(load_trays()), layout(CorEstimate).fields[0].name)
+page = resources.files('nanorocks_ros.dashboard').joinpath('page')
+print(*sorted(one.name for one in page.iterdir()))
 """
 
 
@@ -118,8 +120,10 @@ def test_a_plain_installation_holds_its_package_data(source_copy, tmp_path):
         timeout=300,
     )
     assert result.returncode == 0, result.stderr
-    module, data = result.stdout.splitlines()
+    module, data, page = result.stdout.splitlines()
     assert Path(module).is_relative_to(packages)
     assert data == '8 time'
+    source = ROOT / 'nanorocks_ros' / 'dashboard' / 'page'
+    assert page.split() == sorted(one.name for one in source.iterdir())
     for name in EXECUTABLES:
         assert os.access(tmp_path / 'lib' / 'nanorocks_ros' / name, os.X_OK)

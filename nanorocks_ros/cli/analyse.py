@@ -1,4 +1,4 @@
-"""``nanorocks analyse BAG``: the coefficient of restitution behind a recording."""
+"""``nanorocks analyse BAG...``: the coefficient of restitution behind recordings."""
 
 from __future__ import annotations
 
@@ -17,29 +17,65 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import CorEstimate
     from nanorocks_ros.study.offline import Analysis, TrayResults
 
+_EPILOG = """\
+Several bags, a pattern, or a folder of bags make a batch: one worker for each core, resumed by the
+same command, bad bags listed in the end (exit code 1), all cycles put together in one report.
+Examples:
+
+  nanorocks analyse flight/run_7
+  nanorocks analyse 'flight/*' -o results
+  nanorocks analyse day_1 day_2 -o results --scheduler tcp://10.0.0.1:8786 --format parquet
+"""
+
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
+    import argparse
+
+    from nanorocks_ros.cli.analyse_batch import add_options
     from nanorocks_ros.cli.flags import add_bag
 
-    parser = commands.add_parser('analyse', help='analyse a bag as fast as the machine can')
-    add_bag(parser)
+    parser = commands.add_parser(
+        'analyse',
+        help='analyse a bag, or hundreds, as fast as the machine can',
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_bag(parser, many=True)
     parser.add_argument(
-        '-o', '--output', help='folder for tables and results bag; default BAG_results'
+        '-o',
+        '--output',
+        help='folder for tables and results bag; default BAG_results, needed for many bags',
+    )
+    parser.add_argument(
+        '--format',
+        choices=('csv', 'parquet'),
+        default='csv',
+        help='of the tables (of many bags: of those of all cycles); default csv',
     )
     parser.add_argument('--no-output', action='store_true', help='write no files')
+    add_options(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Analyse the bag, print, write; the exit code."""
+    """Analyse one bag or many, print, write; the exit code."""
+    from nanorocks_ros.cli.analyse_batch import is_batch, run_many
     from nanorocks_ros.cli.flags import settings_from
-    from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.study.export import as_json, write_results
-    from nanorocks_ros.study.offline import analyse
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
-    source = Path(options.bag)
+    if is_batch(options):
+        return run_many(options, settings)
+    return _run_one(options, settings)
+
+
+def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
+    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.study.export import as_json, check_format, write_results
+    from nanorocks_ros.study.offline import analyse
+
+    check_format(options.format)
+    source = Path(options.bags[0])
     with Progress('analysing') as progress:
         analysis = analyse(
             source, settings, image_topic=options.image_topic, progress=progress.count
@@ -52,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
         _print(analysis)
     if not options.no_output:
         folder = Path(options.output or f'{str(source).rstrip("/")}_results')
-        write_results(analysis, folder, source, settings)
+        write_results(analysis, folder, source, settings, options.format)
         print(f'nanorocks: results in {folder}', file=sys.stderr)
     if analysis.error is not None:
         raise analysis.error

@@ -32,9 +32,17 @@ def add_flags(
         )
 
 
-def add_bag(parser: argparse.ArgumentParser, skip: set[str] | None = None) -> None:
+def add_bag(
+    parser: argparse.ArgumentParser, skip: set[str] | None = None, *, many: bool = False
+) -> None:
     """What every command that takes a bag through the stages asks for, settings included."""
-    parser.add_argument('bag', help='rosbag2 folder or .mcap file')
+    kind = 'rosbag2 folder or .mcap file'
+    if many:
+        parser.add_argument(
+            'bags', nargs='+', metavar='BAG', help=f"{kind}; many, a folder of them, or 'bags/*'"
+        )
+    else:
+        parser.add_argument('bag', help=kind)
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     parser.add_argument('--image-topic', default='', help="the camera topic, if it isn't ours")
     parser.add_argument('--parameters', help='ROS parameter file, as the nodes take it')

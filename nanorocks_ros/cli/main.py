@@ -30,9 +30,12 @@ def build_parser() -> argparse.ArgumentParser:
         dashboard,
         doctor,
         figure,
+        import_video,
+        info,
         library,
         look,
         reproduce,
+        salvage,
         simulate,
         speeds,
         sweep,
@@ -53,9 +56,12 @@ def build_parser() -> argparse.ArgumentParser:
     dashboard.add_parser(commands)
     doctor.add_parser(commands)
     figure.add_parser(commands)
+    import_video.add_parser(commands)
+    info.add_parser(commands)
     library.add_parser(commands)
     look.add_parser(commands)
     reproduce.add_parser(commands)
+    salvage.add_parser(commands)
     simulate.add_parser(commands)
     speeds.add_parser(commands)
     sweep.add_parser(commands)

@@ -88,6 +88,7 @@ class Cursor:
 
     trays: dict[int, tuple[int, int]] = field(default_factory=dict)
     series: dict[tuple[int, str], tuple[int, int]] = field(default_factory=dict)
+    finals: dict[int, int] = field(default_factory=dict)
     nodes: int = 0
 
 
@@ -117,6 +118,7 @@ class TrayBoard:
     latest: dict[str, dict[str, Any]] = field(default_factory=dict)
     finals: dict[int, list[float | None]] = field(default_factory=dict)
     _stamps: dict[str, int] = field(default_factory=dict)
+    _finals_version: int = 1
 
     def __post_init__(self) -> None:
         self._begin(-1)
@@ -126,6 +128,7 @@ class TrayBoard:
         name, columns = _COLUMNS[type(record)]
         if record.stamp_ns < self._stamps.get(name, record.stamp_ns) - _BACK_NS:
             self.finals.clear()
+            self._finals_version += 1
             self._begin(record.cycle)
         if isinstance(record, CorEstimate) and record.status is CorStatus.FINAL:
             self._finish(record)
@@ -156,6 +159,7 @@ class TrayBoard:
             _number(record.restitution_lower),
             _number(record.restitution_upper),
         ]
+        self._finals_version += 1
         while len(self.finals) > _MOST_CYCLES:
             del self.finals[min(self.finals)]
 
@@ -179,8 +183,10 @@ class TrayBoard:
             'start': None if self.start_ns is None else _number(self.start_ns / NS),
             'age': round(now_s - self.heard_s, 1),
             'latest': self.latest,
-            'finals': list(self.finals.values()),
         }
+        if cursor.finals.get(number) != self._finals_version:
+            cursor.finals[number] = self._finals_version
+            told['finals'] = list(self.finals.values())
         for name, series in self.series.items():
             known = cursor.series.get((number, name), (0, 0))
             first, rows = series.since(known if known_serial == self.serial else (-1, 0))

@@ -651,6 +651,19 @@ class SourceSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WorkSettings:
+    """How the work of the composed pipeline is shared out."""
+
+    workers: int = _setting(
+        -1,
+        'processes that follow the trays; 0: none, a thread does; -1: for several trays as many '
+        'as there are cores besides one, up to four',
+        low=-1,
+        high=64,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RecordSettings:
     """What the composed pipeline records while it works."""
 

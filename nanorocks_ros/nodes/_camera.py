@@ -61,9 +61,8 @@ class Camera:
                     qos_of(replace(topics.CAMERA_INFO, latched=latched)),
                     event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
                 )
-        node.offer((topics.TAKEN,))
-        node.alone_on(topic.name)
-        node.listen(topic, self._take_message)
+        node.watch.alone_on(topic.name)
+        node.tell_what_is_taken([node.listen(topic, self._take_message)])
 
     def _lens(self, message):
         info = info_from_message(message)

@@ -16,6 +16,7 @@ from nanorocks_ros.wire import topics
 _TOPICS = {'tray': topics.RECTIFIED, 'tracks': topics.TRACKS, 'motion': topics.MOTION}
 # A gray camera has no coloured crops.
 _GRAY_AFTER_S = 2.0
+_OLDEST_S = 60.0
 _LAST_ONLY = QoSProfile(
     history=HistoryPolicy.KEEP_LAST, depth=1, reliability=ReliabilityPolicy.RELIABLE
 )
@@ -57,7 +58,12 @@ class Looks:
 
     def _take(self, look, where, message):
         self._seen[look] = time.monotonic()
-        self._show(look, encoded(look[1], frame_from_image(message, where).image))
+        frame = frame_from_image(message, where)
+        self._show(look, encoded(look[1], frame.image))
+        age_s = 1e-9 * (self._node.get_clock().now().nanoseconds - frame.stamp_ns)
+        # Of a recording of some other day it means nothing.
+        if 0.0 <= age_s < _OLDEST_S:
+            self._node.state['picture, since the camera took it [ms]'] = f'{1e3 * age_s:.0f}'
 
     def sample(self, topic, tray, take, pause_s):
         """Subscribe; messages that come too soon after another are not even read."""

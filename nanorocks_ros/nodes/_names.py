@@ -10,7 +10,7 @@ import sys
 from nanorocks_ros.experiment import settings
 
 _OVERRIDES = 'qos_overrides.'
-_PREFIXES = ('', 'simulation.', 'scene.')
+_PREFIXES = ('', 'simulation.', 'scene.', 'dashboard_')
 _FLAGS = ('-p', '--param')
 
 

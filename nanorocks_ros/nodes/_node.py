@@ -25,7 +25,6 @@ from nanorocks_ros.errors import ConfigurationError, FrameError, NanorocksError
 from nanorocks_ros.experiment.settings import rows, with_values
 from nanorocks_ros.nodes._names import unknown_parameters
 from nanorocks_ros.nodes._now_and_then import NowAndThen
-from nanorocks_ros.nodes._quality import mismatches
 from nanorocks_ros.nodes._shell import (
     array_message,
     image_message,
@@ -33,6 +32,7 @@ from nanorocks_ros.nodes._shell import (
     qos_of,
     time_message,
 )
+from nanorocks_ros.nodes._watch import Watch
 from nanorocks_ros.records import (
     Autocorrelation,
     BodyEstimate,
@@ -79,9 +79,8 @@ _OVERRIDABLE = QoSOverridingOptions(
     )
 )
 _BUILT_AROUND = {'trays', 'trays_file'}
-_ONE_CAMERA = 'end all but one, or give each a namespace of its own (-r __ns:=/NAME)'
-_PATIENCE_S = 5.0
 _THROTTLE_S = 5.0
+_CONNECTED_S = 0.1
 # Acknowledgements come with heartbeats, every 3 s.
 _FAREWELL_S = 3.5
 
@@ -96,8 +95,6 @@ class NanorocksNode(Node):
         self._events = NowAndThen()
         self._declared = {}
         self._refused = {}
-        self._watched = []
-        self._alone = {}
         self.done = False
         self.exit_code = 0
         self.counts = {'received': 0, 'published': 0, 'refused': 0}
@@ -105,12 +102,12 @@ class NanorocksNode(Node):
         self.state = {}
         # Whoever wants to keep what is sent.
         self.recorder = None
+        # What is wrong, but keeps nothing from going on.
+        self.trouble = ''
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._last_report = (time.monotonic(), 0)
         self.create_timer(1.0, self._report, clock=self.steady_clock)
-        self._clock_timer = self.create_timer(
-            _PATIENCE_S, self._check_clock, clock=self.steady_clock
-        )
+        self.watch = Watch(self)
 
     # Parameters
 
@@ -272,13 +269,24 @@ class NanorocksNode(Node):
             name = f'tray {record.tray} COR'
             self.state[name] = f'{record.restitution:.4f} {record.status.name.lower()}'
 
-    def alone_on(self, name, remedy=_ONE_CAMERA):
-        """Say so when more than one node publishes a topic: what they send would be mixed."""
-        self._alone[name] = remedy
+    def tell_what_is_taken(self, inputs):
+        """Offer `camera/taken` once all inputs are connected: then this node can be counted on.
+
+        Parameters
+        ----------
+        inputs : list of rclpy.subscription.Subscription
+        """
+
+        def look():
+            if all(one.get_publisher_count() for one in inputs):
+                timer.cancel()
+                self.offer((topics.TAKEN,))
+
+        timer = self.create_timer(_CONNECTED_S, look, clock=self.steady_clock)
 
     def taken(self, stamp_ns):
         """Tell who waits for it that this node is done with a frame."""
-        if self.wanted(topics.TAKEN):
+        if topics.TAKEN.name in self._outputs and self.wanted(topics.TAKEN):
             message = Header(
                 stamp=time_message(stamp_ns), frame_id=self.get_fully_qualified_name()
             )
@@ -292,12 +300,12 @@ class NanorocksNode(Node):
             partial(self.timed, callback),
             qos_of(topic),
             event_callbacks=SubscriptionEventCallbacks(
-                incompatible_qos=partial(self._mismatch, topic.of(tray))
+                incompatible_qos=partial(self.watch.mismatch, topic.of(tray))
             ),
             qos_overriding_options=_OVERRIDABLE,
         )
         if required:
-            self._watch(subscription.topic_name)
+            self.watch.expect(subscription.topic_name)
         return subscription
 
     def timed(self, work, message):
@@ -329,61 +337,11 @@ class NanorocksNode(Node):
             self.get_logger().error(text)
         self.state['last refusal'] = text
 
-    def _watch(self, topic_name):
-        self._watched.append(topic_name)
-        timer = self.create_timer(
-            _PATIENCE_S, lambda: self._check_publishers(topic_name, timer), clock=self.steady_clock
-        )
-
-    def _check_publishers(self, topic_name, timer):
-        timer.cancel()
-        if self.count_publishers(topic_name) == 0:
-            self.get_logger().warning(
-                f'{topic_name}: no publisher within {_PATIENCE_S:g} s; start one, remap the '
-                'topic, or check the namespace and ROS_DOMAIN_ID'
-            )
-
-    def _check_clock(self):
-        self._clock_timer.cancel()
-        clock = self.get_clock()
-        if clock.ros_time_is_active and clock.now().nanoseconds == 0:
-            self.get_logger().warning(
-                f'/clock: nothing within {_PATIENCE_S:g} s, though use_sim_time is set, and time '
-                'stands still; start bag_player (or ros2 bag play --clock), or set '
-                'use_sim_time:=false'
-            )
-
-    def _check_alone(self):
-        for name, remedy in list(self._alone.items()):
-            if self.count_publishers(name) > 1:
-                del self._alone[name]
-                infos = self.get_publishers_info_by_topic(self.resolve_topic_name(name))
-                nodes = sorted(f'{one.node_namespace}/{one.node_name}' for one in infos)
-                self.get_logger().warning(
-                    f'{self.resolve_topic_name(name)}: {" and ".join(nodes)} publish it, and what '
-                    f'they send is mixed; {remedy}'
-                )
-
-    def _mismatch(self, topic_name, _):
-        name = self.resolve_topic_name(topic_name)
-        offers = self.get_publishers_info_by_topic(name)
-        asked = [
-            one.qos_profile
-            for one in self.get_subscriptions_info_by_topic(name)
-            if one.node_name == self.get_name()
-        ]
-        found = mismatches([one.qos_profile for one in offers], asked)
-        said = ', '.join(f'{policy} {have} and I ask for {want}' for policy, have, want in found)
-        remedies = ', '.join(f'qos_overrides.{name}.subscription.{one[0]}' for one in found)
-        self.get_logger().warning(
-            f'{name}: no data, since the publisher offers {said}; set {remedies}'
-        )
-
     # Diagnostics
 
     def _report(self):
         self._events.open()
-        self._check_alone()
+        self.watch.look()
         now = time.monotonic()
         since, received = self._last_report
         rate = (self.counts['received'] - received) / max(now - since, 1e-9)
@@ -396,10 +354,12 @@ class NanorocksNode(Node):
             'processing, longest [ms]': f'{1e3 * max(busy):.2f}' if busy else '',
             **self.state,
         }
-        missing = [name for name in self._watched if self.count_publishers(name) == 0]
+        missing = self.watch.missing()
         level, text = DiagnosticStatus.OK, 'working'
         if missing:
             level, text = DiagnosticStatus.WARN, f'no publisher on {", ".join(missing)}'
+        if self.trouble:
+            level, text = DiagnosticStatus.WARN, self.trouble
         if self.counts['refused']:
             level, text = DiagnosticStatus.ERROR, self.state['last refusal']
         status = DiagnosticStatus(level=level, name=self.get_fully_qualified_name(), message=text)

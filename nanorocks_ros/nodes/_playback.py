@@ -8,10 +8,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from nanorocks_ros.nodes._node import RESULT_TOPICS
 from nanorocks_ros.nodes._shell import message_class, qos_of
-from nanorocks_ros.recordings.replay import offered_qos
 from nanorocks_ros.wire import topics
 
 NS = 1_000_000_000
+_DEEPEST = 1000
 _TRAYS = range(1, 9)
 _OURS = {
     one.absolute(tray): one for one in topics.TOPICS if one is not topics.TAKEN for tray in _TRAYS
@@ -67,10 +67,9 @@ class Playback:
                 f'{name}: type {info.type} is not installed here; it is not played'
             )
             return
-        recorded = offered_qos(info.offered_qos)
         qos = qos_of(ours) if ours is not None else QoSProfile(depth=10)
-        if recorded is not None:
-            _adapt(qos, recorded, at_least=ours is not None)
+        if info.qos is not None:
+            _adapt(qos, info.qos, at_least=ours is not None)
         published = name.removeprefix(f'{topics.NAMESPACE}/')
         self._publishers[name] = self._node.publisher(kind, published, qos)
         if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
@@ -87,11 +86,13 @@ class Playback:
 def _adapt(qos, recorded, at_least):
     """Make a quality of service what it was, or, of a topic of the graph, at least that."""
     latched = recorded.transient_local
+    # Whoever kept all says any number.
+    depth = min(recorded.depth, _DEEPEST)
     if at_least:
         latched = latched or qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
-        qos.depth = max(qos.depth, recorded.depth)
+        qos.depth = max(qos.depth, depth)
     else:
-        qos.depth = recorded.depth
+        qos.depth = depth
         best = ReliabilityPolicy.RELIABLE if recorded.reliable else ReliabilityPolicy.BEST_EFFORT
         qos.reliability = best
     qos.durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE

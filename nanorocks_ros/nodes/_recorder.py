@@ -101,19 +101,21 @@ class GraphRecorder:
         self._node.state['frames not recorded'] = recorder.dropped
         if recorder.dropped > self._dropped:
             self._dropped = recorder.dropped
-            self._node.get_logger().warning(
+            self._node.trouble = (
                 f'{self._path}: the disk does not keep up; {recorder.dropped} frames are not '
                 'recorded so far, all results are'
             )
+            self._node.get_logger().warning(self._node.trouble, throttle_duration_sec=_LOOK_S * 5)
         if recorder.problem is not None and not self._failed:
             self._failed = True
             self._node.exit_code = 1
             if not isinstance(recorder.problem, NanorocksError):
                 raise recorder.problem
-            self._node.get_logger().error(
+            self._node.trouble = (
                 f'{recorder.problem}; recording has ended, what was written stays readable, and '
                 'the graph goes on'
             )
+            self._node.get_logger().error(self._node.trouble)
 
 
 def provenance(source, *settings):

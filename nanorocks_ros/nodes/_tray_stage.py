@@ -49,12 +49,15 @@ class TrayStageNode(NanorocksNode):
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
         self._joined_ns = dict.fromkeys(self._settings.trays, 0)
-        self.offer((topics.TAKEN,))
         self._joiners = {tray: TrayJoiner(tray) for tray in self._settings.trays}
+        subscriptions = []
         for tray in self._settings.trays:
             self.offer(outputs, tray)
-            for topic, take in inputs.items():
+            subscriptions += [
                 self.listen(topic, partial(take, tray), tray, required=topic == topics.GRAY)
+                for topic, take in inputs.items()
+            ]
+        self.tell_what_is_taken(subscriptions)
 
     def _build(self, settings):
         settings = calibrated(settings)

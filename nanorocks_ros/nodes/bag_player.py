@@ -66,9 +66,9 @@ class BagPlayerNode(NanorocksNode):
     def _expect_to_be_alone(self):
         for topic in (topics.RAW, topics.RAW_COMPRESSED):
             self.offer((topic,))
-            self.alone_on(topic.name)
+            self.watch.alone_on(topic.name)
         for name in self._playback.results:
-            self.alone_on(name, _WORK_IT_OUT_AGAIN)
+            self.watch.alone_on(name, _WORK_IT_OUT_AGAIN)
 
     # What is played
 

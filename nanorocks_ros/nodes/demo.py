@@ -20,7 +20,7 @@ from nanorocks_ros.wire.layouts import from_array
 _TRAY = 1
 _GRAPH = ('preprocessor', 'speed_estimator', 'cluster_autocorrelator', 'haff_fitter', 'simulator')
 # All frames, from the first: the nodes listen before the camera starts.
-_SIMULATOR = ('--ros-args', '-p', 'listeners:=1')
+_SIMULATOR = ('--ros-args', '-p', 'listeners:=3')
 _FIGURE = Path('nanorocks_demo.png')
 _NODE_ENDS_WITHIN_S = 10.0
 _DEADLINE_S = 120.0

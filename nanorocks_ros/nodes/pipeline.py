@@ -17,13 +17,14 @@ from nanorocks_ros.nodes._pacing import Pacer
 from nanorocks_ros.nodes._recorder import GraphRecorder, provenance
 from nanorocks_ros.nodes._tracks import TracksPicture
 from nanorocks_ros.records import Tracks, TrayImage
-from nanorocks_ros.stages.pipeline import Pipeline
+from nanorocks_ros.stages.pipeline import Pipeline, Wanted
 from nanorocks_ros.stages.warm_up import (
     warm_up,
     warm_up_clusters,
     warm_up_cooling,
     warm_up_speed,
 )
+from nanorocks_ros.study.shared_pipeline import SharedPipeline, started, worker_count
 from nanorocks_ros.wire import topics
 
 
@@ -31,7 +32,7 @@ class PipelineNode(NanorocksNode):
     """Composes the stages; records pass between them in memory.
 
     What follows from the tray images of a frame is worked out in the background, while the next
-    frame is decoded and cut.
+    frame is decoded and cut: by other processes where there are cores for them, or in a thread.
     """
 
     def __init__(self):
@@ -45,19 +46,24 @@ class PipelineNode(NanorocksNode):
         record = self.declare(st.RecordSettings())
         page = self.declare(st.DashboardSettings(), prefix='dashboard_')
         shown = self.declare(st.LivePageSettings()).dashboard
+        workers = self.declare(st.WorkSettings()).workers
         self.refuse_unknown_parameters()
         self._page = LivePage(self, page, self._settings.trays_file) if shown else None
         self._epoch = Epoch(self, may_set=True, follow=self._source == 'topic')
         self._recorded = None
         self._where = self._source
         self._camera, self._view = None, None
+        self._workers = started(worker_count(workers, len(self._settings.trays)))
         self._offer_everything()
         self._background = Background(self, self._follow, self._publish)
         # Others find the publishers meanwhile.
         warm_up()
-        warm_up_speed()
-        warm_up_clusters()
-        warm_up_cooling()
+        if not self._workers:
+            warm_up_speed()
+            warm_up_clusters()
+            warm_up_cooling()
+        for worker in self._workers:
+            worker.ready()
         self._adopt(self._settings, self._build(self._settings))
         self.react_to_parameters(st.PipelineSettings(), self._build, self._adopt)
         if self._source == 'topic':
@@ -87,11 +93,13 @@ class PipelineNode(NanorocksNode):
         # A camera that others publish has one publisher, theirs.
         if self._source != 'topic':
             self.offer((topics.RAW,))
-            self.alone_on(topics.RAW.name)
+            self.watch.alone_on(topics.RAW.name)
         for tray in self._settings.trays:
             self.offer(RESULT_TOPICS, tray)
 
     def _build(self, settings):
+        if self._workers:
+            return SharedPipeline(settings, self._where, self._view, self._workers)
         return Pipeline(settings, self._where, self._view)
 
     def _adopt(self, settings, pipeline):
@@ -155,7 +163,7 @@ class PipelineNode(NanorocksNode):
         if self.recorder is not None:
             self.recorder.epoch(self._epoch.ns)
         wanted = {
-            number: (
+            number: Wanted(
                 self.wanted(topics.MOTION, number),
                 self._picture.wanted(number),
                 self.wanted(topics.AUTOCORRELATION, number),
@@ -166,10 +174,7 @@ class PipelineNode(NanorocksNode):
         self.state['frames waiting for the trays'] = self._background.waiting
 
     def _follow(self, job):
-        records, wanted = job
-        for number, tray in self._pipeline.trays.items():
-            tray.speed.emit_mask, tray.speed.emit_tracks, tray.clusters.emit_image = wanted[number]
-        return self._pipeline.follow(records)
+        return self._pipeline.follow(*job)
 
     def _publish(self, records):
         image = None
@@ -194,8 +199,10 @@ class PipelineNode(NanorocksNode):
         self.finish()
 
     def destroy_node(self):
-        """End the threads before what they work for is gone."""
+        """End the threads and processes before what they work for is gone."""
         self._background.close()
+        for worker in self._workers:
+            worker.close()
         if self.recorder is not None:
             self.recorder.close()
         if self._page is not None:

@@ -27,7 +27,7 @@ class SimulatorNode(NanorocksNode):
         scene = self.declare(SceneSettings(), 'scene.')
         self._epoch = Epoch(self, may_set=True, follow=False)
         self.offer((topics.EPOCH, topics.RAW))
-        self.alone_on(topics.RAW.name)
+        self.watch.alone_on(topics.RAW.name)
         if chosen.whole_scene:
             self._simulated = SimulatedScene(self, settings, scene, chosen.effects)
         else:

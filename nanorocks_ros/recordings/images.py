@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.errors import FrameError
+from nanorocks_ros.recordings.jpeg import is_whole_jpeg
 from nanorocks_ros.records import Frame
 
 if TYPE_CHECKING:
@@ -16,9 +17,6 @@ if TYPE_CHECKING:
 NS = 1_000_000_000
 _CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
 _JPEG_START = b'\xff\xd8'
-_JPEG_END = b'\xff\xd9'
-# Some cameras pad a JPEG with zeros; the end marker is looked for before them.
-_PADDING = b'\x00'
 _READ = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
 
 
@@ -109,10 +107,16 @@ def frame_from_compressed(message: Any, where: str) -> Frame:
     data = _bytes_of(message.data)
     stamp_ns = stamp_ns_of(message)
     # A JPEG that lost its end is decoded by OpenCV all the same, with gray where the rest was.
-    whole = not _is_cut_jpeg(data)
+    whole = data[:2].tobytes() != _JPEG_START or is_whole_jpeg(data.data)
     image = _decoded(data) if whole else None
     if image is None:
         what = 'cannot be decoded' if whole else 'ends too early'
+        if picture_kind(message) in _FILMS:
+            raise FrameError(
+                where,
+                f"holds '{picture_kind(message)}', a film whose pictures need each other",
+                'record JPEG or PNG, or write a video of it and run nanorocks import',
+            )
         raise FrameError(
             where,
             f"the picture at {stamp_ns} ns ({data.size} bytes, format '{message.format}') {what}",
@@ -121,15 +125,9 @@ def frame_from_compressed(message: Any, where: str) -> Frame:
     return Frame(stamp_ns=stamp_ns, encoding='mono8' if image.ndim == 2 else 'bgr8', image=image)
 
 
-def _is_cut_jpeg(data: NDArray[np.uint8]) -> bool:
-    if data[:2].tobytes() != _JPEG_START:
-        return False
-    return not data[-64:].tobytes().rstrip(_PADDING).endswith(_JPEG_END)
-
-
-def _decoded(data: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
+def _decoded(data: NDArray[np.uint8], flags: int = _READ) -> NDArray[np.uint8] | None:
     try:
-        image = cv2.imdecode(data, _READ)
+        image = cv2.imdecode(data, flags)
     except cv2.error:
         return None
     return None if image is None else np.asarray(image, dtype=np.uint8)
@@ -163,3 +161,44 @@ def encode_jpeg(image: NDArray[np.uint8], quality: int) -> bytes:
             'JPEG', f'picture of shape {image.shape} cannot be encoded', 'give a smaller one'
         )
     return content.tobytes()
+
+
+def is_decodable(content: bytes) -> bool:
+    """Whether OpenCV makes a picture of it."""
+    return _decoded(_bytes_of(content)) is not None
+
+
+def decoded_gray(content: bytes) -> NDArray[np.uint8]:
+    """The brightness of a compressed picture, (height, width); empty when it is none."""
+    image = _decoded(_bytes_of(content), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+    return np.empty((0, 0), dtype=np.uint8) if image is None else image
+
+
+_FILMS = frozenset({'h264', 'h265', 'hevc', 'vp9', 'av1'})
+_STARTS = {
+    _JPEG_START: 'jpeg',
+    b'\x89PNG': 'png',
+    b'BM': 'bmp',
+    b'RIFF': 'webp',
+    b'II*\x00': 'tiff',
+    b'MM\x00*': 'tiff',
+    # Units of H.264 and H.265 follow a start code; the first is told by what it holds.
+    b'\x00\x00\x00\x01': 'h264',
+    b'\x00\x00\x01': 'h264',
+}
+
+
+def picture_kind(message: Any) -> str:
+    """How a camera message holds its picture: ``jpeg``, ``h264``, ``bgr8``.
+
+    Parameters
+    ----------
+    message : sensor_msgs/Image or sensor_msgs/CompressedImage
+    """
+    if not hasattr(message, 'format'):
+        return str(message.encoding)
+    start = _bytes_of(message.data)[:4].tobytes()
+    for mark, kind in _STARTS.items():
+        if start.startswith(mark):
+            return kind
+    return str(message.format)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.experiment.calibration import CameraInfo, view_of
+from nanorocks_ros.recordings.messages import camera_info_message
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -24,6 +28,26 @@ def info_from_message(message: Any) -> CameraInfo:
         r=_floats(message.r),
         p=_floats(message.p),
     )
+
+
+def info_message(info: CameraInfo, stamp_ns: int, frame_id: str) -> Any:
+    """The sensor_msgs/CameraInfo that says these numbers.
+
+    Parameters
+    ----------
+    info : CameraInfo
+    stamp_ns : int, [ns]
+    frame_id : str
+    """
+    message = camera_info_message(
+        stamp_ns,
+        frame_id,
+        (info.width, info.height),
+        np.array(info.k),
+        (info.distortion_model, info.d),
+    )
+    turned = replace(message, r=np.array(info.r, dtype=np.float64))
+    return replace(turned, p=np.array(info.p, dtype=np.float64)) if info.p else turned
 
 
 def view_from_message(message: Any, where: str) -> View:

@@ -10,6 +10,7 @@ import struct
 import zlib
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import lz4.frame
@@ -28,6 +29,9 @@ RECORD = struct.Struct('<BQ')
 _MESSAGE = struct.Struct('<HIQQ')
 _INDEX_OF_CHANNEL = struct.Struct('<HI')
 _INDEX_ENTRY_BYTES = 16
+_FRAME_STARTS = {'zstd': b'\x28\xb5\x2f\xfd', 'lz4': b'\x04\x22\x4d\x18'}
+# Names stand at the front of a chunk. What is damaged is decompressed piece by piece.
+_NAMES_BYTES, _PIECE_BYTES, _CHECKSUM_BYTES = 1 << 21, 1 << 12, 4
 # A flipped bit in a length must not ask for all memory; common writers stay below 16 MB.
 _CHUNK_LIMIT = 2**31
 
@@ -143,12 +147,24 @@ def _decompressed(chunk: Chunk) -> bytes:
     return chunk.data
 
 
-def _decompressed_so_far(chunk: Chunk) -> bytes:
-    if chunk.compression == 'zstd':
-        return zstandard.ZstdDecompressor().decompressobj().decompress(chunk.data)
-    if chunk.compression == 'lz4':
-        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(chunk.data))
-    return b'' if chunk.compression else chunk.data
+def _decompressed_so_far(data: bytes, compression: str) -> bytes:
+    """As much as can be decompressed, whether it breaks off or is damaged further on."""
+    if not compression:
+        return data
+    work = (
+        zstandard.ZstdDecompressor().decompressobj()
+        if compression == 'zstd'
+        else lz4.frame.LZ4FrameDecompressor()
+    )
+    found = bytearray()
+    # The checksum by itself: where it is wrong, what comes before it is given all the same.
+    places = [*range(0, len(data) - _CHECKSUM_BYTES, _PIECE_BYTES), len(data) - _CHECKSUM_BYTES]
+    try:
+        for start, end in pairwise([*places, len(data)]):
+            found += work.decompress(data[max(0, start) : end])
+    except (*UNREADABLE, EOFError):
+        pass
+    return bytes(found)
 
 
 def _inside(content: memoryview) -> memoryview:
@@ -204,12 +220,41 @@ def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMes
     try:
         if block.cut:
             chunk = Chunk.read(stream_of(raw[RECORD.size :]))
-            _gather(memoryview(_decompressed_so_far(chunk)), catalogue, found, cut=True)
+            data = _decompressed_so_far(chunk.data, chunk.compression)
+            _gather(memoryview(data), catalogue, found, cut=True)
         else:
             _gather(raw, catalogue, found, cut=False)
     except UNREADABLE as error:
+        _gather_names(bytes(raw), catalogue)
         raise DamagedError(str(error)) from error
     return found
+
+
+def gather_names(stream: BinaryIO, start: int, end: int, catalogue: Catalogue) -> None:
+    """Note the channels and schemas at the front of a damaged stretch, which others rely on.
+
+    Parameters
+    ----------
+    stream : binary file
+    start, end : int
+        Of the stretch, [bytes].
+    catalogue : Catalogue
+    """
+    stream.seek(start)
+    _gather_names(stream.read(min(end - start, _NAMES_BYTES)), catalogue)
+
+
+def _gather_names(raw: bytes, catalogue: Catalogue) -> None:
+    for compression, magic in _FRAME_STARTS.items():
+        place = raw.find(magic)
+        if place < 0:
+            continue
+        data = _decompressed_so_far(raw[place : place + _NAMES_BYTES], compression)
+        try:
+            for opcode, content in walk(memoryview(data), cut=True):
+                catalogue.note(opcode, content)
+        except UNREADABLE:
+            return
 
 
 def indexed_messages(content: memoryview) -> int:

@@ -14,7 +14,8 @@ from nanorocks_ros.recordings.mcap_blocks import (
     indexed_after,
     load,
 )
-from nanorocks_ros.recordings.mcap_index import McapIndex, read_index, scan
+from nanorocks_ros.recordings.mcap_index import McapIndex, read_index, recorder_notes, scan
+from nanorocks_ros.recordings.qos import recorded_qos
 from nanorocks_ros.recordings.storage import BagMessage, TopicInfo
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ class McapFile:
     path : Path
     topics : dict of str to TopicInfo
     start_ns, end_ns : int, [ns]
+    recorder_notes : str
+        A copy of ``metadata.yaml`` that some recorders keep in the file; empty without one.
 
     Raises
     ------
@@ -53,6 +56,7 @@ class McapFile:
             self._check_magic(stream)
             index = read_index(stream, size)
             self._index: McapIndex = index or scan(stream, size)
+            self.recorder_notes = recorder_notes(stream, self._index)
         self.topics = _topics(self._index)
         self.start_ns = self._index.start_ns or 0
         self.end_ns = self._index.end_ns or 0
@@ -183,6 +187,6 @@ def _topics(index: McapIndex) -> dict[str, TopicInfo]:
             encoding=channel.message_encoding,
             definition=schema.data.decode('utf-8', 'replace') if schema else '',
             definition_format=schema.encoding if schema else '',
-            offered_qos=channel.metadata.get('offered_qos_profiles', ''),
+            qos=recorded_qos(channel.metadata.get('offered_qos_profiles', '')),
         )
     return topics

@@ -67,18 +67,26 @@ class BagReader:
         Log times of the first and last message; both 0 in an empty bag.
     metadata : dict of str to str
         Provenance, as given to `BagWriter`.
+    expected : int or None
+        Messages that the recorder counted in all; None where it does not say.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._contents: Contents = contents(path)
         self.metadata = self._contents.metadata
+        self.expected = self._contents.expected
         self.topics = _merged_topics(self._contents.files)
         used = [file for file in self._contents.files if _count(file)]
         self.start_ns = min((file.start_ns for file in used), default=0)
         self.end_ns = max((file.end_ns for file in used), default=0)
         self._undone = 0
         self._store: Typestore | None = None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The storage files that it consists of."""
+        return tuple(file.path for file in self._contents.files)
 
     @property
     def complete(self) -> bool:
@@ -236,7 +244,7 @@ def _merged_topics(files: Sequence[StorageFile]) -> dict[str, TopicInfo]:
                 encoding=before.encoding,
                 definition=before.definition or info.definition,
                 definition_format=before.definition_format,
-                offered_qos=before.offered_qos,
+                qos=before.qos or info.qos,
             )
     return merged
 

@@ -74,6 +74,7 @@ class Recorder:
         self._ending = False
         self._changed = threading.Condition()
         self._last_ns: int | None = None
+        self._early: list[tuple[str, Callable[[], bytes | object]]] = []
         self._shift_ns = 0
         self.dropped = 0
         self.written = 0
@@ -96,6 +97,9 @@ class Recorder:
         if behind_ns > _LATE_NS:
             self._shift_ns += behind_ns
         self._last_ns = max(last_ns, stamp_ns + self._shift_ns)
+        early, self._early = self._early, []
+        for topic, make in early:
+            self.put(topic, make)
 
     def put(
         self,
@@ -105,7 +109,7 @@ class Recorder:
         size: int = 0,
         wait: bool = False,
     ) -> bool:
-        """Leave a message to the thread.
+        """Leave a message to the thread; before the first `advance` it waits for that.
 
         Parameters
         ----------
@@ -123,6 +127,9 @@ class Recorder:
         bool
             Whether it was taken.
         """
+        if self._last_ns is None:
+            self._early.append((topic, make))
+            return True
         with self._changed:
             if wait:
                 self._changed.wait_for(lambda: self._has_room(size) or self.problem is not None)
@@ -131,7 +138,7 @@ class Recorder:
             if not self._has_room(size):
                 self.dropped += 1
                 return False
-            self._jobs.append((topic, self._last_ns or 0, make, size))
+            self._jobs.append((topic, self._last_ns, make, size))
             self._bytes += size
             self._changed.notify_all()
             return True

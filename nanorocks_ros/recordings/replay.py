@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import yaml
-
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.recordings.writer import OfferedQos
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -17,7 +14,6 @@ if TYPE_CHECKING:
 NS = 1_000_000_000
 # How far back the last message of a topic is looked for at first; then four times as far.
 _LOOK_BACK_NS = NS
-_MANY = 100_000
 
 
 def played_part(reader: BagReader, start: float, duration: float) -> tuple[int, int]:
@@ -75,31 +71,3 @@ def latest(reader: BagReader, topics: Collection[str], stamp_ns: int) -> list[Ba
         wanted -= found.keys()
         end_ns, step_ns = start_ns - 1, 4 * step_ns
     return sorted(found.values(), key=lambda one: one.log_time_ns)
-
-
-def offered_qos(text: str) -> OfferedQos | None:
-    """How a topic was offered when it was recorded.
-
-    Parameters
-    ----------
-    text : str
-        ``offered_qos_profiles`` as the storage keeps them: YAML, with names or, before version 9
-        of the format, with numbers.
-
-    Returns
-    -------
-    OfferedQos or None
-        What all its publishers offered; None when that is not known.
-    """
-    try:
-        profiles = [dict(one) for one in yaml.safe_load(text) or ()]
-        depths = [int(one.get('depth') or 0) for one in profiles]
-    except (yaml.YAMLError, TypeError, ValueError):
-        return None
-    if not profiles:
-        return None
-    return OfferedQos(
-        reliable=all(one.get('reliability') in ('reliable', 1) for one in profiles),
-        transient_local=all(one.get('durability') in ('transient_local', 1) for one in profiles),
-        depth=min(max(1, *depths), _MANY),
-    )

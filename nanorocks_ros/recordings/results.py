@@ -13,6 +13,9 @@ from nanorocks_ros.errors import RecordingError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+RESULTS_MARK = '.nanorocks_results'
+"""The file by which a folder of results is known."""
+
 
 def write_csv(
     path: str | Path,

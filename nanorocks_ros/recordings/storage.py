@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
     from pathlib import Path
 
+    from nanorocks_ros.recordings.qos import OfferedQos
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TopicInfo:
@@ -27,8 +29,8 @@ class TopicInfo:
         Text of the message definition kept in the recording; empty where there is none.
     definition_format : str
         ``ros2msg`` or ``ros2idl``.
-    offered_qos : str
-        How its publishers offered it, as the storage keeps it (YAML).
+    qos : OfferedQos or None
+        How it was offered; None where the recording does not say.
     """
 
     name: str
@@ -37,7 +39,7 @@ class TopicInfo:
     encoding: str = 'cdr'
     definition: str = ''
     definition_format: str = 'ros2msg'
-    offered_qos: str = ''
+    qos: OfferedQos | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,6 +69,8 @@ class StorageFile(Protocol):
     topics : dict of str to TopicInfo
     start_ns, end_ns : int, [ns]
         Log times of the first and last message; both 0 when there is none.
+    recorder_notes : str
+        A copy of ``metadata.yaml`` that some recorders keep in the file; empty without one.
     complete : bool
         Nothing is known to be missing, so far.
     notices : tuple of str
@@ -79,6 +83,7 @@ class StorageFile(Protocol):
     topics: dict[str, TopicInfo]
     start_ns: int
     end_ns: int
+    recorder_notes: str
 
     @property
     def complete(self) -> bool:

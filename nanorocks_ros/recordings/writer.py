@@ -17,15 +17,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import zstandard
-from rosbags.interfaces import (
-    Connection,
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.rosbag2.errors import WriterError
 from rosbags.rosbag2.storage_mcap import McapWriter
@@ -34,52 +25,23 @@ from rosbags.typesys import TypesysError
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.message_types import register, standard_types
+from nanorocks_ros.recordings.qos import OfferedQos
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from types import TracebackType
     from typing import Literal, Self
 
-# What ROS 2 calls an infinite duration.
-_FOREVER = QosTime(9223372036, 854775807)
+    from rosbags.interfaces import Connection
+
+__all__ = ['BagWriter', 'OfferedQos', 'OfferedTopic']
+
 _CHUNK_NS = 1_000_000_000
 # Pictures are compressed already: a higher level takes time and saves nothing.
 _LEVEL = 1
+# Of a type whose definition is not understood.
+_UNKNOWN_DIGEST = f'RIHS01_{"0" * 64}'
 _UNFIT = (SerdeError, AttributeError, TypeError, ValueError, LookupError, AssertionError)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OfferedQos:
-    """How a topic was, or would be, offered.
-
-    Parameters
-    ----------
-    reliable : bool
-        Else best effort.
-    transient_local : bool
-        A late subscriber still gets the last messages; else volatile.
-    depth : int, >= 1
-        Messages kept.
-    """
-
-    reliable: bool = True
-    transient_local: bool = False
-    depth: int = 10
-
-    def profile(self) -> Qos:
-        """The profile that recordings keep and players offer again."""
-        durability = QosDurability.TRANSIENT_LOCAL if self.transient_local else None
-        return Qos(
-            history=QosHistory.KEEP_LAST,
-            depth=self.depth,
-            reliability=QosReliability.RELIABLE if self.reliable else QosReliability.BEST_EFFORT,
-            durability=durability or QosDurability.VOLATILE,
-            deadline=_FOREVER,
-            lifespan=_FOREVER,
-            liveliness=QosLiveliness.AUTOMATIC,
-            liveliness_lease_duration=_FOREVER,
-            avoid_ros_namespace_conventions=False,
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,12 +57,18 @@ class OfferedTopic:
         Text of the message definition, for types that are not part of ROS 2 Jazzy.
     definition_format : str
         ``ros2msg`` or ``ros2idl``.
+    encoding : str
+        Of its messages.
+    verbatim : bool
+        The definition is kept as it is, understood or not: for copies.
     """
 
     msgtype: str
     qos: OfferedQos
     definition: str = ''
     definition_format: str = 'ros2msg'
+    encoding: str = 'cdr'
+    verbatim: bool = False
 
 
 class BagWriter:
@@ -145,7 +113,7 @@ class BagWriter:
             self._writer = Writer(self.path, version=9, storage_plugin=StoragePlugin.MCAP)
             self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
             for key, value in self._metadata.items():
-                self._writer.set_custom_data(key, value)
+                self._writer.set_custom_data(key, _encodable(value))
             self._writer.open()
         except WriterError as error:
             raise self._exists() from error
@@ -173,6 +141,10 @@ class BagWriter:
             if error is None:
                 raise self._unwritable(failure) from failure
         return False
+
+    def remark(self, key: str, value: str) -> None:
+        """Add to the provenance what was not known at the start, or replace what was."""
+        self._writer.set_custom_data(key, _encodable(value))
 
     def write(self, topic: str, stamp_ns: int, message: object) -> None:
         """Write a message given as an object.
@@ -283,6 +255,8 @@ class BagWriter:
 
     def _new_connection(self, topic: str, offered: OfferedTopic) -> Connection:
         kind, text = offered.msgtype, offered.definition
+        if offered.verbatim:
+            return self._copied_connection(topic, offered)
         try:
             if text:
                 register(self._store, kind, text, offered.definition_format)
@@ -295,6 +269,21 @@ class BagWriter:
                 f"type '{kind}' is not part of ROS 2 Jazzy and has no usable definition",
                 'give its definition',
             ) from error
+
+    def _copied_connection(self, topic: str, offered: OfferedTopic) -> Connection:
+        """As it was recorded; only a definition that is missing is looked up."""
+        kind, text, digest = offered.msgtype, offered.definition, _UNKNOWN_DIGEST
+        if kind in self._store.fielddefs:
+            digest = self._store.hash_rihs01(kind)
+            text = text or self._store.generate_msgdef(kind, ros_version=2)[0]
+        return self._writer.add_connection(
+            topic,
+            kind,
+            msgdef=text,
+            rihs01=digest,
+            serialization_format=offered.encoding,
+            offered_qos_profiles=[offered.qos.profile()],
+        )
 
     def _exists(self) -> RecordingError:
         return RecordingError(
@@ -316,3 +305,8 @@ def _sync_folder(path: Path) -> None:
         os.fsync(number)
     finally:
         os.close(number)
+
+
+def _encodable(text: str) -> str:
+    """The text without what UTF-8 cannot hold, as in names of files of another encoding."""
+    return text.encode('utf-8', 'backslashreplace').decode('utf-8')

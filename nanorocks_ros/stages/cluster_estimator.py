@@ -22,9 +22,11 @@ from nanorocks_ros.stages.shaking import NS
 from nanorocks_ros.stages.sticking import StickingMeter
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.inference.sticking import StickingEstimate
+    from nanorocks_ros.inference.sticking import StickingCycle, StickingEstimate
 
 # What tracks say of an instant is known a second later; another one is for messages on their way.
 _HELD_NS = 2 * NS
@@ -75,6 +77,15 @@ class ClusterEstimator:
     @emit_image.setter
     def emit_image(self, wanted: bool) -> None:
         self._images.emit_image = wanted
+
+    @property
+    def cycles(self) -> tuple[StickingCycle, ...]:
+        """Merges and speeds of the cycles since time last went back."""
+        return self._sticking.seen()
+
+    def together(self, cycles: Sequence[StickingCycle]) -> StickingEstimate | None:
+        """What cycles of this tray say of the sticking speed, also such of other recordings."""
+        return self._sticking.together(cycles)
 
     def push(
         self, record: TrayImage | SpeedEstimate | BodyEstimate | Merge

@@ -29,6 +29,7 @@ from nanorocks_ros.stages.species_decays import species_decays
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.inference.evidence import Evidence, MeanRestitution
 
 
 # Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
@@ -73,6 +74,21 @@ class HaffFitter:
         self._merged = False
         self._last_update_ns: int | None = None
         self._reading: Reading = self._make_reading()
+
+    @property
+    def evidence(self) -> Evidence | None:
+        """What the cycles finished since time last went back say; None without any."""
+        return self._reading.evidence
+
+    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+        """What cycles say together, also such of other recordings of the tray.
+
+        Raises
+        ------
+        FitError
+            When they were read in another way.
+        """
+        return self._reading.mean_of(evidence)
 
     def push(
         self, record: SpeedEstimate | Rebound | PairCollision | Merge

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
@@ -27,7 +27,7 @@ from nanorocks_ros.stages.preprocess import Preprocessor
 from nanorocks_ros.stages.speed import SpeedEstimator
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
@@ -47,6 +47,14 @@ Result = (
     | CorEstimate
     | Notice
 )
+
+
+class Wanted(NamedTuple):
+    """Which pictures of a tray somebody looks at; they are not made otherwise."""
+
+    mask: bool = False
+    tracks: bool = False
+    autocorrelation: bool = False
 
 
 def trays_of(settings: PipelineSettings) -> dict[int, Tray]:
@@ -74,6 +82,10 @@ class TrayStages:
         self.speed = SpeedEstimator(settings, tray)
         self.clusters = ClusterEstimator(settings, tray)
         self.cooling = HaffFitter(settings, tray)
+
+    def emit(self, wanted: Wanted) -> None:
+        """Make these pictures from now on."""
+        self.speed.emit_mask, self.speed.emit_tracks, self.clusters.emit_image = wanted
 
     def push(self, image: TrayImage) -> tuple[Result, ...]:
         """Everything that follows from the next image of the tray."""
@@ -125,8 +137,19 @@ class Pipeline:
         """
         return self.follow(self.preprocessor.push(frame))
 
-    def follow(self, records: Sequence[TrayImage | Notice]) -> tuple[Result, ...]:
-        """The same, of what the preprocessor made of a frame: the rest may be done elsewhere."""
+    def follow(
+        self, records: Sequence[TrayImage | Notice], wanted: Mapping[int, Wanted] | None = None
+    ) -> tuple[Result, ...]:
+        """The same, of what the preprocessor made of a frame: the rest may be done elsewhere.
+
+        Parameters
+        ----------
+        records : sequence of TrayImage or Notice
+        wanted : mapping of int to Wanted, optional
+            By number of the tray; None: as before.
+        """
+        for number, one in (wanted or {}).items():
+            self.trays[number].emit(one)
         found: list[Result] = []
         for record in records:
             found.append(record)

@@ -11,9 +11,9 @@ import numpy as np
 from scipy import special
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.inference.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay_library import library_of
-from nanorocks_ros.inference.decay_likelihood import DecayLikelihood, decay_likelihood
+from nanorocks_ros.inference.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.evidence import Evidence, MeanRestitution
 from nanorocks_ros.inference.restitution import Posterior, check_walls, posterior_of, tables_of
 from nanorocks_ros.physics.haff_fit import HaffFit, fit_haff
 from nanorocks_ros.physics.paper import paper_restitution_of_decay
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.inference.contact_terms import ContactTerms
+    from nanorocks_ros.inference.decay_likelihood import DecayLikelihood
 
 # With less known than that, nothing is: anything from 0 to 1 has a deviation of 0.29.
 _LEAST_KNOWN = 0.2
@@ -52,9 +54,13 @@ class Reading(Protocol):
     """What a way to read decays does; it remembers the cycles that are finished."""
 
     relation: CorRelation
+    evidence: Evidence | None
 
     def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate; raises FitError where there is no decay."""
+
+    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+        """What all cycles of some evidence say together, those of other recordings, too."""
 
 
 class PaperReading:
@@ -71,7 +77,7 @@ class PaperReading:
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._probability = settings.cooling.probability
         self._tray = tray
-        self._finals: list[tuple[float, float]] = []
+        self.evidence: Evidence | None = None
 
     def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate; contacts are nothing that the paper uses.
@@ -90,26 +96,35 @@ class PaperReading:
             for rate in (fit.decay_rate, fit.decay_rate * spread, fit.decay_rate / spread)
         )
         if final:
-            self._finals.append((value, (upper - lower) / (2.0 * quantile)))
-        mean, mean_error = self._running_mean()
+            own = Evidence(cycles=1, by_form=((value, (upper - lower) / (2.0 * quantile)),))
+            self.evidence = self.evidence + own if self.evidence else own
+        mean = self.mean_of(self.evidence) if self.evidence else None
         return {
             'restitution': value,
             'restitution_lower': lower,
             'restitution_upper': upper,
             'paper_restitution': value,
             'reduced_chi_square': fit.reduced_chi_square,
-            'mean_restitution': mean,
-            'mean_restitution_error': mean_error,
+            'mean_restitution': mean.restitution if mean else math.nan,
+            'mean_restitution_error': mean.restitution_error if mean else math.nan,
             **_haff_fields(fit),
         }
 
-    def _running_mean(self) -> tuple[float, float]:
-        if not self._finals:
-            return math.nan, math.nan
-        values = np.array([value for value, _ in self._finals])
-        if values.size == 1:
-            return float(values[0]), self._finals[0][1]
-        return float(values.mean()), float(values.std(ddof=1) / math.sqrt(values.size))
+    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+        """Mean and standard error by the scatter of the cycles; of one, its own error."""
+        values, errors = np.array(evidence.by_form).T
+        mean, error, freedom = float(values.mean()), float(errors[0]), math.inf
+        if values.size > 1:
+            error = float(values.std(ddof=1) / math.sqrt(values.size))
+            freedom = values.size - 1.0
+        reach = error * float(special.stdtrit(freedom, 0.5 + 0.5 * self._probability))
+        return MeanRestitution(
+            cycles=evidence.cycles,
+            restitution=mean,
+            restitution_error=error,
+            restitution_lower=mean - reach,
+            restitution_upper=mean + reach,
+        )
 
 
 class LibraryReading:
@@ -144,7 +159,7 @@ class LibraryReading:
         check_walls(self._walls)
         half = 0.5 * settings.cooling.probability
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
-        self._finished: tuple[DecayLikelihood, ContactTerms] | None = None
+        self.evidence: Evidence | None = None
         self._mean_so_far: dict[str, float] = {}
 
     def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
@@ -200,18 +215,50 @@ class LibraryReading:
         """The mean of what all finished cycles together say; a final one is among them."""
         if not final:
             return self._mean_so_far
-        if self._finished is not None:
-            likelihood, contacts = self._finished[0] + likelihood, self._finished[1] + contacts
-        self._finished = likelihood, contacts
-        posterior = self._posterior(likelihood.integrated(), contacts)
-        error, wall_error = np.sqrt(np.diag(posterior.covariance)).tolist()
+        own = Evidence(cycles=1, decay=likelihood, contacts=contacts)
+        self.evidence = self.evidence + own if self.evidence else own
+        mean = self.mean_of(self.evidence)
         self._mean_so_far = {
-            'mean_restitution': posterior.mean[0],
-            'mean_restitution_error': error,
-            'mean_wall_restitution': posterior.mean[1],
-            'mean_wall_restitution_error': wall_error,
+            'mean_restitution': mean.restitution,
+            'mean_restitution_error': mean.restitution_error,
+            'mean_wall_restitution': mean.wall_restitution,
+            'mean_wall_restitution_error': mean.wall_restitution_error,
         }
         return self._mean_so_far
+
+    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+        """What the cycles say together: what is not known is the same in all of them.
+
+        Raises
+        ------
+        FitError
+            When they were not read by a library, or by one of another grid.
+        """
+        decay, contacts = evidence.decay, evidence.contacts
+        if decay is None or contacts is None or decay.deviation.size != self._tables.mean.shape[0]:
+            raise FitError(
+                f'tray {self._tray.number}',
+                'cycles were not read by this library of decays',
+                'analyse their recordings again',
+            )
+        posterior = self._posterior(decay.integrated(), contacts)
+        error, wall_error = np.sqrt(np.diag(posterior.covariance)).tolist()
+        known = _known(posterior, self._ends)
+        return MeanRestitution(
+            cycles=evidence.cycles,
+            restitution=posterior.mean[0],
+            restitution_error=error,
+            wall_restitution=posterior.mean[1],
+            wall_restitution_error=wall_error,
+            tension=posterior.tension,
+            rebounds=contacts.rebounds,
+            collisions=contacts.collisions,
+            **{
+                f'{name}_{end}': known[f'{name}_{end}']
+                for name in ('restitution', 'wall_restitution')
+                for end in ('lower', 'upper')
+            },
+        )
 
     def _speeds(self, decay: Decay, *, final: bool) -> dict[str, float]:
         """Speed at the shaking event, and Haff time; with errors once the cycle is over."""

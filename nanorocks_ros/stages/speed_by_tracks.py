@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.experiment.colours import hue_of
+from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.records import (
     UNKNOWN,
     BodyEstimate,
@@ -24,7 +25,12 @@ from nanorocks_ros.records import (
 from nanorocks_ros.stages.bodies.count import BodyCounter
 from nanorocks_ros.stages.contacts.find import ContactFinder
 from nanorocks_ros.stages.shaking import NS, CycleFollower
-from nanorocks_ros.stages.tracking.mean_speed import RELIABLE_SHARE, mean_speeds
+from nanorocks_ros.stages.tracking.mean_speed import (
+    JITTER_PICTURES,
+    RELIABLE_SHARE,
+    mean_speeds_in,
+)
+from nanorocks_ros.stages.tracking.recent import RecentTracks
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 if TYPE_CHECKING:
@@ -82,8 +88,9 @@ class TrackSpeed:
         wanted = settings.cooling.rebounds or settings.cooling.collisions
         self._contacts = ContactFinder(tray) if wanted else None
         self._bodies = BodyCounter(settings, tray)
-        self._recent: deque[Tracks] = deque()
-        self._shares: deque[np.ndarray] = deque(maxlen=_MEMORY_FRAMES)
+        self._recent = RecentTracks()
+        self._shares = np.empty((_MEMORY_FRAMES, self._counts.size))
+        self._judged_frames = 0
         self._followed: deque[float] = deque(maxlen=_MEMORY_SPEEDS)
         self._steps: deque[float] = deque(maxlen=_MEMORY_SPEEDS)
         area = tray.dimensions[0] * tray.dimensions[1]
@@ -109,15 +116,13 @@ class TrackSpeed:
             self.judged, self.reliable = True, False
         for tracks in self._tracker.push(image):
             found.append(tracks)
-            self._recent.append(tracks)
-            while tracks.stamp_ns - self._recent[0].stamp_ns > _LOOK_BACK_NS:
-                self._recent.popleft()
+            self._recent.push(tracks, tracks.stamp_ns - _LOOK_BACK_NS)
             self._judge(tracks)
             found += self._contacts_in(tracks, shakes)
             found += self._bodies.push(tracks, shakes.cycle)
             if self._next_ns is None or tracks.stamp_ns >= self._next_ns:
                 self._next_ns = tracks.stamp_ns + self._interval_ns
-                found += self._speeds(shakes)
+                found += self._speeds(shakes, tracks.expected)
         return tuple(found)
 
     def _contacts_in(self, tracks: Tracks, shakes: CycleFollower) -> list[Rebound | PairCollision]:
@@ -135,20 +140,23 @@ class TrackSpeed:
 
     def _judge(self, tracks: Tracks) -> None:
         seen = np.bincount(tracks.species[tracks.seen], minlength=self._counts.size)
-        self._shares.append(seen / self._counts)
+        self._shares[self._judged_frames % _MEMORY_FRAMES] = seen / self._counts
+        self._judged_frames += 1
         if self.hopeless:
             return
         # A track is believed after some pictures only: the first ones show none.
-        least = float(np.median(self._shares, axis=0).min())
-        self.judged = len(self._shares) == _MEMORY_FRAMES
+        least = _least_median(self._shares[: self._judged_frames])
+        self.judged = self._judged_frames >= _MEMORY_FRAMES
         enough = least >= (_STILL_ENOUGH if self.reliable else _ENOUGH)
         # Where many beads are lost and found again, others are taken for them.
         followed = bool(self._followed) and float(np.median(self._followed)) >= RELIABLE_SHARE
         self.reliable = self.judged and enough and followed and self._told_apart()
 
-    def _speeds(self, shakes: CycleFollower) -> list[SpeedEstimate]:
-        mean, *each = mean_speeds(
-            list(self._recent),
+    def _speeds(self, shakes: CycleFollower, expected: NDArray[np.int32]) -> list[SpeedEstimate]:
+        mean, *each = mean_speeds_in(
+            self._recent.series(),
+            self._recent.series(JITTER_PICTURES),
+            expected,
             least_distance=self._least_distance,
             species=(None, *range(self._counts.size)),
         )
@@ -193,6 +201,14 @@ class TrackSpeed:
 
     def _longest_step(self, speeds: NDArray[np.float64]) -> float:
         """Way of a bead between two pictures over the distance to others, of the worst species."""
-        stamps = [one.stamp_ns for one in self._recent]
-        picture = float(np.median(np.diff(stamps))) / NS
+        picture = float(np.median(np.diff(self._recent.stamps))) / NS
         return float(np.max(np.nan_to_num(speeds) * picture / self._neighbours))
+
+
+@compiled
+def _least_median(shares: NDArray[np.float64]) -> float:
+    """Of the medians of the columns, the least."""
+    least = np.inf
+    for k in range(shares.shape[1]):
+        least = min(least, np.median(shares[:, k]))
+    return least

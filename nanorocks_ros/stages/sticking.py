@@ -20,6 +20,8 @@ from nanorocks_ros.records import BodyEstimate, Merge, SpeedEstimate
 from nanorocks_ros.stages.shaking import NS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.physics.sticking import SlowContacts
@@ -110,6 +112,22 @@ class StickingMeter:
         """What the cycle says of the sticking speed up to an instant; None when nothing."""
         seen = self._seen(cycle, stamp_ns)
         return self._estimate([seen]) if seen else None
+
+    def seen(self) -> tuple[StickingCycle, ...]:
+        """All cycles since time last went back, the one under way among them, as known by now."""
+        last = max(self._cycles)
+        own = self._cycles[last]
+        if own.stamps_ns:
+            self.of_all(last, own.stamps_ns[-1])
+        found = dict(self._finished)
+        under_way = self._seen(last, own.stamps_ns[-1]) if own.stamps_ns else None
+        if under_way is not None:
+            found[last] = under_way
+        return tuple(found[number] for number in sorted(found))
+
+    def together(self, cycles: Sequence[StickingCycle]) -> StickingEstimate | None:
+        """What some cycles of this tray say together, also such of other recordings."""
+        return self._estimate(list(cycles)) if cycles else None
 
     def of_all(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
         """The same of all cycles that were over by then."""

@@ -32,7 +32,10 @@ _LOGGERS = ('distributed', 'distributed.client')
 
 
 def finished_on_cluster(
-    function: Callable[[Argument], Result], tasks: Mapping[str, Argument], scheduler: str
+    function: Callable[[Argument], Result],
+    tasks: Mapping[str, Argument],
+    scheduler: str,
+    lost: Callable[[str, str], Result] | None = None,
 ) -> Generator[tuple[str, Result], None, None]:
     """Results as they come. What a lost worker had in hand goes to another.
 
@@ -42,6 +45,9 @@ def finished_on_cluster(
     tasks : mapping of str to picklable objects
     scheduler : str
         Address, ``tcp://host:port``.
+    lost : callable, optional
+        Makes, of a key and what happened, the result of a task over which workers died; without
+        it that ends everything.
 
     Yields
     ------
@@ -56,7 +62,7 @@ def finished_on_cluster(
         or these run another version of this package.
     """
     with _checked(scheduler) as client:
-        yield from _gathered(client, scheduler, function, dict(tasks))
+        yield from _gathered(client, scheduler, function, dict(tasks), lost)
 
 
 def check_cluster(scheduler: str) -> None:
@@ -177,7 +183,11 @@ def _check_versions(client: Any, scheduler: str) -> None:
 
 
 def _gathered(
-    client: Any, scheduler: str, function: Callable[[Argument], Result], left: dict[str, Argument]
+    client: Any,
+    scheduler: str,
+    function: Callable[[Argument], Result],
+    left: dict[str, Argument],
+    lost: Callable[[str, str], Result] | None,
 ) -> Generator[tuple[str, Result], None, None]:
     from distributed import KilledWorker
     from distributed.comm.core import CommClosedError
@@ -203,6 +213,9 @@ def _gathered(
                 continue
             except KilledWorker as error:
                 del keys[future]
+                if lost is not None:
+                    yield key, lost(key, f'{error.allowed_failures + 1} workers died over it')
+                    continue
                 tries[key] += 1
                 if tries[key] == _MOST_TRIES:
                     raise _deadly(key, error) from error

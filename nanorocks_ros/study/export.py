@@ -2,31 +2,35 @@
 
 from __future__ import annotations
 
+import heapq
 import itertools
+import json
 import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.settings import rows
 from nanorocks_ros.recordings.messages import float_array_message, time_message
-from nanorocks_ros.recordings.results import write_csv
+from nanorocks_ros.recordings.results import RESULTS_MARK, write_csv
 from nanorocks_ros.recordings.writer import BagWriter
 from nanorocks_ros.records import ClusterEstimate, CorEstimate, CorStatus
+from nanorocks_ros.study.parquet import Column, check_parquet, write_parquet
 from nanorocks_ros.study.results_bag import offered
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import NS, ArrayRecord, layout, to_array
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.study.offline import Analysis, TrayResults
 
 BAG_NAME = 'results_bag'
-_MARK = '.nanorocks_results'
 
 
 def _known(value: float) -> float | None:
@@ -47,8 +51,15 @@ def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
     return list(latest.values())
 
 
-def as_json(analysis: Analysis) -> dict[str, Any]:
-    """The analysis as the command-line contract wants it: SI units, null for unknown."""
+def as_json(analysis: Analysis, *, series: bool = True) -> dict[str, Any]:
+    """The analysis as the command-line contract wants it: SI units, null for unknown.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    series : bool
+        With what was measured at every instant, not only cycle by cycle.
+    """
     return {
         'frames': analysis.frames,
         'frames_lost': analysis.frames_lost,
@@ -56,19 +67,33 @@ def as_json(analysis: Analysis) -> dict[str, Any]:
         'complete': analysis.complete,
         'notices': list(analysis.notices),
         'trays': {
-            str(number): _tray_as_json(analysis, results)
+            str(number): _tray_as_json(analysis, results, series=series)
             for number, results in analysis.trays.items()
         },
     }
 
 
-def _tray_as_json(analysis: Analysis, results: TrayResults) -> dict[str, Any]:
-    def seconds(stamp_ns: int) -> float:
-        return (stamp_ns - analysis.epoch_ns) / NS
-
+def _tray_as_json(analysis: Analysis, results: TrayResults, *, series: bool) -> dict[str, Any]:
+    epoch_ns = analysis.epoch_ns
     starts = {one.stamp_ns: one.cycle_start_ns for one in results.speeds}
+    clusters = _ends_of_cycles(results.clusters)
     return {
-        'time': [seconds(one.stamp_ns) for one in results.speeds],
+        **(_series_as_json(results, epoch_ns) if series else {}),
+        'cycles': [
+            _cycle_as_json(
+                one,
+                ((starts[one.stamp_ns] or 0) - epoch_ns) / NS,
+                _end_of_cycle(clusters.get(one.cycle, []), one),
+            )
+            for one in last_of_each_cycle(results.cors)
+        ],
+        'truth': _truth_as_json(analysis, results, series=series),
+    }
+
+
+def _series_as_json(results: TrayResults, epoch_ns: int) -> dict[str, Any]:
+    return {
+        'time': [(one.stamp_ns - epoch_ns) / NS for one in results.speeds],
         'mean_projected_speed': [_known(one.mean_projected_speed) for one in results.speeds],
         'mean_projected_speed_error': [
             _known(one.mean_projected_speed_error) for one in results.speeds
@@ -77,25 +102,33 @@ def _tray_as_json(analysis: Analysis, results: TrayResults) -> dict[str, Any]:
         'second_species_speed': [_known(one.second_species_speed) for one in results.speeds],
         'method': [one.method.name.lower() for one in results.speeds],
         'quality': [one.quality.names() for one in results.speeds],
-        'cycles': [
-            _cycle_as_json(one, seconds(starts[one.stamp_ns] or 0), _of_cycle(results, one))
-            for one in last_of_each_cycle(results.cors)
-        ],
-        'truth': _truth_as_json(analysis, results),
     }
 
 
-def _of_cycle(results: TrayResults, cor: CorEstimate) -> list[ClusterEstimate]:
-    """Those of the same cycle, and, of a recording that was played twice, of the same time."""
-    own = [one for one in results.clusters if one.cycle == cor.cycle]
-    rising = [k for k in range(1, len(own)) if own[k].stamp_ns <= own[k - 1].stamp_ns]
-    parts = [own[a:b] for a, b in itertools.pairwise([0, *rising, len(own)])]
-    near = [one for one in parts if one and one[0].stamp_ns <= cor.stamp_ns <= one[-1].stamp_ns]
-    return (near or parts)[-1]
+def _ends_of_cycles(
+    clusters: Iterable[ClusterEstimate],
+) -> dict[int, list[tuple[int, ClusterEstimate]]]:
+    """Of each cycle, and every time it was played: stamp of the first estimate, and the last."""
+    found: dict[int, list[tuple[int, ClusterEstimate]]] = {}
+    for one in clusters:
+        parts = found.setdefault(one.cycle, [])
+        if parts and one.stamp_ns > parts[-1][1].stamp_ns:
+            parts[-1] = parts[-1][0], one
+        else:
+            parts.append((one.stamp_ns, one))
+    return found
+
+
+def _end_of_cycle(
+    parts: Sequence[tuple[int, ClusterEstimate]], cor: CorEstimate
+) -> ClusterEstimate | None:
+    """That of the same time, of a recording that was played twice."""
+    near = [last for first, last in parts if first <= cor.stamp_ns <= last.stamp_ns]
+    return near[-1] if near else parts[-1][1] if parts else None
 
 
 def _cycle_as_json(
-    cor: CorEstimate, start: float, clusters: Sequence[ClusterEstimate]
+    cor: CorEstimate, start: float, clusters: ClusterEstimate | None
 ) -> dict[str, Any]:
     return {
         'cycle': cor.cycle,
@@ -134,11 +167,10 @@ def _cycle_as_json(
     }
 
 
-def _clusters_as_json(clusters: Sequence[ClusterEstimate]) -> dict[str, Any]:
+def _clusters_as_json(last: ClusterEstimate | None) -> dict[str, Any]:
     """What is known of the clusters at the end of a cycle."""
-    if not clusters:
+    if last is None:
         return dict.fromkeys(('cluster_size', 'bodies', 'onset', 'sticking_speed'))
-    last = clusters[-1]
     return {
         'cluster_size': _known(last.combined_size),
         'cluster_size_error': _known(last.combined_size_error),
@@ -152,24 +184,49 @@ def _clusters_as_json(clusters: Sequence[ClusterEstimate]) -> dict[str, Any]:
     }
 
 
-def _truth_as_json(analysis: Analysis, results: TrayResults) -> dict[str, Any] | None:
+def _truth_as_json(
+    analysis: Analysis, results: TrayResults, *, series: bool
+) -> dict[str, Any] | None:
     truth = results.truth
     if not truth:
         return None
-    return {
+    found: dict[str, Any] = {
         'time': [(one.stamp_ns - analysis.epoch_ns) / NS for one in truth],
         'mean_projected_speed': [one.mean_projected_speed for one in truth],
         'bodies': [one.bodies for one in truth],
+    }
+    return {
+        **(found if series else {}),
         'restitution': truth[-1].restitution,
         'wall_restitution': truth[-1].wall_restitution,
         'sticking_speed': truth[-1].sticking_speed,
     }
 
 
+FORMATS = ('csv', 'parquet')
+"""Forms of the tables of results; the first unless another is asked for."""
+
+
+def check_format(form: str) -> None:
+    """Refuse a form of tables that nothing here can write, before the work.
+
+    Raises
+    ------
+    ConfigurationError
+        When pyarrow, which writes Parquet, is not installed.
+    """
+    check_parquet(Path(f'--format.{form}'))
+
+
 def write_results(
-    analysis: Analysis, folder: Path, source: Path, settings: PipelineSettings
+    analysis: Analysis,
+    folder: Path,
+    source: Path,
+    settings: PipelineSettings,
+    form: str = FORMATS[0],
+    more: Callable[[Path], None] | None = None,
 ) -> None:
-    """CSV tables and a results bag in a folder of their own, complete or not at all.
+    """Tables and a results bag in a folder of their own, complete or not at all.
 
     Earlier results in the same folder are replaced, once the new ones are complete.
 
@@ -180,13 +237,19 @@ def write_results(
     source : Path
         The bag that was analysed, for the provenance.
     settings : PipelineSettings
+    form : str
+        Of the tables, one of `FORMATS`.
+    more : callable, optional
+        Called with the folder when the rest is in it, to add to it.
 
     Raises
     ------
+    ConfigurationError
+        When pyarrow, which writes Parquet, is not installed.
     RecordingError
         When the folder cannot be written, or holds something else.
     """
-    if folder.exists() and not (folder / _MARK).is_file():
+    if folder.exists() and not (folder / RESULTS_MARK).is_file():
         raise RecordingError(
             str(folder), 'exists and holds no results of ours', 'pass another --output'
         )
@@ -195,10 +258,16 @@ def write_results(
         with TemporaryDirectory(prefix=f'.{folder.name}.', dir=folder.parent) as scratch:
             fresh = Path(scratch) / 'fresh'
             fresh.mkdir()
-            (fresh / _MARK).touch()
+            (fresh / RESULTS_MARK).touch()
+            provenance = _provenance(source, settings)
             for number, results in analysis.trays.items():
-                _write_tables(analysis, results, fresh, number)
-            _write_bag(analysis, fresh / BAG_NAME, _provenance(source, settings))
+                for name, records in _tables(results).items():
+                    if records:
+                        path = fresh / f'tray_{number}_{name}.{form}'
+                        _write_table(path, records, analysis.epoch_ns, provenance)
+            _write_bag(analysis, fresh / BAG_NAME, provenance)
+            if more is not None:
+                more(fresh)
             if folder.exists():
                 folder.rename(Path(scratch) / 'earlier')
             fresh.rename(folder)
@@ -208,8 +277,8 @@ def write_results(
         ) from error
 
 
-def _write_tables(analysis: Analysis, results: TrayResults, folder: Path, number: int) -> None:
-    tables: dict[str, Sequence[ArrayRecord]] = {
+def _tables(results: TrayResults) -> dict[str, Sequence[ArrayRecord]]:
+    return {
         'speed': results.speeds,
         'cluster': results.clusters,
         'cor': results.cors,
@@ -218,16 +287,24 @@ def _write_tables(analysis: Analysis, results: TrayResults, folder: Path, number
         'bodies': results.bodies,
         'merge': results.merges,
     }
-    for name, records in tables.items():
-        if not records:
-            continue
-        fields = layout(type(records[0])).fields
-        write_csv(
-            folder / f'tray_{number}_{name}.csv',
-            [field.name for field in fields],
-            [field.unit for field in fields],
-            (to_array(one, analysis.epoch_ns).tolist() for one in records),
-        )
+
+
+def _write_table(
+    path: Path, records: Sequence[ArrayRecord], epoch_ns: int, provenance: dict[str, str]
+) -> None:
+    fields = layout(type(records[0])).fields
+    values = (to_array(one, epoch_ns) for one in records)
+    if path.suffix == '.csv':
+        names, units = zip(*((field.name, field.unit) for field in fields), strict=True)
+        write_csv(path, names, units, (row.tolist() for row in values))
+        return
+    table = np.array([np.asarray(row, dtype=np.float64) for row in values])
+    write_parquet(
+        path,
+        [Column(name=field.name, kind='f8', unit=field.unit) for field in fields],
+        [{field.name: table[:, place] for place, field in enumerate(fields)}],
+        json.dumps(provenance),
+    )
 
 
 def _provenance(source: Path, settings: PipelineSettings) -> dict[str, str]:
@@ -241,7 +318,7 @@ def _provenance(source: Path, settings: PipelineSettings) -> dict[str, str]:
 def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> None:
     epoch_topic = topics.EPOCH.absolute()
     table = {epoch_topic: offered(topics.EPOCH)}
-    messages: list[tuple[int, str, ArrayRecord]] = []
+    streams: list[Iterator[tuple[str, ArrayRecord]]] = []
     for number, results in analysis.trays.items():
         for topic, records in (
             (topics.SPEED, results.speeds),
@@ -254,11 +331,18 @@ def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> No
         ):
             name = topic.absolute(number)
             table[name] = offered(topic)
-            messages += [(one.stamp_ns, name, one) for one in records]
-    messages.sort(key=lambda item: item[0])
+            streams.append(zip(itertools.repeat(name), _in_order(records)))
     with BagWriter(path, table, metadata=provenance) as bag:
         bag.write(epoch_topic, analysis.epoch_ns, time_message(analysis.epoch_ns))
-        for stamp_ns, name, record in messages:
+        for name, record in heapq.merge(*streams, key=lambda item: item[1].stamp_ns):
             values = to_array(record, analysis.epoch_ns)
             labels = [field.name for field in layout(type(record)).fields]
-            bag.write(name, stamp_ns, float_array_message(labels, values))
+            bag.write(name, record.stamp_ns, float_array_message(labels, values))
+
+
+def _in_order(records: Sequence[ArrayRecord]) -> Iterable[ArrayRecord]:
+    """By their stamps; not held in memory where they are in order, as most are."""
+    pairs = itertools.pairwise(one.stamp_ns for one in records)
+    if all(earlier <= later for earlier, later in pairs):
+        return records
+    return sorted(records, key=lambda one: one.stamp_ns)

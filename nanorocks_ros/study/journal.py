@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -14,6 +13,7 @@ import numpy as np
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.study.archive import Arrays, read_archive, write_archive, write_whole
+from nanorocks_ros.study.hold import LOCK, hold_folder
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-QUESTION, _LOCK, _FINGERPRINT = 'question.json', 'lock', 'fingerprint'
+QUESTION, _FINGERPRINT = 'question.json', 'fingerprint'
 _KEY = re.compile(r'[A-Za-z0-9][A-Za-z0-9_.-]*')
 
 
@@ -49,29 +49,12 @@ class Journal:
         self.folder = folder
         self.notices: list[str] = []
         self._fingerprint = hashlib.sha256(question.encode()).hexdigest()
+        self._lock: int | None = hold_folder(folder)
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            self._lock: int | None = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT, 0o666)
-        except OSError as error:
-            raise RecordingError(
-                str(folder), f'cannot be written ({error.strerror})', 'pass a writable --output'
-            ) from error
-        try:
-            self._hold(self._lock)
             self._check_question(question)
         except BaseException:
             self._let_go()
             raise
-
-    def _hold(self, lock: int) -> None:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise RecordingError(
-                str(self.folder),
-                'is in use by another process',
-                'wait for it, or pass another --output',
-            ) from error
 
     def _check_question(self, question: str) -> None:
         path = self.folder / QUESTION
@@ -164,7 +147,7 @@ class Journal:
         for path in self._paths():
             path.unlink(missing_ok=True)
         (self.folder / QUESTION).unlink(missing_ok=True)
-        (self.folder / _LOCK).unlink(missing_ok=True)
+        (self.folder / LOCK).unlink(missing_ok=True)
         with suppress(OSError):
             self.folder.rmdir()
         self._let_go()

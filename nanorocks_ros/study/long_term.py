@@ -25,7 +25,7 @@ from nanorocks_ros.study.campaign_cycles import (
 from nanorocks_ros.study.result_tables import trays_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -93,22 +93,49 @@ def read_campaign(folders: Sequence[Path], false_alarms: float = 0.01) -> Campai
         raise ConfigurationError(str(again), 'is named twice', 'name each recording once')
     trays = {folder: trays_of(folder, 'speed') for folder in folders}
     measure = size_measure(trays)
+    recordings = [
+        {number: cycles_of(folder, number, measure) for number in numbers}
+        for folder, numbers in trays.items()
+    ]
+    if not any(own for found in recordings for own in found.values()):
+        raise RecordingError(
+            ', '.join(str(one) for one in folders),
+            'hold no cycle after a shaking event',
+            'analyse recordings with shaking events',
+        )
+    return campaign_of(recordings, measure, false_alarms)
+
+
+def campaign_of(
+    recordings: Sequence[Mapping[int, Sequence[CycleSummary]]],
+    measure: SizeMeasure,
+    false_alarms: float = 0.01,
+) -> Campaign:
+    """Cycles of many recordings, one after the other.
+
+    Parameters
+    ----------
+    recordings : sequence of mappings of int to sequences of CycleSummary
+        Of each recording the cycles of each tray; one cycle at least in all.
+    measure : SizeMeasure
+        By which their sizes were read.
+    false_alarms : float
+        See `quiet_periods`.
+
+    Raises
+    ------
+    ConfigurationError
+        For a rate of false alarms that is none.
+    """
     cycles: list[CycleSummary] = []
     places = 0
-    for folder, numbers in trays.items():
-        found = {number: cycles_of(folder, number, measure) for number in numbers}
+    for found in recordings:
         # Trays are filmed together, but a shaking event may be missed in one of them.
         known = sorted({one.cycle for own in found.values() for one in own})
         cycles += [
             _placed(one, places + known.index(one.cycle)) for own in found.values() for one in own
         ]
         places += len(known)
-    if not cycles:
-        raise RecordingError(
-            ', '.join(str(one) for one in folders),
-            'hold no cycle after a shaking event',
-            'analyse recordings with shaking events',
-        )
     cycles.sort(key=lambda one: (one.place, one.tray))
     campaign = Campaign(
         cycles=tuple(cycles), places=places, measure=measure, trends={}, periods=()

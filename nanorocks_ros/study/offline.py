@@ -24,11 +24,15 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.stages.pipeline import Pipeline
 from nanorocks_ros.study.bag_frames import BagFrames
+from nanorocks_ros.study.spool import Spool, SpoolFile
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
     from nanorocks_ros.experiment.settings import PipelineSettings
+    from nanorocks_ros.inference.evidence import Evidence
+    from nanorocks_ros.inference.sticking import StickingCycle
 
 NS = 1_000_000_000
 Progress = Callable[[int, int], None]
@@ -49,16 +53,22 @@ _GAP = 1.5
 
 @dataclass(slots=True, kw_only=True)
 class TrayResults:
-    """Everything that was measured in one tray, in order of time."""
+    """Everything that was measured in one tray, in order of time.
 
-    speeds: list[SpeedEstimate] = field(default_factory=list)
-    clusters: list[ClusterEstimate] = field(default_factory=list)
-    cors: list[CorEstimate] = field(default_factory=list)
-    rebounds: list[Rebound] = field(default_factory=list)
-    collisions: list[PairCollision] = field(default_factory=list)
-    bodies: list[BodyEstimate] = field(default_factory=list)
-    merges: list[Merge] = field(default_factory=list)
+    Beside the records stands what its cycles say of restitutions and sticking, so that those of
+    other recordings can be added: `evidence`, `sticking`.
+    """
+
+    speeds: list[SpeedEstimate] | Spool[SpeedEstimate] = field(default_factory=list)
+    clusters: list[ClusterEstimate] | Spool[ClusterEstimate] = field(default_factory=list)
+    cors: list[CorEstimate] | Spool[CorEstimate] = field(default_factory=list)
+    rebounds: list[Rebound] | Spool[Rebound] = field(default_factory=list)
+    collisions: list[PairCollision] | Spool[PairCollision] = field(default_factory=list)
+    bodies: list[BodyEstimate] | Spool[BodyEstimate] = field(default_factory=list)
+    merges: list[Merge] | Spool[Merge] = field(default_factory=list)
     truth: list[GroundTruth] = field(default_factory=list)
+    evidence: Evidence | None = None
+    sticking: tuple[StickingCycle, ...] = ()
 
 
 @dataclass(slots=True, kw_only=True)
@@ -80,6 +90,8 @@ class Analysis:
         Why the first of the frames that could not be used could not; the others were.
     refused : int
         Frames that could not be used.
+    metadata : dict of str to str
+        Provenance that the recording holds.
     """
 
     epoch_ns: int
@@ -89,6 +101,7 @@ class Analysis:
     complete: bool = True
     error: FrameError | None = None
     refused: int = 0
+    metadata: dict[str, str] = field(default_factory=dict)
 
     @property
     def frames(self) -> int:
@@ -120,6 +133,7 @@ def analyse(
     *,
     image_topic: str = '',
     progress: Progress | None = None,
+    scratch: Path | None = None,
 ) -> Analysis:
     """Push every frame of a bag through the pipeline.
 
@@ -131,6 +145,8 @@ def analyse(
         Where the bag's camera has another name than the graph's.
     progress : callable, optional
         Called with the frames done and the frames there are.
+    scratch : Path, optional
+        Folder on a disk with room for the records, which are kept in memory otherwise.
 
     Returns
     -------
@@ -155,8 +171,9 @@ def analyse(
     truth = bag.truth(epoch_ns)
     result = Analysis(
         epoch_ns=epoch_ns,
-        trays={n: TrayResults(truth=truth.get(n, [])) for n in settings.trays},
+        trays=_empty(settings.trays, truth, scratch),
         complete=bag.reader.complete,
+        metadata=bag.reader.metadata,
     )
     for number, frame in enumerate(bag.frames(), start=1):
         try:
@@ -178,10 +195,28 @@ def analyse(
         result.complete = False
     for record in pipeline.flush():
         getattr(result.trays[record.tray], _LISTS[type(record)]).append(record)
+    for number, stages in pipeline.trays.items():
+        result.trays[number].evidence = stages.cooling.evidence
+        result.trays[number].sticking = stages.clusters.cycles
     # Known only after reading: where a damaged bag ends.
     result.notices[:0] = bag.reader.notices
     result.complete = result.complete and bag.reader.complete
     return result
+
+
+def _empty(
+    trays: Iterable[int], truth: Mapping[int, list[GroundTruth]], scratch: Path | None
+) -> dict[int, TrayResults]:
+    """A place for the records of each tray."""
+    if scratch is None:
+        return {n: TrayResults(truth=truth.get(n, [])) for n in trays}
+    file = SpoolFile(scratch)
+    found = {}
+    for n in trays:
+        found[n] = TrayResults(truth=truth.get(n, []))
+        for name in _LISTS.values():
+            setattr(found[n], name, Spool(file))
+    return found
 
 
 def _remarks(pipeline: Pipeline, where: str) -> list[str]:

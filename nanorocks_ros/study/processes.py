@@ -7,10 +7,17 @@ import os
 import signal
 import threading
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections import deque
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    Future,
+    ProcessPoolExecutor,
+    as_completed,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager
-from typing import TYPE_CHECKING, TypeVar
+from contextlib import ExitStack, closing, contextmanager
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from nanorocks_ros.errors import NanorocksError
 
@@ -23,6 +30,7 @@ Result = TypeVar('Result')
 
 # Pools in a row that end without finishing a single task.
 _MOST_FRUITLESS = 3
+_DIED = 'the process that worked on it was killed, for lack of memory perhaps'
 # What a worker gets to hand over a result when it is told to end [s].
 _GRACE = 1.0
 
@@ -69,14 +77,8 @@ def finished_in_processes(
 def _one_pool(
     function: Callable[[Argument], Result], tasks: Mapping[str, Argument], processes: int
 ) -> Generator[tuple[str, Result], None, None]:
-    # Not forked: a fork copies the locks of threads that numba or matplotlib may have started.
-    context = multiprocessing.get_context('spawn')
-    ending, lifeline = context.Pipe(duplex=False)
-    pool = ProcessPoolExecutor(
-        processes, mp_context=context, initializer=_start, initargs=(ending,)
-    )
     broken = None
-    try:
+    with _pool(processes) as pool:
         with _born_quiet():
             keys = {pool.submit(_work, function, one): key for key, one in tasks.items()}
         for future in as_completed(keys):
@@ -89,11 +91,102 @@ def _one_pool(
                 yield keys[future], result
         if broken is not None:
             raise broken
+
+
+@contextmanager
+def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+    """Workers that end with this block; nobody waits for work that is not wanted any more."""
+    # Not forked: a fork copies the locks of threads that numba or matplotlib may have started.
+    context = multiprocessing.get_context('spawn')
+    ending, lifeline = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(
+        processes, mp_context=context, initializer=_start, initargs=(ending,)
+    )
+    try:
+        yield pool
     finally:
-        # Nobody waits for work that is not wanted any more.
         lifeline.close()
         pool.shutdown(wait=True, cancel_futures=True)
         ending.close()
+
+
+def finished_apart(
+    function: Callable[[Argument], Result],
+    tasks: Mapping[str, Argument],
+    processes: int,
+    lost: Callable[[str, str], Result],
+) -> Generator[tuple[str, Result], None, None]:
+    """Results as they come; a task that kills its worker costs no other task anything.
+
+    Parameters
+    ----------
+    function, tasks, processes
+        As for `finished_in_processes`.
+    lost : callable
+        Makes, of a key and what happened, the result of a task whose worker ended under it.
+
+    Yields
+    ------
+    key, result
+    """
+    with ExitStack() as everything:
+        lanes = _Lanes(function, tasks, everything)
+        for _ in range(min(processes, len(tasks))):
+            lanes.open()
+        while lanes.busy:
+            for future in wait(lanes.busy, return_when=FIRST_COMPLETED).done:
+                yield lanes.collect(future, lost)
+
+
+class _Lanes(Generic[Argument, Result]):
+    """Pools of one worker each: when one breaks, it is known over what."""
+
+    def __init__(
+        self,
+        function: Callable[[Argument], Result],
+        tasks: Mapping[str, Argument],
+        everything: ExitStack,
+    ) -> None:
+        self._function = function
+        self._waiting = deque(tasks.items())
+        self._everything = everything
+        self.busy: dict[Future[Result], tuple[str, ExitStack, ProcessPoolExecutor]] = {}
+
+    def open(self) -> None:
+        """Start a worker on the next task, if there is one."""
+        if self._waiting:
+            lane = self._everything.enter_context(ExitStack())
+            self._hand_over(lane, lane.enter_context(_pool(1)))
+
+    def _hand_over(self, lane: ExitStack, pool: ProcessPoolExecutor) -> None:
+        key, argument = self._waiting[0]
+        try:
+            with _born_quiet():
+                future = pool.submit(_work, self._function, argument)
+        except BrokenProcessPool:
+            # Killed with nothing in hand: nobody's fault.
+            lane.close()
+            self.open()
+            return
+        self._waiting.popleft()
+        self.busy[future] = key, lane, pool
+
+    def collect(
+        self, future: Future[Result], lost: Callable[[str, str], Result]
+    ) -> tuple[str, Result]:
+        """What came of a task; its worker takes the next, or another one does."""
+        key, lane, pool = self.busy.pop(future)
+        try:
+            result = future.result()
+        except BrokenProcessPool:
+            lane.close()
+            self.open()
+            return key, lost(key, _DIED)
+        if self._waiting:
+            self._hand_over(lane, pool)
+        else:
+            lane.close()
+        return key, result
 
 
 @contextmanager

@@ -21,8 +21,10 @@ from nanorocks_ros.records import (
     SpeedEstimate,
     TrayState,
 )
-from nanorocks_ros.study.viewers import LAYOUTS
-from nanorocks_ros.study.viewers_page import viewers_page
+from nanorocks_ros.study.viewers.foxglove import foxglove
+from nanorocks_ros.study.viewers.page import viewers_page
+from nanorocks_ros.study.viewers.plotjuggler import plotjuggler
+from nanorocks_ros.study.viewers.rviz import rviz
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.beads import beads_layout
 from nanorocks_ros.wire.layouts import layout
@@ -79,6 +81,7 @@ _GROUPS = (
         st.DashboardSettings(),
     ),
     ('`dashboard`', '', st.DashboardGraphSettings()),
+    ('`pipeline`', '', st.WorkSettings()),
 )
 
 
@@ -189,7 +192,9 @@ FILES = {
     'docs/topics.md': topics_page,
     'docs/parameters.md': parameters_page,
     'docs/viewers.md': lambda: _NOTE + viewers_page(),
-    **LAYOUTS,
+    'foxglove/nanorocks.json': foxglove,
+    'rviz/nanorocks.rviz': rviz,
+    'plotjuggler/nanorocks.xml': plotjuggler,
 }
 
 

@@ -118,6 +118,44 @@ def as_finished(
         yield from finished_in_processes(function, tasks, min(workers.count, len(tasks)))
 
 
+def as_finished_apart(
+    function: Callable[[Argument], Result],
+    tasks: Mapping[str, Argument],
+    workers: Workers,
+    lost: Callable[[str, str], Result],
+) -> Generator[tuple[str, Result], None, None]:
+    """As `as_finished`, but a task that kills its worker is that task's concern alone.
+
+    Parameters
+    ----------
+    function, tasks, workers
+        As for `as_finished`; a single process of this machine is another one than this.
+    lost : callable
+        Makes, of a key and what happened, the result of a task whose worker ended under it.
+
+    Yields
+    ------
+    key, result
+
+    Raises
+    ------
+    NanorocksError
+        When the cluster cannot be used.
+    Exception
+        What a task raised.
+    """
+    if not tasks:
+        return
+    if workers.scheduler is not None:
+        from nanorocks_ros.study.cluster import finished_on_cluster
+
+        yield from finished_on_cluster(function, tasks, workers.scheduler, lost)
+    else:
+        from nanorocks_ros.study.processes import finished_apart
+
+        yield from finished_apart(function, tasks, workers.count, lost)
+
+
 def run_tasks(
     function: Callable[[Argument], Result],
     tasks: Mapping[str, Argument],

@@ -106,6 +106,8 @@ def test_a_new_cycle_begins_with_an_empty_curve_and_the_last_stays_as_a_number(b
     assert [row[0] for row in told['speed']['rows']] == [62.0]
     assert 'cor' not in told['latest']
     assert told['finals'] == [[1, 0.88, 0.86, 0.9]]
+    board.take(speed(62.1, cycle=2, start=61.0), 0.0)
+    assert 'finals' not in board.news(cursor, 0.0)['trays']['1']
 
 
 def test_what_is_late_of_the_cycle_before_is_not_shown_in_this_one(board):

@@ -9,6 +9,7 @@ import pytest
 
 from nanorocks_ros.dashboard.pictures import encoded
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.records import CorStatus, Quality
 
 WIDE = {'width': 1440, 'height': 900}
 PHONE = {'width': 390, 'height': 844}
@@ -109,6 +110,23 @@ def test_the_estimate_tightens_while_one_looks(look, serve, results):
     server.take(results.cors[-1])
     text_is(page, '#cor', 'final for this cycle')
     assert shown(results.cors[-1])[0] in page.locator('#finals').inner_text()
+
+
+def test_what_is_wrong_or_not_told_is_said_in_words(look, serve, results):
+    server = serve()
+    for number in (1, 2):
+        for record in (*results.speeds, results.cors[-1]):
+            server.take(replace(record, tray=number))
+    page = look(server.url)
+    text_is(page, '#cor', shown(results.cors[-1])[0])
+    server.take(replace(results.cors[-1], quality=Quality.INCONSISTENT | Quality.LOW_CONTRAST))
+    text_is(page, '#state', 'over, low contrast, inconsistent')
+    text_is(page, '.card', 'low contrast')
+    server.take(replace(results.cors[-1], status=CorStatus.UNDETERMINED))
+    text_is(page, '#cor', 'the decay tells too little yet')
+    server.diagnose([('/n', 0, 'working', [('frames waiting for the trays', '29')])])
+    text_is(page, '#health', '1 behind')
+    text_is(page, '.node', '29 frames waiting')
 
 
 def test_whoever_opens_the_page_late_sees_the_same(look, full):

@@ -32,6 +32,7 @@ def lines_with(output, text):
         ('preprocessor', 'trays_file:=/nowhere.yaml', '/nowhere.yaml: No such file'),
         ('simulator', 'noise:=-1.0', 'parameter noise'),
         ('bag_player', 'rate:=1.0', 'parameter bag: is empty; give the path of a bag'),
+        ('simulator', 'nois:=1.0', "no parameter 'nois' (did you mean 'noise'?)"),
     ],
 )
 def test_a_bad_parameter_ends_the_node_with_one_line(graph, name, parameter, message):
@@ -87,10 +88,11 @@ def test_a_change_that_does_not_fit_the_other_parameters_is_rejected_and_the_nod
     assert graph.interrupt(process).code == 0
 
 
-def test_a_camera_nobody_publishes_is_said_within_seconds(graph):
-    process = graph.start('preprocessor')
+def test_a_camera_or_a_clock_that_nobody_publishes_is_said_within_seconds(graph):
+    process = graph.start('preprocessor', 'use_sim_time:=true')
     said = '/nanorocks/camera/image_raw: no publisher within 5 s'
     graph.until(lambda: said in graph.output(process))
+    graph.until(lambda: '/clock: nothing within 5 s, though use_sim_time' in graph.output(process))
     assert graph.interrupt(process).code == 0
 
 

@@ -89,3 +89,15 @@ def test_states_far_ahead_of_their_pixels_find_them():
     assert [one for image in images for one in pushed(joiner, image, 'color')] == []
     found = [one for image in images for one in pushed(joiner, image, 'gray')]
     assert [one.stamp_ns for one in found] == [one.stamp_ns for one in images]
+
+
+@pytest.mark.parametrize('order', list(permutations(['state', 'gray', 'color'])))
+def test_after_a_seek_back_no_image_is_taken_for_lost(order):
+    """Some parts of the first images arrive before any of the others."""
+    joiner = TrayJoiner(3)
+    for number in range(100, 140):
+        for part in order:
+            pushed(joiner, image_of(number), part)
+    images = [image_of(number) for number in range(3)]
+    found = [one for part in order for image in images for one in pushed(joiner, image, part)]
+    assert [int(one.gray[0, 0]) for one in found] == [0, 1, 2]

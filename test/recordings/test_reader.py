@@ -16,6 +16,7 @@ from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings import mcap_file
 from nanorocks_ros.recordings.mcap_blocks import load
 from nanorocks_ros.recordings.messages import time_message
+from nanorocks_ros.recordings.qos import OfferedQos, recorded_qos
 from nanorocks_ros.recordings.reader import BagMessage, open_bag
 
 EPOCH = '/nanorocks/epoch'
@@ -104,6 +105,27 @@ def write_times(path, stamps, **options):
         writer.add_message(channel, int(stamp), cdr, int(stamp))
     writer.finish()
     return path
+
+
+@pytest.mark.parametrize('plugin', list(StoragePlugin))
+@pytest.mark.parametrize('version', [8, 9])
+def test_how_topics_were_offered_comes_back(tmp_path, plugin, version):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    offered = OfferedQos(reliable=False, transient_local=True, depth=7)
+    with Writer(tmp_path / 'run', version=version, storage_plugin=plugin) as writer:
+        for name, profiles in (('/a', [offered.profile()]), ('/b', [])):
+            connection = writer.add_connection(
+                name, TIME_TYPE, typestore=store, offered_qos_profiles=profiles
+            )
+            writer.write(connection, 1, store.serialize_cdr(time_message(1), TIME_TYPE))
+    bag = open_bag(tmp_path / 'run')
+    assert bag.topics['/a'].qos == offered
+    assert bag.topics['/b'].qos is None
+
+
+@pytest.mark.parametrize('text', ['', '[', '3', '- 1', '- depth: x', '- {depth: 1}', '[' * 2000])
+def test_qualities_of_service_that_make_no_sense_are_not_known(text):
+    assert recorded_qos(text) is None
 
 
 # --- a part of it ---------------------------------------------------------------------------

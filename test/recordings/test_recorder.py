@@ -46,6 +46,7 @@ def held(path):
 
 def test_pictures_are_left_out_when_the_disk_does_not_keep_up_and_results_never_are(tmp_path):
     one = recorder(tmp_path / 'bag', most_bytes=2000)
+    one.advance(NS)
     slow = threading.Event()
     begun = threading.Event()
 
@@ -57,7 +58,7 @@ def test_pictures_are_left_out_when_the_disk_does_not_keep_up_and_results_never_
     taken = [one.put(CAMERA, held_up, size=1000)]
     begun.wait()
     for k in range(1, 10):
-        one.advance(k * NS // 30)
+        one.advance(NS + k * NS // 30)
         taken.append(one.put(CAMERA, lambda k=k: picture(k), size=1000))
         assert one.put(SPEED, lambda k=k: speed(float(k)))
     slow.set()
@@ -73,6 +74,7 @@ def test_pictures_are_left_out_when_the_disk_does_not_keep_up_and_results_never_
 
 def test_who_has_time_waits_and_nothing_is_left_out(tmp_path):
     one = recorder(tmp_path / 'bag', most_bytes=2000)
+    one.advance(NS)
     for k in range(20):
         assert one.put(CAMERA, lambda k=k: picture(k), size=1000, wait=True)
     one.close()
@@ -94,11 +96,23 @@ def test_a_recording_goes_on_when_time_goes_back(tmp_path):
     assert [message.log_time_ns // NS for message in messages] == [10, 11, 11, 12, 12, 13]
 
 
+def test_what_is_known_before_the_first_picture_is_recorded_with_it(tmp_path):
+    one = recorder(tmp_path / 'bag')
+    one.put(SPEED, lambda: speed(7.0))
+    one.advance(5 * NS)
+    one.put(CAMERA, lambda: picture(5 * NS))
+    one.close()
+    bag, messages = held(tmp_path / 'bag')
+    assert [message.topic for message in messages] == [SPEED, CAMERA]
+    assert (bag.start_ns, bag.end_ns) == (5 * NS, 5 * NS)
+
+
 def test_a_picture_that_cannot_be_made_is_counted_and_the_next_one_is_written(tmp_path):
     def fail():
         raise FrameError('JPEG', 'cannot be encoded', 'give another')
 
     one = recorder(tmp_path / 'bag')
+    one.advance(NS)
     one.put(CAMERA, fail)
     one.put(CAMERA, lambda: picture(0))
     one.close()

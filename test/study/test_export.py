@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import fields
+
+import numpy as np
+import pytest
 
 from nanorocks_ros.experiment.settings import PipelineSettings
+from nanorocks_ros.recordings.reader import open_bag
 from nanorocks_ros.records import CorEstimate, CorRelation, CorStatus, SpeedEstimate, SpeedMethod
-from nanorocks_ros.study.export import as_json, write_results
-from nanorocks_ros.study.offline import Analysis, TrayResults
+from nanorocks_ros.study.export import FORMATS, as_json, write_results
+from nanorocks_ros.study.offline import _LISTS, Analysis, TrayResults
+from nanorocks_ros.wire.layouts import from_array, layout
 
 NS = 1_000_000_000
 SPEED = SpeedEstimate(
@@ -55,3 +61,40 @@ def test_the_decay_of_each_species_is_in_the_table(tmp_path):
         (row,) = csv.DictReader(stream)
     assert float(row['first_species_haff_time [s]']) == 2.5
     assert row['second_species_haff_time [s]'] == 'nan'
+
+
+def test_tables_in_parquet_hold_the_numbers_of_the_csv(tmp_path):
+    pytest.importorskip('pyarrow')
+    from pyarrow import parquet
+
+    for form in FORMATS:
+        folder = tmp_path / form
+        write_results(analysis(), folder, tmp_path / 'bag', PipelineSettings(), form)
+    assert {one.stem for one in (tmp_path / 'parquet').glob('*.parquet')} == {
+        one.stem for one in (tmp_path / 'csv').glob('*.csv')
+    }
+    table = parquet.read_table(tmp_path / 'parquet' / 'tray_5_cor.parquet')
+    with (tmp_path / 'csv' / 'tray_5_cor.csv').open(newline='') as stream:
+        (row,) = csv.DictReader(stream)
+    for field in table.schema:
+        unit = field.metadata[b'unit'].decode()
+        np.testing.assert_equal(table[field.name][0].as_py(), float(row[f'{field.name} [{unit}]']))
+    assert json.loads(table.schema.metadata[b'provenance'])['source'] == 'bag'
+
+
+def test_every_kind_of_result_goes_into_the_bag_and_into_the_tables(tmp_path):
+    found = analysis()
+    for kind, name in _LISTS.items():
+        if not getattr(found.trays[5], name):
+            values = np.ones(len(layout(kind).fields))
+            record = from_array(kind, values, tray=5, epoch_ns=0, where='test')
+            getattr(found.trays[5], name).append(record)
+    # What cycles say together is kept beside the tables.
+    beside = {'truth', 'evidence', 'sticking'}
+    assert set(_LISTS.values()) == {one.name for one in fields(TrayResults)} - beside
+    write_results(found, tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
+    bag = open_bag(tmp_path / 'results' / 'results_bag')
+    assert bag.complete
+    tables = {one.stem.removeprefix('tray_5_') for one in (tmp_path / 'results').glob('*.csv')}
+    assert {one.rpartition('/')[2] for one in bag.topics} == {*tables, 'epoch'}
+    assert len(tables) == len(_LISTS)

@@ -15,7 +15,7 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError, NanorocksError
 from nanorocks_ros.study import cluster as cluster_module
-from nanorocks_ros.study.tasks import Workers, as_finished, run_tasks
+from nanorocks_ros.study.tasks import Workers, as_finished, as_finished_apart, run_tasks
 
 # Prints the number of the worker that runs it.
 WHO = 'sleep 0.05; echo $PPID'
@@ -66,6 +66,27 @@ def test_what_a_killed_worker_had_in_hand_is_done_by_another():
 def test_a_task_that_kills_every_worker_is_given_up():
     with pytest.raises(NanorocksError, match=r'workers: were killed 3 times .*--workers'):
         run_tasks(os._exit, {'a': 3, 'b': 3}, Workers(processes=2))
+
+
+def test_a_worker_that_dies_costs_what_it_had_in_hand_and_nothing_else():
+    tasks = {'deadly': 'kill -9 $PPID', **{f'{k}': WHO for k in range(6)}}
+    found, killed = {}, []
+    results = as_finished_apart(
+        subprocess.getoutput, tasks, Workers(processes=2), lambda key, what: (key, what)
+    )
+    for key, result in results:
+        found[key] = result
+        if key == '2':
+            # With nothing in hand, or with the next.
+            killed.append(int(result))
+            os.kill(killed[0], signal.SIGKILL)
+    assert set(found) == set(tasks)
+    name, what = found.pop('deadly')
+    assert name == 'deadly'
+    assert 'was killed' in what
+    lost = [one for one in found.values() if not isinstance(one, str)]
+    assert len(lost) <= 1
+    assert multiprocessing.active_children() == []
 
 
 def test_workers_compute_with_one_thread_of_blas(monkeypatch):

@@ -11,7 +11,9 @@ import yaml
 
 from nanorocks_ros.records import CorEstimate, CorRelation, CorStatus
 from nanorocks_ros.study.reference import FILES
-from nanorocks_ros.study.viewers import foxglove, plotjuggler, rviz
+from nanorocks_ros.study.viewers.foxglove import foxglove
+from nanorocks_ros.study.viewers.plotjuggler import plotjuggler
+from nanorocks_ros.study.viewers.rviz import rviz
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import to_array
 

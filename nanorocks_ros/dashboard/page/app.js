@@ -59,7 +59,7 @@ function take(number, told) {
       rows[name].push(...told[name].rows);
     }
   }
-  trays.set(number, { ...told, rows, heardAt: performance.now() - 1e3 * told.age });
+  trays.set(number, { finals: before?.finals ?? [], ...told, rows, heardAt: performance.now() - 1e3 * told.age });
 }
 
 const silentFor = (tray) => (performance.now() - tray.heardAt) / 1e3;
@@ -86,12 +86,12 @@ function draw() {
 
 function drawTray(tray) {
   const [state, text] = words.trayState(tray, silentFor(tray));
-  const quality = tray.latest.speed?.quality ?? [];
-  const flagged = quality.length ? `, ${quality.map((one) => one.replaceAll('_', ' ')).join(', ')}` : '';
+  const flagged = words.flags(tray.latest).map((one) => `, ${one}`).join('');
   at('title').textContent = `Tray ${chosen}`;
   at('about').textContent = tray.description;
   at('state').dataset.state = flagged && state === 'ok' ? 'warning' : state;
   at('state').textContent = text + flagged;
+  at('canvas').setAttribute('aria-label', `Picture of tray ${chosen}${pressed('tracks') ? ' with its tracks' : ''}`);
   document.title = `Tray ${chosen}, NanoRocks`;
   drawNumbers(tray);
   speeds.draw(tray);
@@ -99,7 +99,7 @@ function drawTray(tray) {
   clusters.draw(tray);
   drawFinals(tray);
   for (const one of document.querySelectorAll('.only-truth')) one.hidden = !tray.latest.truth;
-  sayNow(tray, text);
+  sayNow(tray, text.replace(/ for \d+ s$/, ''));
 }
 
 /** A number with what is to be said of it below; or only that, while there is no number. */
@@ -113,7 +113,7 @@ function number(id, value, small) {
 
 function drawNumbers(tray) {
   const { cor, cluster, speed } = tray.latest;
-  drawCor(cor, tray.start);
+  drawCor(tray);
   const wall = words.saysSomething(cor) && words.known(cor.wall_restitution);
   number(
     'walls',
@@ -136,9 +136,15 @@ function drawNumbers(tray) {
   number('sticking', ...(cluster ? words.sticking(cluster) : ['', 'not known yet']));
 }
 
-function drawCor(cor, start) {
+const final = ([, value, lower, upper]) =>
+  words.known(value) ? `${words.restitution(value)} ${words.interval(lower, upper, words.restitution)}` : 'no estimate';
+
+function drawCor({ latest: { cor }, start, finals }) {
   if (!words.saysSomething(cor)) {
-    number('cor', '', cor ? words.corState(cor) : start === null ? 'no shaking event yet' : 'no estimate yet');
+    const last = finals[finals.length - 1];
+    const before = last && words.known(last[1]) ? `; cycle ${last[0]}: ${final(last)}` : '';
+    const awaited = start === null ? 'no shaking event yet' : 'no estimate yet';
+    number('cor', '', (cor ? words.corState(cor) : awaited) + before);
     return;
   }
   const shown = at('cor');
@@ -155,11 +161,11 @@ function drawCor(cor, start) {
 function drawFinals(tray) {
   at('cycles').hidden = tray.finals.length === 0;
   const list = at('finals');
-  const texts = tray.finals.map(
-    ([cycle, value, lower, upper]) =>
-      `Cycle ${cycle}: ` +
-      (words.known(value) ? `COR ${words.restitution(value)} ${words.interval(lower, upper, words.restitution)}` : 'no estimate'),
-  );
+  const texts = tray.finals.map((one) => `Cycle ${one[0]}: ${words.known(one[1]) ? 'COR ' : ''}${final(one)}`);
+  const { mean_restitution: mean, mean_restitution_error: error } = tray.latest.cor ?? {};
+  if (tray.finals.length > 1 && words.known(mean)) {
+    texts.push(`Mean: COR ${words.restitution(mean)} ${words.give(error, words.restitution)}`);
+  }
   if (list.dataset.shown === texts.join('\n')) return;
   list.dataset.shown = texts.join('\n');
   list.replaceChildren(

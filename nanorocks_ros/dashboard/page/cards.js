@@ -1,6 +1,6 @@
 // All trays at a glance.
 
-import { interval, known, restitution, saysSomething, speed, trayState } from './words.js';
+import { flags, interval, known, restitution, saysSomething, speed, trayState } from './words.js';
 
 const SVG = 'http://www.w3.org/2000/svg';
 const POINTS = 60;
@@ -43,9 +43,10 @@ export class Cards {
   }
 
   drawOne(one, number, tray, silent) {
-    const [state, words] = trayState(tray, silent);
-    one.state.dataset.state = state;
-    one.state.textContent = words;
+    const [state, words, few] = trayState(tray, silent);
+    const [flag] = flags(tray.latest);
+    one.state.dataset.state = flag && state === 'ok' ? 'warning' : state;
+    one.state.textContent = flag ?? few;
     const cor = tray.latest.cor;
     const now = tray.latest.speed?.mean_projected_speed;
     const last = tray.finals[tray.finals.length - 1];
@@ -57,7 +58,7 @@ export class Cards {
       one.small.textContent = ` in cycle ${last[0]}`;
     } else {
       one.value.firstChild.textContent = known(now) ? speed(now) : '–';
-      one.small.textContent = known(now) ? ' mm/s, no COR yet' : ' no COR yet';
+      one.small.textContent = known(now) ? ' mm/s' : ' no COR yet';
     }
     one.line.setAttribute('points', spark(tray.rows.speed));
     one.card.setAttribute('aria-label', `Tray ${number}, ${words}, ${one.value.textContent}`);

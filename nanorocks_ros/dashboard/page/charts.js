@@ -24,8 +24,15 @@ function aligned(curves) {
 const column = (rows, index, change = (value) => value) =>
   rows.map((row) => (known(row[index]) ? change(row[index], row) : null));
 
+// A line of one point would not be seen.
+const few = (plot) => plot.data[0].length < 4;
+
 const line = (name, more = {}) => ({
-  stroke: () => colour(name), width: 2, spanGaps: true, points: { show: false }, ...more,
+  stroke: () => colour(name),
+  width: 2,
+  spanGaps: true,
+  points: { show: few, size: 6, fill: () => colour(name) },
+  ...more,
 });
 
 const edge = { stroke: 'transparent', width: 0, spanGaps: true, points: { show: false } };
@@ -61,6 +68,16 @@ class Chart {
 
   size() {
     return { width: Math.max(160, this.box.clientWidth), height: Math.max(120, this.box.clientHeight) };
+  }
+
+  /** From the shaking event, where that is known, to the last point. */
+  span(low, high) {
+    return [this.shaken ? Math.min(0, low) : low, Math.max(high, low + 1)];
+  }
+
+  begin(tray) {
+    this.shaken = known(tray.start);
+    return tray.start ?? 0;
   }
 
   /** Draw; `data` is null when there is nothing to draw yet. */
@@ -102,13 +119,13 @@ class Chart {
     };
     return {
       legend: { show: false },
-      padding: [10, 12, 0, 0],
+      padding: [10, 20, 0, 0],
       cursor: {
         y: false,
-        drag: { x: true, y: false },
+        drag: { x: false, y: false },
         points: { size: 7, fill: () => colour('--panel') },
       },
-      scales: { x: { time: false }, y },
+      scales: { x: { time: false, range: (_, low, high) => this.span(low, high) }, y },
       axes: [
         { ...axis, size: 30, values: (_, ticks) => ticks.map((one, k) => (k === ticks.length - 1 ? `${one} s` : `${one}`)) },
         { ...axis, size: 52 },
@@ -138,7 +155,7 @@ export class SpeedChart extends Chart {
   }
 
   draw(tray) {
-    const start = tray.start ?? 0;
+    const start = this.begin(tray);
     const time = (rows) => rows.map((row) => row[0] - start);
     const rows = tray.rows.speed;
     const positive = (value) => (value > 0 ? MM * value : null);
@@ -199,7 +216,7 @@ export class CorChart extends Chart {
   }
 
   draw(tray) {
-    const start = tray.start ?? 0;
+    const start = this.begin(tray);
     const rows = tray.rows.cor.filter((row) => known(row[1]));
     const truth = tray.latest.truth;
     const times = rows.map((row) => row[0] - start);
@@ -256,7 +273,7 @@ export class ClusterChart extends Chart {
   }
 
   draw(tray) {
-    const start = tray.start ?? 0;
+    const start = this.begin(tray);
     const rows = tray.rows.cluster.filter((row) => known(row[1]));
     this.show(
       rows.length > 1

@@ -3,12 +3,18 @@
 import { duration } from './words.js';
 
 const SILENT_S = 3.5;
+const WAITING = 'frames waiting for the trays';
+// Of the thirty that may wait before frames are lost.
+const MANY_WAITING = 15;
 const RATES = [
   ['rate [1/s]', (value) => `${value} messages/s`],
   ['processing, mean [ms]', (value) => `${value} ms each`],
   ['refused', (value) => (value === '0' ? '' : `${value} refused`)],
-  ['frames waiting for the trays', (value) => `${value} frames waiting`],
+  ['picture, since the camera took it [ms]', (value) => `pictures ${value} ms old`],
+  [WAITING, (value) => `${value} frames waiting`],
 ];
+
+const colour = (state) => (['silent', 'behind'].includes(state) ? 'warning' : state);
 
 function element(name, className) {
   const one = document.createElement(name);
@@ -38,7 +44,9 @@ export class Nodes {
     const since = (performance.now() - this.heardAt) / 1e3;
     const states = this.nodes.map((node) => {
       const age = node.age + since;
-      return age > SILENT_S ? ['silent', age] : [node.level, age];
+      if (age > SILENT_S) return ['silent', age];
+      const waiting = Number(node.values.find(([key]) => key === WAITING)?.[1]);
+      return [node.level === 'ok' && waiting >= MANY_WAITING ? 'behind' : node.level, age];
     });
     this.nodes.forEach((node, index) => this.drawOne(node, ...states[index]));
     for (const [name, one] of this.shown) {
@@ -53,9 +61,9 @@ export class Nodes {
 
   drawHealth(states) {
     const count = (state) => states.filter((one) => one === state).length;
-    const bad = ['error', 'warning', 'silent'].filter((state) => count(state) > 0);
+    const bad = ['error', 'warning', 'silent', 'behind'].filter((state) => count(state) > 0);
     const words = bad.map((state) => `${count(state)} ${state}`);
-    this.health.dataset.state = bad[0] === 'silent' ? 'warning' : bad[0] ?? (states.length ? 'ok' : 'waiting');
+    this.health.dataset.state = bad.length ? colour(bad[0]) : states.length ? 'ok' : 'waiting';
     const well = states.length === 1 ? '1 node, well' : `${states.length} nodes, all well`;
     const text = states.length ? words.join(', ') || well : 'no node heard yet';
     if (this.health.textContent !== text) this.health.textContent = text;
@@ -63,10 +71,10 @@ export class Nodes {
 
   drawOne(node, state, age) {
     const one = this.shown.get(node.name) ?? this.make(node.name);
-    one.level.dataset.state = state === 'silent' ? 'warning' : state;
-    const words = { ok: 'well', silent: `silent for ${duration(age)}` };
+    one.level.dataset.state = colour(state);
+    const words = { ok: 'well', behind: 'falls behind', silent: `silent for ${duration(age)}` };
     one.level.textContent = words[state] ?? state;
-    one.text.textContent = state === 'ok' && node.text === 'working' ? '' : node.text;
+    one.text.textContent = ['ok', 'behind'].includes(state) && node.text === 'working' ? '' : node.text;
     const values = new Map(node.values);
     one.rates.textContent = RATES.filter(([key]) => values.get(key))
       .map(([key, show]) => show(values.get(key)))

@@ -52,6 +52,7 @@ export class Picture {
       this.canvas.width = base.width;
       this.canvas.height = base.height;
     }
+    document.getElementById('panels').dataset.shape = base.width > 1.6 * base.height ? 'wide' : '';
     const brush = this.canvas.getContext('2d');
     brush.drawImage(base, 0, 0);
     const moving = this.motion && this.fresh('motion');

@@ -33,8 +33,12 @@ const COR_STATES = {
 
 export const corState = (cor) => COR_STATES[cor.status] ?? String(cor.status);
 
-/** Whether an estimate says more than that nothing is known. */
-export const saysSomething = (cor) => !!cor && known(cor.restitution) && cor.status !== 'no_decay';
+/** Whether an estimate is one, and not only what is probable before anything is known. */
+export const saysSomething = (cor) => !!cor && known(cor.restitution) && ['cooling', 'final'].includes(cor.status);
+
+/** What is wrong with the pictures of a tray, or with what was made of them. */
+export const flags = ({ speed: now, cor }) =>
+  [...new Set([...(now?.quality ?? []), ...(cor?.quality ?? [])])].map((one) => one.replaceAll('_', ' '));
 
 /** The value of a sticking speed, and what is to be said of it. */
 export function sticking(cluster) {
@@ -57,13 +61,18 @@ export function sticking(cluster) {
   }
 }
 
-/** What a tray does at present: a state for its colour, and words. */
+/** What a tray does at present: a state for its colour, words, and fewer words. */
 export function trayState(tray, silentFor) {
   const shaken = tray.start !== null && tray.start !== undefined;
-  if (Object.keys(tray.latest).length === 0) return ['waiting', 'nothing measured yet'];
-  if (silentFor > 4) return ['warning', `silent for ${duration(silentFor)}`];
-  if (!shaken && !tray.latest.cor) return ['waiting', 'no shaking event yet'];
+  if (Object.keys(tray.latest).length === 0) return ['waiting', 'nothing measured yet', 'waiting'];
+  if (silentFor > 4) {
+    const text = `silent for ${duration(silentFor)}`;
+    return ['warning', text, text];
+  }
+  if (!shaken && !tray.latest.cor) return ['waiting', 'no shaking event yet', 'not shaken yet'];
   const status = tray.latest.cor?.status;
-  if (status === 'final') return ['ok', `cycle ${tray.cycle}, over`];
-  return ['ok', `cycle ${tray.cycle}, cooling`];
+  if (status === 'final') return ['ok', `cycle ${tray.cycle}, over`, 'over'];
+  const last = tray.rows.speed[tray.rows.speed.length - 1];
+  const since = shaken && last ? ` for ${Math.floor(last[0] - tray.start)} s` : '';
+  return ['ok', `cycle ${tray.cycle}, cooling${since}`, 'cooling'];
 }

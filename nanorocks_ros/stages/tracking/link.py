@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nanorocks_ros.stages.tracking.assignment import assign
 from nanorocks_ros.stages.tracking.flight import KEPT, median_square_speed
 from nanorocks_ros.stages.tracking.pairs import (
     SIZE_JITTER_PX,
     SLOWEST_PX_S,
+    count_lost,
     extend_all,
+    in_view,
+    most_finite,
     pair_costs,
     predict,
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from nanorocks_ros.stages.tracking.detect import Detections
 
 # Collisions of a bead that nobody sees.
@@ -34,6 +36,28 @@ _CONFIRM = 3
 _SPEED_SHARE = 0.1
 # The size of a bead is measured with an error that pictures share, [px].
 _SIZE_FLOOR_PX = 0.03
+
+
+class InView(NamedTuple):
+    """Beads that are believed; lengths in pixels, NaN where a velocity is not known.
+
+    Parameters
+    ----------
+    ids : ndarray of int32, (n,)
+    places, velocities : ndarray (n, 2), [px], [px/s]
+    errors, velocity_errors, radii, radius_errors : ndarray (n,)
+    seen : ndarray of bool, (n,)
+        In this picture; of others the place is where they should be.
+    """
+
+    ids: NDArray[np.int32]
+    places: NDArray[np.float64]
+    errors: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    velocity_errors: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    radius_errors: NDArray[np.float64]
+    seen: NDArray[np.bool_]
 
 
 class Linker:
@@ -79,6 +103,7 @@ class Linker:
         self._errors = np.empty((0, KEPT))
         self._counts = np.empty(0, dtype=np.int64)
         self._lines = np.empty((0, 9))
+        self._last_predicted: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
 
     def push(
         self, time: float, found: Detections, shift: NDArray[np.float64], first_number: int
@@ -101,9 +126,8 @@ class Linker:
         """
         places, variances = self.predicted(time, shift)
         costs = self._pair_costs(time, found, (places, variances))
-        finite = costs[np.isfinite(costs)]
         # Any pair within reach is better than none.
-        alone = float(finite.max()) + 1.0 if finite.size else 0.0
+        alone = most_finite(costs) + 1.0
         chosen = assign(costs, alone)
         extend_all(
             chosen,
@@ -117,6 +141,7 @@ class Linker:
             found.place_errors,
             self._window,
         )
+        self._last_predicted = None
         hit = chosen >= 0
         self._update_sizes(hit, chosen[hit], found)
         self.last[hit] = time
@@ -163,8 +188,7 @@ class Linker:
                 shaken_now,
                 costs,
             )
-            lost = ~np.isfinite(costs).any(axis=1)
-            if np.count_nonzero(lost & fresh) <= _LOST * int(np.count_nonzero(fresh)):
+            if count_lost(costs, fresh) <= _LOST * int(np.count_nonzero(fresh)):
                 break
         return costs
 
@@ -180,9 +204,12 @@ class Linker:
 
         Beads that would have reached a wall come back from it.
         """
-        places, variances = np.empty((self.last.size, 2)), np.empty(self.last.size)
-        predict(self._lines, self.radii, time, shift, shift + self._size, places, variances)
-        return places, variances
+        # Asked for twice before the next picture is known.
+        if self._last_predicted is None or self._last_predicted[0] != time:
+            places, variances = np.empty((self.last.size, 2)), np.empty(self.last.size)
+            predict(self._lines, self.radii, time, shift, shift + self._size, places, variances)
+            self._last_predicted = time, places, variances
+        return self._last_predicted[1:]
 
     def hints(self, time: float, shift: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where beads should be: column, row, radius and its error, (n, 4), [px].
@@ -194,22 +221,30 @@ class Linker:
         order = np.argsort(-self._shares, kind='stable')
         return np.column_stack([places - shift, self.radii, sizes])[order]
 
-    def velocities(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Velocity of each bead, (n, 2), and the error of a component, (n,), [px/s]."""
-        known = np.isfinite(self._lines[:, 6])
-        velocity = np.where(known[:, None], self._lines[:, 3:5], np.nan)
-        return velocity, np.sqrt(np.where(known, self._lines[:, 6], np.nan))
-
     def places(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Last place of each bead, (n, 2), and the error of a coordinate, (n,), [px]."""
         return self._places[:, 0], self._errors[:, 0]
 
-    def strayed(self, time: float) -> NDArray[np.float64]:
-        """Variance of a coordinate by collisions that nobody saw, (n,), [px^2]."""
-        rate = _COLLIDING_A_SECOND * (time - self.last)
-        kick = _COLLISION * self._speed * (time - self.last)
-        # On average the collision was half way.
-        return np.asarray(np.minimum(rate, 1.0) * np.square(kick) / 3.0)
+    def in_view(self, time: float, shift: NDArray[np.float64]) -> InView:
+        """The beads that are believed, as they are now."""
+        predicted, variances = self.predicted(time, shift)
+        return InView(
+            self.numbers[self.confirmed],
+            *in_view(
+                self.confirmed,
+                self.last,
+                self._places,
+                self._errors,
+                self._lines,
+                self.radii,
+                self.radius_errors(),
+                predicted,
+                variances,
+                time,
+                self.systematic,
+                (_COLLIDING_A_SECOND, _COLLISION * self._speed),
+            ),
+        )
 
     def radius_errors(self) -> NDArray[np.float64]:
         """Standard errors of the radii, (n,), [px]."""
@@ -235,6 +270,8 @@ class Linker:
             self._speed += share * (usual - self._speed)
 
     def _drop(self, time: float, hit: NDArray[np.bool_]) -> None:
+        if hit.all():
+            return
         waits = time - self.last
         keep = hit | (self.confirmed & (waits <= self._longest_gap))
         surplus = int(np.count_nonzero(keep & self.confirmed)) - self._expected

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.stages.tracking.paths import ALL, Series, distances_of, jitter_of, series_of
+from nanorocks_ros.stages.tracking.paths import ALL, Series, distances_of, jitter_of, joined
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,8 +40,8 @@ _SOME = 0.8
 _MISSING = 0.4
 # Fewer beads than this say nothing of a mean.
 _FEWEST = 3
-# Pictures from which the jitter is measured.
-_JITTER_PICTURES = 10
+JITTER_PICTURES = 10
+"""Pictures from which the jitter is measured."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,8 +103,35 @@ def mean_speeds(
     """The same for several species, or all beads where None, of the same tracks."""
     if not tracks:
         return [None for _ in species]
-    series, recent = series_of(tracks), series_of(tracks[-_JITTER_PICTURES:])
-    expected = tracks[-1].expected
+    return mean_speeds_in(
+        joined(tracks),
+        joined(tracks[-JITTER_PICTURES:]),
+        tracks[-1].expected,
+        least_distance=least_distance,
+        species=species,
+    )
+
+
+def mean_speeds_in(
+    series: Series,
+    recent: Series,
+    expected: NDArray[np.int32],
+    *,
+    least_distance: float,
+    species: Sequence[int | None],
+) -> list[MeanSpeed | None]:
+    """The same of tracks that are joined already.
+
+    Parameters
+    ----------
+    series : Series
+    recent : Series
+        The last `JITTER_PICTURES` of them.
+    expected : ndarray of int32, (species,)
+        Beads there are.
+    least_distance, species
+        As of `mean_speed`.
+    """
     return [
         _mean_speed(
             series,

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.stages.tracking.flight import extend_flight
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 SIZE_JITTER_PX = 0.3
@@ -109,6 +110,27 @@ def pair_costs(
 
 
 @compiled
+def most_finite(costs: NDArray[np.float64]) -> float:
+    """The largest cost of a pair that is possible; -1 when none is."""
+    most, found = -math.inf, False
+    for i in range(costs.shape[0]):
+        for j in range(costs.shape[1]):
+            if costs[i, j] < math.inf:
+                most, found = max(most, costs[i, j]), True
+    return most if found else -1.0
+
+
+@compiled
+def count_lost(costs: NDArray[np.float64], fresh: NDArray[np.bool_]) -> int:
+    """How many of some tracks have no pair that is possible."""
+    lost = 0
+    for i in range(costs.shape[0]):
+        if fresh[i]:
+            lost += not (costs[i] < math.inf).any()
+    return lost
+
+
+@compiled
 def predict(
     lines: NDArray[np.float64],
     radii: NDArray[np.float64],
@@ -163,3 +185,77 @@ def extend_all(
                 found_errors[j],
                 window,
             )
+
+
+@compiled
+def in_view(
+    shown: NDArray[np.bool_],
+    last: NDArray[np.float64],
+    last_places: NDArray[np.float64],
+    last_errors: NDArray[np.float64],
+    lines: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    radius_errors: NDArray[np.float64],
+    predicted: NDArray[np.float64],
+    variances: NDArray[np.float64],
+    time: float,
+    systematic: float,
+    collisions: tuple[float, float],
+) -> tuple[
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.bool_],
+]:
+    """Fields of `InView` but the first, of those that are shown.
+
+    Parameters
+    ----------
+    shown : ndarray of bool, (n,)
+    last : ndarray (n,), [s]
+        When each was seen last, with the place first in `last_places` and `last_errors`.
+    lines : ndarray (n, 9)
+        Of `fit_flight`.
+    radii, radius_errors : ndarray (n,), [px]
+    predicted, variances : ndarrays (n, 2), (n,)
+        Of `predict`.
+    time : float, [s]
+    systematic : float, [px]
+        Error of all places of a bead together.
+    collisions : tuple of 2 floats, [1/s], [px/s]
+        How often a bead collides, and how much that changes its velocity.
+    """
+    n = np.count_nonzero(shown)
+    places, errors, velocities = np.empty((n, 2)), np.empty(n), np.empty((n, 2))
+    velocity_errors, seen = np.empty(n), np.empty(n, dtype=np.bool_)
+    rate, kick = collisions
+    row = 0
+    for k in range(shown.size):
+        if not shown[k]:
+            continue
+        seen[row] = last[k] == time
+        if seen[row]:
+            places[row], error = last_places[k, 0], last_errors[k, 0]
+        else:
+            # By collisions that nobody saw; on average one was half way.
+            wait = time - last[k]
+            strayed = min(rate * wait, 1.0) * (kick * wait) * (kick * wait) / 3.0
+            places[row], error = predicted[k], math.sqrt(variances[k] + strayed)
+        errors[row] = math.sqrt(error * error + systematic * systematic)
+        known = abs(lines[k, 6]) < math.inf
+        for axis in range(2):
+            velocities[row, axis] = lines[k, 3 + axis] if known else np.nan
+        velocity_errors[row] = math.sqrt(lines[k, 6]) if known else np.nan
+        row += 1
+    return (
+        places,
+        errors,
+        velocities,
+        velocity_errors,
+        radii[shown],
+        radius_errors[shown],
+        seen,
+    )

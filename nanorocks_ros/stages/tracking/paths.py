@@ -52,7 +52,7 @@ class Series(NamedTuple):
     errors: NDArray[np.float64]
 
 
-def series_of(tracks: Sequence[Tracks]) -> Series:
+def joined(tracks: Sequence[Tracks]) -> Series:
     """The same records, at least one, in one set of arrays."""
     counts = [one.ids.size for one in tracks]
     moved = np.repeat(np.array([one.displacement for one in tracks]), counts, axis=0)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nanorocks_ros.records import Quality, Tracks, TrayImage
 from nanorocks_ros.stages.tracking.detect import BeadDetector
-from nanorocks_ros.stages.tracking.link import Linker
+from nanorocks_ros.stages.tracking.link import InView, Linker
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -111,27 +111,27 @@ class Tracker:
 
     def _tracks(self, image: TrayImage, time: float, displacement: NDArray[np.float64]) -> Tracks:
         shift = displacement * self._scale
-        parts = [_in_view(k, linker, time, shift) for k, linker in enumerate(self._linkers)]
-        ids, species, places, errors, velocities, velocity_errors, radii, radius_errors, seen = (
-            np.concatenate(column) for column in zip(*parts, strict=True)
-        )
-        order = np.argsort(ids, kind='stable')
+        parts = [linker.in_view(time, shift) for linker in self._linkers]
+        kinds = np.repeat(np.arange(len(parts), dtype=np.int32), [one.ids.size for one in parts])
+        all_of_them = InView._make(np.concatenate(column) for column in zip(*parts, strict=True))
+        order = np.argsort(all_of_them.ids, kind='stable')
+        beads, species = InView._make(column[order] for column in all_of_them), kinds[order]
         metre = 1.0 / self._scale
         return Tracks(
             stamp_ns=image.stamp_ns,
             tray=self._tray.number,
-            ids=ids[order],
-            species=species[order],
+            ids=beads.ids,
+            species=species,
             displacement=displacement,
-            positions=metre * places[order] - displacement,
-            position_errors=metre * errors[order],
-            velocities=metre * velocities[order],
-            velocity_errors=metre * velocity_errors[order],
-            radii=metre * radii[order],
-            radius_errors=metre * radius_errors[order],
-            seen=seen[order],
+            positions=metre * beads.places - displacement,
+            position_errors=metre * beads.errors,
+            velocities=metre * beads.velocities,
+            velocity_errors=metre * beads.velocity_errors,
+            radii=metre * beads.radii,
+            radius_errors=metre * beads.radius_errors,
+            seen=beads.seen,
             expected=self._expected,
-            quality=image.quality | self._few(species[seen]),
+            quality=image.quality | self._few(species[beads.seen]),
         )
 
     def _few(self, species: NDArray[np.int32]) -> Quality:
@@ -139,27 +139,3 @@ class Tracker:
         counts = np.bincount(species, minlength=self._expected.size)
         few = (counts < _FEW * self._expected).any()
         return Quality.FEW_BEADS if few else Quality(0)
-
-
-def _in_view(
-    species: int, linker: Linker, time: float, shift: NDArray[np.float64]
-) -> tuple[NDArray[Any], ...]:
-    """The columns of the record for one species, in pixels."""
-    shown = linker.confirmed
-    seen = linker.last == time
-    predicted, variances = linker.predicted(time, shift)
-    places, errors = linker.places()
-    velocities, velocity_errors = linker.velocities()
-    lost = np.sqrt(variances + linker.strayed(time))
-    columns = (
-        linker.numbers,
-        np.full(shown.size, species, dtype=np.int32),
-        np.where(seen[:, None], places, predicted),
-        np.hypot(np.where(seen, errors, lost), linker.systematic),
-        velocities,
-        velocity_errors,
-        linker.radii,
-        linker.radius_errors(),
-        seen,
-    )
-    return tuple(column[shown] for column in columns)

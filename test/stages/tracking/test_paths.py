@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.records import Tracks
-from nanorocks_ros.stages.tracking.paths import ALL, distances_of, jitter_of, series_of
+from nanorocks_ros.stages.tracking.paths import ALL, distances_of, jitter_of, joined
 
 
 def _picture(rng, number):
@@ -53,7 +53,7 @@ def test_distances_are_those_of_the_beads_seen_in_all_three_pictures(species):
         earlier, middle, later = (_usable(one, species) for one in tracks)
         common = sorted(earlier.keys() & middle.keys() & later.keys())
         found, square, variance, place_variance = distances_of(
-            series_of(tracks), (2, 1, 0), species, 3e-12
+            joined(tracks), (2, 1, 0), species, 3e-12
         )
         assert found.shape == (3, len(common))
         if not common:
@@ -75,7 +75,7 @@ def test_distances_are_those_of_the_beads_seen_in_all_three_pictures(species):
 def test_without_three_pictures_evenly_apart_nothing_is_known_of_the_jitter():
     rng = np.random.default_rng(9)
     tracks = [_picture(rng, number) for number in (0, 1, 5)]
-    assert jitter_of(series_of(tracks), ALL) == np.inf
-    assert jitter_of(series_of(tracks[:2]), ALL) == np.inf
+    assert jitter_of(joined(tracks), ALL) == np.inf
+    assert jitter_of(joined(tracks[:2]), ALL) == np.inf
     even = [replace(one, stamp_ns=33_000_000 * k) for k, one in enumerate(tracks)]
-    assert jitter_of(series_of(even), ALL) < np.inf
+    assert jitter_of(joined(even), ALL) < np.inf

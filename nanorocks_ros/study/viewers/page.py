@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.study.viewers import CHARTS, PICTURES, element, message_path, series
+from nanorocks_ros.study.viewers.charts import CHARTS, PICTURES, element, message_path, series
 from nanorocks_ros.wire import topics
 
 _TRAY = 1

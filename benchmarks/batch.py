@@ -1,0 +1,225 @@
+"""Many bags: two cores against one, memory against length, and a campaign with broken bags.
+
+Films of one tray, looped and copied, so that making them takes no longer than analysing them; the
+whole plate once, for the memory of a worker with all eight trays.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import shutil
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+from nanorocks_ros.experiment.settings import (
+    CompressionSettings,
+    PipelineSettings,
+    SceneSettings,
+    SimulationSettings,
+)
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.recordings.content import content_hash, file_states, total_size
+from nanorocks_ros.recordings.find_bags import find_bags
+from nanorocks_ros.recordings.messages import compressed_image_message, time_message
+from nanorocks_ros.recordings.reader import open_bag
+from nanorocks_ros.recordings.writer import BagWriter
+from nanorocks_ros.study.batch import BatchPlan, run_batch
+from nanorocks_ros.study.batch_files import write_batch
+from nanorocks_ros.study.campaign import plate_settings
+from nanorocks_ros.study.combined import combined
+from nanorocks_ros.study.film_bag import START_NS, film_into_bag
+from nanorocks_ros.study.film_scene import SceneRecorder
+from nanorocks_ros.study.results_bag import offered
+from nanorocks_ros.study.tasks import Workers
+from nanorocks_ros.wire import topics
+
+_SECONDS = 20.0
+_NS = 1_000_000_000
+_CAMERA = topics.RAW_COMPRESSED.absolute()
+# Bags on each number of cores, of how many films one after the other; rounds.
+_BAGS, _LOOPS, _ROUNDS = 8, 1, 2
+# Lengths of which memory is compared, in films.
+_SHORT, _LONG = 3, 30
+_PLATE_SECONDS = 5.0
+_CAMPAIGN, _FILMS, _SHORT_SECONDS = 178, 4, 3.5
+
+
+class _Quiet:
+    """Told how a batch goes, keeps the largest memory of its workers, [MB]."""
+
+    def __init__(self) -> None:
+        self.peak = 0.0
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._look, daemon=True)
+
+    def begin(self, *_) -> None:
+        self._thread.start()
+
+    def finished(self, *_) -> None:
+        pass
+
+    def notice(self, text) -> None:
+        pass
+
+    def _look(self) -> None:
+        while not self._over.wait(0.1):
+            for child in multiprocessing.active_children():
+                try:
+                    status = Path(f'/proc/{child.pid}/status').read_text()
+                except OSError:
+                    continue
+                peaks = [line for line in status.splitlines() if line.startswith('VmHWM')]
+                self.peak = max([self.peak, *(float(one.split()[1]) / 1e3 for one in peaks)])
+
+    def stop(self) -> None:
+        self._over.set()
+
+
+def short_film(path: Path, seed: int, seconds: float) -> Path:
+    """A bag of tray 1, shaken after 0.3 s."""
+    film_into_bag(
+        path,
+        SimulationSettings(seed=seed, first_shake=0.3),
+        duration=seconds,
+        quality=85,
+        progress=lambda *_: None,
+    )
+    return path
+
+
+def _looped(path: Path, film: Path, loops: int) -> Path:
+    """A bag of the same film again and again, shaken every time."""
+    bag = open_bag(film)
+    frames = [
+        (one.log_time_ns, bytes(bag.deserialize(one).data)) for one in bag.messages([_CAMERA])
+    ]
+    length = frames[-1][0] - frames[0][0] + _NS // 30
+    epoch = topics.EPOCH.absolute()
+    table = {epoch: offered(topics.EPOCH), _CAMERA: offered(topics.RAW_COMPRESSED)}
+    with BagWriter(path, table, metadata={}) as written:
+        written.write(epoch, START_NS, time_message(START_NS))
+        for loop in range(loops):
+            for stamp_ns, jpeg in frames:
+                at = stamp_ns + loop * length
+                message = compressed_image_message(
+                    at, 'camera', 'bgr8; jpeg compressed bgr8', jpeg
+                )
+                written.write(_CAMERA, at, message)
+    return path
+
+
+def _run(folder: Path, bags: Path, settings=None, workers=None):
+    """A batch, how long it took [s], and the largest memory of a worker [MB]."""
+    plan = BatchPlan(
+        bags=find_bags([str(bags)]), folder=folder, settings=settings or PipelineSettings()
+    )
+    quiet = _Quiet()
+    start = time.perf_counter()
+    batch = run_batch(plan, Workers(processes=workers), quiet)
+    seconds = time.perf_counter() - start
+    quiet.stop()
+    return batch, seconds, quiet.peak
+
+
+def _cores(folder: Path, film: Path) -> None:
+    bags = folder / 'bags'
+    first = _looped(bags / '0', film, _LOOPS)
+    for number in range(1, _BAGS):
+        shutil.copytree(first, bags / str(number))
+    cores = sorted(os.sched_getaffinity(0))
+    best = {1: float('inf'), 2: float('inf')}
+    frames = 0
+    try:
+        for turn in range(_ROUNDS):
+            for count in best:
+                os.sched_setaffinity(0, cores[:count])
+                batch, seconds, _ = _run(folder / f'{turn}_{count}', bags)
+                frames = sum(one.summary['frames'] for one in batch.results)
+                best[count] = min(best[count], seconds)
+    finally:
+        os.sched_setaffinity(0, cores)
+    print(f'{_BAGS} bags of {frames // _BAGS} frames, a tray; best of {_ROUNDS}\n')
+    print('| cores, workers | s | frames/s | ratio |')
+    print('| --- | --- | --- | --- |')
+    for count, seconds in best.items():
+        print(f'| {count} | {seconds:.1f} | {frames / seconds:.0f} | {best[1] / seconds:.2f} |')
+
+
+def _memory(folder: Path, film: Path) -> None:
+    print('\n| bag | trays | length [s] | cycles | peak of the worker [MB] |')
+    print('| --- | --- | --- | --- | --- |')
+    for loops in (_SHORT, _LONG):
+        place = folder / f'{loops}'
+        _looped(place / 'bags' / 'run', film, loops)
+        batch, _, peak = _run(place / 'results', place / 'bags', workers=1)
+        summary = batch.results[0].summary
+        cycles = len(summary['trays']['1']['cycles'])
+        print(f'| tray | 1 | {summary["seconds"]:.0f} | {cycles} | {peak:.0f} |', flush=True)
+    size = total_size(file_states(place / 'bags' / 'run'))
+    start = time.perf_counter()
+    content_hash(place / 'bags' / 'run')
+    rate = size / (time.perf_counter() - start)
+    plate = folder / 'plate'
+    scene = SceneSettings(trays=tuple(sorted(load_trays())))
+    recorder = SceneRecorder(SimulationSettings(first_shake=0.5), scene, _PLATE_SECONDS)
+    (plate / 'bags').mkdir(parents=True)
+    recorder.into_bag(plate / 'bags' / 'run', CompressionSettings(), 85, lambda *_: None)
+    batch, _, peak = _run(plate / 'results', plate / 'bags', plate_settings(), workers=1)
+    summary = batch.results[0].summary
+    cycles = max(len(one['cycles']) for one in summary['trays'].values())
+    print(f'| plate, 1080p | 8 | {summary["seconds"]:.0f} | {cycles} | {peak:.0f} |\n')
+    print(f'content hashed at {rate / 1e6:.0f} MB/s', flush=True)
+
+
+def broken_bags(folder: Path, film: Path) -> None:
+    """One of each kind; those cut short and with flipped bits can be analysed in part."""
+    content = next(film.glob('*.mcap')).read_bytes()
+    (folder / 'truncated.mcap').write_bytes(content[: len(content) * 3 // 5])
+    (folder / 'empty.mcap').touch()
+    (folder / 'wrong_magic.mcap').write_bytes(b'RIFF' + content[4:])
+    flipped = bytearray(content)
+    for place in range(len(content) // 3, len(content) // 2, 500):
+        flipped[place] ^= 0x10
+    (folder / 'flipped.mcap').write_bytes(flipped)
+    with BagWriter(folder / 'no_camera', {'/chatter': offered(topics.EPOCH)}, metadata={}) as bag:
+        bag.write('/chatter', START_NS, time_message(START_NS))
+
+
+def _campaign(folder: Path) -> None:
+    bags = folder / 'bags'
+    films = [short_film(folder / f'film_{k}', k, _SHORT_SECONDS) for k in range(_FILMS)]
+    for number in range(_CAMPAIGN - 5):
+        shutil.copytree(films[number % _FILMS], bags / f'run_{number}')
+    broken_bags(bags, films[0])
+    settings = PipelineSettings()
+    batch, seconds, peak = _run(folder / 'results', bags)
+    start = time.perf_counter()
+    together = combined(batch.results, settings)
+    write_batch(folder / 'results', batch, together, settings, 'csv')
+    report = time.perf_counter() - start
+    _, again, _ = _run(folder / 'results', bags)
+    frames = sum(one.summary['frames'] for one in batch.results)
+    print(f'\n{_CAMPAIGN} bags, 5 of them broken: {len(batch.results)} analysed, {frames} frames')
+    print(f'on all cores: {seconds:.0f} s, at most {peak:.0f} MB a worker')
+    print(f'means, tables and report of {len(together.cycles)} cycles: {report:.1f} s')
+    print(f'the same again, with what failed: {again:.1f} s\n')
+    for one in batch.failed:
+        print(f'failed: {Path(one.name).name}: {one.reason.partition(": ")[2].partition(";")[0]}')
+    for one in batch.results:
+        if not one.summary['complete']:
+            print(f'in part: {Path(one.name).name}: {one.summary["frames"]} frames')
+    size = sum(one.stat().st_size for one in (folder / 'results').rglob('*') if one.is_file())
+    print(f'results: {size / 1e6 / len(batch.results):.1f} MB a bag')
+
+
+def report() -> None:
+    """Print all of it."""
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        film = short_film(folder / 'film', 1, _SECONDS)
+        _cores(folder / 'cores', film)
+        _memory(folder / 'memory', film)
+        _campaign(folder / 'campaign')

@@ -1,0 +1,79 @@
+"""Take the pictures of the live page: ``python -m benchmarks.dashboard_pictures BAG [FOLDER]``.
+
+Plays a film of the plate, as slowly as all trays of it are followed, and writes dashboard.png and
+dashboard_phone.png, for the documentation, into docs or the folder given. BAG is made by
+``nanorocks simulate --scene --duration 32 --first-shake 0.5 --shake-period 20 --bag BAG``.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from PIL import Image
+
+from benchmarks.live import start_node
+
+_TRAY = 3
+_AFTER_S = 18
+_RATE = 0.3
+_PATIENCE_S = 300.0
+_DOMAIN = '60'
+_PICTURES = (
+    ('dashboard.png', {'viewport': {'width': 1440, 'height': 900}, 'color_scheme': 'light'}),
+    ('dashboard_phone.png', {'viewport': {'width': 390, 'height': 844}, 'color_scheme': 'dark'}),
+)
+
+
+def main() -> None:
+    """Start the graph, wait until the gas has cooled for a while, and take the pictures."""
+    folder = Path(sys.argv[2] if len(sys.argv) > 2 else 'docs')
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    os.environ['ROS_DOMAIN_ID'] = _DOMAIN
+    pipeline = start_node(
+        'pipeline', '--ros-args', '-p', 'source:=bag', '-p', f'bag:={sys.argv[1]}',
+        '-p', f'rate:={_RATE}', '-p', f'trays:={list(range(1, 9))}',
+        '-p', 'preprocess.layout:=plate', '-p', 'preprocess.pixels_per_metre:=12500.0',
+        '-p', 'dashboard:=true', '-p', 'dashboard_port:=0',
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    url = re.findall(r'http://\S+', pipeline.stdout.readline())[0]
+    try:
+        _take(f'{url}#tray-{_TRAY}', folder)
+    finally:
+        pipeline.send_signal(2)
+        pipeline.wait(10)
+
+
+def _take(url: str, folder: Path) -> None:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(
+            executable_path=shutil.which('chromium'), args=['--no-sandbox', '--disable-gpu']
+        )
+        pages = [(name, browser.new_page(**options)) for name, options in _PICTURES]
+        for _, page in pages:
+            page.goto(url)
+        end = time.monotonic() + _PATIENCE_S
+        while not _cooled(pages[0][1]) and time.monotonic() < end:
+            time.sleep(0.5)
+        for name, page in pages:
+            page.screenshot(path=folder / name)
+            # Small enough for a repository.
+            Image.open(folder / name).quantize(256).save(folder / name, optimize=True)
+        browser.close()
+
+
+def _cooled(page) -> bool:
+    found = re.search(r'cooling for (\d+) s', page.locator('#state').text_content())
+    return found is not None and int(found[1]) >= _AFTER_S
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,191 @@
+"""Import, salvage, opening and seeking, beside decoding, copying and the `rosbags` library.
+
+Import: a film of 1080p noise over a moving picture, once as Motion JPEG and once as H.264, on the
+cores there are. Opening and seeking: a bag of 10 GB, or of NANOROCKS_BENCHMARK_GB.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import statistics
+import tempfile
+import time
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+from rosbags.rosbag2 import Reader
+
+from nanorocks_ros.recordings.messages import compressed_image_message
+from nanorocks_ros.recordings.reader import open_bag
+from nanorocks_ros.recordings.salvage import salvage
+from nanorocks_ros.recordings.writer import BagWriter
+from nanorocks_ros.study.films import ImportSettings
+from nanorocks_ros.study.import_film import import_films
+from nanorocks_ros.study.results_bag import offered
+from nanorocks_ros.wire import topics
+
+_WIDTH, _HEIGHT, _FRAMES = 1920, 1080, 150
+_ROUNDS = 3
+_NS = 1_000_000_000
+_STEP_NS = _NS // 30
+_PICTURE_BYTES = 500_000
+_GB = float(os.environ.get('NANOROCKS_BENCHMARK_GB', '10'))
+_SEEKS = 20
+_CAMERA = topics.RAW_COMPRESSED
+
+
+def _timed(work) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def _film(path: Path, codec: str, form: str, options: dict[str, str]) -> None:
+    noise = np.random.default_rng(1)
+    scene = cv2.GaussianBlur(noise.integers(0, 255, (_HEIGHT, 2 * _WIDTH, 3), np.uint8), (9, 9), 3)
+    grain = noise.integers(0, 12, (8, _HEIGHT, _WIDTH, 3), dtype=np.uint8)
+    with av.open(str(path), 'w') as container:
+        stream = container.add_stream(codec, rate=30, options=options)
+        stream.width, stream.height, stream.pix_fmt = _WIDTH, _HEIGHT, form
+        for number in range(_FRAMES):
+            image = cv2.add(scene[:, 8 * number : 8 * number + _WIDTH], grain[number % 8])
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format='bgr24')))
+        container.mux(stream.encode())
+
+
+def _decode(path: Path) -> None:
+    with av.open(str(path)) as container:
+        container.streams.video[0].thread_type = 'AUTO'
+        for _ in container.decode(video=0):
+            pass
+
+
+def _import(path: Path, bag: Path) -> None:
+    shutil.rmtree(bag, ignore_errors=True)
+    import_films([path], bag, ImportSettings(start_ns=_NS), lambda _: None)
+
+
+def _imports(folder: Path) -> None:
+    for what, name, codec, form, options in (
+        (
+            'remux, MJPEG',
+            'a.avi',
+            'mjpeg',
+            'yuvj420p',
+            {'flags': '+qscale', 'global_quality': '590'},
+        ),
+        ('recompress, H.264', 'a.mp4', 'libx264', 'yuv420p', {'crf': '20', 'preset': 'fast'}),
+    ):
+        path = folder / name
+        _film(path, codec, form, options)
+        pairs = [
+            (
+                _timed(lambda path=path: _decode(path)),
+                _timed(lambda path=path: _import(path, folder / 'bag')),
+            )
+            for _ in range(_ROUNDS)
+        ]
+        decode, whole = (min(column) for column in zip(*pairs, strict=True))
+        print(
+            f'import, {what:18} {_FRAMES / whole:7.1f} frames/s, decode only '
+            f'{_FRAMES / decode:7.1f}, ratio {decode / whole:5.2f}'
+        )
+
+
+def _bag(path: Path, size: float) -> int:
+    """A bag of pictures that cannot be compressed further; the number of them."""
+    count = int(size / _PICTURE_BYTES)
+    pool = [np.random.default_rng(k).bytes(_PICTURE_BYTES) for k in range(8)]
+    name = _CAMERA.absolute()
+    with BagWriter(path, {name: offered(_CAMERA)}, metadata={}) as bag:
+        for number in range(count):
+            stamp_ns = _NS + number * _STEP_NS
+            message = compressed_image_message(stamp_ns, 'camera', 'jpeg', pool[number % 8])
+            bag.write(name, stamp_ns, message)
+    return count
+
+
+def _copy(source: Path, target: Path) -> None:
+    shutil.rmtree(target, ignore_errors=True)
+    shutil.copytree(source, target)
+
+
+def _salvage(source: Path, target: Path) -> None:
+    shutil.rmtree(target, ignore_errors=True)
+    salvage(source, target, lambda *_: None)
+
+
+def _salvages(folder: Path) -> None:
+    source = folder / 'cut'
+    _bag(source, 5e8)
+    (source / 'metadata.yaml').unlink()
+    file = source / 'cut.mcap'
+    os.truncate(file, file.stat().st_size - 1000)
+    pairs = [
+        (
+            _timed(lambda: _copy(source, folder / 'copy')),
+            _timed(lambda: _salvage(source, folder / 'new')),
+        )
+        for _ in range(_ROUNDS)
+    ]
+    copy, whole = (min(column) for column in zip(*pairs, strict=True))
+    size = file.stat().st_size / 1e6
+    print(
+        f'salvage, cut short      {size / whole:7.0f} MB/s, plain copy {size / copy:7.0f}, '
+        f'ratio {copy / whole:5.2f}'
+    )
+    for name in ('cut', 'copy', 'new'):
+        shutil.rmtree(folder / name)
+
+
+def _first_of_ours(path: Path, stamp_ns: int) -> None:
+    assert next(open_bag(path).messages(start_ns=stamp_ns)).log_time_ns >= stamp_ns
+
+
+def _first_of_rosbags(path: Path, stamp_ns: int) -> None:
+    with Reader(path) as reader:
+        assert next(reader.messages(start=stamp_ns))[1] >= stamp_ns
+
+
+def _opening(folder: Path) -> None:
+    path = folder / 'long'
+    count = _bag(path, _GB * 1e9)
+    places = np.random.default_rng(0).integers(0, count - 1, _SEEKS)
+    stamps = [_NS + int(place) * _STEP_NS for place in places]
+    reader = open_bag(path)
+
+    def seek(stamp_ns: int) -> None:
+        next(reader.messages(start_ns=stamp_ns))
+
+    with Reader(path) as theirs:
+        rows = {
+            'open': ([_timed(lambda: open_bag(path)) for _ in stamps], [
+                _timed(lambda: Reader(path).open()) for _ in stamps
+            ]),
+            'seek, opened': (
+                [_timed(lambda one=one: seek(one)) for one in stamps],
+                [_timed(lambda one=one: next(theirs.messages(start=one))) for one in stamps],
+            ),
+            'open and seek': (
+                [_timed(lambda one=one: _first_of_ours(path, one)) for one in stamps],
+                [_timed(lambda one=one: _first_of_rosbags(path, one)) for one in stamps],
+            ),
+        }  # fmt: skip
+    for what, columns in rows.items():
+        ours, other = (statistics.median(column) for column in columns)
+        print(
+            f'{_GB:g} GB, {what:14} {1e3 * ours:9.1f} ms, rosbags {1e3 * other:9.1f} ms, '
+            f'ratio {other / ours:6.2f}'
+        )
+
+
+def report() -> None:
+    """Print the table."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        _imports(folder)
+        _salvages(folder)
+        _opening(folder)

@@ -1,0 +1,266 @@
+"""``nanorocks analyse BAG... -o RESULTS``: many recordings, one result."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import time
+from pathlib import Path
+from threading import Event, Thread
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.study.shown import counted, shown
+
+if TYPE_CHECKING:
+    import argparse
+
+    from nanorocks_ros.experiment.settings import PipelineSettings
+    from nanorocks_ros.study.batch import Batch
+    from nanorocks_ros.study.batch_store import BatchStore
+    from nanorocks_ros.study.batch_task import BagOutcome
+    from nanorocks_ros.study.combined import Combined, TrayMeans
+
+_LOOK = 1.0
+# Where nobody watches a bar, a line is written so often, [s].
+_LINE = 60.0
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options for many recordings."""
+    group = parser.add_argument_group('many recordings')
+    group.add_argument('--workers', type=int, help='processes; default: one for each core')
+    group.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
+
+
+def is_batch(options: argparse.Namespace) -> bool:
+    """Whether many recordings are meant."""
+    from nanorocks_ros.recordings.find_bags import is_collection, is_pattern
+
+    asked = options.workers, options.scheduler
+    if len(options.bags) > 1 or any(one is not None for one in asked):
+        return True
+    return is_pattern(options.bags[0]) or is_collection(Path(options.bags[0]))
+
+
+def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
+    """Analyse all, put them together, report; the exit code."""
+    from nanorocks_ros.recordings.find_bags import find_bags
+    from nanorocks_ros.study.batch import BatchPlan, run_batch
+    from nanorocks_ros.study.batch_files import check_format, write_batch
+    from nanorocks_ros.study.combined import combined
+    from nanorocks_ros.study.tasks import Workers
+
+    if options.no_output or not options.output:
+        raise ConfigurationError(
+            '--output', 'is where results of many recordings are kept', 'pass -o RESULTS'
+        )
+    workers = Workers(processes=options.workers, scheduler=options.scheduler)
+    folder = Path(options.output)
+    check_format(folder, options.format)
+    found = find_bags(options.bags)
+    for text in found.left_out:
+        _notice(f'{shown(text)}; left out')
+    for error in found.missing.values():
+        _notice(shown(str(error)))
+    if not found.bags:
+        raise (
+            ConfigurationError(
+                ', '.join(shown(one) for one in options.bags), 'name no recording', 'correct them'
+            )
+            if not found.missing
+            else next(iter(found.missing.values()))
+        )
+    plan = BatchPlan(bags=found, folder=folder, settings=settings, image_topic=options.image_topic)
+    with _Watch() as watch:
+        batch = run_batch(plan, workers, watch)
+    together = combined(batch.counted, settings)
+    for text in together.notices:
+        _notice(text)
+    report = write_batch(folder, batch, together, settings, options.format)
+    if options.json:
+        print(json.dumps(_as_json(batch, together, folder, report), allow_nan=False))
+    else:
+        _print(batch, together)
+    _notice(f'results in {shown(folder)}, report in {shown(report)}')
+    return _end(batch)
+
+
+def _end(batch: Batch) -> int:
+    if not batch.failed:
+        return 0
+    for one in batch.failed:
+        part = ' (what could be analysed is among the results)' if one.analysed else ''
+        _notice(f'failed: {one.reason}{part}')
+    whole = len(batch.results) + sum(not one.analysed for one in batch.failed)
+    _notice(
+        f'{len(batch.failed)} of {whole} recordings failed, as listed; mend or remove them, and '
+        'run the same command again: what is done is kept'
+    )
+    return 1
+
+
+def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> dict[str, Any]:
+    from nanorocks_ros.study.combined import means_as_json
+
+    shown_keys = 'state', 'frames', 'frames_lost', 'seconds', 'complete', 'notices'
+    return {
+        'bags': [
+            {
+                'bag': one.name,
+                'results': shown(one.folder),
+                'same_as': one.twin or None,
+                **{key: one.summary[key] for key in shown_keys},
+                'trays': {
+                    number: {'cycles': tray['cycles'], 'truth': tray['truth']}
+                    for number, tray in one.summary['trays'].items()
+                },
+            }
+            for one in batch.results
+        ],
+        'trays': {str(number): means_as_json(one) for number, one in together.trays.items()},
+        'failed': [
+            {'bag': one.name, 'reason': one.reason, 'analysed': one.analysed}
+            for one in batch.failed
+        ],
+        'results': shown(folder),
+        'report': shown(report),
+    }
+
+
+def _print(batch: Batch, together: Combined) -> None:
+    from nanorocks_ros.study.batch import told
+
+    frames = sum(one.summary['frames'] for one in batch.results)
+    seconds = sum(one.summary['seconds'] for one in batch.results)
+    print(f'{counted(len(batch.results), "recording")}, {frames} frames, {seconds:.0f} s')
+    for text in told(batch.results):
+        print(text)
+    for number, tray in sorted(together.trays.items()):
+        cycles, recordings = counted(tray.cycles, 'cycle'), counted(tray.recordings, 'recording')
+        print(f'tray {number}: {cycles} of {recordings}')
+        for text in _tray_lines(tray):
+            print(f'  {text}')
+
+
+def _tray_lines(tray: TrayMeans) -> list[str]:
+    from nanorocks_ros.study.combined import means_as_json
+
+    values = means_as_json(tray)
+
+    def text(name: str, factor: float = 1.0, digits: int = 4) -> str:
+        value, low, high = (values[f'{name}{end}'] for end in ('', '_lower', '_upper'))
+        return _interval((value, low, high), factor, digits)
+
+    lines = []
+    if values['restitution_lower'] is not None:
+        walls = f', walls {text("wall_restitution")}' if values['wall_restitution'] else ''
+        count = values['cycles_read']
+        lines.append(f'{counted(count, "cycle")} together: COR {text("restitution")}{walls}')
+    for name, what, factor, unit in (
+        ('cycle_restitution', 'COR of a cycle', 1.0, ''),
+        ('paper_restitution', "COR by the paper's closed form", 1.0, ''),
+        ('initial_speed', 'v0', 1e3, ' mm/s'),
+        ('peak_speed', 'peak speed', 1e3, ' mm/s'),
+        ('haff_time', 'tau', 1.0, ' s'),
+    ):
+        mean = tray.means[name]
+        if mean.cycles:
+            spread = f', scatter {factor * mean.scatter:.3g}' if mean.cycles > 1 else ''
+            lines.append(f'{what}: mean {factor * mean.mean:.4g}{unit}{spread}')
+    if values['sticking_status'] is not None:
+        status = values['sticking_status'].replace('_', ' ')
+        lines.append(f'sticking speed [mm/s]: {text("sticking_speed", 1e3, 2)} ({status})')
+    return lines
+
+
+def _interval(values: tuple[float | None, ...], factor: float, digits: int) -> str:
+    middle, low, high = (
+        'unknown' if one is None else f'{factor * one:.{digits}f}' for one in values
+    )
+    return f'{middle} [{low}, {high}]'
+
+
+def _notice(text: str) -> None:
+    print(f'nanorocks: {text}', file=sys.stderr)
+
+
+class _Watch:
+    """A bar on a terminal, lines elsewhere: recordings, frames a second, time left."""
+
+    def __init__(self) -> None:
+        self._over = Event()
+        self._bar: Any = None
+        self._watcher: Thread | None = None
+
+    def __enter__(self) -> _Watch:
+        return self
+
+    def begin(self, store: BatchStore, sizes: dict[str, int], done: int) -> None:
+        """So many bytes of each recording are left to do."""
+        from tqdm import tqdm
+
+        self._store, self._left = store, {name: max(one, 1) for name, one in sizes.items()}
+        self._bytes, self._frames, self._failed = sum(self._left.values()), 0, 0
+        self._done, self._all = done, done + len(sizes)
+        self._start = time.monotonic()
+        if done:
+            _notice(f'{done} of {self._all} recordings are done already, and have not changed')
+        self._bar = tqdm(
+            total=1.0,
+            disable=None,
+            leave=False,
+            bar_format='{desc} |{bar}|',
+        )
+        self._watcher = Thread(target=self._watch, daemon=True)
+        self._watcher.start()
+
+    def finished(self, name: str, outcome: BagOutcome) -> None:
+        """A recording is done, or failed."""
+        from tqdm import tqdm
+
+        from nanorocks_ros.study.batch_task import DONE
+
+        self._left.pop(name, None)
+        self._frames += outcome.frames
+        self._done += 1
+        if outcome.state != DONE:
+            self._failed += 1
+            with tqdm.external_write_mode(file=sys.stderr):
+                _notice(outcome.reason)
+
+    def notice(self, text: str) -> None:
+        """One line of what the user should know."""
+        _notice(text)
+
+    def _watch(self) -> None:
+        last = time.monotonic()
+        while not self._over.wait(_LOOK):
+            part, text = self._standing()
+            self._bar.n = part
+            self._bar.set_description_str(text)
+            if self._bar.disable and time.monotonic() - last >= _LINE:
+                last = time.monotonic()
+                _notice(text)
+
+    def _standing(self) -> tuple[float, str]:
+        frames, left = self._frames, dict(self._left)
+        for name, (done, total) in self._store.under_way().items():
+            if name in left:
+                frames += done
+                left[name] = round(left[name] * (1.0 - done / max(total, done, 1)))
+        part = 1.0 - sum(left.values()) / max(self._bytes, 1)
+        seconds = time.monotonic() - self._start
+        left_s = seconds * (1.0 / part - 1.0) if part > 0.0 else math.inf
+        when = f'{math.ceil(left_s / 60.0)} min left' if part > 0.0 else 'starting'
+        failed = f', {self._failed} failed' if self._failed else ''
+        standing = f'{self._done} of {self._all} recordings'
+        return part, f'{standing}, {frames / seconds:.0f} frames/s, {when}{failed}'
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        if self._watcher is not None:
+            self._watcher.join()
+        if self._bar is not None:
+            self._bar.close()

@@ -1,0 +1,222 @@
+"""A folder of images as a film."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+from PIL import Image
+
+from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.recordings.film import NS, FilmInfo, Shot, StoredPicture, form_of
+from nanorocks_ros.recordings.instants import instant
+from nanorocks_ros.recordings.jpeg import is_whole_jpeg, jpeg_head, with_huffman_tables
+from nanorocks_ros.recordings.names import natural
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from fractions import Fraction
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+IMAGES = frozenset(
+    ['.jpg', '.jpeg', '.png', '.bmp', '.tif', '.tiff', '.webp', '.pgm', '.ppm', '.jp2']
+)
+"""Endings of the files that are taken for images."""
+
+_ORIENTATION, _EXIF, _TAKEN, _TAKEN_FRACTION, _ZONE = 0x0112, 0x8769, 0x9003, 0x9291, 0x9011
+# Digits of a time since 1970 in seconds with a fraction, and without one in ms, µs, ns.
+_SINCE_1970 = {13: 10**6, 16: 10**3, 19: 1}
+_SECONDS = re.compile(r'(?<!\d)(1\d{9})[._](\d{3,9})(?!\d)')
+_LONG = re.compile(r'(?<!\d)(1\d{12}|1\d{15}|1\d{18})(?!\d)')
+_DATE = re.compile(
+    r'(?<!\d)((?:19|20)\d\d)-?(\d\d)-?(\d\d)'
+    r'[T_ -](\d\d)[:_-]?(\d\d)[:_-]?(\d\d)[._-](\d{3,9})(?!\d)'
+)
+# Of Pillow; an image that it refuses may still be one for OpenCV.
+_UNREADABLE = (OSError, SyntaxError, ValueError, Image.DecompressionBombError)
+
+
+def images_in(folder: Path) -> list[Path]:
+    """The images in a folder, sorted naturally."""
+    found = (one for one in folder.iterdir() if one.suffix.lower() in IMAGES and not _hidden(one))
+    return sorted((one for one in found if one.is_file()), key=lambda one: natural(one.name))
+
+
+def _hidden(path: Path) -> bool:
+    return path.name.startswith('.')
+
+
+class ImageFolder:
+    """A folder of images, in the natural order of their names.
+
+    JPEG and PNG files go into the bag as they are, unless their orientation has to be applied.
+
+    Parameters
+    ----------
+    path : Path
+    rate : Fraction or None, [1/s]
+        Of the camera. Without it, the names or the camera's own notes in the images have to
+        tell when each was taken.
+
+    Attributes
+    ----------
+    info : FilmInfo
+    broken : int
+        Images that could not be used, so far.
+
+    Raises
+    ------
+    ConfigurationError
+        When nothing says when the images were taken.
+    RecordingError
+        When there are none, or they cannot be read.
+    """
+
+    def __init__(self, path: Path, rate: Fraction | None = None) -> None:
+        self.broken = 0
+        files = images_in(path)
+        if not files:
+            raise RecordingError(str(path), 'holds no image', 'pass a video or a folder of images')
+        first = next((one for one in map(_opened, files) if one is not None), None)
+        if first is None:
+            raise RecordingError(
+                str(path),
+                'holds no image that can be decoded',
+                'check that they were copied whole',
+            )
+        self._times, how = _times(path, files, rate)
+        steps = np.diff(np.array(self._times, dtype=np.int64))
+        self.info = FilmInfo(
+            path=path,
+            files=tuple(files),
+            codec=files[0].suffix.lower().lstrip('.'),
+            width=first.shape[1],
+            height=first.shape[0],
+            step_ns=int(np.median(steps)) if steps.size else 0,
+            start_ns=None if rate else self._times[0],
+            as_stored=all(_is_stored(one) for one in files),
+            expected=len(files),
+            remarks=() if rate else (f'{path}: the images were taken when {how} say',),
+        )
+
+    def shots(self) -> Iterator[Shot]:
+        """The images that can be used, in order.
+
+        Yields
+        ------
+        Shot
+        """
+        for number, (file, time_ns) in enumerate(zip(self.info.files, self._times, strict=True)):
+            picture = _picture(file)
+            if picture is None:
+                self.broken += 1
+                continue
+            yield Shot(time_ns, picture, (number + 1) / len(self.info.files))
+
+
+class _Drawn:
+    """An image that was decoded."""
+
+    def __init__(self, image: NDArray[np.uint8]) -> None:
+        self._image = image
+
+    def gray(self) -> NDArray[np.uint8]:
+        if self._image.ndim == 2:
+            return self._image
+        return np.asarray(cv2.cvtColor(self._image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+
+    def pixels(self) -> NDArray[np.uint8]:
+        return self._image
+
+
+def _opened(file: Path) -> NDArray[np.uint8] | None:
+    """Its pixels, upright, gray or bgr; None when it cannot be decoded."""
+    try:
+        content = np.fromfile(file, np.uint8)
+        image = cv2.imdecode(content, cv2.IMREAD_ANYCOLOR) if content.size else None
+    except (OSError, cv2.error):
+        return None
+    return None if image is None else np.asarray(image, dtype=np.uint8)
+
+
+def _is_stored(file: Path) -> bool:
+    """Whether it goes into a bag as it is, as far as its name and orientation say."""
+    if file.suffix.lower() not in {'.jpg', '.jpeg', '.png'}:
+        return False
+    try:
+        with Image.open(file) as image:
+            return bool(image.getexif().get(_ORIENTATION, 1) == 1)
+    except _UNREADABLE:
+        return True
+
+
+def _picture(file: Path) -> StoredPicture | _Drawn | None:
+    image = None
+    if _is_stored(file):
+        try:
+            content = file.read_bytes()
+        except OSError:
+            return None
+        head = jpeg_head(content)
+        if head is not None:
+            whole = is_whole_jpeg(content)
+            content = with_huffman_tables(content, head)
+            return StoredPicture(form_of('jpeg', head.channels), content) if whole else None
+        image = _opened(file)
+        if content.startswith(b'\x89PNG') and image is not None:
+            return StoredPicture(form_of('png', image.ndim), content)
+    image = _opened(file) if image is None else image
+    return None if image is None else _Drawn(image)
+
+
+def _times(path: Path, files: Sequence[Path], rate: Fraction | None) -> tuple[list[int], str]:
+    """When each image was taken, and what says so."""
+    if rate is not None:
+        return [round(number * NS / rate) for number in range(len(files))], '--rate'
+    for how, times in (
+        ('their names', [_time_in_name(one.stem) for one in files]),
+        ('their EXIF notes', [_time_in_exif(one) for one in files]),
+    ):
+        known = [one for one in times if one is not None]
+        rising = all(one < other for one, other in itertools.pairwise(known))
+        if len(known) == len(files) and rising and len(files) > 1:
+            return known, how
+    raise ConfigurationError(
+        str(path),
+        'nothing says when its images were taken: neither their names nor EXIF do, all of them',
+        'pass --rate, in images per second',
+    )
+
+
+def _time_in_name(stem: str) -> int | None:
+    if found := _DATE.search(stem):
+        return _instant(found.groups()[:6], found.group(7))
+    if found := _SECONDS.search(stem):
+        return int(found.group(1)) * NS + int(f'{found.group(2):0<9}')
+    if found := _LONG.search(stem):
+        return int(found.group(1)) * _SINCE_1970[len(found.group(1))]
+    return None
+
+
+def _time_in_exif(file: Path) -> int | None:
+    """When the camera says that it took an image; whole seconds are too coarse for a film."""
+    try:
+        with Image.open(file) as image:
+            notes = image.getexif().get_ifd(_EXIF)
+    except _UNREADABLE:
+        return None
+    fraction = str(notes.get(_TAKEN_FRACTION, '')).strip()
+    date = re.findall(r'\d+', str(notes.get(_TAKEN, '')))
+    if not fraction.isdecimal() or len(date) != 6:
+        return None
+    return _instant(date, fraction, str(notes.get(_ZONE) or ''))
+
+
+def _instant(date: Sequence[str], fraction: str, zone: str = '') -> int | None:
+    year, month, day, hour, minute, second = date
+    return instant(f'{year}-{month}-{day}T{hour}:{minute}:{second}.{fraction}{zone}')

@@ -1,0 +1,277 @@
+"""A video: its pictures, turned upright, and when they were taken by its own clock."""
+
+from __future__ import annotations
+
+from collections import deque
+from fractions import Fraction
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.recordings.film import NS, FilmInfo, Shot, StoredPicture, form_of
+from nanorocks_ros.recordings.images import is_decodable
+from nanorocks_ros.recordings.instants import instant
+from nanorocks_ros.recordings.jpeg import is_whole_jpeg, jpeg_head, with_huffman_tables
+from nanorocks_ros.recordings.upright import UPRIGHT, Turn, turn_of, turned, words_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+_ENDINGS = 'mp4 m4v mov avi mkv webm mts m2ts ts mpg mpeg wmv mxf 3gp ogv mjpeg mjpg y4m'
+VIDEOS = frozenset(f'.{ending}' for ending in _ENDINGS.split())
+"""Endings of the files that a folder of videos is looked through for."""
+
+# The library makes a film of texts and of noise, too, where it is let.
+_CONTAINERS = 'mov,mp4,m4a,3gp,3g2,mj2 matroska,webm avi mpegts mpeg asf mxf flv ogg nut dv ivf'
+_STREAMS = 'mjpeg h264 hevc yuv4mpegpipe'
+_FORMATS = frozenset([*_CONTAINERS.split(), *_STREAMS.split()])
+# Nothing is fetched because a playlist says so.
+_ONLY_FILES = {'protocol_whitelist': 'file,crypto,data'}
+# Cameras without a clock begin in 1904 or 1970; stamps of messages end in 2038.
+_FIRST_NS, _LAST_NS = 315_532_800 * NS, (2**31 - 1) * NS
+# Whose clock knows its zone comes first.
+_START_TAGS = ('com.apple.quicktime.creationdate', 'creation_time')
+_CAMERA_TAGS = ('make', 'model', 'comment', 'encoder', 'location')
+
+
+class Video:
+    """A video file.
+
+    Parameters
+    ----------
+    path : Path
+    threads : int
+        That decode it; 0: as many as there are cores.
+
+    Attributes
+    ----------
+    info : FilmInfo
+    broken : int
+        Pictures that could not be used, so far.
+
+    Raises
+    ------
+    ConfigurationError
+        When PyAV is not installed.
+    RecordingError
+        When it is no video.
+    """
+
+    def __init__(self, path: Path, threads: int = 0) -> None:
+        self.broken = 0
+        self._threads = threads
+        self._av = _library(path)
+        self._bytes = path.stat().st_size
+        self._turn = UPRIGHT
+        with self._opened(path) as container:
+            stream = container.streams.video[0]
+            self.info = self._described(path, container, stream)
+
+    def _opened(self, path: Path) -> Any:
+        try:
+            container = self._av.open(f'file:{path.resolve()}', options=dict(_ONLY_FILES))
+        except (self._av.FFmpegError, OSError) as error:
+            raise RecordingError(
+                str(path),
+                f'is no video that can be read ({_reason(error)})',
+                'check that it was copied whole, or pass another',
+            ) from error
+        streams = container.streams.video
+        if not streams or container.format.name not in _FORMATS:
+            container.close()
+            raise RecordingError(str(path), 'holds no film', 'pass a video')
+        return container
+
+    def _described(self, path: Path, container: Any, stream: Any) -> FilmInfo:
+        first, packet = self._first(path, container, stream)
+        self._turn = turn_of(first)
+        width, height = first.width, first.height
+        info = FilmInfo(
+            path=path,
+            files=(path,),
+            codec=stream.codec_context.name,
+            width=height if self._turn[0] == 0 else width,
+            height=width if self._turn[0] == 0 else height,
+            step_ns=_step_ns(stream),
+            start_ns=_start_ns({**stream.metadata, **container.metadata}),
+            expected=max(0, stream.frames),
+            tags={k: v for k, v in container.metadata.items() if k.lower() in _CAMERA_TAGS},
+        )
+        info.as_stored = self._turn == UPRIGHT and self._is_jpeg(packet, info)
+        info.remarks = _remarks(info, self._turn)
+        return info
+
+    def _first(self, path: Path, container: Any, stream: Any) -> tuple[Any, bytes]:
+        packets = container.demux(stream)
+        while True:
+            try:
+                packet = next(packets, None)
+                if packet is None:
+                    break
+                frames = packet.decode()
+            except (self._av.FFmpegError, EOFError):
+                continue
+            if frames:
+                return frames[0], bytes(packet)
+        raise RecordingError(
+            str(path), 'holds no picture that can be decoded', 'check that it was copied whole'
+        )
+
+    def _is_jpeg(self, content: bytes, info: FilmInfo) -> bool:
+        """Whether its packets are pictures that others can show; two fields in one are not."""
+        head = jpeg_head(content) if info.codec == 'mjpeg' else None
+        if head is None or (head.width, head.height) != (info.width, info.height):
+            return False
+        return is_decodable(with_huffman_tables(content, head))
+
+    def shots(self) -> Iterator[Shot]:
+        """The pictures that can be used, in the order of the film.
+
+        Yields
+        ------
+        Shot
+        """
+        with self._opened(self.info.path) as container:
+            stream = container.streams.video[0]
+            if self.info.as_stored:
+                yield from self._packets(container, stream)
+                return
+            stream.thread_type = 'AUTO'
+            stream.codec_context.thread_count = self._threads
+            yield from self._frames(container, stream)
+
+    def _packets(self, container: Any, stream: Any) -> Iterator[Shot]:
+        for packet, done in self._read(container, stream):
+            if not packet.size or packet.is_discard:
+                continue
+            content = bytes(packet)
+            head = jpeg_head(content)
+            if head is None or not (self._fits(head) and is_whole_jpeg(content)):
+                self.broken += 1
+                continue
+            picture = StoredPicture(
+                form_of('jpeg', head.channels), with_huffman_tables(content, head)
+            )
+            yield Shot(_shown_ns(packet, stream), picture, done)
+
+    def _frames(self, container: Any, stream: Any) -> Iterator[Shot]:
+        # An AVI knows when pictures are decoded, not when they are shown, which is in the same
+        # order of time but in another order of pictures.
+        decoded: deque[int | None] | None = deque() if container.format.name == 'avi' else None
+        for packet, done in self._read(container, stream):
+            if decoded is not None and packet.size:
+                decoded.append(_nanoseconds(packet.dts, packet, stream))
+            try:
+                frames = packet.decode()
+            except (self._av.FFmpegError, EOFError):
+                self.broken += 1
+                continue
+            for frame in frames:
+                time_ns = decoded.popleft() if decoded else _shown_ns(frame, stream)
+                if frame.is_corrupt or not self._fits(frame):
+                    self.broken += 1
+                    continue
+                yield Shot(time_ns, _VideoPicture(frame, self._turn), done)
+
+    def _fits(self, picture: Any) -> bool:
+        """Whether it has the size that the film began with."""
+        sides = self.info.width, self.info.height
+        return (picture.width, picture.height) == (sides[::-1] if self._turn[0] == 0 else sides)
+
+    def _read(self, container: Any, stream: Any) -> Iterator[tuple[Any, float]]:
+        packets = container.demux(stream)
+        done = 0.0
+        while True:
+            try:
+                packet = next(packets, None)
+            except (self._av.FFmpegError, EOFError):
+                self.broken += 1
+                return
+            if packet is None:
+                return
+            if packet.pos is not None and self._bytes:
+                done = min(1.0, max(done, packet.pos / self._bytes))
+            yield packet, done
+
+
+class _VideoPicture:
+    """A decoded frame; its colours are worked out when they are asked for."""
+
+    def __init__(self, frame: Any, turn: Turn) -> None:
+        self._frame = frame
+        self._turn = turn
+        self._gray: NDArray[np.uint8] | None = None
+
+    def gray(self) -> NDArray[np.uint8]:
+        # Worked out once: a frame must not be converted by two threads at a time.
+        if self._gray is None:
+            self._gray = self._brightness()
+        return self._gray
+
+    def _brightness(self) -> NDArray[np.uint8]:
+        plane, name = self._frame.planes[0], self._frame.format.name
+        if (name.startswith(('yuv4', 'yuvj4')) and name.endswith('p')) or name in ('gray', 'nv12'):
+            rows = np.frombuffer(plane, np.uint8)
+            rows = rows.reshape(plane.height, plane.line_size)
+            return rows[: self._frame.height, : self._frame.width]
+        return np.asarray(self._frame.to_ndarray(format='gray'))
+
+    def pixels(self) -> NDArray[np.uint8]:
+        form = 'gray' if self._frame.format.name.startswith('gray') else 'bgr24'
+        return turned(np.asarray(self._frame.to_ndarray(format=form)), self._turn)
+
+
+def _remarks(info: FilmInfo, turn: Turn) -> tuple[str, ...]:
+    if turn == UPRIGHT:
+        return ()
+    again = '; its JPEGs are compressed anew for that' if info.codec == 'mjpeg' else ''
+    return (f'{info.path}: {words_of(turn)}, as its rotation flag says{again}',)
+
+
+def _library(path: Path) -> Any:
+    try:
+        return import_module('av')
+    except ImportError as error:
+        raise ConfigurationError(
+            str(path),
+            'needs PyAV, which is not installed',
+            "run: pip install 'nanorocks_ros[video]'",
+        ) from error
+
+
+def _reason(error: Exception) -> str:
+    return str(getattr(error, 'strerror', None) or error)
+
+
+def _step_ns(stream: Any) -> int:
+    for rate in (stream.average_rate, stream.guessed_rate):
+        if rate:
+            return round(NS / Fraction(rate))
+    return 0
+
+
+def _start_ns(tags: dict[str, str]) -> int | None:
+    for name in _START_TAGS:
+        found = instant(tags.get(name, ''))
+        if found is not None and _FIRST_NS <= found < _LAST_NS:
+            return found
+    return None
+
+
+def _shown_ns(source: Any, stream: Any) -> int | None:
+    """When a packet or frame is to be shown; where it is not said, when it is to be decoded."""
+    time = source.pts if source.pts is not None else source.dts
+    return _nanoseconds(time, source, stream)
+
+
+def _nanoseconds(time: int | None, source: Any, stream: Any) -> int | None:
+    time_base = source.time_base or stream.time_base
+    if time is None or not time_base:
+        return None
+    found: int = round(time * Fraction(time_base) * NS)
+    return found

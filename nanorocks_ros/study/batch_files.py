@@ -1,0 +1,65 @@
+"""What a batch leaves in its folder besides the results of each recording."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from nanorocks_ros import __version__
+from nanorocks_ros.experiment.settings import rows
+from nanorocks_ros.study.batch_report import write_batch_report
+from nanorocks_ros.study.batch_tables import CYCLES, write_tables
+from nanorocks_ros.study.parquet import check_parquet
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from nanorocks_ros.experiment.settings import PipelineSettings
+    from nanorocks_ros.study.batch import Batch
+    from nanorocks_ros.study.combined import Combined
+
+REPORT = 'report.html'
+
+
+def check_format(folder: Path, kind: str) -> None:
+    """Refuse tables that could not be written in the end, before hours of work.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    check_parquet(folder / f'{CYCLES}.{kind}')
+
+
+def write_batch(
+    folder: Path, batch: Batch, together: Combined, settings: PipelineSettings, kind: str
+) -> Path:
+    """Write tables and report.
+
+    Parameters
+    ----------
+    folder : Path
+    batch : Batch
+    together : Combined
+    settings : PipelineSettings
+    kind : 'csv' or 'parquet'
+        Of the tables.
+
+    Returns
+    -------
+    Path
+        Of the report.
+
+    Raises
+    ------
+    RecordingError
+        When something cannot be written.
+    """
+    provenance = {
+        'nanorocks_ros': __version__,
+        **{row.name: row.default for row in rows(settings)},
+    }
+    write_tables(together, folder, kind, json.dumps(provenance))
+    path = folder / REPORT
+    write_batch_report(path, batch, together, settings)
+    return path

@@ -1,0 +1,53 @@
+"""Which parameters are refused by their name alone."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from nanorocks_ros.nodes._names import unknown_parameters
+from nanorocks_ros.nodes._quality import mismatches
+
+OURS = ('rate', 'bag', 'loop')
+
+
+def test_a_file_may_hold_what_other_nodes_read_but_no_name_that_none_has(monkeypatch):
+    monkeypatch.setattr(sys, 'argv', ['bag_player', '--ros-args', '--params-file', 'all.yaml'])
+    of_others = (
+        'cooling.probability',
+        'simulation.tray',
+        'scene.noise',
+        'dashboard_port',
+        'use_sim_time',
+    )
+    assert unknown_parameters(of_others, OURS) == []
+    assert unknown_parameters(('qos_overrides./x.publisher.depth',), OURS) == []
+    assert unknown_parameters(('cooling.probabilty', 'rat'), OURS) == [
+        "no parameter 'cooling.probabilty'",
+        "no parameter 'rat' (did you mean 'rate'?)",
+    ]
+
+
+@pytest.mark.parametrize('rule', ['trays:=1', 'bag_player:trays:=1'])
+def test_on_the_command_line_only_parameters_of_the_node_itself_are_known(monkeypatch, rule):
+    monkeypatch.setattr(sys, 'argv', ['bag_player', '--ros-args', '-p', 'rate:=1.0', '-p', rule])
+    assert unknown_parameters(('trays',), OURS) == ["no parameter 'trays'"]
+
+
+def test_every_policy_that_does_not_match_is_named():
+    weak = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    strong = QoSProfile(
+        depth=1,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+    assert mismatches([strong], [weak]) == []
+    assert mismatches([weak, weak, strong], [strong]) == [
+        ('reliability', 'BEST_EFFORT', 'RELIABLE'),
+        ('durability', 'VOLATILE', 'TRANSIENT_LOCAL'),
+    ]

@@ -1,0 +1,192 @@
+"""The bag player as a ROS citizen: orders, clock, latched topics, other people's topics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from nanorocks_ros.nodes._shell import qos_of, stamp_of
+from nanorocks_ros.recordings.messages import time_message
+from nanorocks_ros.recordings.reader import open_bag
+from nanorocks_ros.recordings.writer import BagWriter, OfferedQos, OfferedTopic
+from nanorocks_ros.wire import topics
+
+SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
+NS = 10**9
+
+
+class Remote:
+    """Gives a player orders, and hears what it plays."""
+
+    def __init__(self, graph):
+        self._graph = graph
+        self.clock, self.frames, self.epochs = [], [], []
+        node = graph.node
+        node.create_subscription(
+            Clock, '/clock', lambda m: self.clock.append(stamp_of(m.clock)), 100
+        )
+        node.create_subscription(
+            CompressedImage,
+            topics.RAW_COMPRESSED.name,
+            lambda m: self.frames.append(stamp_of(m.header.stamp)),
+            qos_of(topics.RAW_COMPRESSED),
+        )
+        node.create_subscription(Time, topics.EPOCH.name, self.epochs.append, qos_of(topics.EPOCH))
+
+    def order(self, name):
+        return self._call(Trigger, name, Trigger.Request())
+
+    def set(self, name, value):
+        parameter = Parameter(name, value=value).to_parameter_msg()
+        request = SetParameters.Request(parameters=[parameter])
+        return self._call(SetParameters, 'set_parameters', request).results[0]
+
+    def _call(self, kind, name, request):
+        client = self._graph.node.create_client(kind, f'/nanorocks/bag_player/{name}')
+        self._graph.until(client.service_is_ready)
+        future = client.call_async(request)
+        self._graph.until(future.done)
+        return future.result()
+
+    def ticks(self):
+        """The next five times that the clock tells."""
+        self.clock.clear()
+        self._graph.until(lambda: len(self.clock) >= 5)
+        return self.clock[:5]
+
+    def next_frame(self):
+        before = len(self.frames)
+        assert self.order('play_next').success
+        self._graph.until(lambda: len(self.frames) > before)
+        return self.frames[-1]
+
+
+def test_a_player_pauses_steps_seeks_and_goes_on_and_its_clock_says_so(graph):
+    bag = open_bag(SAMPLE)
+    played = bag.messages([topics.RAW_COMPRESSED.absolute()])
+    stamps = [stamp_of(bag.deserialize(one).header.stamp) for one in played]
+    start_ns = bag.start_ns
+    remote = Remote(graph)
+    parameters = (f'bag:={SAMPLE}', 'paused:=true', 'start:=1.0', 'duration:=15.0', 'listeners:=1')
+    player = graph.start('bag_player', *parameters)
+    assert remote.ticks() == 5 * [start_ns + NS]
+    assert remote.order('is_paused').success
+    graph.until(lambda: remote.epochs)
+    assert remote.next_frame() == stamps[30]
+    assert remote.next_frame() == stamps[31]
+
+    known = len(remote.epochs)
+    assert remote.set('position', 10.0).successful
+    graph.until(lambda: len(remote.epochs) > known)
+    assert remote.ticks() == 5 * [start_ns + 10 * NS]
+    assert remote.next_frame() == stamps[300]
+    assert remote.set('position', 2.0).successful
+    assert remote.next_frame() == stamps[60]
+
+    beyond = remote.set('position', 18.0)
+    assert not beyond.successful
+    assert '18 s is not in the part that is played, 1 to 16 s' in beyond.reason
+    assert not remote.set('rate', -1.0).successful
+    assert not remote.set('start', 3.0).successful
+
+    assert remote.set('rate', 2.0).successful
+    assert remote.order('resume').message.startswith('playing at 2.0')
+    assert not remote.order('play_next').success
+    graph.until(lambda: len(remote.frames) > 20)
+    assert remote.frames[4:] == stamps[61 : 61 + len(remote.frames) - 4]
+    assert sorted(remote.ticks()) == remote.clock[:5]
+    assert remote.order('toggle_paused').success
+    assert remote.set('position', 15.5).successful
+    assert set(remote.ticks()) == {start_ns + 15 * NS + NS // 2}
+    assert remote.order('resume').success
+    assert graph.wait(player).code == 0
+    assert remote.frames[-1] == stamps[479]
+
+
+def test_a_seek_back_starts_the_stages_afresh_and_sim_time_is_that_of_the_bag(graph):
+    remote = Remote(graph)
+    reports = []
+    graph.node.create_subscription(DiagnosticArray, '/diagnostics', reports.append, 10)
+    stage = graph.start('preprocessor', 'transport:=compressed', 'use_sim_time:=true')
+    graph.start('bag_player', f'bag:={SAMPLE}', 'start:=5.0', 'listeners:=2')
+    graph.until(lambda: len(remote.frames) > 30)
+    assert remote.set('position', 5.0).successful
+    graph.until(lambda: 'time went back by' in graph.output(stage))
+    assert 'starting afresh' in graph.output(stage)
+    names = '/nanorocks/preprocessor'
+    times = [stamp_of(one.header.stamp) for one in reports if one.status[0].name == names]
+    assert times
+    start_ns = open_bag(SAMPLE).start_ns
+    assert all(one == 0 or start_ns < one < start_ns + 60 * NS for one in times)
+    assert any(times)
+    ended = graph.interrupt(stage)
+    assert ended.code == 0
+    assert 'Traceback' not in ended.output
+
+
+def foreign_bag(path):
+    """Topics that are not of the graph: one latched, one of a type that nobody has, a clock."""
+    latched = OfferedQos(transient_local=True, depth=3)
+    table = {
+        '/notes': OfferedTopic(msgtype='std_msgs/msg/String', qos=latched),
+        '/often': OfferedTopic(msgtype='std_msgs/msg/String', qos=OfferedQos(reliable=False)),
+        '/odd': OfferedTopic(msgtype='odd_msgs/msg/Odd', qos=OfferedQos(), definition='int32 x'),
+        '/clock': OfferedTopic(msgtype='builtin_interfaces/msg/Time', qos=OfferedQos()),
+    }
+
+    class Text:
+        def __init__(self, data):
+            self.data = data
+
+    class Odd:
+        x = 1
+
+    with BagWriter(path, table, metadata={}) as bag:
+        bag.write('/notes', NS, Text('first'))
+        bag.write('/odd', NS, Odd())
+        bag.write('/clock', NS, time_message(7))
+        for k in range(40):
+            bag.write('/often', NS + k * NS // 10, Text(str(k)))
+    return path
+
+
+def test_topics_of_others_are_played_as_they_were_offered(graph, tmp_path):
+    """Without a camera, from the middle, in a loop; beside a second camera, which is said."""
+    notes, often, clock = [], [], []
+    late = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    node = graph.node
+    node.create_publisher(Image, topics.RAW.name, qos_of(topics.RAW))
+    best_effort = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+    node.create_subscription(String, '/often', lambda m: often.append(int(m.data)), best_effort)
+    node.create_subscription(Clock, '/clock', lambda m: clock.append(stamp_of(m.clock)), 100)
+    path = foreign_bag(tmp_path / 'bag')
+    player = graph.start('bag_player', f'bag:={path}', 'loop:=true', 'start:=2.0', 'rate:=4.0')
+    graph.until(lambda: 39 in often and often[-1] < 30 and 3 * NS in clock)
+    assert min(often) == 20
+    assert min(clock) == 3 * NS
+    # What comes before the part that is played is still latched in it.
+    node.create_subscription(String, '/notes', lambda m: notes.append(m.data), late)
+    graph.until(lambda: notes)
+    assert set(notes) == {'first'}
+    (info,) = node.get_publishers_info_by_topic('/often')
+    assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+    graph.until(lambda: 'what they send is mixed' in graph.output(player))
+    ended = graph.interrupt(player)
+    assert ended.code == 0
+    assert '/odd: type odd_msgs/msg/Odd is not installed here; it is not played' in ended.output
+    said = '/nanorocks/camera/image_raw: /nanorocks/bag_player and /nanorocks/listener publish it'
+    assert said in ended.output
+    assert 'Traceback' not in ended.output

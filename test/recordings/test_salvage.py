@@ -1,0 +1,176 @@
+"""Whatever is wrong with a recording, a new one gets every message that can be read."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer as McapWriter
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.recordings.messages import compressed_image_message
+from nanorocks_ros.recordings.reader import open_bag
+from nanorocks_ros.recordings.salvage import salvage
+
+SPEED = '/nanorocks/tray_3/speed'
+CAMERA = '/nanorocks/camera/image_raw/compressed'
+IMAGE = 'sensor_msgs/msg/CompressedImage'
+
+
+def salvaged(source, target):
+    """What was salvaged; the source is as it was, and the new recording is whole."""
+    before = {one: hashlib.sha256(one.read_bytes()).digest() for one in files(source)}
+    found = salvage(source, target, lambda done, total: None)
+    assert {one: hashlib.sha256(one.read_bytes()).digest() for one in files(source)} == before
+    bag = open_bag(target)
+    assert bag.complete
+    assert bag.notices == ()
+    messages = list(bag.messages())
+    assert len(messages) == found.recovered
+    if {info.encoding for info in bag.topics.values()} == {'cdr'}:
+        with Reader(target) as reader:
+            assert reader.message_count == found.recovered
+    return found, messages
+
+
+def files(path):
+    return [one for one in path.rglob('*') if one.is_file()] if path.is_dir() else [path]
+
+
+def chunks(path):
+    with path.open('rb') as stream:
+        return make_reader(stream).get_summary().chunk_indexes
+
+
+def test_a_whole_recording_is_copied_message_by_message(tmp_path, record):
+    path = record(tmp_path / 'run')
+    found, messages = salvaged(path, tmp_path / 'new')
+    assert (found.recovered, found.lost) == (81, 0)
+    assert messages == list(open_bag(path).messages())
+    old, new = open_bag(path), open_bag(tmp_path / 'new')
+    assert {k: (v.type, v.qos) for k, v in new.topics.items()} == {
+        k: (v.type, v.qos) for k, v in old.topics.items()
+    }
+    assert old.metadata.items() <= new.metadata.items()
+    assert new.metadata['salvaged_from'] == 'run'
+
+
+@pytest.mark.parametrize('share', [0.3, 0.6, 0.95, 0.999])
+def test_what_lies_before_a_cut_is_recovered_and_the_rest_counted(tmp_path, record, share):
+    path = record(tmp_path / 'run', frames=100, size=9000)
+    everything = list(open_bag(path).messages())
+    file = path / 'run.mcap'
+    content = file.read_bytes()
+    file.write_bytes(content[: int(share * len(content))])
+    found, messages = salvaged(path, tmp_path / 'new')
+    assert messages == everything[: len(messages)]
+    assert found.recovered + found.lost == len(everything) == 201
+    assert found.recovered > (share - 0.2) * 201
+
+
+def test_without_metadata_and_without_an_end(tmp_path, record):
+    path = record(tmp_path / 'run', frames=100, size=9000)
+    (path / 'metadata.yaml').unlink()
+    found, _ = salvaged(path, tmp_path / 'new')
+    assert (found.recovered, found.lost) == (201, 0)
+    # The file itself keeps a copy of what metadata.yaml says.
+    assert open_bag(tmp_path / 'new').metadata['tray'] == '3'
+    file = path / 'run.mcap'
+    file.write_bytes(file.read_bytes()[:-100])
+    found, _ = salvaged(path, tmp_path / 'newer')
+    assert found.recovered == 201
+
+
+@pytest.mark.parametrize('ended', [True, False])
+@pytest.mark.parametrize('number', range(3))
+@pytest.mark.parametrize('place', [1, 6, 'middle'])
+def test_a_damaged_chunk_costs_its_own_messages_alone(tmp_path, record, ended, number, place):
+    """Wherever it is damaged: in its length, or in its middle."""
+    path = record(tmp_path / 'run', frames=100, size=9000)
+    everything = list(open_bag(path).messages())
+    file = path / 'run.mcap'
+    whole = bytearray(file.read_bytes())
+    places = chunks(file)
+    number = min(number, len(places) - 1)
+    chunk = places[number]
+    at = chunk.chunk_length // 2 if place == 'middle' else place
+    whole[chunk.chunk_start_offset + at] ^= 0x55
+    file.write_bytes(whole if ended else whole[:-40])
+    found, messages = salvaged(path, tmp_path / 'new')
+    assert [one for one in everything if one in messages] == messages
+    outside = [
+        one
+        for one in everything
+        if not chunk.message_start_time <= one.log_time_ns <= chunk.message_end_time
+    ]
+    assert [one for one in messages if one in outside] == outside
+    assert found.recovered + found.lost == len(everything)
+
+
+def write_unknown(path, encoding, text):
+    writer = McapWriter(str(path))
+    writer.start()
+    schema = writer.register_schema('my_msgs/msg/Odd', 'ros2msg', text)
+    writer.add_message(writer.register_channel('/odd', encoding, schema), 5, b'1234', 5)
+    writer.finish()
+    return path
+
+
+@pytest.mark.parametrize(('encoding', 'text'), [('cdr', b'nonsense (('), ('json', b'')])
+def test_messages_that_nobody_understands_are_copied_too(tmp_path, encoding, text):
+    path = write_unknown(tmp_path / 'x.mcap', encoding, text)
+    _, (message,) = salvaged(path, tmp_path / 'new')
+    assert message.cdr == b'1234'
+    info = open_bag(tmp_path / 'new').topics['/odd']
+    assert (info.type, info.encoding, info.definition) == (
+        'my_msgs/msg/Odd',
+        encoding,
+        text.decode(),
+    )
+
+
+def write_sqlite(path, count):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    noise = np.random.default_rng(1)
+    with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        connection = writer.add_connection(CAMERA, IMAGE, typestore=store)
+        for stamp in range(1, count + 1):
+            message = compressed_image_message(stamp, 'camera', 'jpeg', noise.bytes(3000))
+            writer.write(connection, stamp, store.serialize_cdr(message, IMAGE))
+    return path
+
+
+def test_of_a_sqlite_file_the_rows_that_can_be_read_are_recovered(tmp_path):
+    path = write_sqlite(tmp_path / 'run', 100)
+    everything = list(open_bag(path).messages())
+    file = next(path.glob('*.db3'))
+    content = file.read_bytes()
+    assert salvaged(path, tmp_path / 'whole')[1] == everything
+    file.write_bytes(content[: int(0.6 * len(content)) // 4096 * 4096])
+    found, messages = salvaged(path, tmp_path / 'cut')
+    assert 40 <= len(messages) <= 70
+    assert [one for one in everything if one in messages] == messages
+    assert found.recovered + found.lost == 100
+    file.write_bytes(content[:81920] + bytes(40960) + content[122880:])
+    found, messages = salvaged(path, tmp_path / 'hole')
+    assert 70 <= len(messages) < 100
+    assert found.recovered + found.lost == 100
+
+
+def test_the_target_is_not_overwritten(tmp_path, record):
+    path = record(tmp_path / 'run', frames=2)
+    with pytest.raises(RecordingError, match='exists already and is not overwritten'):
+        salvage(path, path, lambda *_: None)
+    assert len(list(open_bag(path).messages())) == 5
+
+
+@pytest.mark.parametrize('content', [b'\x89MCAP0\r\n', b'\x89MCAP0\r\n' + bytes(500)])
+def test_where_nothing_is_left_nothing_is_made(tmp_path, content):
+    (tmp_path / 'x.mcap').write_bytes(content)
+    with pytest.raises(RecordingError, match='holds no message that can be recovered'):
+        salvage(tmp_path / 'x.mcap', tmp_path / 'new', lambda *_: None)
+    assert not (tmp_path / 'new').exists()
