@@ -63,6 +63,10 @@ class Companions:
         self._rows: dict[tuple[int, int], _Row] = {}
         self._next = 0.0
 
+    def due(self, time: float) -> bool:
+        """Whether bodies are to be compared again."""
+        return time >= self._next
+
     def push(
         self,
         time: float,
@@ -71,7 +75,7 @@ class Companions:
         hidden: bool,
         largest: float,
     ) -> list[Bond]:
-        """Take the beads of the next picture.
+        """Take the beads of the next picture in which bodies are compared.
 
         Parameters
         ----------
@@ -90,8 +94,6 @@ class Companions:
         list of Bond
             New ones, of the two beads that are nearest to each other.
         """
-        if time < self._next:
-            return []
         self._next = time + _INTERVAL
         nearest = _neighbours(beads, body, hidden)
         members: dict[int, list[int]] = {}

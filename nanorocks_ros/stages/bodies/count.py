@@ -137,7 +137,7 @@ class BodyCounter:
 
     def _as_one(self, time: float, tracks: Tracks, beads: Beads) -> list[Bond]:
         """Bodies that move as one. Of two single beads only their own separation tells."""
-        if self._first_merge is None:
+        if self._first_merge is None or not self._companions.due(time):
             return []
         picture = self._pictures[-1]
         body = bodies_of(picture.known, [*self._bonds, *picture.clinging])

@@ -26,6 +26,8 @@ def _joined(drift, *, hidden):
     found = []
     for k in range(90):
         time = k * STEP
+        if not companions.due(time):
+            continue
         places = PLACES + np.array([1e-3 * time, 0.0])
         places += rng.normal(0.0, ERROR, (4, 2))
         places[2:, 1] += drift * time
