@@ -16,6 +16,8 @@ from nanorocks_ros.experiment.settings import PipelineSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import View
 from nanorocks_ros.records import Frame, SpeedEstimate, TrayImage
+from nanorocks_ros.stages.bodies.count import BodyCounter
+from nanorocks_ros.stages.contacts.find import ContactFinder
 from nanorocks_ros.stages.pipeline import Pipeline
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
@@ -65,6 +67,8 @@ def report() -> None:
     pipeline = Pipeline(settings, 'film', View(camera=film.camera.geometry.camera))
     trackers = {number: Tracker(settings, load_trays()[number]) for number in _TRAYS}
     trackers = {number: one for number, one in trackers.items() if not one.crowded}
+    finders = {number: ContactFinder(load_trays()[number]) for number in trackers}
+    counters = {number: BodyCounter(settings, load_trays()[number]) for number in trackers}
     clock = _Clock()
     for number, shot in enumerate(shots):
         clock.running = number >= _WARM_UP
@@ -73,7 +77,9 @@ def report() -> None:
         frame = Frame(stamp_ns=stamp_ns, encoding='bgr8', image=image)
         for one in _push(pipeline, clock, frame):
             if one.tray in trackers:
-                clock.timed('tracking', trackers[one.tray].push, one)
+                (tracks,) = clock.timed('tracking', trackers[one.tray].push, one)
+                clock.timed('contacts', finders[one.tray].push, tracks)
+                clock.timed('bodies', counters[one.tray].push, tracks, 1)
     cv2.setNumThreads(threads)
     _print(clock, len(shots) - _WARM_UP, sorted(trackers))
 
@@ -81,10 +87,12 @@ def report() -> None:
 def _print(clock: _Clock, frames: int, followed: list[int]) -> None:
     spent = {name: 1e3 * seconds / frames for name, seconds in clock.spent.items()}
     tracking, decoding = spent.pop('tracking'), spent.pop('decoding')
-    spent['speeds'] -= tracking
+    spent['speeds'] -= tracking + spent['contacts'] + spent['bodies']
     rows = {
         'preprocessing': spent.pop('preprocessing'),
         f'tracking of trays {", ".join(map(str, followed))}': tracking,
+        'contacts': spent.pop('contacts'),
+        'bodies': spent.pop('bodies'),
         'speeds by tracks and structure function': spent.pop('speeds'),
         **spent,
     }

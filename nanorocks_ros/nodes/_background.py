@@ -1,10 +1,11 @@
 """Work that goes on in a thread of its own while the node takes the next message.
 
 On two cores a camera of 1080p is followed only if the next frame is decoded and cut while the
-trays of the last are measured. The work releases Python's lock wherever it counts (compiled
-functions, OpenCV), so two threads are worth nearly two cores. Jobs are done one after the
-other, in order, and results come back in the thread of the node: what is published does not
-depend on who was faster, and nothing of ROS is touched by two threads.
+trays of the last are measured. The work releases Python's lock where most of it is done (compiled
+functions, OpenCV); of a whole plate the rest is too much for one lock, and the thread here only
+hands it to other processes (`study.shared_pipeline`). Jobs are done one after the other, in order,
+and results come back in the thread of the node: what is published does not depend on who was
+faster, and nothing of ROS is touched by two threads.
 """
 
 from __future__ import annotations

@@ -200,9 +200,10 @@ class PipelineNode(NanorocksNode):
 
     def destroy_node(self):
         """End the threads and processes before what they work for is gone."""
-        self._background.close()
+        # First the processes: the thread need not wait for what they are doing.
         for worker in self._workers:
             worker.close()
+        self._background.close()
         if self.recorder is not None:
             self.recorder.close()
         if self._page is not None:

@@ -7,6 +7,7 @@ import os
 import signal
 import threading
 import traceback
+from contextlib import suppress
 from dataclasses import replace
 from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.shared_memory import SharedMemory
@@ -145,8 +146,9 @@ class TrayProcess:
         self._process.kill()
         self._process.join()
         if self._memory is not None:
-            self._memory.close()
-            self._memory = None
+            # Another thread may be about to write.
+            with suppress(BufferError):
+                self._memory.close()
 
     def _answer(self) -> tuple[Found, Exception | None]:
         try:
