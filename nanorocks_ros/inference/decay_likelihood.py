@@ -30,9 +30,13 @@ _MOST = 1e300
 _LONGEST_STEP = 0.5
 _SMALL = 3e-3
 # Before anything is measured the gas is taken to have been faster at the shaking event than at the
-# first speed used by a factor of 1.6, give or take a factor of e.
+# first speed used by a factor of 1.6, give or take a factor of e, where that is within so many
+# seconds (their logarithm) of the event. What it did before a first speed that comes later is known
+# the less the later that is: both rise with the logarithm of that time.
 _AMPLITUDE_LEAD, _AMPLITUDE_SPREAD = 0.5, 1.0
-_MOST_LEAD = 3.0
+_EARLY, _LEAD_PER_LOG_TIME = math.log(4.0), 1.0
+# The search begins where the first speeds are matched, however fast the gas was.
+_MOST_LEAD = 8.0
 # Speeds from which the amplitude is guessed.
 _FIRST_SPEEDS = 3
 # Nothing is measured better than that, relative.
@@ -231,7 +235,9 @@ def _evaluate(
     # Columns: residual, derivative with ln a, then the nuisances; whitened in place.
     columns = np.empty((2 + n_z, n))
     middle = log_speed.mean()
-    expected = log_speed[0] + _AMPLITUDE_LEAD
+    late = _LEAD_PER_LOG_TIME * max(log_time[0] - _EARLY, 0.0)
+    expected = log_speed[0] + _AMPLITUDE_LEAD + late
+    spread = _AMPLITUDE_SPREAD + late
     for place in range(means.shape[0]):
         amplitude = _matching(log_time, log_speed, means[place], first, step)
         offset = (amplitude + log_time[0] - first) / step
@@ -245,10 +251,10 @@ def _evaluate(
         for _ in range(_NEWTON_STEPS):
             _compare(log_time, log_speed, means[place], first, step, amplitude, columns)
             _whiten(factor, columns, 2)
-            off = (amplitude - expected) / _AMPLITUDE_SPREAD
+            off = (amplitude - expected) / spread
             now = off * off
-            pull = -off / _AMPLITUDE_SPREAD
-            stiffness = 1.0 / _AMPLITUDE_SPREAD**2
+            pull = -off / spread
+            stiffness = 1.0 / spread**2
             for i in range(n):
                 now += columns[0, i] ** 2
                 pull += columns[0, i] * columns[1, i]
@@ -273,8 +279,8 @@ def _evaluate(
             columns[n_z, i] = camera[0] * (columns[1, i] - 1.0)
             columns[n_z + 1, i] = camera[1] * (log_speed[i] - middle)
         _whiten(factor, columns, 2 + n_z)
-        _sum_up(columns, numbers[place], gradients[place], informations[place])
-        off = (amplitude - expected) / _AMPLITUDE_SPREAD
+        off = (amplitude - expected) / spread
+        _sum_up(columns, (off, spread), numbers[place], gradients[place], informations[place])
         numbers[place, 0] -= 0.5 * (log_determinant + off * off)
 
 
@@ -388,16 +394,21 @@ def _between(values: NDArray[np.float64], at: float) -> tuple[float, float]:
 @compiled
 def _sum_up(
     columns: NDArray[np.float64],
+    amplitude: tuple[float, float],
     numbers: NDArray[np.float64],
     gradient: NDArray[np.float64],
     information: NDArray[np.float64],
 ) -> None:
     """Log likelihood and its derivatives, with the amplitude projected out."""
     n = columns.shape[1]
+    off, spread = amplitude
     deviation = 0.0
-    stiffness = 1.0 / _AMPLITUDE_SPREAD**2
+    # At the best amplitude there is no pull left, but where the mean has a kink or an end.
+    pull = -off / spread
+    stiffness = 1.0 / spread**2
     for i in range(n):
         deviation += columns[0, i] ** 2
+        pull += columns[0, i] * columns[1, i]
         stiffness += columns[1, i] ** 2
     along = np.zeros(gradient.size)
     for z in range(gradient.size):
@@ -405,6 +416,8 @@ def _sum_up(
         for i in range(n):
             along[z] += columns[1, i] * columns[2 + z, i]
             gradient[z] += columns[0, i] * columns[2 + z, i]
+        # What the amplitude would take over is no gain of a nuisance.
+        gradient[z] -= along[z] * pull / stiffness
         for y in range(z + 1):
             total = -along[z] * along[y] / stiffness
             for i in range(n):

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicSpline, RectBivariateSpline
+from scipy.signal import savgol_filter
 from scipy.special import logsumexp
 
 from nanorocks_ros.errors import ConfigurationError
@@ -37,6 +38,11 @@ _DEPTH = 18.0
 # Beyond about so much less, log likelihoods are compressed before they are interpolated: next to
 # steep slopes a spline would swing.
 _COMPRESSION = 200.0
+# Where nothing is lost there is no decay to compare with: that corner of the grid is taken as so
+# much less likely than the likelier of its neighbours, lest a spline swing around it.
+_CORNER = 10.0
+# Cells of ln t over which curves of the library are smoothed.
+_SMOOTH_CELLS = 9
 # Places, at least, at which a term is evaluated to be smeared.
 _SMEARED = 1000
 
@@ -55,7 +61,7 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
     restitution = 1.0 - np.linspace(1.0, 0.0, _PLACES) ** (1.0 / _POWER)
     wall = 1.0 - (1.0 - LOWEST_WALL) * np.linspace(1.0, 0.0, _WALL_PLACES) ** (1.0 / _WALL_POWER)
     beads, walls = (one.ravel() for one in np.meshgrid(restitution, wall, indexing='ij'))
-    mean = library.log_speed(beads, walls)
+    mean = _smooth(library.log_speed(beads, walls))
     slopes = [_floor_and_lid(library, beads, walls, settings.floor_lid_spread)]
     for number, spread in enumerate(_spreads(tray, settings)):
         change = np.zeros((beads.size, len(NUISANCES)))
@@ -69,10 +75,19 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
         restitution=restitution,
         wall_restitution=wall,
         mean=mean,
-        slopes=np.stack(slopes, axis=1),
+        slopes=_smooth(np.stack(slopes, axis=1)),
         corners=corners,
         shares=shares,
     )
+
+
+def _smooth(curves: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Curves of the library without the noise of its runs.
+
+    Their slopes tell how far amplitude and scale make up for each other. Where the speed falls as
+    1/t they nearly do, and noise of 0.01 from cell to cell would decide.
+    """
+    return np.asarray(savgol_filter(curves, _SMOOTH_CELLS, 3, axis=-1))
 
 
 def _spreads(tray: Tray, settings: PriorSettings) -> tuple[float, ...]:
@@ -262,6 +277,8 @@ def posterior_of(
     check_walls(walls)
     shape = (tables.restitution.size, tables.wall_restitution.size)
     less = (log_likelihood.max() - log_likelihood).reshape(shape)
+    less = _without_pits(_without_pits(less, 0), 1)
+    less[-1, -1] = min(less[-1, -1], min(less[-2, -1], less[-1, -2]) + _CORNER)
     values = -_COMPRESSION * np.log1p(less / _COMPRESSION)
     surface = RectBivariateSpline(
         _even(tables.restitution, 0.0, _POWER),
@@ -289,6 +306,17 @@ def posterior_of(
         probability=weight / weight.sum(),
         tension=math.sqrt(2.0 * max(apart - best, 0.0)) if of_beads or of_walls else 0.0,
     )
+
+
+def _without_pits(less: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    """How much less likely places are, where along one restitution there is one best of them.
+
+    Where amplitude, scale and restitution make up for each other, noise of the library leaves
+    single places without the best of it, around which a spline would swing.
+    """
+    before = np.minimum.accumulate(less, axis=axis)
+    behind = np.flip(np.minimum.accumulate(np.flip(less, axis=axis), axis=axis), axis=axis)
+    return np.minimum(less, np.maximum(before, behind))
 
 
 def _even(restitution: NDArray[np.float64], low: float, power: float) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from fractions import Fraction
 from importlib import import_module
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -206,12 +207,14 @@ class _VideoPicture:
         self._frame = frame
         self._turn = turn
         self._gray: NDArray[np.uint8] | None = None
+        # Two threads that convert one frame at a time wait for each other for ever.
+        self._converting = Lock()
 
     def gray(self) -> NDArray[np.uint8]:
-        # Worked out once: a frame must not be converted by two threads at a time.
-        if self._gray is None:
-            self._gray = self._brightness()
-        return self._gray
+        with self._converting:
+            if self._gray is None:
+                self._gray = self._brightness()
+            return self._gray
 
     def _brightness(self) -> NDArray[np.uint8]:
         plane, name = self._frame.planes[0], self._frame.format.name
@@ -223,7 +226,9 @@ class _VideoPicture:
 
     def pixels(self) -> NDArray[np.uint8]:
         form = 'gray' if self._frame.format.name.startswith('gray') else 'bgr24'
-        return turned(np.asarray(self._frame.to_ndarray(format=form)), self._turn)
+        with self._converting:
+            pixels = np.asarray(self._frame.to_ndarray(format=form))
+        return turned(pixels, self._turn)
 
 
 def _remarks(info: FilmInfo, turn: Turn) -> tuple[str, ...]:
