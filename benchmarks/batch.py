@@ -12,6 +12,7 @@ import shutil
 import tempfile
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from nanorocks_ros.experiment.settings import (
@@ -196,8 +197,10 @@ def _campaign(folder: Path) -> None:
     broken_bags(bags, films[0])
     settings = PipelineSettings()
     batch, seconds, peak = _run(folder / 'results', bags)
+    # Copies count here as if they were recordings of their own.
+    batch.results = [replace(one, twin='') for one in batch.results]
     start = time.perf_counter()
-    together = combined(batch.results, settings)
+    together = combined(batch.counted, settings)
     write_batch(folder / 'results', batch, together, settings, 'csv')
     report = time.perf_counter() - start
     _, again, _ = _run(folder / 'results', bags)

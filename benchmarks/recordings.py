@@ -27,7 +27,7 @@ from nanorocks_ros.study.import_film import import_films
 from nanorocks_ros.study.results_bag import offered
 from nanorocks_ros.wire import topics
 
-_WIDTH, _HEIGHT, _FRAMES = 1920, 1080, 150
+_WIDTH, _HEIGHT, _FRAMES = 1920, 1080, 300
 _ROUNDS = 3
 _NS = 1_000_000_000
 _STEP_NS = _NS // 30
@@ -51,7 +51,7 @@ def _film(path: Path, codec: str, form: str, options: dict[str, str]) -> None:
         stream = container.add_stream(codec, rate=30, options=options)
         stream.width, stream.height, stream.pix_fmt = _WIDTH, _HEIGHT, form
         for number in range(_FRAMES):
-            image = cv2.add(scene[:, 8 * number : 8 * number + _WIDTH], grain[number % 8])
+            image = cv2.add(scene[:, 6 * number : 6 * number + _WIDTH], grain[number % 8])
             container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format='bgr24')))
         container.mux(stream.encode())
 

@@ -1,7 +1,7 @@
 """Bodies, sizes, first merges and sticking speeds from tracks, against the truth.
 
-First true places at 30 pictures a second with errors like those of tracking, 58 s after a
-shaking event at 10 mm/s; then tracks of films with all effects of the camera.
+True places at 30 pictures a second with errors like those of tracking, 58 s after a
+shaking event at 10 mm/s. Tracks of films are in `sticking_films`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.contacts import filmed_tracks, tracks_of
+from benchmarks.contacts import tracks_of
 from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.inference.sticking import StickingCycle, sticking_cycle, sticking_estimate
@@ -19,6 +19,7 @@ from nanorocks_ros.physics.sticking import slow_contacts
 from nanorocks_ros.records import BodyEstimate, Merge, Tracks
 from nanorocks_ros.simulation.shaking import ShakenTray
 from nanorocks_ros.stages.bodies.count import BodyCounter
+from nanorocks_ros.study.tasks import Workers, run_tasks
 
 _RATE = 30.0
 _SECONDS = 58.0
@@ -28,9 +29,6 @@ _STICKING = (1e-3, 3e-3, 5e-3, 10.4e-3)
 _CYCLES = 6
 _CONTROLS = 7
 _CONTROL_TRUTHS = [(pairs, walls) for pairs in (0.5, 0.7, 0.89, 0.95) for walls in (0.9, 0.97)]
-_FILM_SECONDS = 26.0
-_FILM_STICKING = (3e-3,)
-_FILM_SEED = 9
 _NS = 1e9
 
 
@@ -113,12 +111,15 @@ def _report_controls() -> None:
     print('\nControls without sticking: restitutions 0.5 to 0.95, walls 0.9 and 0.97\n')
     print('| tray | cycles | with a false merge |')
     print('| --- | --- | --- |')
+    tasks = {
+        f'{number} {pairs} {walls} {run}': (number, pairs, walls, run)
+        for number in _TRAYS
+        for pairs, walls in _CONTROL_TRUTHS
+        for run in range(_CONTROLS)
+    }
+    found = run_tasks(_false_alarm, tasks, Workers())
     for number in _TRAYS:
-        false = [
-            bool(simulated(number, run, 7, restitution=pairs, wall_restitution=walls).merges)
-            for pairs, walls in _CONTROL_TRUTHS
-            for run in range(_CONTROLS)
-        ]
+        false = [one for (of, *_), one in zip(tasks.values(), found, strict=True) if of == number]
         print(f'| {number} | {len(false)} | {sum(false)} |', flush=True)
 
 
@@ -177,10 +178,10 @@ def _cycle(one: Course, beads: int, merges: list[Merge]) -> StickingCycle:
     return sticking_cycle(beads, merges, stamps, one.speeds[1:], 0)
 
 
-def _true_merges(one: Course) -> list[Merge]:
-    """As if all had been found."""
-    fallen = -np.diff(one.bodies, prepend=one.counts[0].beads)
-    stamps = np.rint(np.repeat(one.times, fallen.astype(np.int64)) * _NS).astype(np.int64)
+def true_merges(times: np.ndarray, bodies: np.ndarray, beads: int) -> list[Merge]:
+    """As if all had been found: of the times and numbers of bodies, (n,)."""
+    fallen = -np.diff(bodies, prepend=beads)
+    stamps = np.rint(np.repeat(times, fallen.astype(np.int64)) * _NS).astype(np.int64)
     fields = {'tray': 0, 'cycle': 1, 'tracks': np.zeros(2, dtype=np.int32), 'joins': True}
     return [Merge(stamp_ns=int(at), known_ns=int(at), **fields) for at in stamps]
 
@@ -190,7 +191,9 @@ def threshold_row(number: int, speed: float, cycles: list[Course], measure: str)
     tray = load_trays()[number]
     contacts = slow_contacts(tray)
     given = [_cycle(one, tray.count, one.merges) for one in cycles]
-    true = [_cycle(one, tray.count, _true_merges(one)) for one in cycles]
+    true = [
+        _cycle(one, tray.count, true_merges(one.times, one.bodies, tray.count)) for one in cycles
+    ]
     each = [sticking_estimate([one], contacts, tray.count, measure=measure) for one in given]
     ratios = np.array([one.sticking_speed for one in each]) / speed
     covered = sum(one.lower <= speed <= one.upper for one in each)
@@ -221,46 +224,29 @@ def _report_thresholds(
         print(f'| {number}, {1e3 * speed:g} mm/s | {row} |', flush=True)
 
 
-def _report_films() -> None:
-    print(f'\nTracks of films with all effects, {_FILM_SECONDS:g} s, one cycle each\n')
-    for number, one in _filmed(0.0, _FILM_SEED).items():
-        print(f'Tray {number}, nothing sticks: {len(one.merges)} false merges\n')
-    courses = {
-        (number, speed): [one]
-        for speed in _FILM_STICKING
-        for number, one in _filmed(speed, _FILM_SEED).items()
-    }
-    print(f'| tray, sticking speed | {SIZE_HEADER}')
-    print('| --- |' + ' --- |' * 7)
-    for (number, speed), cycles in courses.items():
-        print(f'| {number}, {1e3 * speed:g} mm/s | {size_row(cycles)} |', flush=True)
-    _report_thresholds(courses)
+def _cycle_of(task: tuple[int, float, int]) -> Course:
+    number, speed, run = task
+    return simulated(number, run, sticking_speed=speed)
 
 
-def _filmed(speed: float, seed: int) -> dict[int, Course]:
-    settings = SimulationSettings(
-        restitution=0.89,
-        wall_restitution=0.97,
-        seed=seed,
-        mean_speed=_SPEED,
-        first_shake=0.0,
-        frame_rate=_RATE,
-        sticking_speed=speed,
-    )
-    pictures: dict[int, list[tuple[Tracks, np.ndarray, float]]] = {n: [] for n in _TRAYS}
-    for image, tracks, truth in filmed_tracks(_TRAYS, settings, _FILM_SECONDS):
-        pictures[image.tray].append((tracks, truth.bodies, truth.projected_speeds.mean()))
-    return {number: course(load_trays()[number], seen) for number, seen in pictures.items()}
+def _false_alarm(task: tuple[int, float, float, int]) -> bool:
+    number, pairs, walls, run = task
+    gas = simulated(number, run, 7, restitution=pairs, wall_restitution=walls)
+    return bool(gas.merges)
 
 
 def report() -> None:
     """Print the tables."""
-    courses = {
-        (number, speed): [simulated(number, run, sticking_speed=speed) for run in range(_CYCLES)]
+    tasks = {
+        f'{number} {speed} {run}': (number, speed, run)
         for number in _TRAYS
         for speed in _STICKING
+        for run in range(_CYCLES)
     }
+    courses: dict[tuple[int, float], list[Course]] = {}
+    found = run_tasks(_cycle_of, tasks, Workers())
+    for (number, speed, _), one in zip(tasks.values(), found, strict=True):
+        courses.setdefault((number, speed), []).append(one)
     _report_sizes(courses)
     _report_thresholds(courses)
     _report_controls()
-    _report_films()

@@ -739,7 +739,8 @@ class Merge:
     tray, cycle : int
     tracks : ndarray of int32, (2,)
     joins : bool
-        Whether it made one body of two; False for two beads of one body.
+        Whether bodies became fewer by it; False for two beads of one body, or of one that only
+        seemed to be two.
     """
 
     stamp_ns: int

@@ -62,3 +62,10 @@ def test_links_between_pages_lead_somewhere(page):
         if not there.exists() or (anchor and anchor not in anchors(there)):
             dead.append(target)
     assert dead == []
+
+
+def test_every_page_is_in_the_index():
+    index = (ROOT / 'docs/README.md').read_text(encoding='utf-8')
+    named = {target.partition('#')[0] for target in LINK.findall(index)}
+    pages = {path.name for path in (ROOT / 'docs').glob('*.md')} - {'README.md'}
+    assert pages - named == set()

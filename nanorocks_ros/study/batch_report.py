@@ -109,7 +109,8 @@ def _restitutions(together: Combined) -> Section:
                     for one in _known(together)
                 ],
                 caption='Means over the cycles ± scatter of a single cycle, as the paper reports '
-                'them over its 178 runs; in brackets how many cycles are known.',
+                'them over its 178 runs; in brackets how many cycles are known. v0 and tau count '
+                'where the fit knows them to half of their value.',
             ),
             *(_unread(together)),
         ],

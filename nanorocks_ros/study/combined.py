@@ -40,6 +40,9 @@ MEANS = {
     'bodies': '1',
     'onset': 's',
 }
+# Of these a decay that is too short tells nothing, and its fit anything: they are not part of a
+# mean unless they are known to this part of themselves.
+_FITTED, _WORST_FIT = ('initial_speed', 'haff_time'), 0.5
 # Less known than this nothing is: anything from 0 to 1 has a deviation of 0.29.
 _LEAST_KNOWN = 0.2
 
@@ -188,9 +191,17 @@ def _rows(one: BagResults, column: str) -> Iterable[CycleRow]:
 
 
 def _mean(rows: Sequence[CycleRow], name: str) -> Mean:
-    mean, scatter, count = mean_of([one.values.get(name) for one in rows])
+    values = [one.values for one in rows]
+    if name in _FITTED:
+        values = [one for one in values if _fitted(one, name)]
+    mean, scatter, count = mean_of([one.get(name) for one in values])
     error = scatter / math.sqrt(count) if count else math.nan
     return Mean(mean=mean, error=error, scatter=scatter, cycles=count)
+
+
+def _fitted(values: Mapping[str, Any], name: str) -> bool:
+    value, error = values.get(name), values.get(f'{name}_error')
+    return value is not None and error is not None and error <= _WORST_FIT * value
 
 
 def _added_up(

@@ -47,13 +47,14 @@ def read_columns(
     """
     try:
         with path.open(encoding='utf-8', newline='') as stream:
-            header, *lines = [line for line in csv.reader(stream) if line]
-        names = [name.split('[')[0].strip() for name in header]
-        missing = [one for one in wanted if one not in names]
-        if missing:
-            raise RecordingError(str(path), f'has no column {", ".join(missing)}', _FORM)
-        kept = [k for k, name in enumerate(names) if name in {*wanted, *optional}]
-        values = [[float(line[k]) for k in kept] for line in lines]
+            lines = (line for line in csv.reader(stream) if line)
+            names = [name.split('[')[0].strip() for name in next(lines, [])]
+            missing = [one for one in wanted if one not in names]
+            if missing:
+                raise RecordingError(str(path), f'has no column {", ".join(missing)}', _FORM)
+            kept = [k for k, name in enumerate(names) if name in {*wanted, *optional}]
+            # Line by line: the text of an hour takes ten times the memory of its numbers.
+            values = [[float(line[k]) for k in kept] for line in lines]
     except OSError as error:
         raise RecordingError(
             str(path), f'cannot be read ({error.strerror})', 'name another folder'

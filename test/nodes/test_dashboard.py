@@ -7,6 +7,7 @@ import re
 import socket
 import subprocess
 import sys
+import urllib.error
 import urllib.request
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import from_array
 
 SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
+TOKEN = 'correct-horse-battery'
 CLI = 'import sys; from nanorocks_ros.cli.main import main; sys.exit(main())'
 
 
@@ -79,20 +81,24 @@ def test_the_page_shows_what_the_topic_says(graph, look):
     graph.until(lambda: text_of(late, '#cor') == text_of(page, '#cor') != '')
     points = late.locator('.card polyline').get_attribute('points')
     assert len(points.split()) > 10
-    health = text_of(page, '#health')
-    assert health == '2 nodes, all well', health
+    nodes = page.locator('.node .name').all_text_contents()
+    assert nodes == ['/nanorocks/dashboard', '/nanorocks/pipeline']
+    assert 'messages/s' in page.locator('.node', has_text='pipeline').inner_text()
     assert graph.interrupt(pipeline).code == 0
     graph.until(lambda: 'connection lost' in text_of(page, '#link'))
     assert not page_answers(url)
 
 
-def test_the_page_ends_with_a_pipeline_that_is_killed(graph):
+def test_the_page_has_the_token_of_its_pipeline_and_ends_when_that_is_killed(graph):
     pipeline = graph.start(
         'pipeline', 'source:=topic', 'dashboard:=true', 'dashboard_port:=0',
-        arguments=('-r', '__ns:=/lab'),
+        f'dashboard_token:={TOKEN}', arguments=('-r', '__ns:=/lab'),
     )  # fmt: skip
     url = address(graph, pipeline)
     graph.until(lambda: page_answers(url))
+    assert url.endswith(f'?token={TOKEN}')
+    with pytest.raises(urllib.error.HTTPError, match='401'):
+        urllib.request.urlopen(url.partition('?')[0] + 'app.js', timeout=5)
     pipeline.kill()
     pipeline.wait()
     graph.until(lambda: not page_answers(url))

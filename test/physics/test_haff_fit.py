@@ -105,6 +105,25 @@ def test_residuals_taken_for_independent_would_be_far_too_sure():
     assert np.median(honest) > 3.0 * np.median(naive)
 
 
+@pytest.mark.parametrize(
+    ('decay', 'haff_time'),
+    [
+        (lambda time: 1.0 / (1.0 + time / 100.0), 100.0),
+        (lambda time: np.maximum(1.0 / (1.0 + time / 2.0), 0.3), 30.0),
+    ],
+    ids=['errors far too small', 'a decay that stops'],
+)
+def test_decays_that_the_noise_does_not_explain_are_fitted_no_worse_than_they_can_be(
+    decay, haff_time
+):
+    time = np.arange(1.75, 20.0, 0.2)
+    rng = np.random.default_rng(5)
+    speed = 0.01 * decay(time) * np.exp(0.05 * rng.normal(size=time.size))
+    # From one start the fit ended at 1 ms in each of them.
+    fit = fit_haff(time, speed, 0.002 * speed, 1000)
+    assert fit.haff_time == pytest.approx(haff_time, rel=0.5)
+
+
 def test_speeds_that_do_not_fall_are_no_decay():
     speed = np.full_like(TIME, 5e-3)
     with pytest.raises(FitError, match='do not fall'):

@@ -48,7 +48,7 @@ export class Nodes {
       const waiting = Number(node.values.find(([key]) => key === WAITING)?.[1]);
       return [node.level === 'ok' && waiting >= MANY_WAITING ? 'behind' : node.level, age];
     });
-    this.nodes.forEach((node, index) => this.drawOne(node, ...states[index]));
+    this.nodes.forEach((node, index) => this.drawOne(node, index, ...states[index]));
     for (const [name, one] of this.shown) {
       if (!this.nodes.some((node) => node.name === name)) {
         one.item.remove();
@@ -69,8 +69,10 @@ export class Nodes {
     if (this.health.textContent !== text) this.health.textContent = text;
   }
 
-  drawOne(node, state, age) {
+  drawOne(node, index, state, age) {
     const one = this.shown.get(node.name) ?? this.make(node.name);
+    const there = this.list.children[index];
+    if (there !== one.item) this.list.insertBefore(one.item, there ?? null);
     one.level.dataset.state = colour(state);
     const words = { ok: 'well', behind: 'falls behind', silent: `silent for ${duration(age)}` };
     one.level.textContent = words[state] ?? state;
@@ -108,7 +110,6 @@ export class Nodes {
     summary.append(one.name, one.level, one.text, one.rates);
     one.details.append(summary, one.values);
     one.item.append(one.details);
-    this.list.append(one.item);
     this.shown.set(name, one);
     return one;
   }

@@ -15,6 +15,8 @@ from nanorocks_ros.inference.persistence import (
 )
 from nanorocks_ros.records import BodyEstimate, Merge
 from nanorocks_ros.stages.bodies.births import Births
+from nanorocks_ros.stages.bodies.clinging import Clinging
+from nanorocks_ros.stages.bodies.companions import Companions
 from nanorocks_ros.stages.bodies.ghosts import Ghosts
 from nanorocks_ros.stages.bodies.pair_table import Beads
 from nanorocks_ros.stages.bodies.pairs import Bond, Pairs
@@ -35,6 +37,8 @@ _LOOK_BACK = 10.0
 # before the first.
 _BELIEVED = 0.1
 _UNSEEN_MERGES = 0.5
+# Bodies that touch nowhere in sight are believed to be one when that is so much less by chance.
+_SURER = 0.3
 # Tracks break off this often at most, of each bead on average, [s]: where they break more often,
 # nobody can tell who stays beside whom. Of films without sticking 7 to 100 s in trays 1, 3 and 5,
 # where none of what stays together is one bead found twice; 1 to 3 s in trays 4 and 7.
@@ -44,13 +48,14 @@ _ENERGY_SHARE = 0.2
 
 
 class _Picture(NamedTuple):
-    """One of the last pictures: beads seen, and all that are known to be there."""
+    """One of the last pictures: beads seen, all that are known to be there, who clings to whom."""
 
     time: float
     stamp_ns: int
     ids: NDArray[np.int64]
     places: NDArray[np.float64]
     known: frozenset[int]
+    clinging: tuple[tuple[int, int], ...]
 
 
 class BodyCounter:
@@ -83,8 +88,11 @@ class BodyCounter:
         self._births.next_cycle()
         self._pairs.clear()
         self._ghosts = Ghosts()
+        self._clinging = Clinging()
+        self._companions = Companions(self._rate)
         self._bonds: dict[tuple[int, int], Bond] = {}
         self._doubted: list[Bond] = []
+        self._joins = 0
         self._first_merge: int | None = None
         self._pictures: deque[_Picture] = deque()
         self._waiting: deque[_Picture] = deque()
@@ -120,11 +128,28 @@ class BodyCounter:
         bonds, broken = self._pairs.push(time, beads, self._allowed())
         for ids_of in broken:
             self._bonds.pop(ids_of, None)
+        bonds += self._as_one(time, tracks, beads)
         due = self._due(tracks.stamp_ns)
         if self._unclear():
             return found
         merges = [self._merge(bond, tracks.stamp_ns) for bond in self._believed(bonds)]
         return (*found, *merges, *due)
+
+    def _as_one(self, time: float, tracks: Tracks, beads: Beads) -> list[Bond]:
+        """Bodies that move as one. Of two single beads only their own separation tells."""
+        if self._first_merge is None or not self._companions.due(time):
+            return []
+        picture = self._pictures[-1]
+        body = bodies_of(picture.known, [*self._bonds, *picture.clinging])
+        sizes = Counter(body.values())
+        # All bodies have the same energy on average, and each bead its share of the whole.
+        mean = len(body) / len(sizes)
+        own = np.array([sizes[body[one]] for one in beads.ids.tolist()])
+        free = beads._replace(variances=self._usual * mean / own)
+        hidden = beads.ids.size < self._tray.count
+        bonds = self._companions.push(time, free, body, hidden, _SURER * self._allowed())
+        self._pairs.adopt(time, beads, bonds)
+        return bonds
 
     def _believed(self, bonds: list[Bond]) -> list[Bond]:
         """Those that are two beads: one of a pair that appeared over the other may be the same.
@@ -157,6 +182,7 @@ class BodyCounter:
         self._learn(tracks)
         seen = np.flatnonzero(tracks.seen)
         seen = seen[np.argsort(ids[seen], kind='stable')]
+        self._usual = (self._energies[tracks.species] / tracks.radii**3)[seen]
         return Beads(
             ids=ids[seen],
             places=tracks.positions[seen],
@@ -210,7 +236,9 @@ class BodyCounter:
 
     def _keep(self, time: float, tracks: Tracks, beads: Beads, ids: NDArray[np.int64]) -> None:
         known = frozenset(ids.tolist()) | self._ghosts.hidden
-        picture = _Picture(time, tracks.stamp_ns, beads.ids, beads.places, known)
+        members = {one for pair in self._bonds for one in pair}
+        clinging = self._clinging.push(tracks, ids, members)
+        picture = _Picture(time, tracks.stamp_ns, beads.ids, beads.places, known, clinging)
         self._pictures.append(picture)
         while time - self._pictures[0].time > _LOOK_BACK:
             self._pictures.popleft()
@@ -232,8 +260,9 @@ class BodyCounter:
 
     def _merge(self, bond: Bond, known_ns: int) -> Merge:
         start = self._since(bond)
-        joined = bodies_of(bond.ids, self._bonds)
         self._bonds[bond.ids] = bond._replace(start=start)
+        fewer = self._free() < self._tray.count - self._joins
+        self._joins += fewer
         stamp_ns = self._first_ns + round(start * _NS)
         if self._first_merge is None or stamp_ns < self._first_merge:
             self._first_merge = stamp_ns
@@ -243,8 +272,14 @@ class BodyCounter:
             tray=self._tray.number,
             cycle=self._cycle,
             tracks=np.array(bond.ids, dtype=np.int32),
-            joins=joined[bond.ids[0]] != joined[bond.ids[1]],
+            joins=fewer,
         )
+
+    def _free(self) -> int:
+        """Bodies now, at most: beads that nobody knows of are free."""
+        picture = self._pictures[-1]
+        body = bodies_of(picture.known, [*self._bonds, *picture.clinging])
+        return len(set(body.values())) + max(self._tray.count - len(body), 0)
 
     def _since(self, bond: Bond) -> float:
         """Since when the separation has been what it is now: a jump in a track is no beginning."""
@@ -274,7 +309,7 @@ class BodyCounter:
 
     def _count(self, picture: _Picture) -> BodyEstimate:
         bonds = [ids for ids, one in self._bonds.items() if one.start <= picture.time]
-        body = bodies_of(picture.known, bonds)
+        body = bodies_of(picture.known, [*bonds, *picture.clinging])
         sizes = Counter(body.values())
         first = self._first_merge
         return BodyEstimate(

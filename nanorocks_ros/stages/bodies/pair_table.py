@@ -18,6 +18,9 @@ _OUTLINE = 0.02
 _TOLERANCE = 3.0
 # Of a body that is known, before it is called broken.
 _BROKEN = 2.0
+# A track that jumps to a neighbour in its cluster moves on with it: so long, [s], without leaving
+# the range of a body, no further than so many sums of radii.
+_STEADY, _STEADY_REACH = 0.3, 2.5
 # Over which places are smoothed, and the separation of a body follows a slow turn, [s].
 _TIMES = np.array([0.1, 2.0])
 # Two of which one is not seen are remembered so long, [s].
@@ -172,15 +175,58 @@ def _follow(
             now[SMOOTH + c] = beads.places[j, c] - beads.places[i, c]
         restart(now, time)
         now[SPEED] = usual
-    away = 0.0
-    for c in range(2):
-        away = max(away, abs(now[SMOOTH + c] - now[OFFSET + c]))
-    if away < _BROKEN * now[TOLERANCE]:
+    if _stays(now, table.bonded[k], time, beads, i, j):
         now[STAYED] = time
         for c in range(2):
             apart = beads.places[j, c] - beads.places[i, c]
             now[OFFSET + c] += (apart - now[OFFSET + c]) * shares[1]
     return True
+
+
+@compiled
+def _stays(
+    now: NDArray[np.float64], bonded: bool, time: float, beads: Beads, i: int, j: int
+) -> bool:
+    """Whether a pair is apart as it was, or as it has been since a track jumped."""
+    away, moved = 0.0, False
+    for c in range(2):
+        away = max(away, abs(now[SMOOTH + c] - now[OFFSET + c]))
+        moved |= now[HIGH + c] - now[LOW + c] > 2.0 * now[TOLERANCE]
+    stays = bool(away < _BROKEN * now[TOLERANCE])
+    if not bonded:
+        return stays
+    if stays or moved:
+        for c in range(2):
+            if not stays:
+                now[SMOOTH + c] = beads.places[j, c] - beads.places[i, c]
+            now[LOW + c] = now[HIGH + c] = now[SMOOTH + c]
+        now[START] = time
+        return stays
+    distance = math.hypot(now[SMOOTH], now[SMOOTH + 1])
+    near = distance < _STEADY_REACH * (beads.radii[i] + beads.radii[j])
+    if near and time - now[START] >= _STEADY:
+        for c in range(2):
+            now[OFFSET + c] = now[SMOOTH + c]
+        return True
+    return False
+
+
+def adopted(table: PairTable, time: float, beads: Beads, pairs: NDArray[np.int64]) -> PairTable:
+    """With pairs of beads that are seen, (n, 2), among the bodies."""
+    keys = (pairs[:, 0] << SHIFT) | pairs[:, 1]
+    fresh = ~np.isin(keys, table.keys)
+    new = PairTable.empty(int(np.count_nonzero(fresh)))
+    rows = np.searchsorted(beads.ids, pairs[fresh])
+    for k, (key, (i, j)) in enumerate(zip(keys[fresh].tolist(), rows.tolist(), strict=True)):
+        _begin(new, k, time, beads, (key, i, j))
+    both = [np.concatenate(part) for part in zip(table, new, strict=True)]
+    order = np.argsort(both[0], kind='stable')
+    found = PairTable(*(part[order] for part in both))
+    own = np.isin(found.keys, keys)
+    found.bonded[own] = True
+    found.numbers[own, STAYED] = time
+    found.numbers[own, OFFSET : OFFSET + 2] = found.numbers[own, SMOOTH : SMOOTH + 2]
+    return found
 
 
 @compiled

@@ -18,6 +18,7 @@ from nanorocks_ros.stages.bodies.pair_table import (
     WAY,
     Beads,
     PairTable,
+    adopted,
     advanced,
     restart,
 )
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 # Jitter alone makes it this part of that.
 _LEAST_RANGE = 0.25
 # Beads of a body are apart so long before it is called broken, [s].
-_BROKEN_TIME = 0.3
+_BROKEN_TIME = 0.7
 # No body is younger, [s].
 _YOUNGEST = 0.3
 
@@ -95,6 +96,12 @@ class Pairs:
         """
         self._table = advanced(self._table, time, beads)
         return self._bonds(time, largest), self._fallen(time)
+
+    def adopt(self, time: float, beads: Beads, bonds: list[Bond]) -> None:
+        """Follow pairs that are bodies for other reasons, until they come apart."""
+        if bonds:
+            pairs = np.array([one.ids for one in bonds], dtype=np.int64)
+            self._table = adopted(self._table, time, beads, pairs)
 
     def pending(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Pairs that may yet turn out to be bodies, (n, 2), and the chance that free beads do so.
