@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.stages.tracking.flight import fit_line as _fit
 
 _SUMS = 8
 LINE = 10
@@ -131,29 +132,8 @@ def line_through(
     row: NDArray[np.float64],
 ) -> None:
     """The line through places (n, 2), n >= 2, weighted by their errors, into an array (LINE,)."""
-    total, time, x, y = 0.0, 0.0, 0.0, 0.0
-    for k in range(times.size):
-        weight = 1.0 / (errors[k] * errors[k])
-        total += weight
-        time += weight * times[k]
-        x += weight * places[k, 0]
-        y += weight * places[k, 1]
-    time, x, y = time / total, x / total, y / total
-    spread, u, v = 0.0, 0.0, 0.0
-    for k in range(times.size):
-        weight = (times[k] - time) / (errors[k] * errors[k])
-        spread += weight * (times[k] - time)
-        u += weight * (places[k, 0] - x)
-        v += weight * (places[k, 1] - y)
-    u, v = u / spread, v / spread
-    chi_square = 0.0
-    for k in range(times.size):
-        dx = places[k, 0] - x - u * (times[k] - time)
-        dy = places[k, 1] - y - v * (times[k] - time)
-        chi_square += (dx * dx + dy * dy) / (errors[k] * errors[k])
-    row[0], row[1], row[2], row[3], row[4] = time, x, y, u, v
-    row[5], row[6], row[7] = 1.0 / total, 1.0 / spread, chi_square
-    row[8], row[9] = times.size, times[-1] - times[0]
+    _fit(times, places, errors, row)
+    row[9] = times[-1] - times[0]
 
 
 @compiled

@@ -21,6 +21,49 @@ _BENT = 3.0
 
 
 @compiled
+def fit_line(
+    times: NDArray[np.float64],
+    places: NDArray[np.float64],
+    errors: NDArray[np.float64],
+    line: NDArray[np.float64],
+) -> None:
+    """Fit a line to places, weighted by their errors.
+
+    Parameters
+    ----------
+    times : ndarray (n,), n >= 2, [s]
+    places : ndarray (n, 2)
+    errors : ndarray (n,)
+        Of a coordinate.
+    line : ndarray (9 or more,)
+        Written: time and place of the centre of the line, velocity, variances of place and
+        velocity, chi square of the residuals, places used.
+    """
+    total, time, x, y = 0.0, 0.0, 0.0, 0.0
+    for k in range(times.size):
+        weight = 1.0 / (errors[k] * errors[k])
+        total += weight
+        time += weight * times[k]
+        x += weight * places[k, 0]
+        y += weight * places[k, 1]
+    time, x, y = time / total, x / total, y / total
+    spread, u, v = 0.0, 0.0, 0.0
+    for k in range(times.size):
+        weight = (times[k] - time) / (errors[k] * errors[k])
+        spread += weight * (times[k] - time)
+        u += weight * (places[k, 0] - x)
+        v += weight * (places[k, 1] - y)
+    u, v = u / spread, v / spread
+    chi = 0.0
+    for k in range(times.size):
+        dx = places[k, 0] - x - u * (times[k] - time)
+        dy = places[k, 1] - y - v * (times[k] - time)
+        chi += (dx * dx + dy * dy) / (errors[k] * errors[k])
+    line[0], line[1], line[2], line[3], line[4] = time, x, y, u, v
+    line[5], line[6], line[7], line[8] = 1.0 / total, 1.0 / spread, chi, times.size
+
+
+@compiled
 def fit_flight(
     times: NDArray[np.float64],
     places: NDArray[np.float64],
@@ -39,33 +82,13 @@ def fit_flight(
     count : int, >= 2
         Places used, the first ones of the arrays.
     line : ndarray (9,)
-        Written: time and place of the centre of the line, velocity, variances of place and
-        velocity, chi square of the residuals, places used.
+        Written, see `fit_line`.
     """
-    total, time, x, y = 0.0, 0.0, 0.0, 0.0
-    for k in range(count):
-        weight = 1.0 / (errors[k] * errors[k])
-        total += weight
-        time += weight * times[k]
-        x += weight * places[k, 0]
-        y += weight * places[k, 1]
-    time, x, y = time / total, x / total, y / total
-    spread, u, v = 0.0, 0.0, 0.0
-    for k in range(count):
-        weight = (times[k] - time) / (errors[k] * errors[k])
-        spread += weight * (times[k] - time)
-        u += weight * (places[k, 0] - x)
-        v += weight * (places[k, 1] - y)
-    u, v = u / spread, v / spread
-    chi = 0.0
-    for k in range(count):
-        dx = places[k, 0] - x - u * (times[k] - time)
-        dy = places[k, 1] - y - v * (times[k] - time)
-        chi += (dx * dx + dy * dy) / (errors[k] * errors[k])
-    line[0], line[1], line[2], line[3], line[4] = time, x, y, u, v
+    fit_line(times[:count], places[:count], errors[:count], line)
     # Places that scatter more than their errors say are worse than those.
-    worse = max(chi / (2 * count - 4), 1.0) if count > 3 else 1.0
-    line[5], line[6], line[7], line[8] = worse / total, worse / spread, chi, count
+    worse = max(line[7] / (2 * count - 4), 1.0) if count > 3 else 1.0
+    line[5] *= worse
+    line[6] *= worse
 
 
 @compiled
