@@ -30,9 +30,9 @@ _MOST = 1e300
 _LONGEST_STEP = 0.5
 _SMALL = 3e-3
 # Before anything is measured the gas is taken to have been faster at the shaking event than at the
-# first speed used by a factor of 1.6, give or take a factor of e, where that is within some seconds
-# (here their logarithm) of the event. What it did before a first speed that comes later is known
-# the less the later that is: both rise with the logarithm of that time.
+# first speed used by a factor of 1.6, give or take a factor of e, where that is within four
+# seconds of the event. What it did before a first speed that comes later is known the less the
+# later that is: both rise with the logarithm of that time.
 _AMPLITUDE_LEAD, _AMPLITUDE_SPREAD = 0.5, 1.0
 _EARLY, _LEAD_PER_LOG_TIME = math.log(4.0), 1.0
 # The search begins where the first speeds are matched, however fast the gas was.
