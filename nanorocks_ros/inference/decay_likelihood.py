@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import logsumexp
 
 from nanorocks_ros.physics.compiled import compiled
 
@@ -46,6 +47,10 @@ _ROUNDING = 1e-9
 _FARTHEST = 4.0
 # One of so many places is looked at to find about the best.
 _EVERY = 4
+# A scale known no better than this is no linear nuisance: it is tried at so many of its standard
+# deviations, and linear by half of one between them.
+_WIDE = 0.1
+_SCALES = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
 # Nuisances of the camera, beside those of the library: scale of lengths, and a relative error of
 # the speeds that grows with their logarithm.
 CAMERA_NUISANCES = ('scale', 'speed_bias')
@@ -83,6 +88,9 @@ class DecayTables:
 class DecayLikelihood:
     """What decays say, at the places of the grid; those of several decays add up.
 
+    Where the scale is hardly known every array has one axis more before those named here: one
+    likelihood for each scale that is tried.
+
     Parameters
     ----------
     log_likelihood : ndarray (n_places,)
@@ -114,13 +122,22 @@ class DecayLikelihood:
 
     def integrated(self) -> NDArray[np.float64]:
         """Log likelihood (n_places,) with the nuisances integrated over their Gaussian priors."""
-        prior = np.eye(self.gradient.shape[1])
+        prior = np.eye(self.gradient.shape[-1])
         matrix = prior + self.information
         shift = np.linalg.solve(matrix, self.gradient[..., np.newaxis])[..., 0]
         # Far out the dependence is not linear, and could explain anything.
-        share = np.minimum(1.0, _FARTHEST / np.maximum(np.abs(shift).max(axis=1), _FARTHEST))
-        gain = (share - 0.5 * share**2) * np.einsum('pz,pz->p', self.gradient, shift)
-        return np.asarray(self.log_likelihood + gain - 0.5 * np.linalg.slogdet(matrix)[1])
+        share = np.minimum(1.0, _FARTHEST / np.maximum(np.abs(shift).max(axis=-1), _FARTHEST))
+        gain = (share - 0.5 * share**2) * np.einsum('...z,...z->...', self.gradient, shift)
+        each = self.log_likelihood + gain - 0.5 * np.linalg.slogdet(matrix)[1]
+        if each.ndim == 1:
+            return np.asarray(each)
+        weight = np.exp(-0.5 * _SCALES**2)
+        return np.asarray(logsumexp(each, axis=0, b=(weight / weight.sum())[:, np.newaxis]))
+
+    def deviation_at(self, place: int) -> float:
+        """Sum of the squares of the whitened residuals at a place, for the likeliest scale."""
+        deviation = np.atleast_2d(self.deviation)[:, place]
+        return float(deviation[np.atleast_2d(self.log_likelihood)[:, place].argmax()])
 
 
 def decay_likelihood(
@@ -156,7 +173,28 @@ def decay_likelihood(
     best = int(np.argmax(rough.log_likelihood)) * _EVERY
     corners = np.tile(tables.corners[best], (tables.mean.shape[0], 1))
     shares = np.tile(tables.shares[best], (tables.mean.shape[0], 1))
-    return _over(tables, data, cells, camera, slice(None), corners, shares)
+    scale, bias = camera
+    if scale <= _WIDE:
+        return _over(tables, data, cells, camera, slice(None), corners, shares)
+    each = [
+        _over(
+            tables,
+            (log_time, log_speed - step * scale, variance),
+            cells,
+            (0.5 * scale, bias),
+            slice(None),
+            corners,
+            shares,
+        )
+        for step in _SCALES
+    ]
+    return DecayLikelihood(
+        **{
+            name: np.stack([getattr(one, name) for one in each])
+            for name in ('log_likelihood', 'gradient', 'information', 'deviation')
+        },
+        samples=cells.size,
+    )
 
 
 def _over(

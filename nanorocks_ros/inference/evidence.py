@@ -57,12 +57,12 @@ class Evidence:
         }
         if self.decay is None or self.contacts is None:
             return found
-        upper = np.triu_indices(self.decay.gradient.shape[1])
+        upper = np.triu_indices(self.decay.gradient.shape[-1])
         for prefix, part in (('decay', self.decay), ('contacts', self.contacts)):
             for field in fields(part):
                 found[f'{prefix}.{field.name}'] = np.asarray(getattr(part, field.name))
         # The largest by far, and symmetric.
-        found['decay.information'] = self.decay.information[:, upper[0], upper[1]].astype(
+        found['decay.information'] = self.decay.information[..., upper[0], upper[1]].astype(
             np.float32
         )
         found['decay.gradient'] = self.decay.gradient.astype(np.float32)
@@ -89,10 +89,10 @@ class Evidence:
             if 'decay.information' not in arrays:
                 return cls(cycles=cycles, by_form=by_form)
             gradient = arrays['decay.gradient'].astype(np.float64)
-            upper = np.triu_indices(gradient.shape[1])
-            information = np.empty((*gradient.shape, gradient.shape[1]))
-            information[:, upper[0], upper[1]] = arrays['decay.information']
-            information[:, upper[1], upper[0]] = arrays['decay.information']
+            upper = np.triu_indices(gradient.shape[-1])
+            information = np.empty((*gradient.shape, gradient.shape[-1]))
+            information[..., upper[0], upper[1]] = arrays['decay.information']
+            information[..., upper[1], upper[0]] = arrays['decay.information']
             return cls(
                 cycles=cycles,
                 decay=DecayLikelihood(

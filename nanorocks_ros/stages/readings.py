@@ -183,8 +183,7 @@ class LibraryReading:
             'collisions': contacts.collisions,
             'tension': posterior.tension,
             **self._speeds(decay, final=final),
-            'reduced_chi_square': float(likelihood.deviation[best])
-            / max(likelihood.samples - 1, 1),
+            'reduced_chi_square': likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
         }
         if math.sqrt(posterior.covariance[0, 0]) > _LEAST_KNOWN:
             return {
@@ -235,7 +234,11 @@ class LibraryReading:
             When they were not read by a library, or by one of another grid.
         """
         decay, contacts = evidence.decay, evidence.contacts
-        if decay is None or contacts is None or decay.deviation.size != self._tables.mean.shape[0]:
+        if (
+            decay is None
+            or contacts is None
+            or decay.deviation.shape[-1] != self._tables.mean.shape[0]
+        ):
             raise FitError(
                 f'tray {self._tray.number}',
                 'cycles were not read by this library of decays',

@@ -413,11 +413,11 @@ def test_speeds_of_grains_by_their_pictures_say_less():
     for method in (SpeedMethod.STRUCTURE_FUNCTION, SpeedMethod.TRACKING):
         speeds = [
             replace(speed(t, v), tray=8, method=method)
-            for t, v in zip(times, 1.2 * values, strict=True)
+            for t, v in zip(times, 1.4 * values, strict=True)
         ]
         stage = HaffFitter(PipelineSettings(), tray)
         *_, found[method] = [*all_estimates(stage, speeds), *stage.flush()]
     grains, beads = found.values()
-    # They were found 20 % too fast.
+    # They were found 40 % too fast.
     assert grains.restitution_lower < 0.89 < grains.restitution_upper
-    assert half_width(grains) > 1.1 * half_width(beads)
+    assert half_width(grains) > 1.5 * half_width(beads)
