@@ -83,6 +83,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # What the core has to say while it works; of others, warnings only.
     logging.basicConfig(format='nanorocks: %(message)s')
     logging.getLogger('nanorocks_ros').setLevel(logging.INFO)
+    # Which fonts of its own it did not find is no concern of who asked for a figure.
+    logging.getLogger('matplotlib.font_manager').setLevel(logging.ERROR)
     try:
         options = build_parser().parse_args(arguments)
         code: int = options.run(options)
