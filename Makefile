@@ -44,9 +44,9 @@ test: venv ## Run all tests, then those of the core with the oldest dependencies
 	@$(RUN) python -m pytest $(ALONE) $(PYTEST_ARGS)
 	@$(MAKE) test-oldest
 
-# What takes minutes and only goes through, once more, what other tests go through. The engine is the
-# same, bit by bit, with all dependencies: published values and the reference are compared once.
-ONCE := test/validation test/simulation/reference test/simulation/engine \
+# What takes minutes and only goes through, once more, what other tests go through. The simulation is
+# the same, bit by bit, with all dependencies: it is tested once.
+ONCE := test/validation test/simulation \
         test/study/test_reproduce.py test/cli/test_figure_cor.py test/dashboard/test_page.py \
         test/test_contributing.py
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
