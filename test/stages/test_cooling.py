@@ -404,7 +404,7 @@ def test_a_merge_of_another_cycle_ends_no_window():
     assert final.window_end == pytest.approx(20.0, abs=0.11)
 
 
-def test_speeds_of_grains_by_their_pictures_say_less():
+def test_speeds_of_grains_by_their_pictures_alone_say_nothing():
     tray = load_trays()[8]
     settings = SimulationSettings(tray=8, restitution=0.89, wall_restitution=0.97, seed=9)
     times = np.arange(0.5, 12.0, 0.1)
@@ -412,12 +412,15 @@ def test_speeds_of_grains_by_their_pictures_say_less():
     found = {}
     for method in (SpeedMethod.STRUCTURE_FUNCTION, SpeedMethod.TRACKING):
         speeds = [
-            replace(speed(t, v), tray=8, method=method)
-            for t, v in zip(times, 1.4 * values, strict=True)
+            replace(speed(t, v), tray=8, method=method) for t, v in zip(times, values, strict=True)
         ]
         stage = HaffFitter(PipelineSettings(), tray)
         *_, found[method] = [*all_estimates(stage, speeds), *stage.flush()]
     grains, beads = found.values()
-    # They were found 40 % too fast.
-    assert grains.restitution_lower < 0.89 < grains.restitution_upper
-    assert half_width(grains) > 1.5 * half_width(beads)
+    assert grains.status is CorStatus.UNDETERMINED
+    assert (grains.restitution_lower, grains.restitution_upper) == (0.0, 1.0)
+    assert math.isnan(grains.restitution)
+    assert math.isnan(grains.mean_restitution)
+    assert math.isfinite(grains.haff_time)
+    assert beads.status is CorStatus.FINAL
+    assert beads.restitution_lower < 0.89 < beads.restitution_upper
