@@ -82,7 +82,7 @@ def restitution_chapter(context: Context) -> Chapter:
             f'{context.plan.restitution:g}, walls {context.plan.wall_restitution:g}. The paper: '
             f'{reported.PAPER_RESTITUTION:g} for tray 1, {reported.PAPER_RESTITUTION_RANGE[0]:g} '
             f'to {reported.PAPER_RESTITUTION_RANGE[1]:g} over all trays. A dash: nothing that '
-            'could be relied upon; intervals of trays 6 to 8 rest on the decay alone.',
+            'could be relied upon, as of speeds of grains by their pictures alone.',
         ),
         *_errata(),
         Picture(
