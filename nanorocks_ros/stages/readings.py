@@ -29,6 +29,11 @@ if TYPE_CHECKING:
 
 # With less known than that, nothing is: anything from 0 to 1 has a deviation of 0.29.
 _LEAST_KNOWN = 0.2
+_UNKNOWN = {
+    'status': CorStatus.UNDETERMINED,
+    'restitution_lower': 0.0,
+    'restitution_upper': 1.0,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,6 +177,10 @@ class LibraryReading:
         """
         if np.polyfit(decay.time, np.log(decay.speed), 1)[0] >= 0.0:
             raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
+        if decay.of_grains and not contacts.rebounds and not contacts.collisions:
+            # How such speeds are off changes while grains slow down: intervals of filmed trays 6
+            # and 8 lay beside the truth, and over many cycles that does not average out.
+            return {**self._speeds(decay, final=final), **_UNKNOWN}
         likelihood = decay_likelihood(
             self._tables, decay.time, decay.speed, decay.error, self._camera[decay.of_grains]
         )
@@ -185,17 +194,8 @@ class LibraryReading:
             **self._speeds(decay, final=final),
             'reduced_chi_square': likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
         }
-        unknown = {
-            'status': CorStatus.UNDETERMINED,
-            'restitution_lower': 0.0,
-            'restitution_upper': 1.0,
-        }
-        if decay.of_grains and not contacts.rebounds and not contacts.collisions:
-            # How such speeds are off changes while grains slow down: intervals of filmed trays 6
-            # and 8 lay beside the truth, and over many cycles that does not average out.
-            return {**fields, **unknown}
         if math.sqrt(posterior.covariance[0, 0]) > _LEAST_KNOWN:
-            return {**fields, **unknown, **self._mean(likelihood, contacts, final=final)}
+            return {**fields, **_UNKNOWN, **self._mean(likelihood, contacts, final=final)}
         return {
             **fields,
             **_known(posterior, self._ends),
