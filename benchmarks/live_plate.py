@@ -32,6 +32,7 @@ _SECONDS = float(os.environ.get('LIVE_PLATE_SECONDS', '60'))
 _RUNS = os.environ.get('LIVE_PLATE_RUNS', 'compressed raw everything').split()
 _BROWSERS = int(os.environ.get('LIVE_PLATE_BROWSERS', '10'))
 _SETTLE_S = 60.0
+_SLOW_MS = 500.0
 _RATE = 30.0
 _TRAYS = tuple(range(1, 9))
 PLATE = {
@@ -192,25 +193,40 @@ def _run(bag: Path, run: str, folder: str) -> None:
 
 def _print(tally: _Tally, used, run: str) -> None:
     done = {tray: len(tally.sent.keys() & frames.keys()) for tray, frames in tally.done.items()}
-    late = [
-        1e3 * (max(frames[k] for frames in tally.done.values()) - sent)
-        for k, sent in tally.sent.items()
-        if all(k in frames for frames in tally.done.values())
-    ]
+    first = min(tally.sent)
+    late, lost = {}, []
+    for frame, sent in sorted(tally.sent.items()):
+        second = (frame - first) / _RATE
+        if all(frame in frames for frames in tally.done.values()):
+            late[second] = 1e3 * (max(one[frame] for one in tally.done.values()) - sent)
+        else:
+            lost.append(second)
     counts = ', '.join(f'{tray}: {count}' for tray, count in done.items())
     print(f'\n{run}: frames sent {len(tally.sent)}, all trays done {len(late)}, '
-          f'dropped {len(tally.sent) - len(late)}')  # fmt: skip
+          f'dropped {len(lost)}{_when(lost)}')  # fmt: skip
     print(f'tray images done, by tray: {counts}')
     for name in ('speed', 'cluster', 'cor'):
         found = ', '.join(f'{tray}: {tally.results[f"{name} {tray}"]}' for tray in _TRAYS)
         print(f'results, {name}, by tray: {found}')
     if late:
+        ms = list(late.values())
         print(
-            f'latency of the last tray, median {np.median(late):.1f} ms, '
-            f'p99 {np.quantile(late, 0.99):.1f} ms, longest {max(late):.1f} ms'
+            f'latency of the last tray, median {np.median(ms):.1f} ms, '
+            f'p99 {np.quantile(ms, 0.99):.1f} ms, longest {max(ms):.1f} ms'
         )
+        slow = [second for second, one in late.items() if one > _SLOW_MS]
+        print(f'later than {_SLOW_MS:g} ms: {len(slow)}{_when(slow)}')
     print(f'CPU while playing: bag_player {used[0]:.2f} cores, pipeline {used[1]:.2f} cores',
           flush=True)  # fmt: skip
+
+
+def _when(seconds: list[float]) -> str:
+    """Spans of time in which something happened, less than a second apart."""
+    if not seconds:
+        return ''
+    gaps = np.flatnonzero(np.diff(seconds) > 1.0) + 1
+    spans = np.split(np.array(seconds), gaps)
+    return ', at ' + ', '.join(f'{one[0]:.1f} to {one[-1]:.1f} s' for one in spans)
 
 
 def report() -> None:
