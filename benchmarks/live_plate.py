@@ -17,6 +17,7 @@ from __future__ import annotations
 import json
 import os
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -26,13 +27,16 @@ from pathlib import Path
 
 import numpy as np
 
+from nanorocks_ros.records import GroundTruth, TrayState
 from nanorocks_ros.study.bag_frames import BagFrames
+from nanorocks_ros.wire.layouts import layout
 
 _SECONDS = float(os.environ.get('LIVE_PLATE_SECONDS', '60'))
 _RUNS = os.environ.get('LIVE_PLATE_RUNS', 'compressed raw everything').split()
 _BROWSERS = int(os.environ.get('LIVE_PLATE_BROWSERS', '10'))
 _SETTLE_S = 60.0
 _SLOW_MS = 500.0
+_QUIET_S = 3.0
 _RATE = 30.0
 _TRAYS = tuple(range(1, 9))
 PLATE = {
@@ -47,30 +51,39 @@ _CLI = 'import sys; from nanorocks_ros.cli.main import main; sys.exit(main())'
 
 
 class _Tally:
-    """When each frame was sent and each tray image done, by the number of the frame."""
+    """When each frame was sent and each tray image done, by the number of the frame.
+
+    Messages are not unpacked but for the time in them: the cores are for those who are measured.
+    """
 
     def __init__(self, node) -> None:
         from nanorocks_ros.wire import topics
 
+        self._node = node
+        self.last = time.monotonic()
         self.sent: dict[int, float] = {}
         self.done: dict[int, dict[int, float]] = {tray: {} for tray in _TRAYS}
         self.results: dict[str, int] = defaultdict(int)
-        node.listen(topics.TRUTH, self._sent, 1, required=False)
+        self._listen(topics.TRUTH, 1, self._noted(self.sent, GroundTruth))
         for tray in _TRAYS:
-            node.listen(topics.STATE, self._noted(tray), tray, required=False)
+            self._listen(topics.STATE, tray, self._noted(self.done[tray], TrayState))
             for topic in (topics.SPEED, topics.CLUSTER, topics.COR):
-                node.listen(topic, self._counted(tray, topic.name), tray, required=False)
+                self._listen(topic, tray, self._counted(tray, topic.name))
 
-    @staticmethod
-    def _frame(message) -> int:
-        return round(message.data[0] * _RATE)
+    def _listen(self, topic, tray: int, take) -> None:
+        from nanorocks_ros.nodes._shell import message_class, qos_of
 
-    def _sent(self, message) -> None:
-        self.sent[self._frame(message)] = time.monotonic()
+        kind = message_class(topic.type)
+        self._node.create_subscription(kind, topic.of(tray), take, qos_of(topic), raw=True)
 
-    def _noted(self, tray: int):
-        def note(message) -> None:
-            self.done[tray][self._frame(message)] = time.monotonic()
+    def _noted(self, when: dict[int, float], kind):
+        # The values are the last that stands in a message; the time is the first of them.
+        values_size = 4 * len(layout(kind).fields)
+
+        def note(cdr: bytes) -> None:
+            now = self.last = time.monotonic()
+            (seconds,) = struct.unpack_from('<f', cdr, len(cdr) - values_size)
+            when[round(seconds * _RATE)] = now
 
         return note
 
@@ -178,7 +191,8 @@ def _run(bag: Path, run: str, folder: str) -> None:
     _spin(executor, _SECONDS - 0.5, lambda: player.poll() is not None)
     used = np.subtract([_cpu(player), _cpu(pipeline)], before) / (time.monotonic() - start)
     _spin(executor, _SETTLE_S, lambda: player.poll() is not None)
-    _spin(executor, 1.0)
+    # What waits is not lost.
+    _spin(executor, _SETTLE_S, lambda: time.monotonic() - tally.last > _QUIET_S)
     pipeline.send_signal(2)
     pipeline.wait(20)
     executor.shutdown()

@@ -6,7 +6,9 @@ import time
 
 from nanorocks_ros.nodes._takers import Takers
 
-_TICK_S = 0.002
+# How soon to look again at the soonest, and at the latest: somebody may resume meanwhile.
+_SOON_S = 0.002
+_LATEST_S = 0.02
 # Then others have their turn: services, timers.
 _SLICE_S = 0.005
 # Until those who are known know their publishers as well: the first frames were lost otherwise.
@@ -54,7 +56,7 @@ class Pacer:
         self.paused = paused
         self.takers = Takers(node)
         self.set_rate(pacing.rate)
-        self._timer = node.create_timer(_TICK_S, self._tick, clock=node.steady_clock)
+        self._timer = node.create_timer(_SOON_S, self._tick, clock=node.steady_clock)
 
     @property
     def now_ns(self):
@@ -112,6 +114,7 @@ class Pacer:
     def _tick(self):
         if not self._started:
             if self.paused or not self._all_listen():
+                self._look_again_in(_LATEST_S)
                 return
             self._started = True
             self._anchor(self._position_ns)
@@ -123,6 +126,21 @@ class Pacer:
         if self._next is None and not self.paused:
             self._timer.cancel()
             self._finished()
+        else:
+            self._look_again_in(self._wait_s())
+
+    def _look_again_in(self, seconds):
+        # Each turn of the executor costs as much as reading a frame: there are no idle ones.
+        self._timer.timer_period_ns = round(seconds * NS)
+        self._timer.reset()
+
+    def _wait_s(self):
+        """Until the next moment is due, or something else may have to be done."""
+        if self._next is None or self.paused:
+            return _LATEST_S
+        if self.rate == 0.0:
+            return _SOON_S
+        return min(max(self._due() - time.monotonic(), _SOON_S), _LATEST_S)
 
     def _all_listen(self):
         wanted = self._pacing.listeners
@@ -142,8 +160,10 @@ class Pacer:
             return False
         if self.rate == 0.0:
             return self.takers.ready()
-        due = self._since + (stamp_ns - self._position_ns) / NS / self.rate
-        return stamp_ns < self._position_ns or time.monotonic() >= due
+        return stamp_ns < self._position_ns or time.monotonic() >= self._due()
+
+    def _due(self):
+        return self._since + (self._next[0] - self._position_ns) / NS / self.rate
 
     def _advance(self):
         stamp_ns, moment = self._next

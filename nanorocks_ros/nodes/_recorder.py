@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from functools import partial
 
-import cv2
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import CompressedImage
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.experiment.settings import rows
-from nanorocks_ros.recordings.images import encode_jpeg
+from nanorocks_ros.recordings.images import jpeg_of
 from nanorocks_ros.recordings.messages import compressed_image_message, time_message
 from nanorocks_ros.recordings.reader import BagMessage
 from nanorocks_ros.recordings.recorder import Recorder
@@ -136,8 +135,4 @@ def _cdr(message):
 
 
 def _as_jpeg(frame, quality):
-    image = frame.image
-    if frame.encoding == 'rgb8':
-        image = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
-    jpeg = encode_jpeg(image, quality)
-    return compressed_image_message(frame.stamp_ns, 'camera', _JPEG, jpeg)
+    return compressed_image_message(frame.stamp_ns, 'camera', _JPEG, jpeg_of(frame, quality))

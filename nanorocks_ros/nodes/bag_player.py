@@ -14,15 +14,16 @@ from nanorocks_ros.experiment.settings import problem as wrong_with
 from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.nodes._pacing import NS, Pacer
 from nanorocks_ros.nodes._playback import Playback, stamp_in
-from nanorocks_ros.nodes._shell import image_message, time_message
+from nanorocks_ros.nodes._shell import compressed_message, image_message, time_message
 from nanorocks_ros.nodes._sources import path_of_bag
-from nanorocks_ros.recordings.images import frame_from_compressed
+from nanorocks_ros.recordings.images import frame_from_compressed, frame_from_image, jpeg_of
 from nanorocks_ros.recordings.reader import open_bag
 from nanorocks_ros.recordings.replay import latest, played_part
 from nanorocks_ros.study.bag_frames import BagFrames
 from nanorocks_ros.wire import topics
 
 _CLOCK_S = 0.025
+_JPEG_QUALITY = 95
 _CAMERA = (topics.RAW.absolute(), topics.RAW_COMPRESSED.absolute())
 _WORK_IT_OUT_AGAIN = 'set results:=false for bag_player, or end the other'
 
@@ -91,8 +92,11 @@ class BagPlayerNode(NanorocksNode):
         if message.topic not in self._camera:
             return
         self._pacer.takers.sent(stamp_in(message.cdr))
+        # Who asks for the camera in the other form gets it.
         if self._camera == [_CAMERA[1]] and self.wanted(topics.RAW):
             self.timed(self._decoded, message)
+        if self._camera == [_CAMERA[0]] and self.wanted(topics.RAW_COMPRESSED):
+            self.timed(self._encoded, message)
 
     def _decoded(self, message):
         content = self._reader.deserialize(message)
@@ -101,6 +105,12 @@ class BagPlayerNode(NanorocksNode):
         self.send(topics.RAW, image)
         # Let go only when there is the next one, see _camera.py.
         self._last = frame, image
+
+    def _encoded(self, message):
+        content = self._reader.deserialize(message)
+        frame = frame_from_image(content, message.topic)
+        jpeg = jpeg_of(frame, _JPEG_QUALITY)
+        self.send(topics.RAW_COMPRESSED, compressed_message(frame.stamp_ns, 'camera', jpeg))
 
     def _tell_latched(self, stamp_ns):
         """Publish what latched topics held at a time."""

@@ -163,6 +163,20 @@ def encode_jpeg(image: NDArray[np.uint8], quality: int) -> bytes:
     return content.tobytes()
 
 
+def jpeg_of(frame: Frame, quality: int) -> bytes:
+    """A frame as JPEG, whatever its encoding.
+
+    Raises
+    ------
+    FrameError
+        As `encode_jpeg`.
+    """
+    image = frame.image
+    if frame.encoding == 'rgb8':
+        image = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2BGR), dtype=np.uint8)
+    return encode_jpeg(image, quality)
+
+
 def is_decodable(content: bytes) -> bool:
     """Whether OpenCV makes a picture of it."""
     return _decoded(_bytes_of(content)) is not None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip('rclpy')
@@ -19,7 +20,8 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from nanorocks_ros.nodes._shell import qos_of, stamp_of
-from nanorocks_ros.recordings.messages import time_message
+from nanorocks_ros.recordings.images import frame_from_compressed
+from nanorocks_ros.recordings.messages import image_message, time_message
 from nanorocks_ros.recordings.reader import open_bag
 from nanorocks_ros.recordings.writer import BagWriter, OfferedQos, OfferedTopic
 from nanorocks_ros.wire import topics
@@ -190,3 +192,23 @@ def test_topics_of_others_are_played_as_they_were_offered(graph, tmp_path):
     said = '/nanorocks/camera/image_raw: /nanorocks/bag_player and /nanorocks/listener publish it'
     assert said in ended.output
     assert 'Traceback' not in ended.output
+
+
+def test_of_a_raw_recording_jpegs_are_made_for_who_asks_for_them(graph, tmp_path):
+    name = topics.RAW.absolute()
+    table = {name: OfferedTopic(msgtype=topics.RAW.type, qos=OfferedQos())}
+    picture = np.full((48, 64, 3), (200, 120, 40), dtype=np.uint8)
+    with BagWriter(tmp_path / 'raw', table, metadata={}) as bag:
+        for k in range(5):
+            bag.write(name, k * NS // 10, image_message(k * NS // 10, 'camera', 'rgb8', picture))
+    found = []
+    graph.node.create_subscription(
+        CompressedImage, topics.RAW_COMPRESSED.name, found.append, qos_of(topics.RAW_COMPRESSED)
+    )
+    player = graph.start('bag_player', f'bag:={tmp_path / "raw"}', 'listeners:=1')
+    assert graph.wait(player).code == 0
+    frames = [frame_from_compressed(one, 'jpeg') for one in found]
+    assert [one.stamp_ns for one in frames] == [k * NS // 10 for k in range(5)]
+    for one in frames:
+        assert one.image.shape == picture.shape
+        assert np.abs(one.image.astype(int) - picture[:, :, ::-1]).max() <= 3
