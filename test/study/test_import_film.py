@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import shutil
 import signal
@@ -470,18 +471,17 @@ COMMAND = [
 ]
 
 
-def test_an_interrupted_import_leaves_a_bag_that_can_be_read(tmp_path):
-    folder = write_images(tmp_path / 'images', ['0.png'])
-    for k in range(1, 1500):
-        (folder / f'{k}.png').hardlink_to(folder / f'{k % 2}.png') if k > 1 else cv2.imwrite(
-            str(folder / '1.png'), picture(1)
-        )
-    bag = tmp_path / 'bag'
-    process = subprocess.Popen(
-        [*COMMAND, str(folder), '-o', str(bag), '--rate', '30', '--start', '2023-11-14T22:13:20Z'],
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+def many_images(folder, count=1500):
+    """A folder of so many images that its import can be interrupted."""
+    write_images(folder, ['0.png', '1.png'])
+    for k in range(2, count):
+        (folder / f'{k}.png').hardlink_to(folder / f'{k % 2}.png')
+    return folder
+
+
+def interrupted(arguments, bag):
+    """Import until something is in a bag, then Ctrl-C; the last line that was said."""
+    process = subprocess.Popen([*COMMAND, *arguments], stderr=subprocess.PIPE, text=True)
     try:
         end = time.monotonic() + 60
         while not (bag.is_dir() and any(one.stat().st_size > 9999 for one in bag.iterdir())):
@@ -492,11 +492,36 @@ def test_an_interrupted_import_leaves_a_bag_that_can_be_read(tmp_path):
     finally:
         process.kill()
     assert process.returncode == 130
-    assert said.splitlines()[-1].startswith('nanorocks: interrupted; what was written until now')
+    return said.splitlines()[-1]
+
+
+def test_an_interrupted_import_leaves_a_bag_that_can_be_read(tmp_path):
+    folder, bag = many_images(tmp_path / 'images'), tmp_path / 'bag'
+    options = ('--rate', '30', '--start', '2023-11-14T22:13:20Z')
+    said = interrupted([str(folder), '-o', str(bag), *options], bag)
+    assert said.startswith('nanorocks: interrupted; what was written until now')
     left = open_bag(bag)
     assert left.complete
     assert left.metadata['import'] == 'unfinished'
     assert 0 < left.topics[CAMERA].count < 1500
+
+
+def test_an_interrupted_import_of_many_goes_on_where_it_was(tmp_path):
+    write_video(tmp_path / 'a.avi', range(3))
+    films = [tmp_path / 'a.avi', many_images(tmp_path / 'b')]
+    bags = tmp_path / 'bags'
+    options = ('--rate', '30', '--start', '2023-11-14T22:13:20Z')
+    arguments = [*map(str, films), '--each', '-o', str(bags), *options]
+    said = interrupted(arguments, bags / '.unfinished' / 'b')
+    assert said == 'nanorocks: interrupted; the same command goes on with what is left'
+    # Of what is in the folder everything is whole.
+    assert [one.name for one in bags.iterdir() if not one.name.startswith('.')] == ['a']
+    done = subprocess.run([*COMMAND, *arguments, '--json'], capture_output=True, check=True)
+    found = json.loads(done.stdout)
+    assert found['skipped'] == [str(bags / 'a')]
+    assert [one['bag'] for one in found['imported']] == [str(bags / 'b')]
+    assert BagFrames(bags / 'b').count == found['frames']
+    assert sorted(os.listdir(bags)) == ['a', 'b']
 
 
 def test_what_is_printed_is_what_programs_rely_on(tmp_path):
