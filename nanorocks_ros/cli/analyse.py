@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.experiment.settings import PipelineSettings
-from nanorocks_ros.records import CorRelation, CorStatus
+from nanorocks_ros.records import CorRelation, CorStatus, Quality
 
 if TYPE_CHECKING:
     import argparse
@@ -62,8 +62,11 @@ def run(options: argparse.Namespace) -> int:
     """Analyse one bag or many, print, write; the exit code."""
     from nanorocks_ros.cli.analyse_batch import is_batch, run_many
     from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.study.parquet import check_parquet
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
+    # Before hours of work.
+    check_parquet(Path(f'tables.{options.format}'))
     if is_batch(options):
         return run_many(options, settings)
     return _run_one(options, settings)
@@ -71,10 +74,9 @@ def run(options: argparse.Namespace) -> int:
 
 def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.study.export import as_json, check_format, write_results
+    from nanorocks_ros.study.export import as_json, write_results
     from nanorocks_ros.study.offline import analyse
 
-    check_format(options.format)
     source = Path(options.bags[0])
     with Progress('analysing') as progress:
         analysis = analyse(
@@ -117,8 +119,8 @@ def _print_cycles(results: TrayResults) -> None:
             )
             if math.isfinite(time):
                 print(f'    {name} species: v0 {speed * 1e3:.2f} mm/s, tau {time:.2f} s')
-    if len(cycles) > 1:
-        last = cycles[-1]
+    last = cycles[-1] if cycles else None
+    if last is not None and len(cycles) > 1 and math.isfinite(last.mean_restitution):
         print(
             f'  all cycles: COR {last.mean_restitution:.4f} +- {last.mean_restitution_error:.4f}'
         )
@@ -131,7 +133,10 @@ def _print_cycles(results: TrayResults) -> None:
 
 def _cor_text(cor: CorEstimate) -> str:
     if cor.status in (CorStatus.NO_DECAY, CorStatus.UNDETERMINED):
-        return f'COR unknown ({cor.status.name.lower()}: the decay tells too little)'
+        why = 'the decay tells too little'
+        if cor.quality & Quality.WRONG_SCALE:
+            why = 'the trays are not where the settings say'
+        return f'COR unknown ({cor.status.name.lower()}: {why})'
     walls = (
         f', walls {cor.wall_restitution:.3f} [{cor.wall_restitution_lower:.3f}, '
         f'{cor.wall_restitution_upper:.3f}], paper says {cor.paper_restitution:.3f}'

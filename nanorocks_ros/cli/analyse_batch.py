@@ -48,7 +48,7 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
     """Analyse all, put them together, report; the exit code."""
     from nanorocks_ros.recordings.find_bags import find_bags
     from nanorocks_ros.study.batch import BatchPlan, run_batch
-    from nanorocks_ros.study.batch_files import check_format, write_batch
+    from nanorocks_ros.study.batch_files import write_batch
     from nanorocks_ros.study.combined import combined
     from nanorocks_ros.study.tasks import Workers
 
@@ -58,7 +58,6 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
         )
     workers = Workers(processes=options.workers, scheduler=options.scheduler)
     folder = Path(options.output)
-    check_format(folder, options.format)
     found = find_bags(options.bags)
     for text in found.left_out:
         _notice(f'{shown(text)}; left out')

@@ -70,6 +70,11 @@ class PreprocessSettings:
         low=0.0001,
         high=0.01,
     )
+    check_map: bool = _setting(
+        True,
+        'look whether the trays are where they should be; where they are plainly somewhere else '
+        'no restitution is given',
+    )
     shake_speed: float = _setting(
         0.001,
         'a plate that starts to move faster than this is being shaken',

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections import deque
 from fractions import Fraction
-from importlib import import_module
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.film import NS, FilmInfo, Shot, StoredPicture, form_of
 from nanorocks_ros.recordings.images import is_decodable
 from nanorocks_ros.recordings.instants import instant
 from nanorocks_ros.recordings.jpeg import is_whole_jpeg, jpeg_head, with_huffman_tables
+from nanorocks_ros.recordings.pyav import pyav
 from nanorocks_ros.recordings.upright import UPRIGHT, Turn, turn_of, turned, words_of
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Video:
     def __init__(self, path: Path, threads: int = 0) -> None:
         self.broken = 0
         self._threads = threads
-        self._av = _library(path)
+        self._av = pyav(str(path))
         self._bytes = path.stat().st_size
         self._turn = UPRIGHT
         with self._opened(path) as container:
@@ -236,17 +236,6 @@ def _remarks(info: FilmInfo, turn: Turn) -> tuple[str, ...]:
         return ()
     again = '; its JPEGs are compressed anew for that' if info.codec == 'mjpeg' else ''
     return (f'{info.path}: {words_of(turn)}, as its rotation flag says{again}',)
-
-
-def _library(path: Path) -> Any:
-    try:
-        return import_module('av')
-    except ImportError as error:
-        raise ConfigurationError(
-            str(path),
-            'needs PyAV, which is not installed',
-            "run: pip install 'nanorocks_ros[video]'",
-        ) from error
 
 
 def _reason(error: Exception) -> str:

@@ -209,19 +209,19 @@ class HaffFitter:
         )
         fields: dict[str, Any] = {'status': status}
         final = status is CorStatus.FINAL
+        quality = reduce(or_, (one.quality for one in self._samples))
         try:
-            fields.update(self._reading.read(decay, self._contacts.terms, final=final))
+            if quality & Quality.WRONG_SCALE:
+                # Speeds and places are wrong by nobody knows how much.
+                fields = _nothing(CorStatus.UNDETERMINED)
+            else:
+                fields.update(self._reading.read(decay, self._contacts.terms, final=final))
         except FitError:
             # Nothing is known of the restitution then, and that is what is published.
-            fields = {
-                'status': CorStatus.NO_DECAY,
-                'restitution_lower': 0.0,
-                'restitution_upper': 1.0,
-            }
+            fields = _nothing(CorStatus.NO_DECAY)
         if status is CorStatus.FINAL:
             few = self._settings.fewest_samples
             fields.update(species_decays(self._tray, decay.time, self._samples, few))
-        quality = reduce(or_, (one.quality for one in self._samples))
         if fields.get('tension', 0.0) > _TENSE:
             quality |= Quality.INCONSISTENT
         return (
@@ -238,6 +238,10 @@ class HaffFitter:
                 **fields,
             ),
         )
+
+
+def _nothing(status: CorStatus) -> dict[str, Any]:
+    return {'status': status, 'restitution_lower': 0.0, 'restitution_upper': 1.0}
 
 
 def _usable(speed: SpeedEstimate) -> bool:

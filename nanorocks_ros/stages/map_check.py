@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import cv2
@@ -21,8 +22,10 @@ if TYPE_CHECKING:
 # One pixel of the reduced picture is so many of the frame.
 _REDUCED = 4
 # What is tried beside what is set: scales, and shifts in reduced pixels.
-_SCALES = np.geomspace(0.75, 1.34, 59)
+_SCALES = np.geomspace(0.2, 5.0, 323)
 _SHIFT = 16
+# Scales this close to one another are of the same trays.
+_NEARLY = 0.1
 # A slope is an edge when it is so many times the usual one, and so many gray levels.
 _TIMES_USUAL = 3.0
 _LEAST_SLOPE = 6.0
@@ -30,6 +33,8 @@ _LEAST_SLOPE = 6.0
 # are not, and of a single tray that is not where the others say.
 _FOUND = 0.65
 _CLEARLY = 0.12
+# At a scale that is off by more than this, what has four sides need not be a tray: more is asked.
+_FAR, _FOUND_FAR = 1.35, 0.85
 _ABSENT = 0.4
 _AS_GOOD = 0.01
 _SCALE_MATTERS = 0.02
@@ -75,21 +80,33 @@ def _best(
     reach: int,
     found: NDArray[np.float64],
 ) -> None:
-    """Scale and shift with most of the sides on edges: share, scale, shift along x and y.
+    """Scale and shift at which the sides lie on edges least by chance: share, scale, shifts.
 
     Edges are a few pixels wide, so several are as good: the middle of these.
     """
     shares = np.empty(boxes.shape[0])
     side = 2 * reach + 1
     tried = np.empty((scales.size, side, side))
+    perimeter = 2.0 * (boxes[:, 2].sum() + boxes[:, 3].sum())
+    area = float(down.shape[0] * across.shape[1])
+    usual = 0.5 * (across[-1].sum() + down[:, -1].sum()) / area
+    chosen, highest = 0, -np.inf
     for k in range(scales.size):
+        # What small boxes do by chance, large ones do not.
+        weight = math.sqrt(scales[k] * perimeter)
         for i in range(side):
             for j in range(side):
                 shift = (float(j - reach), float(i - reach))
                 tried[k, i, j] = _coverage(across, down, boxes, scales[k], shift, shares)
+                score = weight * (tried[k, i, j] - usual)
+                if score > highest:
+                    chosen, highest = k, score
+    near = np.abs(scales / scales[chosen] - 1.0) < _NEARLY
+    best, count = tried[near].max(), 0
     found[:] = 0.0
-    best, count = tried.max(), 0
     for k in range(scales.size):
+        if not near[k]:
+            continue
         for i in range(side):
             for j in range(side):
                 if tried[k, i, j] >= best - _AS_GOOD:
@@ -156,7 +173,8 @@ def map_problem(
     found = np.empty(4)
     _best(across, down, boxes, _SCALES, _SHIFT, found)
     share, scale, x, y = (float(one) for one in found)
-    if share < _FOUND:
+    near = 1.0 / _FAR < scale < _FAR
+    if share < (_FOUND if near else _FOUND_FAR):
         return '', frozenset()
     if own >= share - _CLEARLY:
         return _one_tray(shares, trays, settings)
@@ -166,13 +184,13 @@ def map_problem(
         set_to = settings.pixels_per_metre
         text = (
             f'{what} looks wrong: the trays look as at {set_to * scale:.0f} px/m, '
-            f'not at {set_to:.0f}'
+            f'not at {set_to:.0f}; {_remedy(settings, set_to * scale)}'
         )
         return text, frozenset(trays)
     if max(abs(x), abs(y)) * _REDUCED > _SHIFT_MATTERS_PX:
         text = (
             f'{what} looks wrong: the trays look shifted by {x * _REDUCED:.0f}, '
-            f'{y * _REDUCED:.0f} px'
+            f'{y * _REDUCED:.0f} px; {_remedy(settings)}'
         )
         return text, frozenset(trays)
     return '', frozenset()
@@ -185,7 +203,10 @@ def _one_tray(
     if not absent or 2 * len(absent) >= len(trays):
         return '', frozenset()
     names = ', '.join(str(tray) for tray in absent)
-    text = f'{_source(settings)} looks wrong for tray {names}: no walls are seen around it'
+    text = (
+        f'{_source(settings)} looks wrong for tray {names}: no walls are seen around it; '
+        f'{_remedy(settings)}'
+    )
     return text, frozenset(absent)
 
 
@@ -196,3 +217,14 @@ def _source(settings: PreprocessSettings) -> str:
     if settings.regions_px:
         return 'preprocess.regions_px'
     return 'preprocess.pixels_per_metre'
+
+
+def _remedy(settings: PreprocessSettings, scale: float = 0.0) -> str:
+    """What to do about it."""
+    if settings.calibration:
+        remedy = 'calibrate again'
+    elif scale and not settings.regions_px:
+        remedy = f'set it to {scale:.0f}'
+    else:
+        remedy = 'set preprocess.regions_px'
+    return f'{remedy}, or preprocess.check_map to false'

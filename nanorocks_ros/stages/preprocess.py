@@ -142,7 +142,7 @@ class Preprocessor:
     def _check_map(self, frame: Frame) -> tuple[Notice, ...]:
         """Whether the trays are where they should be: early on, and once more to be sure."""
         self._frames += 1
-        if self._frames not in _MAP_CHECKS:
+        if self._frames not in _MAP_CHECKS or not self._settings.check_map:
             return ()
         view = self._view or self._straight
         image = np.ascontiguousarray(frame.image).reshape(*frame.image.shape[:2], -1)

@@ -68,7 +68,8 @@ class BagResults:
     summary : dict
         What `nanorocks analyse --json` gives, without the series, and more.
     twin : str
-        Name of the recording that holds the same, bit by bit, and counts in its place.
+        Name of the recording that holds the same, bit by bit or imported from the same film, and
+        counts in its place.
     """
 
     name: str
@@ -250,7 +251,8 @@ def _gathered(plan: BatchPlan, store: BatchStore) -> Batch:
     first: dict[str, str] = {}
     for entry, summary in found:
         name = shown(entry.path)
-        twin = first.setdefault(summary['content'], name)
+        # A film that was copied and imported twice is no second measurement either.
+        twin = first.setdefault(summary.get('film') or summary['content'], name)
         batch.results.append(
             BagResults(
                 name=name,

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 from nanorocks_ros import __version__
 from nanorocks_ros.experiment.settings import rows
 from nanorocks_ros.study.batch_report import write_batch_report
-from nanorocks_ros.study.batch_tables import CYCLES, write_tables
-from nanorocks_ros.study.parquet import check_parquet
+from nanorocks_ros.study.batch_tables import write_tables
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,16 +18,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.study.combined import Combined
 
 REPORT = 'report.html'
-
-
-def check_format(folder: Path, kind: str) -> None:
-    """Refuse tables that could not be written in the end, before hours of work.
-
-    Raises
-    ------
-    ConfigurationError
-    """
-    check_parquet(folder / f'{CYCLES}.{kind}')
 
 
 def write_batch(

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import replace
 from fractions import Fraction
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.recordings.images import encode_jpeg
+from nanorocks_ros.recordings.pyav import pyav
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 # Frames of the minute that the rate is given for.
 _FRAMES = 1800.0
 _QUALITIES = 1, 100
+# What needs PyAV, and what does without.
+_H264 = '--compression-codec h264', 'take jpeg'
 # The size of a frame may be off by this much before the quality is changed.
 _TOLERANCE = 0.02
 
@@ -76,7 +78,7 @@ def check_codec(compression: CompressionSettings) -> None:
         When PyAV is needed and not installed.
     """
     if compression.codec == 'h264':
-        _av()
+        pyav(*_H264)
 
 
 class _SizeKeeper:
@@ -152,7 +154,7 @@ class H264Stream:
     """
 
     def __init__(self, size: float, frame_rate: float) -> None:
-        self._av = _av()
+        self._av = pyav(*_H264)
         self.bytes_written = 0
         self._rate = Fraction(frame_rate).limit_denominator(1000)
         self._bits = round(8.0 * size * frame_rate)
@@ -205,14 +207,3 @@ class H264Stream:
             'bufsize': buffer,
         }
         return encoder
-
-
-def _av() -> Any:
-    try:
-        return import_module('av')
-    except ImportError as error:
-        raise ConfigurationError(
-            '--compression-codec h264',
-            'needs PyAV, which is not installed',
-            "take jpeg, or run: pip install 'nanorocks_ros[video]'",
-        ) from error

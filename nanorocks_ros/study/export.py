@@ -19,7 +19,7 @@ from nanorocks_ros.recordings.messages import float_array_message, time_message
 from nanorocks_ros.recordings.results import RESULTS_MARK, write_csv
 from nanorocks_ros.recordings.writer import BagWriter
 from nanorocks_ros.records import ClusterEstimate, CorEstimate, CorStatus
-from nanorocks_ros.study.parquet import Column, check_parquet, write_parquet
+from nanorocks_ros.study.parquet import Column, write_parquet
 from nanorocks_ros.study.results_bag import offered
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import NS, ArrayRecord, layout, to_array
@@ -207,17 +207,6 @@ def _truth_as_json(
 
 FORMATS = ('csv', 'parquet')
 """Forms of the tables of results; the first unless another is asked for."""
-
-
-def check_format(form: str) -> None:
-    """Refuse a form of tables that nothing here can write, before the work.
-
-    Raises
-    ------
-    ConfigurationError
-        When pyarrow, which writes Parquet, is not installed.
-    """
-    check_parquet(Path(f'--format.{form}'))
 
 
 def write_results(

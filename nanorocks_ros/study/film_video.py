@@ -6,14 +6,13 @@ import math
 from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
 
 from nanorocks_ros import __version__
-from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.recordings.pyav import pyav
 from nanorocks_ros.simulation.film import film
 from nanorocks_ros.simulation.render import RIM
 from nanorocks_ros.study.output_files import whole_file
@@ -46,6 +45,8 @@ _SCALES = 100.0, 1e6
 # Sensor noise is costly; at 20 one has to look for the loss.
 _QUALITY = '20'
 _TICKS = 1000
+# What does without PyAV.
+_OTHERWISE = 'name a .avi file'
 
 
 def check_video(path: Path) -> None:
@@ -57,7 +58,7 @@ def check_video(path: Path) -> None:
         When PyAV, which writes H.264, is not installed.
     """
     if path.suffix == '.mp4':
-        _av(path)
+        pyav(str(path), _OTHERWISE)
 
 
 def close_up(settings: SimulationSettings, tray: Tray) -> SimulationSettings:
@@ -175,7 +176,7 @@ def _no_warnings() -> Iterator[None]:
 
 @contextmanager
 def _h264(path: Path, settings: SimulationSettings) -> Iterator[Callable[[Picture], None]]:
-    av = _av(path)
+    av = pyav(str(path), _OTHERWISE)
     # The index first, so that players of web pages start at once.
     with av.open(str(path), 'w', options={'movflags': '+faststart'}) as container:
         container.metadata['comment'] = f'nanorocks_ros {__version__}, seed {settings.seed}'
@@ -191,14 +192,3 @@ def _h264(path: Path, settings: SimulationSettings) -> Iterator[Callable[[Pictur
 
         yield write
         container.mux(stream.encode())
-
-
-def _av(path: Path) -> Any:
-    try:
-        return import_module('av')
-    except ImportError as error:
-        raise ConfigurationError(
-            str(path),
-            'needs PyAV, which is not installed',
-            "name a .avi file, or run: pip install 'nanorocks_ros[video]'",
-        ) from error

@@ -191,6 +191,16 @@ def test_what_was_wrong_with_the_pictures_goes_with_the_estimate():
     assert final.quality is Quality.GLARE
 
 
+def test_of_trays_that_are_not_where_the_settings_say_nothing_is_told():
+    stage = fitter()
+    wrong = [replace(one, quality=Quality.WRONG_SCALE) for one in simulated_cycle()]
+    found = all_estimates(stage, wrong)
+    assert {one.status for one in found} == {CorStatus.UNDETERMINED}
+    assert all((one.restitution_lower, one.restitution_upper) == (0.0, 1.0) for one in found)
+    assert found[-1].quality is Quality.WRONG_SCALE
+    assert stage.evidence is None
+
+
 def test_a_cycle_that_the_next_shake_cuts_short_is_final_then():
     speeds = cooling_cycle(until=10.0) + cooling_cycle(cycle=2, start=10.0, until=3.0)
     finals = [one for one in all_estimates(fitter(), speeds) if one.status is CorStatus.FINAL]

@@ -12,8 +12,11 @@ from plates import SCALE, Plate, settings
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.experiment.camera import Camera
+from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings, with_values
+from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import View
 from nanorocks_ros.records import Frame, Notice, Quality, TrayImage
+from nanorocks_ros.simulation.film import film
 from nanorocks_ros.stages.pipeline import Pipeline, trays_of
 from nanorocks_ros.stages.preprocess import Preprocessor
 
@@ -170,7 +173,7 @@ def test_a_gray_camera_works_in_gray_and_says_so(plate):
         (
             {'preprocess.pixels_per_metre': 0.85 * SCALE},
             r'^cam: preprocess.pixels_per_metre looks wrong: the trays look as at '
-            r'4[789]\d\d px/m, not at 4080$',
+            r'(4[789]\d\d) px/m, not at 4080; set it to \1, or preprocess.check_map to false$',
         ),
         ('shift', r'^cam: preprocess.regions_px looks wrong: the trays look shifted by 1\d, -'),
         ('tray 5', r'^cam: preprocess.regions_px looks wrong for tray 5: no walls are seen'),
@@ -196,6 +199,22 @@ def test_a_map_that_is_right_is_not_called_wrong(plate):
     images, texts = pushed(preprocessor(), [plate.frame(k) for k in range(18)])
     assert texts == []
     assert all(one.quality == 0 for one in images)
+
+
+@pytest.mark.parametrize('noise', [1.0, 4.0])
+def test_the_scale_of_a_film_from_close_by_is_found(noise):
+    camera = SimulationSettings(width_px=720, height_px=720, pixels_per_metre=38.7e3, noise=noise)
+    shots = [frame for frame, _ in film(camera, load_trays()[1], 18)]
+    chosen = with_values(PipelineSettings(), {}, 'test')
+    images, texts = pushed(Preprocessor(chosen, trays_of(chosen), 'cam', None), shots)
+    (text,) = [one for one in texts if 'looks wrong' in one]
+    assert float(text.split(' px/m')[0].split()[-1]) == pytest.approx(38700.0, rel=0.01)
+    assert images[-1].quality & Quality.WRONG_SCALE
+    values = {'preprocess.check_map': False}
+    chosen = with_values(PipelineSettings(), values, 'test')
+    images, texts = pushed(Preprocessor(chosen, trays_of(chosen), 'cam', None), shots)
+    assert not [one for one in texts if 'looks wrong' in one]
+    assert not images[-1].quality & Quality.WRONG_SCALE
 
 
 def test_frames_of_any_rate_and_with_gaps_give_speeds_by_their_stamps(plate):

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from videos import write_video
 
 from benchmarks.batch import broken_bags, short_film
 from nanorocks_ros.cli.main import main
@@ -24,6 +25,8 @@ from nanorocks_ros.experiment.settings import PipelineSettings, with_values
 from nanorocks_ros.recordings.find_bags import find_bags
 from nanorocks_ros.study.batch import BagResults, BatchPlan, run_batch
 from nanorocks_ros.study.combined import combined
+from nanorocks_ros.study.films import ImportSettings
+from nanorocks_ros.study.import_film import import_films
 from nanorocks_ros.study.offline import analyse
 from nanorocks_ros.study.result_tables import read_columns
 from nanorocks_ros.study.tasks import Workers
@@ -312,3 +315,17 @@ def test_a_cluster_does_the_same(scheduler, tiny, tmp_path):
     batch = run_batch(plan, Workers(scheduler=scheduler.address), Watcher())
     assert [one.folder.name for one in batch.results] == ['tiny']
     assert not batch.failed
+
+
+def test_two_copies_of_one_video_count_once(tmp_path):
+    videos = [write_video(tmp_path / name, range(8)) for name in ('a.avi', 'b.avi', 'c.avi')]
+    shutil.copy(videos[0], videos[2])
+    write_video(videos[1], range(1, 9))
+    made = [tmp_path / 'bags' / one.stem for one in videos]
+    for video, bag in zip(videos, made, strict=True):
+        import_films([video], bag, ImportSettings(start_ns=10**18), lambda _: None)
+    settings = with_values(PipelineSettings(), {'preprocess.pixels_per_metre': 1000.0}, 'test')
+    batch, _ = batch_of(tmp_path / 'out', *made, settings=settings)
+    assert not batch.failed
+    twins = {Path(one.name).name: Path(one.twin).name for one in batch.results}
+    assert twins == {'a': '', 'b': '', 'c': 'a'}
