@@ -224,7 +224,8 @@ def _remedy(settings: PreprocessSettings, scale: float = 0.0) -> str:
     if settings.calibration:
         remedy = 'calibrate again'
     elif scale and not settings.regions_px:
-        remedy = f'set it to {scale:.0f}'
+        # Around the floor there may be a rim, which looks like a tray as well.
+        remedy = 'set it to about that and see with nanorocks look that the floor fills the crop'
     else:
         remedy = 'set preprocess.regions_px'
-    return f'{remedy}, or preprocess.check_map to false'
+    return f'{remedy}, or set preprocess.check_map to false'

@@ -173,7 +173,7 @@ def test_a_gray_camera_works_in_gray_and_says_so(plate):
         (
             {'preprocess.pixels_per_metre': 0.85 * SCALE},
             r'^cam: preprocess.pixels_per_metre looks wrong: the trays look as at '
-            r'(4[789]\d\d) px/m, not at 4080; set it to \1, or preprocess.check_map to false$',
+            r'4[789]\d\d px/m, not at 4080; set it to about that and see with nanorocks look',
         ),
         ('shift', r'^cam: preprocess.regions_px looks wrong: the trays look shifted by 1\d, -'),
         ('tray 5', r'^cam: preprocess.regions_px looks wrong for tray 5: no walls are seen'),
