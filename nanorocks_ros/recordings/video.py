@@ -75,7 +75,12 @@ class Video:
 
     def _opened(self, path: Path) -> Any:
         try:
-            container = self._av.open(f'file:{path.resolve()}', options=dict(_ONLY_FILES))
+            # Notes of old cameras need not be UTF-8.
+            container = self._av.open(
+                f'file:{path.resolve()}',
+                options=dict(_ONLY_FILES),
+                metadata_errors='backslashreplace',
+            )
         except (self._av.FFmpegError, OSError) as error:
             raise RecordingError(
                 str(path),

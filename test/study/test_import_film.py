@@ -411,6 +411,13 @@ def test_hostile_names_and_notes_come_through(tmp_path):
     assert '!!python/object' in bag.metadata['camera.COMMENT']
 
 
+def test_notes_that_are_not_utf8_are_kept_as_they_can_be_shown(tmp_path):
+    video = write_video(tmp_path / 'a.mkv', range(3), tags={'comment': 'Muenster'})
+    video.write_bytes(video.read_bytes().replace(b'Muenster', 'M\xfcnsterx'.encode('latin-1')))
+    imported(video, tmp_path / 'bag')
+    assert open_bag(tmp_path / 'bag').metadata['camera.COMMENT'] == r'M\xfcnsterx'
+
+
 # --- a bag of each --------------------------------------------------------------------------
 
 
