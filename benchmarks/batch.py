@@ -15,6 +15,9 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
+import numpy as np
+
 from nanorocks_ros.experiment.settings import (
     CompressionSettings,
     PipelineSettings,
@@ -42,6 +45,8 @@ _NS = 1_000_000_000
 _CAMERA = topics.RAW_COMPRESSED.absolute()
 # Bags on each number of cores, of how many films one after the other; rounds.
 _BAGS, _LOOPS, _ROUNDS = 8, 1, 2
+# What two cores do over one where nothing is shared: for so long.
+_DECODE_S = 3.0
 # Lengths of which memory is compared, in films.
 _SHORT, _LONG = 3, 30
 _PLATE_SECONDS = 5.0
@@ -147,6 +152,37 @@ def _cores(folder: Path, film: Path) -> None:
     print('| --- | --- | --- | --- |')
     for count, seconds in best.items():
         print(f'| {count} | {seconds:.1f} | {frames / seconds:.0f} | {best[1] / seconds:.2f} |')
+    alone = max(_decoded_by(1, film) for _ in range(_ROUNDS))
+    both = max(_decoded_by(2, film) for _ in range(_ROUNDS))
+    print(f'\ntwo processes that only decode, over one: {both / alone:.2f}', flush=True)
+
+
+def _decoding(film: str, barrier, found) -> None:
+    """Decode the film for some seconds, beginning with the others; frames a second."""
+    cv2.setNumThreads(1)
+    bag = open_bag(film)
+    jpegs = [bytes(bag.deserialize(one).data) for one in bag.messages([_CAMERA])]
+    frames = [np.frombuffer(one, np.uint8) for one in jpegs]
+    barrier.wait()
+    start, done = time.perf_counter(), 0
+    while time.perf_counter() - start < _DECODE_S:
+        cv2.imdecode(frames[done % len(frames)], cv2.IMREAD_COLOR)
+        done += 1
+    found.put(done / (time.perf_counter() - start))
+
+
+def _decoded_by(count: int, film: Path) -> float:
+    """Frames a second that some processes decode, which have nothing to do with each other."""
+    context = multiprocessing.get_context('spawn')
+    barrier, found = context.Barrier(count), context.Queue()
+    arguments = (str(film), barrier, found)
+    processes = [context.Process(target=_decoding, args=arguments) for _ in range(count)]
+    for one in processes:
+        one.start()
+    total = sum(found.get() for _ in processes)
+    for one in processes:
+        one.join()
+    return total
 
 
 def _memory(folder: Path, film: Path) -> None:

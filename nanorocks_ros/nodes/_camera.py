@@ -8,6 +8,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from sensor_msgs.msg import CameraInfo
 
 from nanorocks_ros.errors import FrameError
+from nanorocks_ros.nodes._gaps import Gaps
 from nanorocks_ros.nodes._shell import qos_of
 from nanorocks_ros.recordings.images import frame_from_compressed, frame_from_image, stamp_ns_of
 from nanorocks_ros.recordings.lens import info_from_message, view_from_message
@@ -46,6 +47,7 @@ class Camera:
         self._held = []
         self._last = None
         self._started = False
+        self._gaps = Gaps()
         self.view = None
         self.lens_message = None
         self.message = None
@@ -112,6 +114,8 @@ class Camera:
         if self._refusal is not None:
             raise self._refusal
         frame = self._read(message, self.topic)
+        if self._gaps.push(frame.stamp_ns):
+            self._node.tell_missing(self.topic, self._gaps.missing)
         # The last frame is let go only now that there is the next one: otherwise its 6 MB go back
         # to the system each time, and to get them again took as long as decoding.
         self._last, self.message = frame, message

@@ -80,6 +80,7 @@ _OVERRIDABLE = QoSOverridingOptions(
 )
 _BUILT_AROUND = {'trays', 'trays_file'}
 _THROTTLE_S = 5.0
+_MISSING_S = 30.0
 _CONNECTED_S = 0.1
 # Acknowledgements come with heartbeats, every 3 s.
 _FAREWELL_S = 3.5
@@ -336,6 +337,17 @@ class NanorocksNode(Node):
             self._refused[text] = now
             self.get_logger().error(text)
         self.state['last refusal'] = text
+
+    def tell_missing(self, topic, count):
+        """Say, once in a while, how many frames did not come so far."""
+        self.state['frames missing'] = count
+        now = time.monotonic()
+        if now - self._refused.get('missing', -_MISSING_S) >= _MISSING_S:
+            self._refused['missing'] = now
+            self.get_logger().warning(
+                f'{topic}: {count} frames missing so far, by their stamps: lost on the way, or '
+                'this machine is too slow; follow fewer trays, see docs/doctor.md'
+            )
 
     # Diagnostics
 

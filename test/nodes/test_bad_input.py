@@ -124,6 +124,7 @@ class Camera:
         self._publisher = graph.node.create_publisher(Image, topics.RAW.name, qos_of(topics.RAW))
         self.trays = []
         self.levels = []
+        self.values = {}
         graph.node.create_subscription(
             Image, topics.GRAY.of(1), self.trays.append, qos_of(topics.GRAY)
         )
@@ -132,11 +133,12 @@ class Camera:
 
     def _diagnostics(self, message):
         self.levels += [(one.level, one.message) for one in message.status]
+        self.values.update({one.key: one.value for it in message.status for one in it.values})
 
-    def publish(self, encoding=None, size=240, second=None):
+    def publish(self, encoding=None, size=240, second=None, level=90):
         self._graph.until(lambda: self._publisher.get_subscription_count() == 1)
         self._second = self._second + 1 if second is None else second
-        pixels = np.full((size, size, 3), 90, np.uint8)
+        pixels = np.full((size, size, 3), level, np.uint8)
         stamp_ns = self._second * 1_000_000_000
         self._publisher.publish(image_message(stamp_ns, 'camera', pixels, encoding))
 
@@ -177,6 +179,20 @@ def test_time_that_goes_back_is_said(graph):
     camera.publish(second=100)
     camera.publish(second=50)
     graph.until(lambda: 'time went back by 50.000 s; starting afresh' in graph.output(process))
+    assert graph.interrupt(process).code == 0
+
+
+def test_missing_frames_are_said_and_counted(graph):
+    camera = Camera(graph)
+    process = graph.start('preprocessor')
+    for second in (*range(1, 25), 30, 31):
+        before = len(camera.trays)
+        # Of other brightness, or they would be left out as the same frame again.
+        camera.publish(second=second, level=60 + 2 * second)
+        graph.until(lambda before=before: len(camera.trays) > before)
+    said = '/nanorocks/camera/image_raw: 5 frames missing so far, by their stamps'
+    graph.until(lambda: said in graph.output(process))
+    graph.until(lambda: camera.values.get('frames missing') == '5')
     assert graph.interrupt(process).code == 0
 
 
