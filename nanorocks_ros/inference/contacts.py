@@ -10,10 +10,11 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.special import logsumexp, ndtr
+from scipy.special import ndtr
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.contact_estimate import checked_grid
+from nanorocks_ros.inference.log_sums import log_sum
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,7 +56,7 @@ def marginal(table: NDArray[np.float64]) -> NDArray[np.float64]:
     table : ndarray (m, n)
         One of those below, or a sum of some: what is not known is then the same in all of them.
     """
-    return np.asarray(logsumexp(table, axis=0) - math.log(len(table)))
+    return np.asarray(log_sum(table) - math.log(len(table)))
 
 
 def rebound_log_likelihood(
