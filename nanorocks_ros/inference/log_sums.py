@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def log_sum(
     logs: NDArray[np.float64], weights: NDArray[np.float64] | None = None
 ) -> NDArray[np.float64]:
-    """ln of the sum over the first axis of weights times exp(logs), without overflow.
+    """Logarithm of the sum over the first axis of weights times exp(logs), without overflow.
 
     Parameters
     ----------

@@ -59,7 +59,7 @@ def _smeared(
     nodes: NDArray[np.float64],
     spread: float,
 ) -> NDArray[np.float64]:
-    """ln of the sum of exp(logs) times a Gaussian around each node; places evenly spaced."""
+    """Logarithm of the sum, over even places, of exp(logs) times a Gaussian around each node."""
     found = np.empty(nodes.size)
     part = np.empty(fine.size)
     most = logs.max()
