@@ -27,8 +27,8 @@ _EARLY, _LEAD_PER_LOG_TIME = math.log(4.0), 1.0
 _MOST_LEAD = 8.0
 # Speeds from which the amplitude is guessed.
 _FIRST_SPEEDS = 3
-# Sums that are made side by side: one alone would wait for its own last result at each term.
-_ABREAST = 4
+# Standard deviations up to which a nuisance may be off.
+_FARTHEST = 4.0
 
 
 @compiled
@@ -85,46 +85,65 @@ n_z + 2)
         for i in range(n):
             factor[i, i] += variance[i]
         log_determinant = _factorise(factor)
-        change = _LONGEST_STEP
-        cost = _MOST
-        best = amplitude
-        for _ in range(_NEWTON_STEPS):
-            _compare(log_time, log_speed, means[place], first, step, amplitude, columns)
-            _whiten(factor, columns, 2)
-            off = (amplitude - expected) / spread
-            now = off * off
-            pull = -off / spread
-            stiffness = 1.0 / spread**2
-            for i in range(n):
-                now += columns[0, i] ** 2
-                pull += columns[0, i] * columns[1, i]
-                stiffness += columns[1, i] ** 2
-            if now > cost:
-                # Too far: the mean is curved.
-                change *= 0.3
-            else:
-                cost, best = now, amplitude
-                change = min(max(pull / stiffness, -_LONGEST_STEP), _LONGEST_STEP)
-            amplitude = best + change
-            if abs(change) < _SMALL:
-                break
+        best, cost = _best_amplitude(
+            data, means[place], (first, step), factor, (amplitude, expected, spread), columns
+        )
         off = (best - expected) / spread
         if gradients.shape[0] == 0:
             numbers[place, 1] = cost - off * off
             numbers[place, 0] = -0.5 * (cost + log_determinant)
             continue
         _compare(log_time, log_speed, means[place], first, step, best, columns)
-        for i in range(n):
-            at = (best + log_time[i] - first) / step
-            # Beyond its ends the library's slopes stay as they are there.
-            at = min(max(at, 0.0), slopes.shape[2] - 1.0)
-            for z in range(slopes.shape[1]):
-                columns[2 + z, i] = _between(slopes[place, z], at)[0]
-            columns[n_z, i] = camera[0] * (columns[1, i] - 1.0)
-            columns[n_z + 1, i] = camera[1] * (log_speed[i] - middle)
+        offset = (best - first) / step
+        _look_up(slopes[place], log_time / step + offset, columns[2:])
+        columns[n_z] = camera[0] * (columns[1] - 1.0)
+        columns[n_z + 1] = camera[1] * (log_speed - middle)
         _whiten(factor, columns, 2 + n_z)
         _sum_up(columns, (off, spread), numbers[place], gradients[place], informations[place])
         numbers[place, 0] -= 0.5 * (log_determinant + off * off)
+
+
+@compiled
+def _best_amplitude(
+    data: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    mean: NDArray[np.float64],
+    axis: tuple[float, float],
+    factor: NDArray[np.float64],
+    amplitudes: tuple[float, float, float],
+    columns: NDArray[np.float64],
+) -> tuple[float, float]:
+    """The likeliest ln a and what it costs, by Newton's method.
+
+    The amplitudes are that to begin with, the expected one and the spread of what is expected.
+    """
+    log_time, log_speed, _ = data
+    first, step = axis
+    amplitude, expected, spread = amplitudes
+    residual, slope = columns[0], columns[1]
+    change = _LONGEST_STEP
+    cost = _MOST
+    best = amplitude
+    for _ in range(_NEWTON_STEPS):
+        _compare(log_time, log_speed, mean, first, step, amplitude, columns)
+        _whiten(factor, columns, 2)
+        off = (amplitude - expected) / spread
+        now = off * off
+        pull = -off / spread
+        stiffness = 1.0 / spread**2
+        for i in range(log_time.size):
+            now += residual[i] ** 2
+            pull += residual[i] * slope[i]
+            stiffness += slope[i] ** 2
+        if now > cost:
+            # Too far: the mean is curved.
+            change *= 0.3
+        else:
+            cost, best = now, amplitude
+            change = min(max(pull / stiffness, -_LONGEST_STEP), _LONGEST_STEP)
+        amplitude = best + change
+        if abs(change) < _SMALL:
+            break
+    return best, cost
 
 
 @compiled
@@ -192,50 +211,55 @@ def _covariance(
     low = 1.0 - high
     for i in range(n):
         row = max(whole + cells[i], 0)
+        here, next_one, into = table[row], table[row + 1], found[i]
         for j in range(i + 1):
             column = max(whole + cells[j], 0)
-            found[i, j] = low * table[row, column] + high * table[row + 1, column + 1]
+            into[j] = low * here[column] + high * next_one[column + 1]
 
 
 @compiled
 def _factorise(matrix: NDArray[np.float64]) -> float:
-    """Cholesky factor in place, in the lower half; ln of the determinant."""
-    n = matrix.shape[0]
+    """Cholesky factor in place, in the lower half, but 1 over its diagonal; ln of the determinant.
+
+    Two of a row are worked out side by side: one alone would wait for itself at each term.
+    """
     log_determinant = 0.0
-    for i in range(n):
-        for j in range(i + 1):
-            total = matrix[i, j]
+    for i in range(matrix.shape[0]):
+        row = matrix[i]
+        for j in range(0, i - 1, 2):
+            one, two = matrix[j], matrix[j + 1]
+            a, b = row[j], row[j + 1]
             for k in range(j):
-                total -= matrix[i, k] * matrix[j, k]
-            if i == j:
-                log_determinant += math.log(total)
-                matrix[i, i] = math.sqrt(total)
-            else:
-                matrix[i, j] = total / matrix[j, j]
+                a -= row[k] * one[k]
+                b -= row[k] * two[k]
+            a *= one[j]
+            row[j], row[j + 1] = a, (b - a * two[j]) * two[j + 1]
+        if i % 2 == 1:
+            one, a = matrix[i - 1], row[i - 1]
+            for k in range(i - 1):
+                a -= row[k] * one[k]
+            row[i - 1] = a * one[i - 1]
+        rest = row[i]
+        for k in range(i):
+            rest -= row[k] * row[k]
+        log_determinant += math.log(rest)
+        row[i] = 1.0 / math.sqrt(rest)
     return log_determinant
 
 
 @compiled
 def _whiten(factor: NDArray[np.float64], columns: NDArray[np.float64], count: int) -> None:
-    """The first columns divided by the factor, in place."""
-    for one in range(0, count, _ABREAST):
-        # Beyond the end the last column is done again, which does no harm.
-        two, three, four = (
-            min(one + 1, count - 1),
-            min(one + 2, count - 1),
-            min(one + 3, count - 1),
-        )
+    """The first columns divided by a factor of `_factorise`, in place; two side by side."""
+    for first in range(0, count, 2):
+        # An odd one at the end goes with itself.
+        one, two = columns[first], columns[min(first + 1, count - 1)]
         for i in range(factor.shape[0]):
-            a, b, c, d = columns[one, i], columns[two, i], columns[three, i], columns[four, i]
+            row = factor[i]
+            a, b = one[i], two[i]
             for k in range(i):
-                share = factor[i, k]
-                a -= share * columns[one, k]
-                b -= share * columns[two, k]
-                c -= share * columns[three, k]
-                d -= share * columns[four, k]
-            root = factor[i, i]
-            columns[one, i], columns[two, i] = a / root, b / root
-            columns[three, i], columns[four, i] = c / root, d / root
+                a -= row[k] * one[k]
+                b -= row[k] * two[k]
+            one[i], two[i] = a * row[i], b * row[i]
 
 
 @compiled
@@ -264,6 +288,21 @@ def _between(values: NDArray[np.float64], at: float) -> tuple[float, float]:
 
 
 @compiled
+def _look_up(
+    slopes: NDArray[np.float64], places: NDArray[np.float64], found: NDArray[np.float64]
+) -> None:
+    """Changes of ln f with nuisances, (n_z, n_x), between distances; (n_z, n)."""
+    for i in range(places.size):
+        # Beyond its ends the library's slopes stay as they are there.
+        at = min(max(places[i], 0.0), slopes.shape[1] - 1.0)
+        cell = min(int(at), slopes.shape[1] - 2)
+        share = at - cell
+        for z in range(slopes.shape[0]):
+            value = slopes[z, cell]
+            found[z, i] = value + share * (slopes[z, cell + 1] - value)
+
+
+@compiled
 def _sum_up(
     columns: NDArray[np.float64],
     amplitude: tuple[float, float],
@@ -282,27 +321,70 @@ def _sum_up(
         deviation += columns[0, i] ** 2
         pull += columns[0, i] * columns[1, i]
         stiffness += columns[1, i] ** 2
-    along = np.zeros(gradient.size)
+    along = np.empty(gradient.size)
+    residual, with_amplitude = columns[0], columns[1]
     for z in range(gradient.size):
-        slope = 0.0
+        own = columns[2 + z]
+        slope, shared = 0.0, 0.0
         for i in range(n):
-            along[z] += columns[1, i] * columns[2 + z, i]
-            slope += columns[0, i] * columns[2 + z, i]
+            shared += with_amplitude[i] * own[i]
+            slope += residual[i] * own[i]
+        along[z] = shared
         # What the amplitude would take over is no gain of a nuisance.
-        gradient[z] = slope - along[z] * pull / stiffness
-        for one in range(0, z + 1, _ABREAST):
-            two, three, four = min(one + 1, z), min(one + 2, z), min(one + 3, z)
-            share = -along[z]
-            a, b = share * along[one] / stiffness, share * along[two] / stiffness
-            c, d = share * along[three] / stiffness, share * along[four] / stiffness
+        gradient[z] = slope - shared * pull / stiffness
+        for first in range(0, z + 1, 2):
+            # Two side by side; an odd one at the end goes with itself.
+            second = min(first + 1, z)
+            one, two = columns[2 + first], columns[2 + second]
+            a, b = -shared * along[first] / stiffness, -shared * along[second] / stiffness
             for i in range(n):
-                value = columns[2 + z, i]
-                a += value * columns[2 + one, i]
-                b += value * columns[2 + two, i]
-                c += value * columns[2 + three, i]
-                d += value * columns[2 + four, i]
-            for y, total in ((one, a), (two, b), (three, c), (four, d)):
-                information[z, y] = total
-                information[y, z] = total
+                a += own[i] * one[i]
+                b += own[i] * two[i]
+            information[z, first] = information[first, z] = a
+            information[z, second] = information[second, z] = b
     numbers[0] = -0.5 * deviation
     numbers[1] = deviation
+
+
+@compiled
+def integrate(
+    gradients: NDArray[np.float64],
+    informations: NDArray[np.float64],
+    found: NDArray[np.float64],
+) -> None:
+    """What the log likelihood gains by nuisances that may be off by one of their deviations each.
+
+    Parameters
+    ----------
+    gradients, informations : ndarray (n_places, n_z), (n_places, n_z, n_z)
+    found : ndarray (n_places,)
+        Filled in.
+    """
+    n = gradients.shape[1]
+    # The information and the prior, as L D L^T: pivots, and L below the diagonal.
+    lower, pivots = np.empty((n, n)), np.empty(n)
+    shift = np.empty(n)
+    for place in range(gradients.shape[0]):
+        log_determinant = 0.0
+        for i in range(n):
+            shift[i] = gradients[place, i]
+            for j in range(i + 1):
+                total = informations[place, i, j]
+                for k in range(j):
+                    total -= lower[i, k] * lower[j, k] * pivots[k]
+                if i == j:
+                    pivots[i] = 1.0 + total
+                    log_determinant += math.log(abs(pivots[i]))
+                else:
+                    lower[i, j] = total / pivots[j]
+                    shift[i] -= lower[i, j] * shift[j]
+        farthest, product = 0.0, 0.0
+        for i in range(n - 1, -1, -1):
+            shift[i] /= pivots[i]
+            for k in range(i + 1, n):
+                shift[i] -= lower[k, i] * shift[k]
+            farthest = max(farthest, abs(shift[i]))
+            product += gradients[place, i] * shift[i]
+        # Far out the dependence is not linear, and could explain anything.
+        share = min(1.0, _FARTHEST / max(farthest, _FARTHEST))
+        found[place] = (share - 0.5 * share**2) * product - 0.5 * log_determinant

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.inference.decay_kernels import ROUNDING, evaluate
+from nanorocks_ros.inference.decay_kernels import ROUNDING, evaluate, integrate
 from nanorocks_ros.inference.log_sums import log_sum
 
 if TYPE_CHECKING:
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 # Nothing is measured better than that, relative.
 _LEAST_ERROR = 2e-3
-# Standard deviations up to which a nuisance may be off.
-_FARTHEST = 4.0
 # One of so many places is looked at to find about the best.
 _EVERY = 4
 # A scale known no better than this is no linear nuisance: it is tried at so many of its standard
@@ -107,13 +105,14 @@ class DecayLikelihood:
 
     def integrated(self) -> NDArray[np.float64]:
         """Log likelihood (n_places,) with the nuisances integrated over their Gaussian priors."""
-        prior = np.eye(self.gradient.shape[-1])
-        matrix = prior + self.information
-        shift = np.linalg.solve(matrix, self.gradient[..., np.newaxis])[..., 0]
-        # Far out the dependence is not linear, and could explain anything.
-        share = np.minimum(1.0, _FARTHEST / np.maximum(np.abs(shift).max(axis=-1), _FARTHEST))
-        gain = (share - 0.5 * share**2) * np.einsum('...z,...z->...', self.gradient, shift)
-        each = self.log_likelihood + gain - 0.5 * np.linalg.slogdet(matrix)[1]
+        each = np.empty(self.log_likelihood.shape)
+        n_z = self.gradient.shape[-1]
+        integrate(
+            np.ascontiguousarray(self.gradient).reshape(-1, n_z),
+            np.ascontiguousarray(self.information).reshape(-1, n_z, n_z),
+            each.reshape(-1),
+        )
+        each += self.log_likelihood
         if each.ndim == 1:
             return np.asarray(each)
         weight = np.exp(-0.5 * _SCALES**2)
