@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.physics.compiled import compiled, kernel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 ROUNDING = 1e-9
 _NEWTON_STEPS = 15
-_MOST = 1e300
+# Beyond these a product could be too much for a double.
+_LEAST, _MOST = 1e-150, 1e150
 _LONGEST_STEP = 0.5
 _SMALL = 3e-3
 # Before anything is measured the gas is taken to have been faster at the shaking event than at the
@@ -103,7 +104,7 @@ n_z + 2)
         numbers[place, 0] -= 0.5 * (log_determinant + off * off)
 
 
-@compiled
+@kernel
 def _best_amplitude(
     data: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     mean: NDArray[np.float64],
@@ -121,7 +122,7 @@ def _best_amplitude(
     amplitude, expected, spread = amplitudes
     residual, slope = columns[0], columns[1]
     change = _LONGEST_STEP
-    cost = _MOST
+    cost = np.inf
     best = amplitude
     for _ in range(_NEWTON_STEPS):
         _compare(log_time, log_speed, mean, first, step, amplitude, columns)
@@ -146,7 +147,7 @@ def _best_amplitude(
     return best, cost
 
 
-@compiled
+@kernel
 def _matching(
     log_time: NDArray[np.float64],
     log_speed: NDArray[np.float64],
@@ -170,7 +171,7 @@ def _matching(
     return float(low)
 
 
-@compiled
+@kernel
 def _mix(
     covariances: NDArray[np.float64],
     corners: NDArray[np.int64],
@@ -194,7 +195,7 @@ def _mix(
             )
 
 
-@compiled
+@kernel
 def _covariance(
     table: NDArray[np.float64],
     cells: NDArray[np.int64],
@@ -217,13 +218,13 @@ def _covariance(
             into[j] = low * here[column] + high * next_one[column + 1]
 
 
-@compiled
+@kernel
 def _factorise(matrix: NDArray[np.float64]) -> float:
     """Cholesky factor in place, in the lower half, but 1 over its diagonal; ln of the determinant.
 
     Two of a row are worked out side by side: one alone would wait for itself at each term.
     """
-    log_determinant = 0.0
+    log_determinant, product = 0.0, 1.0
     for i in range(matrix.shape[0]):
         row = matrix[i]
         for j in range(0, i - 1, 2):
@@ -242,12 +243,14 @@ def _factorise(matrix: NDArray[np.float64]) -> float:
         rest = row[i]
         for k in range(i):
             rest -= row[k] * row[k]
-        log_determinant += math.log(rest)
+        product *= rest
+        if not _LEAST < product < _MOST:
+            log_determinant, product = log_determinant + math.log(product), 1.0
         row[i] = 1.0 / math.sqrt(rest)
-    return log_determinant
+    return log_determinant + math.log(product)
 
 
-@compiled
+@kernel
 def _whiten(factor: NDArray[np.float64], columns: NDArray[np.float64], count: int) -> None:
     """The first columns divided by a factor of `_factorise`, in place; two side by side."""
     for first in range(0, count, 2):
@@ -262,7 +265,7 @@ def _whiten(factor: NDArray[np.float64], columns: NDArray[np.float64], count: in
             one[i], two[i] = a * row[i], b * row[i]
 
 
-@compiled
+@kernel
 def _compare(
     log_time: NDArray[np.float64],
     log_speed: NDArray[np.float64],
@@ -279,7 +282,7 @@ def _compare(
         columns[1, i] = 1.0 + slope / step
 
 
-@compiled
+@kernel
 def _between(values: NDArray[np.float64], at: float) -> tuple[float, float]:
     """Value and slope between two entries, straight on beyond the ends."""
     cell = min(max(math.floor(at), 0), values.size - 2)
@@ -287,7 +290,7 @@ def _between(values: NDArray[np.float64], at: float) -> tuple[float, float]:
     return values[cell] + (at - cell) * slope, slope
 
 
-@compiled
+@kernel
 def _look_up(
     slopes: NDArray[np.float64], places: NDArray[np.float64], found: NDArray[np.float64]
 ) -> None:
@@ -302,7 +305,7 @@ def _look_up(
             found[z, i] = value + share * (slopes[z, cell + 1] - value)
 
 
-@compiled
+@kernel
 def _sum_up(
     columns: NDArray[np.float64],
     amplitude: tuple[float, float],
@@ -321,27 +324,31 @@ def _sum_up(
         deviation += columns[0, i] ** 2
         pull += columns[0, i] * columns[1, i]
         stiffness += columns[1, i] ** 2
-    along = np.empty(gradient.size)
     residual, with_amplitude = columns[0], columns[1]
     for z in range(gradient.size):
         own = columns[2 + z]
-        slope, shared = 0.0, 0.0
+        shared = 0.0
         for i in range(n):
             shared += with_amplitude[i] * own[i]
-            slope += residual[i] * own[i]
-        along[z] = shared
-        # What the amplitude would take over is no gain of a nuisance.
-        gradient[z] = slope - shared * pull / stiffness
+        # Kept here until all of them are needed no more.
+        gradient[z] = shared
         for first in range(0, z + 1, 2):
             # Two side by side; an odd one at the end goes with itself.
             second = min(first + 1, z)
             one, two = columns[2 + first], columns[2 + second]
-            a, b = -shared * along[first] / stiffness, -shared * along[second] / stiffness
+            a, b = -shared * gradient[first] / stiffness, -shared * gradient[second] / stiffness
             for i in range(n):
                 a += own[i] * one[i]
                 b += own[i] * two[i]
             information[z, first] = information[first, z] = a
             information[z, second] = information[second, z] = b
+    for z in range(gradient.size):
+        own = columns[2 + z]
+        slope = 0.0
+        for i in range(n):
+            slope += residual[i] * own[i]
+        # What the amplitude would take over is no gain of a nuisance.
+        gradient[z] = slope - gradient[z] * pull / stiffness
     numbers[0] = -0.5 * deviation
     numbers[1] = deviation
 
