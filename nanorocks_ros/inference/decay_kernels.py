@@ -78,10 +78,16 @@ n_z + 2)
     expected = log_speed[0] + _AMPLITUDE_LEAD + late
     spread = _AMPLITUDE_SPREAD + late
     for place in range(means.shape[0]):
-        if place < corners.shape[0]:
-            _mix(covariances, corners[place], shares[place], mixed)
         amplitude = _matching(log_time, log_speed, means[place], first, step)
-        offset = (amplitude + log_time[0] - first) / step
+        # Beyond the ends of the library the covariance is that of its ends, cells apart as they
+        # are.
+        offset = max((amplitude + log_time[0] - first) / step, 0.0)
+        offset = min(offset, len(mixed) - 1 - cells[n - 1] - ROUNDING)
+        if corners.shape[0] > 1:
+            part = max(int(offset), 0), min(int(offset) + cells[n - 1] + 2, len(mixed))
+            _mix(covariances, corners[place], shares[place], part, mixed)
+        elif place == 0:
+            _mix(covariances, corners[0], shares[0], (0, len(mixed)), mixed)
         _covariance(mixed, cells, offset, factor)
         for i in range(n):
             factor[i, i] += variance[i]
@@ -176,17 +182,18 @@ def _mix(
     covariances: NDArray[np.float64],
     corners: NDArray[np.int64],
     shares: NDArray[np.float64],
+    part: tuple[int, int],
     found: NDArray[np.float64],
 ) -> None:
-    """The covariance of the library between four corners."""
+    """The covariance of the library between four corners, from one distance to another."""
     one, two, three, four = (
         covariances[corners[0]],
         covariances[corners[1]],
         covariances[corners[2]],
         covariances[corners[3]],
     )
-    for i in range(found.shape[0]):
-        for j in range(found.shape[1]):
+    for i in range(part[0], part[1]):
+        for j in range(part[0], part[1]):
             found[i, j] = (
                 shares[0] * one[i, j]
                 + shares[1] * two[i, j]
@@ -203,14 +210,10 @@ def _covariance(
     found: NDArray[np.float64],
 ) -> None:
     """Lower half of the covariance of data at some cells after an offset."""
-    n = cells.size
-    last = table.shape[0] - 1
-    # Beyond the ends of the library the covariance is that of its ends, cells apart as they are.
-    within = min(max(offset, 0.0), last - cells[n - 1] - ROUNDING)
-    whole = math.floor(within)
-    high = within - whole
+    whole = math.floor(offset)
+    high = offset - whole
     low = 1.0 - high
-    for i in range(n):
+    for i in range(cells.size):
         row = max(whole + cells[i], 0)
         here, next_one, into = table[row], table[row + 1], found[i]
         for j in range(i + 1):

@@ -221,7 +221,7 @@ class HaffFitter:
         if status is CorStatus.FINAL:
             few = self._settings.fewest_samples
             fields.update(species_decays(self._tray, decay.time, self._samples, few))
-        quality = reduce(or_, (one.quality for one in self._samples))
+        quality = reduce(or_, {one.quality for one in self._samples})
         if fields.get('tension', 0.0) > _TENSE:
             quality |= Quality.INCONSISTENT
         return (
