@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.inference.triangles import factorise, whiten
 from nanorocks_ros.physics.compiled import compiled, kernel
 
 if TYPE_CHECKING:
@@ -14,10 +15,7 @@ if TYPE_CHECKING:
 
 ROUNDING = 1e-9
 _NEWTON_STEPS = 15
-# Beyond these a product could be too much for a double.
-_LEAST, _MOST = 1e-150, 1e150
-_LONGEST_STEP = 0.5
-_SMALL = 3e-3
+_LONGEST_STEP, _SMALL = 0.5, 3e-3
 # Before anything is measured the gas is taken to have been faster at the shaking event than at the
 # first speed used by a factor of 1.6, give or take a factor of e, where that is within four
 # seconds of the event. What it did before a first speed that comes later is known the less the
@@ -28,8 +26,6 @@ _EARLY, _LEAD_PER_LOG_TIME = math.log(4.0), 1.0
 _MOST_LEAD = 8.0
 # Speeds from which the amplitude is guessed.
 _FIRST_SPEEDS = 3
-# Standard deviations up to which a nuisance may be off.
-_FARTHEST = 4.0
 
 
 @compiled
@@ -61,9 +57,9 @@ def evaluate(
     camera : ndarray (2,)
     first, step : float
         Logarithm of the first distance of the library, and from each to the next.
-    found : tuple of ndarray (n_places, 2), (n_places or 0, n_z + 2), (n_places or 0, n_z + 2, \
-n_z + 2)
-        Log likelihood and deviation; gradient and information, which may be left out.
+    found : tuple of 3 ndarrays
+        Log likelihood and deviation, (n_places, 2); gradient, (n_places, n_z + 2), and
+        information, (n_places, n_z + 2, n_z + 2): without entries where nobody asks for them.
     """
     log_time, log_speed, variance = data
     numbers, gradients, informations = found
@@ -79,8 +75,7 @@ n_z + 2)
     spread = _AMPLITUDE_SPREAD + late
     for place in range(means.shape[0]):
         amplitude = _matching(log_time, log_speed, means[place], first, step)
-        # Beyond the ends of the library the covariance is that of its ends, cells apart as they
-        # are.
+        # Beyond the ends of the library the covariance is that of its ends.
         offset = max((amplitude + log_time[0] - first) / step, 0.0)
         offset = min(offset, len(mixed) - 1 - cells[n - 1] - ROUNDING)
         if corners.shape[0] > 1:
@@ -91,7 +86,7 @@ n_z + 2)
         _covariance(mixed, cells, offset, factor)
         for i in range(n):
             factor[i, i] += variance[i]
-        log_determinant = _factorise(factor)
+        log_determinant = factorise(factor)
         best, cost = _best_amplitude(
             data, means[place], (first, step), factor, (amplitude, expected, spread), columns
         )
@@ -105,7 +100,7 @@ n_z + 2)
         _look_up(slopes[place], log_time / step + offset, columns[2:])
         columns[n_z] = camera[0] * (columns[1] - 1.0)
         columns[n_z + 1] = camera[1] * (log_speed - middle)
-        _whiten(factor, columns, 2 + n_z)
+        whiten(factor, columns, 2 + n_z)
         _sum_up(columns, (off, spread), numbers[place], gradients[place], informations[place])
         numbers[place, 0] -= 0.5 * (log_determinant + off * off)
 
@@ -132,7 +127,7 @@ def _best_amplitude(
     best = amplitude
     for _ in range(_NEWTON_STEPS):
         _compare(log_time, log_speed, mean, first, step, amplitude, columns)
-        _whiten(factor, columns, 2)
+        whiten(factor, columns, 2)
         off = (amplitude - expected) / spread
         now = off * off
         pull = -off / spread
@@ -186,12 +181,8 @@ def _mix(
     found: NDArray[np.float64],
 ) -> None:
     """The covariance of the library between four corners, from one distance to another."""
-    one, two, three, four = (
-        covariances[corners[0]],
-        covariances[corners[1]],
-        covariances[corners[2]],
-        covariances[corners[3]],
-    )
+    one, two = covariances[corners[0]], covariances[corners[1]]
+    three, four = covariances[corners[2]], covariances[corners[3]]
     for i in range(part[0], part[1]):
         for j in range(part[0], part[1]):
             found[i, j] = (
@@ -219,53 +210,6 @@ def _covariance(
         for j in range(i + 1):
             column = max(whole + cells[j], 0)
             into[j] = low * here[column] + high * next_one[column + 1]
-
-
-@kernel
-def _factorise(matrix: NDArray[np.float64]) -> float:
-    """Cholesky factor in place, in the lower half, but 1 over its diagonal; ln of the determinant.
-
-    Two of a row are worked out side by side: one alone would wait for itself at each term.
-    """
-    log_determinant, product = 0.0, 1.0
-    for i in range(matrix.shape[0]):
-        row = matrix[i]
-        for j in range(0, i - 1, 2):
-            one, two = matrix[j], matrix[j + 1]
-            a, b = row[j], row[j + 1]
-            for k in range(j):
-                a -= row[k] * one[k]
-                b -= row[k] * two[k]
-            a *= one[j]
-            row[j], row[j + 1] = a, (b - a * two[j]) * two[j + 1]
-        if i % 2 == 1:
-            one, a = matrix[i - 1], row[i - 1]
-            for k in range(i - 1):
-                a -= row[k] * one[k]
-            row[i - 1] = a * one[i - 1]
-        rest = row[i]
-        for k in range(i):
-            rest -= row[k] * row[k]
-        product *= rest
-        if not _LEAST < product < _MOST:
-            log_determinant, product = log_determinant + math.log(product), 1.0
-        row[i] = 1.0 / math.sqrt(rest)
-    return log_determinant + math.log(product)
-
-
-@kernel
-def _whiten(factor: NDArray[np.float64], columns: NDArray[np.float64], count: int) -> None:
-    """The first columns divided by a factor of `_factorise`, in place; two side by side."""
-    for first in range(0, count, 2):
-        # An odd one at the end goes with itself.
-        one, two = columns[first], columns[min(first + 1, count - 1)]
-        for i in range(factor.shape[0]):
-            row = factor[i]
-            a, b = one[i], two[i]
-            for k in range(i):
-                a -= row[k] * one[k]
-                b -= row[k] * two[k]
-            one[i], two[i] = a * row[i], b * row[i]
 
 
 @kernel
@@ -354,47 +298,3 @@ def _sum_up(
         gradient[z] = slope - gradient[z] * pull / stiffness
     numbers[0] = -0.5 * deviation
     numbers[1] = deviation
-
-
-@compiled
-def integrate(
-    gradients: NDArray[np.float64],
-    informations: NDArray[np.float64],
-    found: NDArray[np.float64],
-) -> None:
-    """What the log likelihood gains by nuisances that may be off by one of their deviations each.
-
-    Parameters
-    ----------
-    gradients, informations : ndarray (n_places, n_z), (n_places, n_z, n_z)
-    found : ndarray (n_places,)
-        Filled in.
-    """
-    n = gradients.shape[1]
-    # The information and the prior, as L D L^T: pivots, and L below the diagonal.
-    lower, pivots = np.empty((n, n)), np.empty(n)
-    shift = np.empty(n)
-    for place in range(gradients.shape[0]):
-        log_determinant = 0.0
-        for i in range(n):
-            shift[i] = gradients[place, i]
-            for j in range(i + 1):
-                total = informations[place, i, j]
-                for k in range(j):
-                    total -= lower[i, k] * lower[j, k] * pivots[k]
-                if i == j:
-                    pivots[i] = 1.0 + total
-                    log_determinant += math.log(abs(pivots[i]))
-                else:
-                    lower[i, j] = total / pivots[j]
-                    shift[i] -= lower[i, j] * shift[j]
-        farthest, product = 0.0, 0.0
-        for i in range(n - 1, -1, -1):
-            shift[i] /= pivots[i]
-            for k in range(i + 1, n):
-                shift[i] -= lower[k, i] * shift[k]
-            farthest = max(farthest, abs(shift[i]))
-            product += gradients[place, i] * shift[i]
-        # Far out the dependence is not linear, and could explain anything.
-        share = min(1.0, _FARTHEST / max(farthest, _FARTHEST))
-        found[place] = (share - 0.5 * share**2) * product - 0.5 * log_determinant

@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.inference.decay_kernels import ROUNDING, evaluate, integrate
+from nanorocks_ros.inference.decay_kernels import ROUNDING, evaluate
 from nanorocks_ros.inference.log_sums import log_sum
+from nanorocks_ros.inference.triangles import integrate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,7 +8,7 @@ from sticking_records import cooling
 
 from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference import decay_kernels, single_term, splines
+from nanorocks_ros.inference import decay_kernels, single_term, splines, triangles
 from nanorocks_ros.physics import sticking
 from nanorocks_ros.records import Rebound, SpeedEstimate
 from nanorocks_ros.stages.cooling import HaffFitter
@@ -22,7 +22,7 @@ def compiled_for():
     """For which types of arguments each kernel of the estimates is compiled."""
     return {
         (module.__name__, name): tuple(kernel.signatures)
-        for module in (decay_kernels, single_term, splines, sticking)
+        for module in (decay_kernels, single_term, splines, sticking, triangles)
         for name, kernel in vars(module).items()
         if hasattr(kernel, 'signatures')
     }
