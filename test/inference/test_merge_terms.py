@@ -34,7 +34,7 @@ def merges(*times):
 
 
 def cycle(until, *times):
-    used = STAMPS <= until * NS
+    used = until * NS >= STAMPS
     return sticking_cycle(BEADS, merges(*times), STAMPS[used], SPEEDS[used], 0)
 
 
