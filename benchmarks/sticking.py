@@ -14,7 +14,8 @@ import numpy as np
 from benchmarks.contacts import tracks_of
 from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import Tray, load_trays
-from nanorocks_ros.inference.sticking import StickingCycle, sticking_cycle, sticking_estimate
+from nanorocks_ros.inference.sticking import sticking_estimate
+from nanorocks_ros.inference.sticking_cycle import StickingCycle, sticking_cycle
 from nanorocks_ros.physics.sticking import slow_contacts
 from nanorocks_ros.records import BodyEstimate, Merge, Tracks
 from nanorocks_ros.simulation.shaking import ShakenTray

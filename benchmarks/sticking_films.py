@@ -26,7 +26,8 @@ from nanorocks_ros.experiment.settings import (
 )
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.experiment.view import View
-from nanorocks_ros.inference.sticking import StickingCycle, sticking_cycle, sticking_estimate
+from nanorocks_ros.inference.sticking import sticking_estimate
+from nanorocks_ros.inference.sticking_cycle import StickingCycle, sticking_cycle
 from nanorocks_ros.physics.paper_clusters import paper_onset
 from nanorocks_ros.physics.sticking import slow_contacts
 from nanorocks_ros.records import (

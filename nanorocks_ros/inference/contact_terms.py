@@ -9,7 +9,7 @@ import numpy as np
 
 from nanorocks_ros.inference.contacts import marginal, pair_table, rebound_table
 from nanorocks_ros.inference.decay_library import LOWEST_WALL
-from nanorocks_ros.inference.restitution import SingleTerm
+from nanorocks_ros.inference.single_term import SingleTerm
 from nanorocks_ros.records import PairCollision, Rebound
 
 if TYPE_CHECKING:

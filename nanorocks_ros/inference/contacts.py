@@ -7,13 +7,14 @@ likelihood of the decay. Constants that do not depend on the restitution are lef
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import logsumexp, ndtr
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.contact_estimate import checked_grid
+from nanorocks_ros.inference.log_sums import log_sum
+from nanorocks_ros.inference.seen_collisions import RANGE, SeenCollisions, pairs_given
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,13 +38,7 @@ _ERROR_SCALES = (1.0, 1.4, 2.0, 2.8)
 # The same of collisions, which tell errors from vertical speeds too badly to have it free:
 # simulated cycles scatter so much more.
 _PAIR_ERRORS = 1.25
-# Range of speeds after a contact of the other kind, over the speed before.
-_RANGE = 2.0
-_HEIGHTS = 20
 _AT_ONCE = 128
-_TINY = 1e-300
-# Vertical parts of the line of centres that are less likely are left out.
-_UNLIKELY = 1e-9
 _SQRT_2_PI = math.sqrt(2.0 * math.pi)
 
 
@@ -55,7 +50,7 @@ def marginal(table: NDArray[np.float64]) -> NDArray[np.float64]:
     table : ndarray (m, n)
         One of those below, or a sum of some: what is not known is then the same in all of them.
     """
-    return np.asarray(logsumexp(table, axis=0) - math.log(len(table)))
+    return np.asarray(log_sum(table) - math.log(len(table)))
 
 
 def rebound_log_likelihood(
@@ -104,7 +99,7 @@ def rebound_table(
     # The speed of the wall is in both speeds, with opposite signs.
     variance = (grid * before) ** 2 + after**2 + ((1.0 + grid) * wall) ** 2
     square = (outgoing - grid * incoming) ** 2 / variance
-    other = outliers / (_RANGE * incoming)
+    other = outliers / (RANGE * incoming)
     by_scale = []
     for scale in _ERROR_SCALES:
         density = np.exp(-0.5 * square / scale**2) / (_SQRT_2_PI * scale * np.sqrt(variance))
@@ -172,161 +167,22 @@ def pair_table(
     _check_share(outliers)
     if not collisions:
         return np.zeros((len(vertical_ratios) * len(radius_errors), grid.size))
-    seen = _Seen.of(collisions).with_errors(_PAIR_ERRORS)
+    seen = SeenCollisions.of(collisions).with_errors(_PAIR_ERRORS)
     # In parts, so that memory does not grow with the number of collisions.
     parts = [
-        _Seen(*(one[k : k + _AT_ONCE] for one in seen))
+        SeenCollisions(*(one[k : k + _AT_ONCE] for one in seen))
         for k in range(0, len(collisions), _AT_ONCE)
     ]
     limits = sticking_speed, outliers
     # Where no radius was measured, it does not matter how wrong they are.
     errors = radius_errors if seen.measured.any() else (0.0,)
-    table = [
-        np.sum([_pairs_given(one, grid, ratio, error, limits) for one in parts], axis=0)
-        for ratio in vertical_ratios
+    ratios = np.array(vertical_ratios, dtype=np.float64)
+    by_error = [
+        np.sum([pairs_given(one, grid, ratios, error, limits) for one in parts], axis=0)
         for error in errors
     ]
+    table = np.stack(by_error, axis=1).reshape(-1, grid.size)
     return np.repeat(table, len(radius_errors) // len(errors), axis=0)
-
-
-class _Seen(NamedTuple):
-    """What is seen of collisions, each (m,): along the projected line of centres.
-
-    Parameters
-    ----------
-    approach, parting : ndarray, [m/s]
-        Relative speed before and after.
-    approach_variance, parting_variance, covariance : ndarray, [m^2/s^2]
-    distance, distance_error : ndarray, [m]
-        Projected, of the centres at contact; the error of the sum of radii is in its error.
-    reach, measured, height : ndarray, [m]
-        Sum of radii, of those that were measured alone, and height of the tray.
-    radii : ndarray (m, 2), [m]
-    temperature : ndarray, [m^2/s^2]
-        Sum over both beads.
-    """
-
-    approach: NDArray[np.float64]
-    parting: NDArray[np.float64]
-    approach_variance: NDArray[np.float64]
-    parting_variance: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    distance: NDArray[np.float64]
-    distance_error: NDArray[np.float64]
-    reach: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    height: NDArray[np.float64]
-    radii: NDArray[np.float64]
-    temperature: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, collisions: Sequence[PairCollision]) -> _Seen:
-        separation = np.array([one.separation for one in collisions])
-        distance = np.hypot(*separation.T)
-        normal = separation / distance[:, None]
-        before = np.array([one.before[1] - one.before[0] for one in collisions])
-        after = np.array([one.after[1] - one.after[0] for one in collisions])
-        error = np.array([one.separation_error for one in collisions])
-        radii = np.array([one.radii for one in collisions])
-        radius_errors = np.array([one.radius_errors for one in collisions])
-        across = np.column_stack([-normal[:, 1], normal[:, 0]])
-        # A line of centres that is turned by its error mixes in the speed across it.
-        turned = error / distance
-        slip = [np.sum(one * across, axis=1) * turned for one in (before, after)]
-        noise = [
-            np.array([np.sum(getattr(one, name) ** 2) for one in collisions])
-            for name in ('before_errors', 'after_errors')
-        ]
-        return cls(
-            approach=-np.sum(before * normal, axis=1),
-            parting=np.sum(after * normal, axis=1),
-            approach_variance=noise[0] + slip[0] ** 2,
-            parting_variance=noise[1] + slip[1] ** 2,
-            covariance=-slip[0] * slip[1],
-            distance=distance,
-            distance_error=np.hypot(error, np.hypot(*radius_errors.T)),
-            reach=radii.sum(axis=1),
-            measured=np.where(radius_errors > 0.0, radii, 0.0).sum(axis=1),
-            height=np.array([one.height for one in collisions]),
-            radii=radii,
-            temperature=np.array([one.temperatures.sum() for one in collisions]),
-        )
-
-    def with_errors(self, scale: float) -> _Seen:
-        """The same with so many times the errors."""
-        return self._replace(
-            approach_variance=scale**2 * self.approach_variance,
-            parting_variance=scale**2 * self.parting_variance,
-            covariance=scale**2 * self.covariance,
-            distance_error=scale * self.distance_error,
-        )
-
-
-def _tilts(seen: _Seen, radius_error: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Vertical parts of the line of centres, (1, h), and how likely they are, (m, h).
-
-    Lines of centres point anywhere alike, as far as the height of the tray lets them; what they
-    leave of the distance in the picture is seen, with its error.
-    """
-    tilt = (np.arange(_HEIGHTS) + 0.5)[None, :] / _HEIGHTS
-    reach = (seen.reach - radius_error * seen.measured)[:, None]
-    free = seen.height[:, None] - 2.0 * seen.radii
-    above = tilt * reach
-    room = np.minimum(free.min(axis=1)[:, None], 0.5 * free.sum(axis=1)[:, None] - above)
-    square = ((reach * np.sqrt(1.0 - tilt**2) - seen.distance[:, None])
-              / seen.distance_error[:, None]) ** 2  # fmt: skip
-    weight = np.maximum(room, 0.0) * np.exp(-0.5 * (square - square.min(axis=1)[:, None]))
-    return tilt, weight / weight.sum(axis=1)[:, None]
-
-
-def _pairs_given(
-    seen: _Seen,
-    grid: NDArray[np.float64],
-    ratio: float,
-    radius_error: float,
-    limits: tuple[float, float],
-) -> NDArray[np.float64]:
-    """Log likelihood, (n,), of collisions when vertical speeds and radii are known.
-
-    The speed w along the line of centres is that seen times its part in the picture, p, and the
-    vertical one, a Gaussian, times the other part; the more often beads meet, the larger w. All
-    is Gaussian but for that factor w, w above the sticking speed, which leaves a closed form.
-    """
-    sticking_speed, outliers = limits
-    tilt, weight = _tilts(seen, radius_error)
-    likely = weight.max(axis=0) > _UNLIKELY
-    tilt, weight = tilt[:, likely], weight[:, likely]
-    part = np.sqrt(1.0 - tilt**2)[:, :, None]
-    a, c, aa, cc, ac = (
-        one[:, None, None]
-        for one in (seen.approach, seen.parting, seen.approach_variance,
-                    seen.parting_variance, seen.covariance)
-    )  # fmt: skip
-    vertical = tilt[:, :, None] ** 2 * ratio * seen.temperature[:, None, None]
-    gain = (1.0 + grid) * part
-    left = gain * part - 1.0
-    speed, speed_variance = part * a, part**2 * aa + vertical
-    both = part * left * aa + gain * vertical - part * ac
-    variance = left**2 * aa + gain**2 * vertical + cc - 2.0 * left * ac
-    miss = c - (gain * speed - a)
-    given = speed + both / variance * miss
-    given_variance = np.maximum(speed_variance - both**2 / variance, 0.0)
-    density = np.exp(-0.5 * miss**2 / variance) / (_SQRT_2_PI * np.sqrt(variance))
-    flux = _mean_above(sticking_speed, given, given_variance)
-    flux /= _mean_above(sticking_speed, speed, speed_variance)
-    found = np.einsum('mh,mhn->mn', weight, density * flux)
-    other = outliers / (_RANGE * seen.approach[:, None])
-    return np.asarray(np.log((1.0 - outliers) * found + other).sum(axis=0))
-
-
-def _mean_above(
-    least: float, mean: NDArray[np.float64], variance: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Integral of x over a Gaussian density of x from the least x up; never quite 0."""
-    spread = np.sqrt(variance) + _TINY
-    ratio = (mean - least) / spread
-    density = np.exp(-0.5 * np.minimum(ratio**2, 1e3)) / _SQRT_2_PI
-    return np.asarray(mean * ndtr(ratio) + spread * density) + _TINY
 
 
 def _check_share(outliers: float) -> None:

@@ -10,16 +10,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline, RectBivariateSpline
+from scipy.interpolate import RectBivariateSpline
 from scipy.signal import savgol_filter
-from scipy.special import logsumexp
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.inference.decay_library import LOWEST_WALL, NUISANCES, UNITS, count_step
 from nanorocks_ros.inference.decay_likelihood import DecayTables
+from nanorocks_ros.inference.splines import spline_basis
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.settings import PriorSettings
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.inference.decay_library import DecayLibrary
+    from nanorocks_ros.inference.single_term import SingleTerm
 
 # Places of the grid along each restitution, closer towards 1: evenly spaced in the powers below of
 # 1 - restitution, in which likelihoods are smooth.
@@ -43,8 +44,6 @@ _COMPRESSION = 200.0
 _CORNER = 10.0
 # Cells of ln t over which curves of the library are smoothed.
 _SMOOTH_CELLS = 9
-# Places, at least, at which a term is evaluated to be smeared.
-_SMEARED = 1000
 
 
 @lru_cache(maxsize=16)
@@ -201,37 +200,6 @@ def _quantiles(
     return np.asarray(np.interp(probabilities, below / below[-1], edges))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SingleTerm:
-    """What something else says of one of the two restitutions, such as rebounds or collisions.
-
-    Parameters
-    ----------
-    restitution : ndarray (n,)
-        Rising, from end to end of what is possible, and close enough that a cubic spline tells
-        the term between them; 4 or more.
-    log_likelihood : ndarray (n,)
-    """
-
-    restitution: NDArray[np.float64]
-    log_likelihood: NDArray[np.float64]
-
-    def at(self, restitution: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The term at other restitutions, (n,)."""
-        return np.asarray(CubicSpline(self.restitution, self.log_likelihood)(restitution))
-
-    def off_by(self, spread: float) -> SingleTerm:
-        """The same where all of it may be off by a common amount, a Gaussian of this spread."""
-        if spread == 0.0:
-            return self
-        first, last = self.restitution[[0, -1]]
-        step = min(0.25 * spread, float(last - first) / _SMEARED)
-        fine = np.arange(first, last + step, step)
-        apart = (fine - self.restitution[:, np.newaxis]) / spread
-        smeared = logsumexp(self.at(fine) - 0.5 * apart**2, axis=1)
-        return SingleTerm(restitution=self.restitution, log_likelihood=smeared)
-
-
 def check_walls(walls: tuple[float, float]) -> None:
     """Refuse a prior of the walls beyond what a library covers.
 
@@ -280,7 +248,7 @@ def posterior_of(
     less = _without_pits(_without_pits(less, 0), 1)
     less[-1, -1] = min(less[-1, -1], min(less[-2, -1], less[-1, -2]) + _CORNER)
     values = -_COMPRESSION * np.log1p(less / _COMPRESSION)
-    surface = RectBivariateSpline(
+    surface = _Surface.through(
         _even(tables.restitution, 0.0, _POWER),
         _even(tables.wall_restitution, LOWEST_WALL, _WALL_POWER),
         values,
@@ -288,7 +256,7 @@ def posterior_of(
     box = (0.0, 1.0, *walls)
     for _ in range(3):
         beads, wall = _axes(*box)
-        pressed = surface(_even(beads, 0.0, _POWER), _even(wall, LOWEST_WALL, _WALL_POWER))
+        pressed = surface.at(_even(beads, 0.0, _POWER), _even(wall, LOWEST_WALL, _WALL_POWER))
         fine = -_COMPRESSION * np.expm1(-pressed / _COMPRESSION)
         if of_beads is not None:
             fine += of_beads.at(beads)[:, np.newaxis]
@@ -306,6 +274,27 @@ def posterior_of(
         probability=weight / weight.sum(),
         tension=math.sqrt(2.0 * max(apart - best, 0.0)) if of_beads or of_walls else 0.0,
     )
+
+
+class _Surface(NamedTuple):
+    """A bicubic spline through a grid of values: knots, and coefficients of their B-splines."""
+
+    knots: tuple[NDArray[np.float64], NDArray[np.float64]]
+    coefficients: NDArray[np.float64]
+
+    @classmethod
+    def through(
+        cls, x: NDArray[np.float64], y: NDArray[np.float64], values: NDArray[np.float64]
+    ) -> _Surface:
+        spline = RectBivariateSpline(x, y, values)
+        return cls(spline.get_knots(), spline.get_coeffs().reshape(values.shape))
+
+    def at(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """On the grid of some places within the knots, (n_x, n_y)."""
+        rows, columns = (
+            spline_basis(knots, one) for knots, one in zip(self.knots, (x, y), strict=True)
+        )
+        return np.asarray(rows @ self.coefficients @ columns.T)
 
 
 def _without_pits(less: NDArray[np.float64], axis: int) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.physics.confined import confined_gas
 
 if TYPE_CHECKING:
@@ -64,9 +65,45 @@ class SlowContacts:
         ConfigurationError
             For another measure.
         """
+        return np.asarray(np.exp(np.interp(np.log(speed), _LOG_SPEEDS, self._log_curve(measure))))
+
+    def slower_sum(
+        self,
+        speed: NDArray[np.float64],
+        mean: NDArray[np.float64],
+        weights: NDArray[np.float64],
+        measure: str = 'normal',
+    ) -> NDArray[np.float64]:
+        """`slower_between` at some speeds, (n,), summed with weights over some mean ones.
+
+        Parameters
+        ----------
+        speed : ndarray (n,), [m/s]
+        mean : ndarray (m,), [m/s]
+            Projected.
+        weights : ndarray (m,)
+
+        Raises
+        ------
+        ConfigurationError
+            For another measure.
+        """
+        found = np.empty(speed.size)
+        curve = self._log_curve(measure)
+        _sum_slower(np.log(speed), np.log(mean), weights, _LOG_SPEEDS, curve, found)
+        return found
+
+    def log_slower_sum(
+        self, speed: NDArray[np.float64], mean: NDArray[np.float64], measure: str = 'normal'
+    ) -> NDArray[np.float64]:
+        """The logarithm of `slower_between`, summed over some mean speeds; as `slower_sum`."""
+        ratio = np.log(speed)[:, np.newaxis] - np.log(mean)
+        return np.asarray(np.interp(ratio, _LOG_SPEEDS, self._log_curve(measure)).sum(axis=1))
+
+    def _log_curve(self, measure: str) -> NDArray[np.float64]:
         if measure not in self._curves:
             self._curves[measure] = np.log(self.slower(np.exp(_LOG_SPEEDS), measure))
-        return np.asarray(np.exp(np.interp(np.log(speed), _LOG_SPEEDS, self._curves[measure])))
+        return self._curves[measure]
 
     def slower(self, speed: ArrayLike, measure: str = 'normal') -> NDArray[np.float64]:
         """Contacts of a bead per way, [1/m], at less than a speed, over the mean projected one.
@@ -139,3 +176,26 @@ def _sum_of_exponentials(
     # Where the difference would cancel.
     small = 0.5 * value**2 / (one * other) * (1.0 - value * (1.0 / one + 1.0 / other) / 3.0)
     return np.asarray(np.where(value < _SMALL * np.minimum(one, other), small, exact))
+
+
+@compiled
+def _sum_slower(
+    speeds: NDArray[np.float64],
+    means: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    nodes: NDArray[np.float64],
+    curve: NDArray[np.float64],
+    found: NDArray[np.float64],
+) -> None:
+    """Sum over mean speeds at each speed; all as logarithms, with a curve at even nodes."""
+    step = (nodes[-1] - nodes[0]) / (nodes.size - 1)
+    last = nodes.size - 1.0
+    for i in range(speeds.size):
+        total = 0.0
+        for k in range(means.size):
+            # Beyond its ends the curve stays as it is there.
+            at = min(max((speeds[i] - means[k] - nodes[0]) / step, 0.0), last)
+            cell = min(int(at), nodes.size - 2)
+            value = curve[cell] + (at - cell) * (curve[cell + 1] - curve[cell])
+            total += weights[k] * math.exp(value)
+        found[i] = total

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.inference.sticking import StickingCycle, StickingEstimate
+    from nanorocks_ros.inference.sticking import StickingEstimate
+    from nanorocks_ros.inference.sticking_cycle import StickingCycle
 
 # What tracks say of an instant is known a second later; another one is for messages on their way.
 _HELD_NS = 2 * NS

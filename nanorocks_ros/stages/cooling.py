@@ -209,7 +209,7 @@ class HaffFitter:
         )
         fields: dict[str, Any] = {'status': status}
         final = status is CorStatus.FINAL
-        quality = reduce(or_, (one.quality for one in self._samples))
+        quality = reduce(or_, {one.quality for one in self._samples})
         try:
             if quality & Quality.WRONG_SCALE:
                 # Speeds and places are wrong by nobody knows how much.

@@ -175,7 +175,7 @@ class LibraryReading:
         FitError
             When the speeds do not fall.
         """
-        if np.polyfit(decay.time, np.log(decay.speed), 1)[0] >= 0.0:
+        if (decay.time - decay.time.mean()) @ np.log(decay.speed) >= 0.0:
             raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
         if decay.of_grains and not contacts.rebounds and not contacts.collisions:
             # How such speeds are off changes while grains slow down: intervals of filmed trays 6

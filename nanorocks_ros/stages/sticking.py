@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right, insort
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial, reduce
+from operator import add, attrgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nanorocks_ros.errors import NanorocksError
-from nanorocks_ros.inference.sticking import (
-    StickingCycle,
-    StickingEstimate,
-    sticking_cycle,
-    sticking_estimate,
-)
+from nanorocks_ros.inference.merge_terms import MergeRates, MergeTerms
+from nanorocks_ros.inference.sticking import StickingEstimate, estimate_by
+from nanorocks_ros.inference.sticking_cycle import StickingCycle, sticking_cycle
 from nanorocks_ros.physics.sticking import slow_contacts
 from nanorocks_ros.records import BodyEstimate, Merge, SpeedEstimate
 from nanorocks_ros.stages.shaking import NS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.physics.sticking import SlowContacts
 
 # Fewer speeds are no cycle.
 _FEWEST_SPEEDS = 4
@@ -33,10 +32,12 @@ _KNOWN_NS = 1_000_000_000
 # Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
 _ROUNDING_NS = 1_000_000
 
+_stamp = attrgetter('stamp_ns')
+
 
 @dataclass(slots=True)
 class _Cycle:
-    """What was seen since a shaking event."""
+    """What was seen since a shaking event; counts of bodies by their stamps."""
 
     number: int
     start_ns: int | None = None
@@ -61,17 +62,22 @@ class StickingMeter:
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.sticking
         self._tray = tray
-        self._contacts: SlowContacts | None = None
+        self._make_rates: Callable[[], MergeRates] | None = None
         with suppress(NanorocksError):
             # Without a theory of the tray merges are counted, but no speed follows from them.
-            self._contacts = slow_contacts(tray)
+            contacts = slow_contacts(tray)
+            # Its curve is worked out now, while no image waits.
+            contacts.slower_between(1.0, settings.sticking.measure)
+            self._make_rates = partial(MergeRates, contacts, tray.count, settings.sticking.measure)
         self._restart()
 
     def _restart(self) -> None:
         self._cycles = {0: _Cycle(0)}
         self._last_ns: int | None = None
         self._finished: dict[int, StickingCycle] = {}
-        self._all: tuple[int, StickingEstimate] | None = None
+        self._terms: list[MergeTerms | None] = []
+        self._all: StickingEstimate | None = None
+        self._rates = self._make_rates() if self._make_rates else None
 
     def push(self, record: SpeedEstimate | BodyEstimate | Merge) -> None:
         """Take the next record; a speed whose stamp goes back starts all afresh."""
@@ -83,7 +89,7 @@ class StickingMeter:
         if isinstance(record, Merge):
             cycle.merges.append(record)
         elif isinstance(record, BodyEstimate):
-            cycle.bodies.append(record)
+            insort(cycle.bodies, record, key=_stamp)
         else:
             cycle.start_ns = record.cycle_start_ns
             if np.isfinite(record.mean_projected_speed):
@@ -97,8 +103,11 @@ class StickingMeter:
         """The last count of bodies up to an instant of a cycle."""
         own = self._cycles.get(cycle)
         last_ns = stamp_ns + _ROUNDING_NS
-        found = [one for one in own.bodies if one.stamp_ns <= last_ns] if own else []
-        return max(found, key=lambda one: one.stamp_ns, default=None)
+        count = bisect_right(own.bodies, last_ns, key=_stamp) if own else 0
+        if own is None or count == 0:
+            return None
+        # Of some with the same stamp the one that came in first.
+        return own.bodies[bisect_left(own.bodies, _stamp(own.bodies[count - 1]), key=_stamp)]
 
     def onset(self, cycle: int, stamp_ns: int) -> float | None:
         """Time of the first merge since the shaking event, [s], as of an instant; None before."""
@@ -111,7 +120,7 @@ class StickingMeter:
     def of_cycle(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
         """What the cycle says of the sticking speed up to an instant; None when nothing."""
         seen = self._seen(cycle, stamp_ns)
-        return self._estimate([seen]) if seen else None
+        return self._estimate([self._terms_of(seen)]) if seen else None
 
     def seen(self) -> tuple[StickingCycle, ...]:
         """All cycles since time last went back, the one under way among them, as known by now."""
@@ -127,7 +136,11 @@ class StickingMeter:
 
     def together(self, cycles: Sequence[StickingCycle]) -> StickingEstimate | None:
         """What some cycles of this tray say together, also such of other recordings."""
-        return self._estimate(list(cycles)) if cycles else None
+        if self._make_rates is None or not cycles:
+            return None
+        # Rates of their own, lest the cycle under way has to be worked out afresh.
+        rates = self._make_rates()
+        return self._estimate([self._terms_of(one, rates) for one in cycles])
 
     def of_all(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
         """The same of all cycles that were over by then."""
@@ -136,15 +149,9 @@ class StickingMeter:
             seen = self._seen(before, stamp_ns)
             if seen is not None:
                 self._finished[before] = seen
-        if not self._finished:
-            return None
-        # The last cycle may have been joined since.
-        if self._all is None or self._all[0] != len(self._finished):
-            found = self._estimate(list(self._finished.values()))
-            if found is None:
-                return None
-            self._all = len(self._finished), found
-        return self._all[1]
+                self._terms.append(self._terms_of(seen))
+                self._all = self._estimate(self._terms)
+        return self._all
 
     def _known(self, cycle: _Cycle, stamp_ns: int) -> list[Merge]:
         last_ns = stamp_ns + _ROUNDING_NS
@@ -170,16 +177,22 @@ class StickingMeter:
             own.start_ns,
         )
 
-    def _estimate(self, cycles: list[StickingCycle]) -> StickingEstimate | None:
-        if self._contacts is None:
-            return None
+    def _terms_of(
+        self, cycle: StickingCycle, rates: MergeRates | None = None
+    ) -> MergeTerms | None:
+        """What a cycle says of each sticking speed; None where that cannot be told."""
+        rates = rates or self._rates
         with suppress(NanorocksError):
-            return sticking_estimate(
-                cycles,
-                self._contacts,
-                self._tray.count,
-                measure=self._settings.measure,
-                rate_error=self._settings.rate_error,
-                probability=self._settings.probability,
-            )
+            return rates.terms(cycle) if rates else None
         return None
+
+    def _estimate(self, terms: Sequence[MergeTerms | None]) -> StickingEstimate | None:
+        """By all of some cycles; None where one of them cannot be used."""
+        known = [one for one in terms if one is not None]
+        if len(known) < len(terms):
+            return None
+        return estimate_by(
+            reduce(add, known),
+            rate_error=self._settings.rate_error,
+            probability=self._settings.probability,
+        )

@@ -8,7 +8,10 @@ import numpy as np
 from nanorocks_ros.experiment.settings import PipelineSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import Straight, View
-from nanorocks_ros.records import Frame, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.inference.sticking import sticking_estimate
+from nanorocks_ros.inference.sticking_cycle import StickingCycle
+from nanorocks_ros.physics.sticking import slow_contacts
+from nanorocks_ros.records import Frame, Rebound, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.stages.clusters import ClusterAutocorrelator
 from nanorocks_ros.stages.cooling import HaffFitter
 from nanorocks_ros.stages.preprocess import Preprocessor
@@ -28,12 +31,21 @@ def warm_up_counting() -> None:
 
 
 def warm_up_clusters() -> None:
-    """Correlate a picture with a disc on it."""
+    """Correlate a picture with a disc on it, and hold a merge against the theory."""
     stage = ClusterAutocorrelator(PipelineSettings(), load_trays()[1])
     gray = np.full((64, 64), 150, dtype=np.uint8)
     cv2.circle(gray, (32, 32), 12, 60, -1)
     gray[:8, :8] = 255
     stage.push(TrayImage(stamp_ns=0, tray=1, gray=gray))
+    tray = load_trays()[1]
+    times = np.linspace(0.0, 10.0, 20)
+    cycle = StickingCycle(
+        times=times,
+        speeds=0.005 / (1.0 + times),
+        bodies=np.where(times > 5.0, tray.count - 1.0, tray.count),
+        merges=np.array([5.0]),
+    )
+    sticking_estimate([cycle], slow_contacts(tray), tray.count)
 
 
 def warm_up() -> None:
@@ -58,8 +70,26 @@ def warm_up() -> None:
 
 
 def warm_up_cooling() -> None:
-    """Hold a decay against the simulated ones."""
+    """Hold a decay against the simulated ones, and a rebound beside it."""
     fitter = HaffFitter(PipelineSettings(), load_trays()[1])
+    rebound = Rebound(
+        stamp_ns=2_000_000_000,
+        tray=1,
+        track=0,
+        species=0,
+        wall=0,
+        incoming=0.003,
+        incoming_error=1e-4,
+        outgoing=0.0028,
+        outgoing_error=1e-4,
+        tangential_incoming=0.0,
+        tangential_outgoing=0.0,
+        tangential_error=1e-4,
+        wall_velocity=0.0,
+        wall_velocity_error=0.0,
+        place=np.zeros(2),
+    )
+    fitter.push(rebound)
     for number in range(1, 60):
         time_ns = number * 100_000_000
         speed = 0.005 / (1.0 + 1e-10 * time_ns)

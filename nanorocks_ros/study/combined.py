@@ -11,7 +11,7 @@ import numpy as np
 from nanorocks_ros.errors import FitError, RecordingError
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.inference.evidence import Evidence
-from nanorocks_ros.inference.sticking import StickingCycle
+from nanorocks_ros.inference.sticking_cycle import StickingCycle
 from nanorocks_ros.stages.pipeline import TrayStages, trays_of
 from nanorocks_ros.study.archive import read_archive
 from nanorocks_ros.study.batch_task import EVIDENCE

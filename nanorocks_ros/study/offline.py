@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.inference.evidence import Evidence
-    from nanorocks_ros.inference.sticking import StickingCycle
+    from nanorocks_ros.inference.sticking_cycle import StickingCycle
 
 NS = 1_000_000_000
 Progress = Callable[[int, int], None]

@@ -12,7 +12,8 @@ from nanorocks_ros.experiment.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay_library import library_of
 from nanorocks_ros.inference.decay_likelihood import decay_likelihood
-from nanorocks_ros.inference.restitution import SingleTerm, posterior_of, tables_of
+from nanorocks_ros.inference.restitution import posterior_of, tables_of
+from nanorocks_ros.inference.single_term import SingleTerm
 from nanorocks_ros.simulation.ensemble import cooling_runs
 
 TRAY = load_trays()[1]

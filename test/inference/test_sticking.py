@@ -9,14 +9,10 @@ import pytest
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.sticking import (
-    StickingCycle,
-    StickingStatus,
-    sticking_cycle,
-    sticking_estimate,
-)
+from nanorocks_ros.inference.sticking import sticking_estimate
+from nanorocks_ros.inference.sticking_cycle import StickingCycle, sticking_cycle
 from nanorocks_ros.physics.sticking import slow_contacts
-from nanorocks_ros.records import Merge
+from nanorocks_ros.records import Merge, StickingStatus
 
 BEADS = 15
 CONTACTS = slow_contacts(load_trays()[1])

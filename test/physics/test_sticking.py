@@ -59,3 +59,14 @@ def test_between_nodes_contacts_are_as_many_as_worked_out_for_that_speed(measure
     for _ in range(2):
         found = contacts.slower_between(speeds, measure)
         np.testing.assert_allclose(found, contacts.slower(speeds, measure), rtol=1e-3)
+
+
+@pytest.mark.parametrize('measure', ['normal', 'total'])
+def test_sums_over_mean_speeds_are_those_of_the_single_ones(measure):
+    speeds, means = np.geomspace(1e-9, 10.0, 40), np.geomspace(1e-4, 1e-2, 7)
+    weights = np.linspace(0.5, 2.0, 7)
+    each = CONTACTS.slower_between(speeds[:, np.newaxis] / means, measure)
+    found = CONTACTS.slower_sum(speeds, means, weights, measure)
+    np.testing.assert_allclose(found, each @ weights, rtol=1e-11)
+    logs = CONTACTS.log_slower_sum(speeds, means, measure)
+    np.testing.assert_allclose(logs, np.log(each).sum(axis=1), rtol=1e-11)

@@ -1,0 +1,205 @@
+"""Collisions as a picture from above shows them, and how likely they are so.
+
+A line of centres that is tilted is seen too short, and so is the speed along it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.special import ndtr
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.records import PairCollision
+
+RANGE = 2.0
+"""Range of speeds after a contact of the other kind, over the speed before."""
+
+_HEIGHTS = 20
+# Of so many the arrays of all heights, restitutions and vertical speeds stay in the cache.
+_IN_CACHE = 4
+# Standard deviations beyond which the tail of a Gaussian is less than what doubles resolve.
+_ALL_ABOVE = 9.0
+_TINY = 1e-300
+# Vertical parts of the line of centres that are less likely are left out.
+_UNLIKELY = 1e-9
+_SQRT_2_PI = math.sqrt(2.0 * math.pi)
+
+
+class SeenCollisions(NamedTuple):
+    """What is seen of collisions, each (m,): along the projected line of centres.
+
+    Parameters
+    ----------
+    approach, parting : ndarray, [m/s]
+        Relative speed before and after.
+    approach_variance, parting_variance, covariance : ndarray, [m^2/s^2]
+    distance, distance_error : ndarray, [m]
+        Projected, of the centres at contact; the error of the sum of radii is in its error.
+    reach, measured, height : ndarray, [m]
+        Sum of radii, of those that were measured alone, and height of the tray.
+    radii : ndarray (m, 2), [m]
+    temperature : ndarray, [m^2/s^2]
+        Sum over both beads.
+    """
+
+    approach: NDArray[np.float64]
+    parting: NDArray[np.float64]
+    approach_variance: NDArray[np.float64]
+    parting_variance: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    distance: NDArray[np.float64]
+    distance_error: NDArray[np.float64]
+    reach: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    height: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    temperature: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, collisions: Sequence[PairCollision]) -> SeenCollisions:
+        """What is seen of some collisions."""
+        separation = np.array([one.separation for one in collisions])
+        distance = np.hypot(*separation.T)
+        normal = separation / distance[:, None]
+        before = np.array([one.before[1] - one.before[0] for one in collisions])
+        after = np.array([one.after[1] - one.after[0] for one in collisions])
+        error = np.array([one.separation_error for one in collisions])
+        radii = np.array([one.radii for one in collisions])
+        radius_errors = np.array([one.radius_errors for one in collisions])
+        across = np.column_stack([-normal[:, 1], normal[:, 0]])
+        # A line of centres that is turned by its error mixes in the speed across it.
+        turned = error / distance
+        slip = [np.sum(one * across, axis=1) * turned for one in (before, after)]
+        noise = [
+            np.array([np.sum(getattr(one, name) ** 2) for one in collisions])
+            for name in ('before_errors', 'after_errors')
+        ]
+        return cls(
+            approach=-np.sum(before * normal, axis=1),
+            parting=np.sum(after * normal, axis=1),
+            approach_variance=noise[0] + slip[0] ** 2,
+            parting_variance=noise[1] + slip[1] ** 2,
+            covariance=-slip[0] * slip[1],
+            distance=distance,
+            distance_error=np.hypot(error, np.hypot(*radius_errors.T)),
+            reach=radii.sum(axis=1),
+            measured=np.where(radius_errors > 0.0, radii, 0.0).sum(axis=1),
+            height=np.array([one.height for one in collisions]),
+            radii=radii,
+            temperature=np.array([one.temperatures.sum() for one in collisions]),
+        )
+
+    def with_errors(self, scale: float) -> SeenCollisions:
+        """The same with so many times the errors."""
+        return self._replace(
+            approach_variance=scale**2 * self.approach_variance,
+            parting_variance=scale**2 * self.parting_variance,
+            covariance=scale**2 * self.covariance,
+            distance_error=scale * self.distance_error,
+        )
+
+
+def _tilts(
+    seen: SeenCollisions, radius_error: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Vertical parts of the line of centres, (1, h), and how likely they are, (m, h).
+
+    Lines of centres point anywhere alike, as far as the height of the tray lets them; what they
+    leave of the distance in the picture is seen, with its error.
+    """
+    tilt = (np.arange(_HEIGHTS) + 0.5)[None, :] / _HEIGHTS
+    reach = (seen.reach - radius_error * seen.measured)[:, None]
+    free = seen.height[:, None] - 2.0 * seen.radii
+    above = tilt * reach
+    room = np.minimum(free.min(axis=1)[:, None], 0.5 * free.sum(axis=1)[:, None] - above)
+    square = ((reach * np.sqrt(1.0 - tilt**2) - seen.distance[:, None])
+              / seen.distance_error[:, None]) ** 2  # fmt: skip
+    weight = np.maximum(room, 0.0) * np.exp(-0.5 * (square - square.min(axis=1)[:, None]))
+    return tilt, weight / weight.sum(axis=1)[:, None]
+
+
+def pairs_given(
+    seen: SeenCollisions,
+    grid: NDArray[np.float64],
+    ratios: NDArray[np.float64],
+    radius_error: float,
+    limits: tuple[float, float],
+) -> NDArray[np.float64]:
+    """Log likelihood, (r, n), of collisions for vertical speeds, (r,), when radii are known."""
+    sticking_speed, outliers = limits
+    tilt, weight = _tilts(seen, radius_error)
+    likely = weight.max(axis=0) > _UNLIKELY
+    tilt, weight = tilt[:, likely], weight[:, likely]
+    total = np.zeros((ratios.size, grid.size))
+    for k in range(0, len(weight), _IN_CACHE):
+        some = slice(k, k + _IN_CACHE)
+        one = SeenCollisions(*(each[some] for each in seen))
+        density = _density(one, grid, ratios, tilt[0, :, np.newaxis], sticking_speed)
+        found = np.einsum('mh,rmhn->rmn', weight[some], density)
+        other = outliers / (RANGE * one.approach[:, np.newaxis])
+        total += np.log((1.0 - outliers) * found + other).sum(axis=1)
+    return total
+
+
+def _density(
+    seen: SeenCollisions,
+    grid: NDArray[np.float64],
+    ratios: NDArray[np.float64],
+    tilt: NDArray[np.float64],
+    sticking_speed: float,
+) -> NDArray[np.float64]:
+    """Of the speeds after collisions, (r, m, h, n), for tilts (h, 1) of the line of centres.
+
+    The speed w along the line of centres is that seen times its part in the picture, p, and the
+    vertical one, a Gaussian, times the other part; the more often beads meet, the larger w. All
+    is Gaussian but for that factor w, w above the sticking speed, which leaves a closed form.
+    """
+    part = np.sqrt(1.0 - tilt**2)
+    a, c, aa, cc, ac = (
+        one[:, None, None]
+        for one in (seen.approach, seen.parting, seen.approach_variance,
+                    seen.parting_variance, seen.covariance)
+    )  # fmt: skip
+    vertical = tilt**2 * ratios[:, None, None, None] * seen.temperature[:, None, None]
+    gain = (1.0 + grid) * part
+    left = gain * part - 1.0
+    speed, speed_variance = part * a, part**2 * aa + vertical
+    both = gain * vertical
+    both += part * left * aa - part * ac
+    variance = gain**2 * vertical
+    variance += left**2 * aa + cc - 2.0 * left * ac
+    miss = c - (gain * speed - a)
+    share = both / variance
+    given = speed + share * miss
+    share *= both
+    given_variance = np.maximum(speed_variance - share, 0.0)
+    density = np.exp(-0.5 * miss**2 / variance)
+    density *= _mean_above(sticking_speed, given, given_variance)
+    density /= np.sqrt(variance)
+    density /= _SQRT_2_PI * _mean_above(sticking_speed, speed, speed_variance)
+    return density
+
+
+def _mean_above(
+    least: float, mean: NDArray[np.float64], variance: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Integral of x over a Gaussian density of x from the least x up; never quite 0."""
+    spread = np.sqrt(variance) + _TINY
+    ratio = (mean - least) / spread
+    found = np.empty(ratio.shape)
+    found[:] = mean
+    # Higher up there is nothing below the least.
+    near = np.flatnonzero(ratio < _ALL_ABOVE)
+    if near.size:
+        x = ratio.ravel()[near]
+        density = np.exp(-0.5 * np.minimum(x**2, 1e3)) / _SQRT_2_PI
+        found.ravel()[near] = found.ravel()[near] * ndtr(x) + spread.ravel()[near] * density
+    found += _TINY
+    return found
