@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.physics.compiled import compiled, kernel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,7 +20,7 @@ _KINK = 11.8
 _BENT = 3.0
 
 
-@compiled
+@kernel
 def fit_line(
     times: NDArray[np.float64],
     places: NDArray[np.float64],
@@ -63,7 +63,7 @@ def fit_line(
     line[5], line[6], line[7], line[8] = 1.0 / total, 1.0 / spread, chi, times.size
 
 
-@compiled
+@kernel
 def fit_flight(
     times: NDArray[np.float64],
     places: NDArray[np.float64],
@@ -91,7 +91,7 @@ def fit_flight(
     line[6] *= worse
 
 
-@compiled
+@kernel
 def extend_flight(
     times: NDArray[np.float64],
     places: NDArray[np.float64],
