@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from enum import IntEnum, IntFlag
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -94,12 +95,18 @@ NOTHING_WRONG = Quality(0)
 
 
 def _freeze_arrays(record: Any) -> None:
-    for field in fields(record):
-        value = getattr(record, field.name)
+    for name in _names(type(record)):
+        value = getattr(record, name)
         if isinstance(value, np.ndarray) and value.flags.writeable:
             view = value.view()
-            view.flags.writeable = False
-            object.__setattr__(record, field.name, view)
+            view.setflags(write=False)
+            object.__setattr__(record, name, view)
+
+
+@cache
+def _names(record: type[Any]) -> tuple[str, ...]:
+    """Of the fields of a record; asked for anew they cost more than all else about it."""
+    return tuple(one.name for one in fields(record))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

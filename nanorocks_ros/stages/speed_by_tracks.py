@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
+from itertools import pairwise
+from statistics import median
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -149,7 +151,7 @@ class TrackSpeed:
         self.judged = self._judged_frames >= _MEMORY_FRAMES
         enough = least >= (_STILL_ENOUGH if self.reliable else _ENOUGH)
         # Where many beads are lost and found again, others are taken for them.
-        followed = bool(self._followed) and float(np.median(self._followed)) >= RELIABLE_SHARE
+        followed = bool(self._followed) and median(self._followed) >= RELIABLE_SHARE
         self.reliable = self.judged and enough and followed and self._told_apart()
 
     def _speeds(self, shakes: CycleFollower, expected: NDArray[np.int32]) -> list[SpeedEstimate]:
@@ -197,11 +199,11 @@ class TrackSpeed:
 
     def _told_apart(self) -> bool:
         """Whether beads come less far between two pictures than others are away."""
-        return bool(self._steps) and float(np.median(self._steps)) <= _FURTHEST_STEP
+        return bool(self._steps) and median(self._steps) <= _FURTHEST_STEP
 
     def _longest_step(self, speeds: NDArray[np.float64]) -> float:
         """Way of a bead between two pictures over the distance to others, of the worst species."""
-        picture = float(np.median(np.diff(self._recent.stamps))) / NS
+        picture = median(later - earlier for earlier, later in pairwise(self._recent.stamps)) / NS
         return float(np.max(np.nan_to_num(speeds) * picture / self._neighbours))
 
 

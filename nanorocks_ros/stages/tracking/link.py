@@ -8,7 +8,6 @@ import numpy as np
 
 from nanorocks_ros.stages.tracking.followed import (
     CONFIRM,
-    Followed,
     Habits,
     Walls,
     add,
