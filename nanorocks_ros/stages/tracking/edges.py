@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.physics.compiled import compiled, inlined
+from nanorocks_ros.physics.compiled import compiled, inlined, kernel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,6 +29,8 @@ _OTHER_HUE = 20.0
 _MOST_NEIGHBOURS = 24
 # Of a bead so large, edges are looked for within 3 px, else 2.
 _FAR_FROM_PX = 6.0
+# Places along a ray where a picture is looked at.
+_MOST_SAMPLES = 7
 # An edge off the circle by so many pixels counts half.
 _HALF_WEIGHT_PX = 0.35
 
@@ -42,103 +44,214 @@ class Rays(NamedTuple):
         Of the discs around: column, row, and the square of the distance within which an edge is
         hidden.
     ends : ndarray (2, rays), [px]
-        Column and row where each ray crosses the circle.
+        Column and row where each ray crosses the circle, from the centre of the first pixel on.
     hidden : ndarray of uint8, (rays,)
-        1 where it does so on or beside another bead.
+        1 where it does so on or beside another bead, or at the end of the picture.
+    some : ndarray of int64, (rays,)
+        Numbers of the rays that are being looked at.
+    edges, weights : ndarrays (rays,)
+        Distance of the edge from the circle [px], NaN where there is none, and its weight.
+    samples : Samples
     """
 
     neighbours: NDArray[np.float64]
     ends: NDArray[np.float64]
     hidden: NDArray[np.uint8]
+    some: NDArray[np.int64]
+    edges: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    samples: Samples
+
+
+class Samples(NamedTuple):
+    """What a picture shows along rays, from the inside out; all (most, rays) or (rays,).
+
+    Parameters
+    ----------
+    columns, rows : ndarrays of int32
+        The pixel to the upper left of each place.
+    right, down : ndarrays
+        Share of the way to the next pixel.
+    corners : ndarray of int32, (4, most, rays)
+        Of the four pixels around: upper left, upper right, lower left, lower right.
+    values : ndarray
+        Between the pixels.
+    outside, step, edges : ndarrays (rays,)
+        Of each ray: the value outside, the step from there, and the distance of the edge.
+    """
+
+    columns: NDArray[np.int32]
+    rows: NDArray[np.int32]
+    right: NDArray[np.float64]
+    down: NDArray[np.float64]
+    corners: NDArray[np.int32]
+    values: NDArray[np.float64]
+    outside: NDArray[np.float64]
+    step: NDArray[np.float64]
+    edges: NDArray[np.float64]
 
 
 @compiled
 def room_for_rays() -> Rays:
     """Room that nothing is written in yet."""
+    samples = Samples(
+        np.empty((_MOST_SAMPLES, RAYS), dtype=np.int32),
+        np.empty((_MOST_SAMPLES, RAYS), dtype=np.int32),
+        np.empty((_MOST_SAMPLES, RAYS)),
+        np.empty((_MOST_SAMPLES, RAYS)),
+        np.empty((4, _MOST_SAMPLES, RAYS), dtype=np.int32),
+        np.empty((_MOST_SAMPLES, RAYS)),
+        np.empty(RAYS),
+        np.empty(RAYS),
+        np.empty(RAYS),
+    )
     return Rays(
         np.empty((_MOST_NEIGHBOURS, 3)),
         np.empty((2, RAYS)),
         np.empty(RAYS, dtype=np.uint8),
+        np.empty(RAYS, dtype=np.int64),
+        np.empty(RAYS),
+        np.empty(RAYS),
+        samples,
     )
 
 
 @inlined
-def _at(picture: NDArray[np.integer[Any]], column: float, row: float) -> float:
-    """Value between pixels, from the centre of the first one on; within the picture."""
-    j, i = int(column), int(row)
-    u, v = column - j, row - i
-    # Unsigned places need no look at whether they count from the end.
-    left, top, one = np.uint64(j), np.uint64(i), np.uint64(1)
-    right, bottom = left + one, top + one
-    upper = picture[top, left] * (1.0 - u) + picture[top, right] * u
-    lower = picture[bottom, left] * (1.0 - u) + picture[bottom, right] * u
-    return float(upper * (1.0 - v) + lower * v)
-
-
-@inlined
-def _edge(
-    picture: NDArray[np.integer[Any]],
-    end: tuple[float, float],
-    ray: int,
+def _lay_rays(
+    disc: tuple[float, float, float],
     reach: int,
-    sign: float,
-    least: float,
-    most_outside: float,
-) -> float:
-    """Distance of an edge from the end of a ray, along it, [px]; NaN where there is none."""
-    c, s = _COSINES[ray], _SINES[ray]
-    # Pixel centres are at halves.
-    x, y = end[0] - 0.5, end[1] - 0.5
-    left, right = x - reach * abs(c), x + reach * abs(c)
-    top, bottom = y - reach * abs(s), y + reach * abs(s)
-    if left < 0.0 or top < 0.0:
-        return np.nan
-    if right + 1.0 >= picture.shape[1] or bottom + 1.0 >= picture.shape[0]:
-        return np.nan
-    most = 2.0 * most_outside
-    farthest = sign * _at(picture, x + reach * c, y + reach * s)
-    far = sign * _at(picture, x + (reach - 1) * c, y + (reach - 1) * s)
-    outside = 0.5 * (farthest + far)
-    if far > most or farthest > most or outside > most_outside:
-        return np.nan
-    near = sign * _at(picture, x - (reach - 1) * c, y - (reach - 1) * s)
-    nearest = sign * _at(picture, x - reach * c, y - reach * s)
-    step = 0.5 * (near + nearest) - outside
-    if step < least:
-        return np.nan
-    # The outermost samples are 1 and 0 by the choice of the levels.
-    total = 1.0 - (reach + 0.5)
-    total += min(max((near - outside) / step, 0.0), 1.0)
-    total += min(max((far - outside) / step, 0.0), 1.0)
-    for t in range(2 - reach, reach - 1):
-        value = sign * _at(picture, x + t * c, y + t * s)
-        total += min(max((value - outside) / step, 0.0), 1.0)
-    return total
-
-
-@inlined
-def lay_rays(x: float, y: float, radius: float, neighbours: int, rays: Rays) -> None:
-    """Where the rays of a circle end, and whether that is on or beside another bead."""
+    shape: tuple[int, int],
+    neighbours: int,
+    rays: Rays,
+) -> None:
+    """Where the rays of a circle end, and whether an edge can be seen there."""
     columns, rows, hidden = rays.ends[0], rays.ends[1], rays.hidden
+    x, y, radius = disc
     for k in range(RAYS):
         columns[k], rows[k] = x + radius * _COSINES[k], y + radius * _SINES[k]
         hidden[k] = 0
     for n in range(neighbours):
-        other_x, other_y, near2 = (
-            rays.neighbours[n, 0],
-            rays.neighbours[n, 1],
-            rays.neighbours[n, 2],
-        )
+        near2 = rays.neighbours[n, 2]
+        other_x, other_y = rays.neighbours[n, 0], rays.neighbours[n, 1]
         for k in range(RAYS):
             dx, dy = other_x - columns[k], other_y - rows[k]
             hidden[k] |= np.uint8(dx * dx + dy * dy < near2)
+    for k in range(RAYS):
+        # Pixel centres are at halves.
+        column, row = columns[k] - 0.5, rows[k] - 0.5
+        aside, along = reach * abs(_COSINES[k]), reach * abs(_SINES[k])
+        beyond = (column - aside < 0.0) | (row - along < 0.0)
+        beyond |= (column + aside + 1.0 >= shape[1]) | (row + along + 1.0 >= shape[0])
+        columns[k], rows[k] = column, row
+        hidden[k] |= np.uint8(beyond)
+
+
+@kernel
+def _look_along(
+    picture: NDArray[np.integer[Any]], sign: float, reach: int, count: int, rays: Rays
+) -> None:
+    """Look at a picture along some rays: each step for many places at once."""
+    samples, some = rays.samples, rays.some
+    for t in range(-reach, reach + 1):
+        columns, rows = samples.columns[t + reach], samples.rows[t + reach]
+        right, down = samples.right[t + reach], samples.down[t + reach]
+        for q in range(count):
+            k = np.uint64(some[q])
+            column = rays.ends[0, k] + t * _COSINES[k]
+            row = rays.ends[1, k] + t * _SINES[k]
+            columns[q], rows[q] = np.int32(column), np.int32(row)
+            right[q], down[q] = column - columns[q], row - rows[q]
+    one = np.uint64(1)
+    for t in range(2 * reach + 1):
+        columns, rows = samples.columns[t], samples.rows[t]
+        upper_left, upper_right = samples.corners[0, t], samples.corners[1, t]
+        lower_left, lower_right = samples.corners[2, t], samples.corners[3, t]
+        for q in range(count):
+            # Unsigned places need no look at whether they count from the end.
+            i, j = np.uint64(rows[q]), np.uint64(columns[q])
+            upper_left[q], upper_right[q] = picture[i, j], picture[i, j + one]
+            lower_left[q], lower_right[q] = picture[i + one, j], picture[i + one, j + one]
+    for t in range(2 * reach + 1):
+        upper_left, upper_right = samples.corners[0, t], samples.corners[1, t]
+        lower_left, lower_right = samples.corners[2, t], samples.corners[3, t]
+        right, down, values = samples.right[t], samples.down[t], samples.values[t]
+        for q in range(count):
+            upper = upper_left[q] * (1.0 - right[q]) + upper_right[q] * right[q]
+            lower = lower_left[q] * (1.0 - right[q]) + lower_right[q] * right[q]
+            values[q] = sign * (upper * (1.0 - down[q]) + lower * down[q])
+
+
+@inlined
+def _find_edges(
+    reach: int, least: float, most_outside: float, count: int, samples: Samples
+) -> None:
+    """Distance of an edge from the end of each ray, [px]; NaN where there is none."""
+    outside, step, edges = samples.outside, samples.step, samples.edges
+    nearest, near = samples.values[0], samples.values[1]
+    far, farthest = samples.values[2 * reach - 1], samples.values[2 * reach]
+    for q in range(count):
+        outside[q] = 0.5 * (farthest[q] + far[q])
+        step[q] = 0.5 * (near[q] + nearest[q]) - outside[q]
+        # The outermost samples are 1 and 0 by the choice of the levels.
+        total = 1.0 - (reach + 0.5)
+        total += min(max((near[q] - outside[q]) / step[q], 0.0), 1.0)
+        edges[q] = total + min(max((far[q] - outside[q]) / step[q], 0.0), 1.0)
+    for t in range(2, 2 * reach - 1):
+        values = samples.values[t]
+        for q in range(count):
+            edges[q] += min(max((values[q] - outside[q]) / step[q], 0.0), 1.0)
+    most = 2.0 * most_outside
+    for q in range(count):
+        none = (far[q] > most) | (farthest[q] > most) | (outside[q] > most_outside)
+        edges[q] = np.nan if none | (step[q] < least) else edges[q]
+
+
+@inlined
+def _edges_in(
+    picture: NDArray[np.integer[Any]],
+    levels: tuple[float, float, float],
+    reach: int,
+    every: int,
+    rays: Rays,
+) -> None:
+    """Look for the edges that are neither hidden nor found yet, of every so many-th ray.
+
+    `levels` are the sign of the step, the least one and the most outside.
+    """
+    count = 0
+    for k in range(0, RAYS, every):
+        rays.some[count] = k
+        count += (rays.hidden[k] == 0) & (rays.edges[k] != rays.edges[k])
+    if not count:
+        return
+    sign, least, most_outside = levels
+    _look_along(picture, sign, reach, count, rays)
+    _find_edges(reach, least, most_outside, count, rays.samples)
+    for q in range(count):
+        rays.edges[rays.some[q]] = rays.samples.edges[q]
 
 
 @inlined
 def add_edges(
-    picture: Picture, hue_sign: float, radius: float, every: int, robust: bool, rays: Rays
+    picture: Picture,
+    hue_sign: float,
+    disc: tuple[float, float, float],
+    neighbours: int,
+    every: int,
+    robust: bool,
+    rays: Rays,
 ) -> tuple[int, float, tuple[float, float, float], float, float, float, float, float, float]:
     """Normal equations of a circle through the edges.
+
+    Parameters
+    ----------
+    picture, hue_sign, neighbours, rays
+        See `fit_circle`.
+    disc : tuple of 3 floats, [px]
+    every : int
+        Of so many rays one is used.
+    robust : bool
+        Whether edges far from the circle weigh less.
 
     Returns
     -------
@@ -149,22 +262,25 @@ def add_edges(
     floats
         Upper triangle of the matrix, row by row.
     """
+    reach = 3 if disc[2] >= _FAR_FROM_PX else 2
+    _lay_rays(disc, reach, picture.darkness.shape, neighbours, rays)
+    edges, weights = rays.edges, rays.weights
+    for k in range(RAYS):
+        edges[k] = np.nan
+    _edges_in(picture.darkness, (1.0, _LEAST_STEP, _FLOOR_DARKNESS), reach, every, rays)
+    if hue_sign != 0.0:
+        # Against another species it is the hue that has a step.
+        _edges_in(picture.hue, (hue_sign, _LEAST_HUE_STEP, _OTHER_HUE), reach, every, rays)
+    for k in range(RAYS):
+        off = edges[k] / _HALF_WEIGHT_PX
+        weights[k] = 1.0 / (1.0 + off * off) if robust else 1.0
     seen, total = 0, 0.0
     xx, xy, yy, xr, yr, rr = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     side_x, side_y, side_r = 0.0, 0.0, 0.0
-    reach = 3 if radius >= _FAR_FROM_PX else 2
     for k in range(0, RAYS, every):
-        if rays.hidden[k]:
-            continue
-        end = rays.ends[0, k], rays.ends[1, k]
-        edge = _edge(picture.darkness, end, k, reach, 1.0, _LEAST_STEP, _FLOOR_DARKNESS)
-        if edge != edge and hue_sign != 0.0:
-            # Against another species it is the hue that has a step.
-            edge = _edge(picture.hue, end, k, reach, hue_sign, _LEAST_HUE_STEP, _OTHER_HUE)
+        edge, weight = edges[k], weights[k]
         if edge != edge:
             continue
-        off = edge / _HALF_WEIGHT_PX
-        weight = 1.0 / (1.0 + off * off) if robust else 1.0
         c, s = _COSINES[k], _SINES[k]
         seen += 1
         total += weight * edge * edge

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.physics.compiled import compiled, kernel
+from nanorocks_ros.stages.tracking.median import median_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -166,4 +167,4 @@ def median_square_speed(lines: NDArray[np.float64], known: NDArray[np.bool_]) ->
         if known[i]:
             squares[n] = lines[i, 3] * lines[i, 3] + lines[i, 4] * lines[i, 4]
             n += 1
-    return float(np.median(squares[:n]))
+    return median_of(squares[:n])

@@ -11,7 +11,6 @@ from nanorocks_ros.stages.tracking.edges import (
     RAYS,
     Rays,
     add_edges,
-    lay_rays,
     room_for_rays,
 )
 from nanorocks_ros.stages.tracking.pixels import Picture
@@ -83,9 +82,8 @@ def fit_circle(
     column_variance, row_variance, radius_variance = 0.0, 0.0, 0.0
     seen, scatter2 = 0, 0.0
     for turn in range(_ROUNDS):
-        lay_rays(x, y, radius, neighbours, rays)
         seen, total, sides, xx, xy, xr, yy, yr, rr = add_edges(
-            picture, hue_sign, radius, every, turn > 0, rays
+            picture, hue_sign, (x, y, radius), neighbours, every, turn > 0, rays
         )
         scatter2 = total / max(seen - 3, 1)
         prior = max(scatter2, _LEAST_SCATTER_PX * _LEAST_SCATTER_PX)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.physics.compiled import compiled, inlined, kernel
+from nanorocks_ros.stages.tracking.median import median_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -102,7 +103,7 @@ def _shown(series: Series, picture: int, species: int) -> NDArray[np.int64]:
     if n == 0:
         return found[:0]
     # A bead half hidden is placed badly; who is hidden does not depend on the speed.
-    worst = _WORST * np.median(errors[:n])
+    worst = _WORST * median_of(errors[:n])
     kept = 0
     for k in range(n):
         if errors[k] <= worst:
@@ -158,7 +159,7 @@ def jitter_of(series: Series, species: int) -> float:
         first, second = second, third
     if n == 0:
         return math.inf
-    return float(np.median(squares[:n]) / (1.5 * _MEDIAN_SQUARE))
+    return float(median_of(squares[:n]) / (1.5 * _MEDIAN_SQUARE))
 
 
 @kernel
@@ -220,7 +221,7 @@ def distances_of(
     if n == 0:
         return distances, math.nan, math.nan, math.nan
     square, variance = _measure(series, found, jitter, distances, variances)
-    return distances, square / (2.0 * n), variance / n, float(np.median(variances))
+    return distances, square / (2.0 * n), variance / n, median_of(variances)
 
 
 @kernel
