@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.physics.compiled import compiled, inlined, kernel
-from nanorocks_ros.stages.tracking.edges import Rays, room_for_rays
+from nanorocks_ros.stages.tracking.edges import Planes, Rays, planes_of, room_for_rays
 from nanorocks_ros.stages.tracking.gains import (
     Gains,
     Search,
@@ -64,15 +64,16 @@ def cover(
     """
     if search.most == 0:
         return 0
-    rays, guess = room_for_rays(), np.empty(3)
-    found = _follow_hints(picture, search, hints, discs, fits, rays)
+    planes, rays, guess = planes_of(picture), room_for_rays(), np.empty(3)
+    found = _follow_hints(picture, planes, search, hints, discs, fits, rays)
     gains = first_gains(balance_of(picture, search), search)
-    return _search(picture, search, gains, discs, fits, found, guess, rays)
+    return _search(picture, planes, search, gains, discs, fits, found, guess, rays)
 
 
 @kernel
 def _search(
     picture: Picture,
+    planes: Planes,
     search: Search,
     gains: Gains,
     discs: NDArray[np.float64],
@@ -84,7 +85,7 @@ def _search(
     """Find beads where most is left to explain; how many there are then. `guess` is room."""
     left = gains.places.shape[0]
     while found < search.most and left:
-        good, left = _take(picture, search, gains, left, discs, fits, found, guess, rays)
+        good, left = _take(picture, planes, search, gains, left, discs, fits, found, guess, rays)
         found += good
     return found
 
@@ -92,6 +93,7 @@ def _search(
 @kernel
 def _take(
     picture: Picture,
+    planes: Planes,
     search: Search,
     gains: Gains,
     left: int,
@@ -109,7 +111,7 @@ def _take(
     disc, fit = discs[own], fits[own]
     disc[0], disc[1], disc[2] = guess[0], guess[1], guess[2]
     neighbours = find_neighbours(discs, own, own, rays)
-    fit_circle(picture, search.hue_sign, disc, neighbours, search.expected, fit, rays)
+    fit_circle(planes, search.hue_sign, disc, neighbours, search.expected, fit, rays)
     _uncount(picture, search, disc, gains.balance)
     fit[3] = _explain(picture, search.kind, disc)
     good = bool(fit[3] >= _FIT_KEEPS * search.least_share)
@@ -133,6 +135,7 @@ def _take(
 @kernel
 def _follow_hints(
     picture: Picture,
+    planes: Planes,
     search: Search,
     hints: NDArray[np.float64],
     discs: NDArray[np.float64],
@@ -147,7 +150,7 @@ def _follow_hints(
         if _left_to_explain(picture, search.kind, disc) < search.least_share:
             continue
         neighbours = find_neighbours(discs, found, found, rays)
-        fit_circle(picture, search.hue_sign, disc, neighbours, hint[2:], fits[found], rays)
+        fit_circle(planes, search.hue_sign, disc, neighbours, hint[2:], fits[found], rays)
         dx, dy = disc[0] - hint[0], disc[1] - hint[1]
         if dx * dx + dy * dy > (_HINT_REACH * hint[2]) ** 2:
             continue

@@ -35,6 +35,29 @@ _MOST_SAMPLES = 7
 _HALF_WEIGHT_PX = 0.35
 
 
+class Planes(NamedTuple):
+    """The parts of a `Picture` that have edges, row by row.
+
+    Parameters
+    ----------
+    darkness : ndarray of uint8, (pixels,)
+    hue : ndarray of int16, (pixels,)
+    rows, columns : int
+    """
+
+    darkness: NDArray[np.uint8]
+    hue: NDArray[np.int16]
+    rows: int
+    columns: int
+
+
+@compiled
+def planes_of(picture: Picture) -> Planes:
+    """Where to look for edges."""
+    rows, columns = picture.darkness.shape
+    return Planes(picture.darkness.reshape(-1), picture.hue.reshape(-1), rows, columns)
+
+
 class Rays(NamedTuple):
     """Room for the fits of one circle after the other.
 
@@ -64,24 +87,27 @@ class Rays(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """What a picture shows along rays, from the inside out; all (most, rays) or (rays,).
+    """What a picture shows along rays: of all of them inside first, then further outside.
 
     Parameters
     ----------
-    columns, rows : ndarrays of int32
-        The pixel to the upper left of each place.
-    right, down : ndarrays
+    starts, steps : ndarrays (2, rays), [px]
+        Of each ray: column and row of its end, and of one step along it.
+    places : ndarray of int32, (places,)
+        The pixel to the upper left of each place, counted from the first one, row by row.
+    right, down : ndarrays (places,)
         Share of the way to the next pixel.
-    corners : ndarray of int32, (4, most, rays)
+    corners : ndarray of int32, (4, places)
         Of the four pixels around: upper left, upper right, lower left, lower right.
-    values : ndarray
+    values : ndarray (places,)
         Between the pixels.
     outside, step, edges : ndarrays (rays,)
         Of each ray: the value outside, the step from there, and the distance of the edge.
     """
 
-    columns: NDArray[np.int32]
-    rows: NDArray[np.int32]
+    starts: NDArray[np.float64]
+    steps: NDArray[np.float64]
+    places: NDArray[np.int32]
     right: NDArray[np.float64]
     down: NDArray[np.float64]
     corners: NDArray[np.int32]
@@ -95,12 +121,13 @@ class Samples(NamedTuple):
 def room_for_rays() -> Rays:
     """Room that nothing is written in yet."""
     samples = Samples(
-        np.empty((_MOST_SAMPLES, RAYS), dtype=np.int32),
-        np.empty((_MOST_SAMPLES, RAYS), dtype=np.int32),
-        np.empty((_MOST_SAMPLES, RAYS)),
-        np.empty((_MOST_SAMPLES, RAYS)),
-        np.empty((4, _MOST_SAMPLES, RAYS), dtype=np.int32),
-        np.empty((_MOST_SAMPLES, RAYS)),
+        np.empty((2, RAYS)),
+        np.empty((2, RAYS)),
+        np.empty(_MOST_SAMPLES * RAYS, dtype=np.int32),
+        np.empty(_MOST_SAMPLES * RAYS),
+        np.empty(_MOST_SAMPLES * RAYS),
+        np.empty((4, _MOST_SAMPLES * RAYS), dtype=np.int32),
+        np.empty(_MOST_SAMPLES * RAYS),
         np.empty(RAYS),
         np.empty(RAYS),
         np.empty(RAYS),
@@ -120,7 +147,7 @@ def room_for_rays() -> Rays:
 def _lay_rays(
     disc: tuple[float, float, float],
     reach: int,
-    shape: tuple[int, int],
+    planes: Planes,
     neighbours: int,
     rays: Rays,
 ) -> None:
@@ -141,44 +168,46 @@ def _lay_rays(
         column, row = columns[k] - 0.5, rows[k] - 0.5
         aside, along = reach * abs(_COSINES[k]), reach * abs(_SINES[k])
         beyond = (column - aside < 0.0) | (row - along < 0.0)
-        beyond |= (column + aside + 1.0 >= shape[1]) | (row + along + 1.0 >= shape[0])
+        beyond |= (column + aside + 1.0 >= planes.columns) | (row + along + 1.0 >= planes.rows)
         columns[k], rows[k] = column, row
         hidden[k] |= np.uint8(beyond)
 
 
-@kernel
+@inlined
 def _look_along(
-    picture: NDArray[np.integer[Any]], sign: float, reach: int, count: int, rays: Rays
+    pixels: NDArray[np.integer[Any]],
+    width: int,
+    sign: float,
+    reach: int,
+    count: int,
+    samples: Samples,
 ) -> None:
     """Look at a picture along some rays: each step for many places at once."""
-    samples, some = rays.samples, rays.some
+    start_x, start_y = samples.starts[0], samples.starts[1]
+    step_x, step_y = samples.steps[0], samples.steps[1]
+    columns = np.int32(width)
     for t in range(-reach, reach + 1):
-        columns, rows = samples.columns[t + reach], samples.rows[t + reach]
-        right, down = samples.right[t + reach], samples.down[t + reach]
+        first = (t + reach) * count
+        places = samples.places[first : first + count]
+        right, down = samples.right[first : first + count], samples.down[first : first + count]
         for q in range(count):
-            k = np.uint64(some[q])
-            column = rays.ends[0, k] + t * _COSINES[k]
-            row = rays.ends[1, k] + t * _SINES[k]
-            columns[q], rows[q] = np.int32(column), np.int32(row)
-            right[q], down[q] = column - columns[q], row - rows[q]
-    one = np.uint64(1)
-    for t in range(2 * reach + 1):
-        columns, rows = samples.columns[t], samples.rows[t]
-        upper_left, upper_right = samples.corners[0, t], samples.corners[1, t]
-        lower_left, lower_right = samples.corners[2, t], samples.corners[3, t]
-        for q in range(count):
-            # Unsigned places need no look at whether they count from the end.
-            i, j = np.uint64(rows[q]), np.uint64(columns[q])
-            upper_left[q], upper_right[q] = picture[i, j], picture[i, j + one]
-            lower_left[q], lower_right[q] = picture[i + one, j], picture[i + one, j + one]
-    for t in range(2 * reach + 1):
-        upper_left, upper_right = samples.corners[0, t], samples.corners[1, t]
-        lower_left, lower_right = samples.corners[2, t], samples.corners[3, t]
-        right, down, values = samples.right[t], samples.down[t], samples.values[t]
-        for q in range(count):
-            upper = upper_left[q] * (1.0 - right[q]) + upper_right[q] * right[q]
-            lower = lower_left[q] * (1.0 - right[q]) + lower_right[q] * right[q]
-            values[q] = sign * (upper * (1.0 - down[q]) + lower * down[q])
+            x, y = start_x[q] + t * step_x[q], start_y[q] + t * step_y[q]
+            column, row = np.int32(x), np.int32(y)
+            places[q] = row * columns + column
+            right[q], down[q] = x - column, y - row
+    one, below = np.uint64(1), np.uint64(width)
+    upper_left, upper_right = samples.corners[0], samples.corners[1]
+    lower_left, lower_right = samples.corners[2], samples.corners[3]
+    right, down, values = samples.right, samples.down, samples.values
+    for q in range((2 * reach + 1) * count):
+        # Unsigned places need no look at whether they count from the end.
+        k = np.uint64(samples.places[q])
+        upper_left[q], upper_right[q] = pixels[k], pixels[k + one]
+        lower_left[q], lower_right[q] = pixels[k + below], pixels[k + below + one]
+    for q in range((2 * reach + 1) * count):
+        upper = upper_left[q] * (1.0 - right[q]) + upper_right[q] * right[q]
+        lower = lower_left[q] * (1.0 - right[q]) + lower_right[q] * right[q]
+        values[q] = sign * (upper * (1.0 - down[q]) + lower * down[q])
 
 
 @inlined
@@ -187,8 +216,9 @@ def _find_edges(
 ) -> None:
     """Distance of an edge from the end of each ray, [px]; NaN where there is none."""
     outside, step, edges = samples.outside, samples.step, samples.edges
-    nearest, near = samples.values[0], samples.values[1]
-    far, farthest = samples.values[2 * reach - 1], samples.values[2 * reach]
+    nearest, near = samples.values[:count], samples.values[count : 2 * count]
+    last = 2 * reach * count
+    far, farthest = samples.values[last - count : last], samples.values[last : last + count]
     for q in range(count):
         outside[q] = 0.5 * (farthest[q] + far[q])
         step[q] = 0.5 * (near[q] + nearest[q]) - outside[q]
@@ -197,7 +227,7 @@ def _find_edges(
         total += min(max((near[q] - outside[q]) / step[q], 0.0), 1.0)
         edges[q] = total + min(max((far[q] - outside[q]) / step[q], 0.0), 1.0)
     for t in range(2, 2 * reach - 1):
-        values = samples.values[t]
+        values = samples.values[t * count : (t + 1) * count]
         for q in range(count):
             edges[q] += min(max((values[q] - outside[q]) / step[q], 0.0), 1.0)
     most = 2.0 * most_outside
@@ -208,7 +238,8 @@ def _find_edges(
 
 @inlined
 def _edges_in(
-    picture: NDArray[np.integer[Any]],
+    pixels: NDArray[np.integer[Any]],
+    width: int,
     levels: tuple[float, float, float],
     reach: int,
     every: int,
@@ -225,15 +256,20 @@ def _edges_in(
     if not count:
         return
     sign, least, most_outside = levels
-    _look_along(picture, sign, reach, count, rays)
-    _find_edges(reach, least, most_outside, count, rays.samples)
+    samples = rays.samples
     for q in range(count):
-        rays.edges[rays.some[q]] = rays.samples.edges[q]
+        k = np.uint64(rays.some[q])
+        samples.starts[0, q], samples.starts[1, q] = rays.ends[0, k], rays.ends[1, k]
+        samples.steps[0, q], samples.steps[1, q] = _COSINES[k], _SINES[k]
+    _look_along(pixels, width, sign, reach, count, samples)
+    _find_edges(reach, least, most_outside, count, samples)
+    for q in range(count):
+        rays.edges[rays.some[q]] = samples.edges[q]
 
 
 @inlined
 def add_edges(
-    picture: Picture,
+    planes: Planes,
     hue_sign: float,
     disc: tuple[float, float, float],
     neighbours: int,
@@ -245,7 +281,7 @@ def add_edges(
 
     Parameters
     ----------
-    picture, hue_sign, neighbours, rays
+    planes, hue_sign, neighbours, rays
         See `fit_circle`.
     disc : tuple of 3 floats, [px]
     every : int
@@ -263,14 +299,18 @@ def add_edges(
         Upper triangle of the matrix, row by row.
     """
     reach = 3 if disc[2] >= _FAR_FROM_PX else 2
-    _lay_rays(disc, reach, picture.darkness.shape, neighbours, rays)
+    _lay_rays(disc, reach, planes, neighbours, rays)
     edges, weights = rays.edges, rays.weights
     for k in range(RAYS):
         edges[k] = np.nan
-    _edges_in(picture.darkness, (1.0, _LEAST_STEP, _FLOOR_DARKNESS), reach, every, rays)
+    _edges_in(
+        planes.darkness, planes.columns, (1.0, _LEAST_STEP, _FLOOR_DARKNESS), reach, every, rays
+    )
     if hue_sign != 0.0:
         # Against another species it is the hue that has a step.
-        _edges_in(picture.hue, (hue_sign, _LEAST_HUE_STEP, _OTHER_HUE), reach, every, rays)
+        _edges_in(
+            planes.hue, planes.columns, (hue_sign, _LEAST_HUE_STEP, _OTHER_HUE), reach, every, rays
+        )
     for k in range(RAYS):
         off = edges[k] / _HALF_WEIGHT_PX
         weights[k] = 1.0 / (1.0 + off * off) if robust else 1.0

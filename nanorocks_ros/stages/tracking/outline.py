@@ -9,8 +9,10 @@ from nanorocks_ros.physics.compiled import compiled, kernel
 from nanorocks_ros.stages.tracking.edges import (
     NEAR_PX,
     RAYS,
+    Planes,
     Rays,
     add_edges,
+    planes_of,
     room_for_rays,
 )
 from nanorocks_ros.stages.tracking.pixels import Picture
@@ -51,7 +53,7 @@ def find_neighbours(discs: NDArray[np.float64], own: int, count: int, rays: Rays
 
 @kernel
 def fit_circle(
-    picture: Picture,
+    planes: Planes,
     hue_sign: float,
     disc: NDArray[np.float64],
     neighbours: int,
@@ -63,7 +65,7 @@ def fit_circle(
 
     Parameters
     ----------
-    picture : Picture
+    planes : Planes
     hue_sign : float
         1 for a red, -1 for a blue, 0 for a gray bead.
     disc : ndarray (3,), [px]
@@ -83,7 +85,7 @@ def fit_circle(
     seen, scatter2 = 0, 0.0
     for turn in range(_ROUNDS):
         seen, total, sides, xx, xy, xr, yy, yr, rr = add_edges(
-            picture, hue_sign, (x, y, radius), neighbours, every, turn > 0, rays
+            planes, hue_sign, (x, y, radius), neighbours, every, turn > 0, rays
         )
         scatter2 = total / max(seen - 3, 1)
         prior = max(scatter2, _LEAST_SCATTER_PX * _LEAST_SCATTER_PX)
@@ -140,12 +142,12 @@ def refit(
         First three columns written, see `fit_circle`.
     """
     alone = discs[first : first + count].copy()
-    _refit(picture, hue_sign, discs, first, alone, expected, fits, room_for_rays())
+    _refit(planes_of(picture), hue_sign, discs, first, alone, expected, fits, room_for_rays())
 
 
 @kernel
 def _refit(
-    picture: Picture,
+    planes: Planes,
     hue_sign: float,
     discs: NDArray[np.float64],
     first: int,
@@ -162,10 +164,10 @@ def _refit(
         if not neighbours:
             continue
         x, y, radius = disc[0], disc[1], disc[2]
-        fit_circle(picture, hue_sign, disc, neighbours, expected, fit, rays)
+        fit_circle(planes, hue_sign, disc, neighbours, expected, fit, rays)
         if fit[2] < _ENOUGH and hue_sign != 0.0:
             # Edges against the other species show in the colour.
             alone[k, 0], alone[k, 1], alone[k, 2] = x, y, radius
             neighbours = find_neighbours(alone, k, count, rays)
-            fit_circle(picture, hue_sign, alone[k], neighbours, expected, fit, rays)
+            fit_circle(planes, hue_sign, alone[k], neighbours, expected, fit, rays)
             disc[0], disc[1], disc[2] = alone[k, 0], alone[k, 1], alone[k, 2]
