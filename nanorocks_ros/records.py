@@ -8,12 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from enum import IntEnum, IntFlag
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Hashable, Iterable
 
     from numpy.typing import NDArray
 
@@ -95,7 +95,8 @@ NOTHING_WRONG = Quality(0)
 
 
 def _freeze_arrays(record: Any) -> None:
-    for name in _names(type(record)):
+    kind: Any = type(record)
+    for name in _names(kind):
         value = getattr(record, name)
         if isinstance(value, np.ndarray) and value.flags.writeable:
             view = value.view()
@@ -104,9 +105,9 @@ def _freeze_arrays(record: Any) -> None:
 
 
 @cache
-def _names(record: type[Any]) -> tuple[str, ...]:
+def _names(record: Hashable) -> tuple[str, ...]:
     """Of the fields of a record; asked for anew they cost more than all else about it."""
-    return tuple(one.name for one in fields(record))
+    return tuple(one.name for one in fields(cast('Any', record)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -156,9 +156,9 @@ def _edges_in(
     sign, least, most_outside = levels
     samples = rays.samples
     for q in range(count):
-        k = np.uint64(rays.some[q])
-        samples.starts[0, q], samples.starts[1, q] = rays.ends[0, k], rays.ends[1, k]
-        samples.steps[0, q], samples.steps[1, q] = _COSINES[k], _SINES[k]
+        ray = np.uint64(rays.some[q])
+        samples.starts[0, q], samples.starts[1, q] = rays.ends[0, ray], rays.ends[1, ray]
+        samples.steps[0, q], samples.steps[1, q] = _COSINES[ray], _SINES[ray]
     look_along(pixels, width, sign, reach, count, samples)
     find_edges(reach, least, most_outside, count, samples)
     for q in range(count):

@@ -9,7 +9,7 @@ import numpy as np
 
 from nanorocks_ros.physics.compiled import compiled, inlined, kernel
 from nanorocks_ros.stages.tracking.flight import KEPT, extend_flight, median_square_speed
-from nanorocks_ros.stages.tracking.pairs import SLOWEST_PX_S, Seen
+from nanorocks_ros.stages.tracking.pairs import Seen
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,13 +71,6 @@ class Habits(NamedTuple):
     window: float
 
 
-class Walls(NamedTuple):
-    """The sides of a tray: smallest and largest place along columns and rows, (2,), [px]."""
-
-    near: NDArray[np.float64]
-    far: NDArray[np.float64]
-
-
 def room_to_follow(room: int) -> Followed:
     """Room for so many tracks, with nothing in it."""
     return Followed(
@@ -93,43 +86,6 @@ def room_to_follow(room: int) -> Followed:
         counts=np.empty(room, dtype=np.int64),
         lines=np.empty((room, 9)),
     )
-
-
-@inlined
-def predicted(
-    line: NDArray[np.float64], radius: float, time: float, walls: Walls
-) -> tuple[float, float, float]:
-    """Where a line leads, and the variance of a coordinate; walls reflect."""
-    after = time - line[0]
-    moving = line[6] < math.inf
-    spread = line[6] if moving else SLOWEST_PX_S * SLOWEST_PX_S
-    x = _reflected(line[1] + (line[3] * after if moving else 0.0), radius, walls, 0)
-    y = _reflected(line[2] + (line[4] * after if moving else 0.0), radius, walls, 1)
-    return x, y, line[5] + spread * after * after
-
-
-@inlined
-def _reflected(place: float, radius: float, walls: Walls, axis: int) -> float:
-    low, high = walls.near[axis] + radius, walls.far[axis] - radius
-    # A bead may be a little beyond where its wall should be.
-    if high > low and not low - 1.0 <= place <= high + 1.0:
-        room = high - low
-        place = low + abs((place - low + room) % (2.0 * room) - room)
-    return place
-
-
-@kernel
-def predict(
-    followed: Followed,
-    time: float,
-    walls: Walls,
-    places: NDArray[np.float64],
-    variances: NDArray[np.float64],
-) -> None:
-    """Where the first tracks should be, (n, 2), and the variance of a coordinate, (n,)."""
-    for k in range(variances.size):
-        x, y, variance = predicted(followed.lines[k], followed.radii[k], time, walls)
-        places[k, 0], places[k, 1], variances[k] = x, y, variance
 
 
 @kernel
@@ -290,3 +246,36 @@ def add(
             line[1 + axis] = found.places[j, axis]
         used += 1
     return used
+
+
+@compiled
+def advance(
+    followed: Followed,
+    used: int,
+    chosen: NDArray[np.int64],
+    found: Seen,
+    shares: NDArray[np.float64],
+    time: float,
+    habits: Habits,
+    speed: float,
+    first_number: int,
+    hits: int,
+) -> tuple[int, int, float]:
+    """Take, learn, drop and add what the next picture shows.
+
+    Returns
+    -------
+    int, int
+        Tracks, and how many of them are new.
+    float, [px/s]
+        See `learn_speed`.
+    """
+    new = np.ones(found.radii.size, dtype=np.bool_)
+    for k in range(used):
+        if chosen[k] >= 0:
+            new[chosen[k]] = False
+    take(followed, used, chosen, found, shares, time, habits)
+    speed = learn_speed(followed, used, speed)
+    kept = drop(followed, used, chosen, time, habits)
+    used = add(followed, kept, new, found, shares, time, first_number, hits)
+    return used, used - kept, speed

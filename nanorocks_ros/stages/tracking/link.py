@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nanorocks_ros.stages.tracking.followed import (
     CONFIRM,
     Habits,
-    Walls,
-    add,
-    drop,
-    learn_speed,
-    predict,
+    advance,
     room_to_follow,
-    take,
 )
 from nanorocks_ros.stages.tracking.pairs import SIZE_JITTER_PX, SLOWEST_PX_S, Known, Seen, pair_up
-from nanorocks_ros.stages.tracking.view import InView, hint_at, show
+from nanorocks_ros.stages.tracking.prediction import Walls, hint_at, predict
+from nanorocks_ros.stages.tracking.view import InView, show
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -106,26 +102,31 @@ class Linker:
         collided = max(_COLLISION * self._speed, SLOWEST_PX_S)
         known = Known(places, variances, here, time - last, sizes)
         chosen = pair_up(known, seen, collided, self._fastest)
-        new = np.ones(found.radii.size, dtype=np.bool_)
-        new[chosen[chosen >= 0]] = False
-        take(followed, used, chosen, seen, found.area_seen, time, self._habits)
-        self._speed = learn_speed(followed, used, self._speed)
-        used = drop(followed, used, chosen, time, self._habits)
         self._make_room(used, found.radii.size)
-        hits = 1 if self._started else CONFIRM
-        self._used = add(
-            self._followed, used, new, seen, found.area_seen, time, first_number, hits
+        self._used, new, self._speed = advance(
+            self._followed,
+            used,
+            chosen,
+            seen,
+            found.area_seen,
+            time,
+            self._habits,
+            self._speed,
+            first_number,
+            1 if self._started else CONFIRM,
         )
         self._started = True
         self._last_predicted = None
-        return self._used - used
+        return int(new)
 
     def _make_room(self, used: int, more: int) -> None:
         """Have room for more tracks than are in use."""
         if used + more <= self._followed.last.size:
             return
-        old, self._followed = self._followed, room_to_follow(2 * (used + more))
-        for column, values in zip(self._followed, old, strict=True):
+        old: tuple[NDArray[Any], ...] = self._followed
+        self._followed = room_to_follow(2 * (used + more))
+        new: tuple[NDArray[Any], ...] = self._followed
+        for column, values in zip(new, old, strict=True):
             column[:used] = values[:used]
 
     def _walls(self, shift: NDArray[np.float64]) -> Walls:

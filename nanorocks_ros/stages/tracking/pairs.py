@@ -205,4 +205,4 @@ def _cost(
     off = seen.radii[j] - size
     usual = SIZE_JITTER_PX * SIZE_JITTER_PX + seen.radius_errors[j] * seen.radius_errors[j]
     unlike = 0.5 * off * off / usual
-    return min(unlike, _LARGEST_SIZE_COST) - math.log(likelihood)
+    return float(min(unlike, _LARGEST_SIZE_COST) - math.log(likelihood))

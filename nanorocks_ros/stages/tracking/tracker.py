@@ -11,7 +11,7 @@ import numpy as np
 from nanorocks_ros.records import Quality, Tracks, TrayImage
 from nanorocks_ros.stages.tracking.detect import BeadDetector
 from nanorocks_ros.stages.tracking.link import Linker
-from nanorocks_ros.stages.tracking.view import in_metres, room_in_view
+from nanorocks_ros.stages.tracking.view import count_seen, in_metres, room_in_view
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -133,12 +133,12 @@ class Tracker:
             radius_errors=beads.radius_errors,
             seen=beads.seen,
             expected=self._expected,
-            quality=image.quality | self._few(beads.species[beads.seen]),
+            quality=image.quality | self._few(beads.species, beads.seen),
         )
 
-    def _few(self, species: NDArray[np.int32]) -> Quality:
+    def _few(self, species: NDArray[np.int32], seen: NDArray[np.bool_]) -> Quality:
         """What the species of the beads that are seen say of how many are not."""
-        counts = np.bincount(species, minlength=self._expected.size)
+        counts = count_seen(species, seen, self._expected.size)
         few = (counts < _FEW * self._expected).any()
         return Quality.FEW_BEADS if few else Quality(0)
 

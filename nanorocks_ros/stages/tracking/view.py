@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.physics.compiled import compiled, kernel
-from nanorocks_ros.stages.tracking.followed import CONFIRM, Followed, Walls, predicted
+from nanorocks_ros.stages.tracking.followed import CONFIRM, Followed
+from nanorocks_ros.stages.tracking.prediction import SIZE_FLOOR2, Walls, predicted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-# The size of a bead is measured with an error that pictures share, [px].
-_SIZE_FLOOR2 = 0.03**2
 
 
 class InView(NamedTuple):
@@ -54,28 +52,6 @@ def room_in_view(room: int) -> InView:
         np.empty(room),
         np.empty(room, dtype=np.bool_),
     )
-
-
-@kernel
-def hint_at(
-    followed: Followed,
-    order: NDArray[np.int64],
-    places: NDArray[np.float64],
-    corner: NDArray[np.float64],
-    least_error: float,
-    hints: NDArray[np.float64],
-) -> None:
-    """Write where beads should be in a picture: column, row, radius and its error, (n, 4), [px].
-
-    `order` says which comes first, `places` where each should be past the camera, `corner` where
-    the first pixel is.
-    """
-    for row in range(order.size):
-        k = order[row]
-        hints[row, 0], hints[row, 1] = places[k, 0] - corner[0], places[k, 1] - corner[1]
-        hints[row, 2] = followed.radii[k]
-        error = math.sqrt(1.0 / followed.radius_weights[k] + _SIZE_FLOOR2)
-        hints[row, 3] = max(error, least_error)
 
 
 @kernel
@@ -134,7 +110,7 @@ def show(
             view.velocities[row, axis] = line[3 + axis] if known else np.nan
         view.velocity_errors[row] = math.sqrt(line[6]) if known else np.nan
         view.radii[row] = followed.radii[k]
-        view.radius_errors[row] = math.sqrt(1.0 / followed.radius_weights[k] + _SIZE_FLOOR2)
+        view.radius_errors[row] = math.sqrt(1.0 / followed.radius_weights[k] + SIZE_FLOOR2)
         row += 1
     return row
 
@@ -167,3 +143,14 @@ def in_metres(
         found.radii[row] = metre * view.radii[k]
         found.radius_errors[row] = metre * view.radius_errors[k]
     return found
+
+
+@compiled
+def count_seen(
+    species: NDArray[np.int32], seen: NDArray[np.bool_], kinds: int
+) -> NDArray[np.int64]:
+    """How many beads of each of so many species are seen."""
+    counts = np.zeros(kinds, dtype=np.int64)
+    for k in range(species.size):
+        counts[species[k]] += seen[k]
+    return counts
