@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from enum import IntEnum, IntFlag
-from typing import TYPE_CHECKING, Any
+from functools import cache
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Hashable, Iterable
 
     from numpy.typing import NDArray
 
@@ -94,12 +95,19 @@ NOTHING_WRONG = Quality(0)
 
 
 def _freeze_arrays(record: Any) -> None:
-    for field in fields(record):
-        value = getattr(record, field.name)
+    kind: Any = type(record)
+    for name in _names(kind):
+        value = getattr(record, name)
         if isinstance(value, np.ndarray) and value.flags.writeable:
             view = value.view()
-            view.flags.writeable = False
-            object.__setattr__(record, field.name, view)
+            view.setflags(write=False)
+            object.__setattr__(record, name, view)
+
+
+@cache
+def _names(record: Hashable) -> tuple[str, ...]:
+    """Of the fields of a record; asked for anew they cost more than all else about it."""
+    return tuple(one.name for one in fields(cast('Any', record)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

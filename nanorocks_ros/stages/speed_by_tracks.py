@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
+from statistics import median
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +33,7 @@ from nanorocks_ros.stages.tracking.mean_speed import (
 )
 from nanorocks_ros.stages.tracking.recent import RecentTracks
 from nanorocks_ros.stages.tracking.tracker import Tracker
+from nanorocks_ros.stages.tracking.view import count_seen
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -139,7 +141,7 @@ class TrackSpeed:
         ]
 
     def _judge(self, tracks: Tracks) -> None:
-        seen = np.bincount(tracks.species[tracks.seen], minlength=self._counts.size)
+        seen = count_seen(tracks.species, tracks.seen, self._counts.size)
         self._shares[self._judged_frames % _MEMORY_FRAMES] = seen / self._counts
         self._judged_frames += 1
         if self.hopeless:
@@ -149,12 +151,13 @@ class TrackSpeed:
         self.judged = self._judged_frames >= _MEMORY_FRAMES
         enough = least >= (_STILL_ENOUGH if self.reliable else _ENOUGH)
         # Where many beads are lost and found again, others are taken for them.
-        followed = bool(self._followed) and float(np.median(self._followed)) >= RELIABLE_SHARE
+        followed = bool(self._followed) and median(self._followed) >= RELIABLE_SHARE
         self.reliable = self.judged and enough and followed and self._told_apart()
 
     def _speeds(self, shakes: CycleFollower, expected: NDArray[np.int32]) -> list[SpeedEstimate]:
+        series = self._recent.series()
         mean, *each = mean_speeds_in(
-            self._recent.series(),
+            series,
             self._recent.series(JITTER_PICTURES),
             expected,
             least_distance=self._least_distance,
@@ -172,7 +175,8 @@ class TrackSpeed:
             for one in each
         ]
         self._followed.append(min(one.share if one else 0.0 for one in each))
-        self._steps.append(self._longest_step(np.array([speed for speed, _ in species])))
+        speeds = np.array([speed for speed, _ in species])
+        self._steps.append(self._longest_step(speeds, np.diff(series.stamps)))
         flags, self._flags = self._flags, Quality(0)
         if mean.share < RELIABLE_SHARE:
             flags |= Quality.FEW_BEADS
@@ -197,11 +201,13 @@ class TrackSpeed:
 
     def _told_apart(self) -> bool:
         """Whether beads come less far between two pictures than others are away."""
-        return bool(self._steps) and float(np.median(self._steps)) <= _FURTHEST_STEP
+        return bool(self._steps) and median(self._steps) <= _FURTHEST_STEP
 
-    def _longest_step(self, speeds: NDArray[np.float64]) -> float:
+    def _longest_step(self, speeds: NDArray[np.float64], intervals_ns: NDArray[np.int64]) -> float:
         """Way of a bead between two pictures over the distance to others, of the worst species."""
-        picture = float(np.median(np.diff(self._recent.stamps))) / NS
+        intervals_ns.sort()
+        middle = (intervals_ns.size - 1) // 2, intervals_ns.size // 2
+        picture = float(intervals_ns[middle[0]] + intervals_ns[middle[1]]) / 2 / NS
         return float(np.max(np.nan_to_num(speeds) * picture / self._neighbours))
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.physics.compiled import compiled, kernel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,34 +31,32 @@ class _Pairing(NamedTuple):
     visited: NDArray[np.int64]
 
 
-@compiled
-def _possible(costs: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Columns that each row may be paired with, one row after the other, and where it starts."""
-    n, m = costs.shape
-    starts = np.zeros(n + 1, dtype=np.int64)
-    for i in range(n):
-        total = 0
-        for j in range(m):
-            total += costs[i, j] < np.inf
-        starts[i + 1] = starts[i] + total
-    columns = np.empty(starts[n], dtype=np.int64)
-    for i in range(n):
-        place = starts[i]
-        for j in range(m):
-            if costs[i, j] < np.inf:
-                columns[place] = j
-                place += 1
-    return starts, columns
+class Costs(NamedTuple):
+    """Costs of the pairs that are possible.
+
+    Parameters
+    ----------
+    starts : ndarray of int64, (n + 1,)
+        Where the pairs of each row begin in the others.
+    columns : ndarray of int64, (pairs,)
+        Rising within a row.
+    values : ndarray (pairs,)
+    """
+
+    starts: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    values: NDArray[np.float64]
 
 
 @compiled
-def assign(costs: NDArray[np.float64], alone: float) -> NDArray[np.int64]:
+def assign(costs: Costs, columns: int, alone: float) -> NDArray[np.int64]:
     """Pair rows with columns, or leave them alone, at the least total cost.
 
     Parameters
     ----------
-    costs : ndarray (n, m)
-        Infinite where a pair is not possible.
+    costs : Costs
+    columns : int
+        How many there are.
     alone : float
         Cost of a row without a column.
 
@@ -71,8 +69,7 @@ def assign(costs: NDArray[np.float64], alone: float) -> NDArray[np.int64]:
     ----------
     Shortest augmenting paths: Jonker and Volgenant (1987), Computing 38, 325.
     """
-    n, m = costs.shape
-    starts, columns = _possible(costs)
+    n, m = costs.starts.size - 1, columns
     state = _Pairing(
         np.full(n, -1, dtype=np.int64),
         np.full(m, -1, dtype=np.int64),
@@ -85,17 +82,20 @@ def assign(costs: NDArray[np.float64], alone: float) -> NDArray[np.int64]:
         np.empty(n),
         np.empty(n, dtype=np.int64),
     )
-    for start in range(n):
-        _add_row(costs, alone, starts, columns, state, start)
+    _add_rows(costs, alone, state)
     return state.partner
 
 
-@compiled
+@kernel
+def _add_rows(costs: Costs, alone: float, state: _Pairing) -> None:
+    for start in range(state.partner.size):
+        _add_row(costs, alone, state, start)
+
+
+@kernel
 def _add_row(
-    costs: NDArray[np.float64],
+    costs: Costs,
     alone: float,
-    starts: NDArray[np.int64],
-    columns: NDArray[np.int64],
     state: _Pairing,
     start: int,
 ) -> None:
@@ -106,7 +106,7 @@ def _add_row(
     row, end_column = start, -1
     end_row, end_distance = start, alone - state.row_price[start]
     while True:
-        reached = _reach_from(costs, starts, columns, state, row, reached)
+        reached = _reach_from(costs, state, row, reached)
         nearest, nearest_distance = _nearest(state, reached, end_distance)
         if nearest < 0:
             break
@@ -135,21 +135,19 @@ def _add_row(
         column = before
 
 
-@compiled
+@kernel
 def _reach_from(
-    costs: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    columns: NDArray[np.int64],
+    costs: Costs,
     state: _Pairing,
     row: int,
     reached: int,
 ) -> int:
     """Update the distances of the columns that a row may be paired with; how many have one."""
-    for k in range(starts[row], starts[row + 1]):
-        j = columns[k]
+    for k in range(costs.starts[row], costs.starts[row + 1]):
+        j = costs.columns[k]
         if state.done[j]:
             continue
-        reduced = costs[row, j] - state.row_price[row] - state.column_price[j]
+        reduced = costs.values[k] - state.row_price[row] - state.column_price[j]
         if state.row_distance[row] + reduced < state.distance[j]:
             if state.distance[j] == np.inf:
                 state.touched[reached] = j
@@ -159,7 +157,7 @@ def _reach_from(
     return reached
 
 
-@compiled
+@kernel
 def _nearest(state: _Pairing, reached: int, limit: float) -> tuple[int, float]:
     nearest, distance = -1, limit
     for k in range(reached):
@@ -169,7 +167,7 @@ def _nearest(state: _Pairing, reached: int, limit: float) -> tuple[int, float]:
     return nearest, distance
 
 
-@compiled
+@kernel
 def _settle_prices(state: _Pairing, visits: int, reached: int, end: float) -> None:
     """Keep all reduced costs positive, and make ready for the next row."""
     for k in range(visits):

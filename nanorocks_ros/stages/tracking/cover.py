@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.physics.compiled import compiled, inlined, kernel
+from nanorocks_ros.stages.tracking.edges import Planes, Rays, planes_of, room_for_rays
 from nanorocks_ros.stages.tracking.gains import (
     Gains,
     Search,
@@ -16,7 +17,7 @@ from nanorocks_ros.stages.tracking.gains import (
     first_gains,
     renew_gains,
 )
-from nanorocks_ros.stages.tracking.outline import fit_circle
+from nanorocks_ros.stages.tracking.outline import find_neighbours, fit_circle
 from nanorocks_ros.stages.tracking.pixels import FLOOR, GRAY, Picture
 
 if TYPE_CHECKING:
@@ -63,78 +64,104 @@ def cover(
     """
     if search.most == 0:
         return 0
-    found = _follow_hints(picture, search, hints, discs, fits)
+    planes, rays, guess = planes_of(picture), room_for_rays(), np.empty(3)
+    found = _follow_hints(picture, planes, search, hints, discs, fits, rays)
     gains = first_gains(balance_of(picture, search), search)
-    while found < search.most:
-        size, row, column = best_disc(gains, search)
-        if size < 0:
-            break
-        found += _take(picture, search, gains, (size, row, column), discs, fits, found)
+    return _search(picture, planes, search, gains, discs, fits, found, guess, rays)
+
+
+@kernel
+def _search(
+    picture: Picture,
+    planes: Planes,
+    search: Search,
+    gains: Gains,
+    discs: NDArray[np.float64],
+    fits: NDArray[np.float64],
+    found: int,
+    guess: NDArray[np.float64],
+    rays: Rays,
+) -> int:
+    """Find beads where most is left to explain; how many there are then. `guess` is room."""
+    left = gains.places.shape[0]
+    while found < search.most and left:
+        good, left = _take(picture, planes, search, gains, left, discs, fits, found, guess, rays)
+        found += good
     return found
 
 
-@compiled
+@kernel
 def _take(
     picture: Picture,
+    planes: Planes,
     search: Search,
     gains: Gains,
-    place: tuple[int, int, int],
+    left: int,
     discs: NDArray[np.float64],
     fits: NDArray[np.float64],
     own: int,
-) -> bool:
-    """Fit the disc of a size, row and column; whether it is a bead."""
-    size, row, column = place
+    guess: NDArray[np.float64],
+    rays: Rays,
+) -> tuple[bool, int]:
+    """Fit the disc that explains most; whether it is a bead, and how many places are left."""
+    best = best_disc(gains, left)
+    size, row, column = gains.places[best, 0], gains.places[best, 1], gains.places[best, 2]
     step = search.step
-    guess = np.array([(column + 0.5) * step, (row + 0.5) * step, search.radii[size]])
-    discs[own] = guess
-    fit_circle(picture, search.hue_sign, discs, own, own + 1, search.expected, fits[own])
-    _uncount(picture, search, discs[own], gains.balance)
-    fits[own, 3] = _explain(picture, search.kind, discs[own])
-    good = bool(fits[own, 3] >= _FIT_KEEPS * search.least_share)
+    guess[0], guess[1], guess[2] = (column + 0.5) * step, (row + 0.5) * step, search.radii[size]
+    disc, fit = discs[own], fits[own]
+    disc[0], disc[1], disc[2] = guess[0], guess[1], guess[2]
+    neighbours = find_neighbours(discs, own, own, rays)
+    fit_circle(planes, search.hue_sign, disc, neighbours, search.expected, fit, rays)
+    _uncount(picture, search, disc, gains.balance)
+    fit[3] = _explain(picture, search.kind, disc)
+    good = bool(fit[3] >= _FIT_KEEPS * search.least_share)
     if not good:
         # The circle went elsewhere: these pixels are no bead, and not to be tried again.
         _uncount(picture, search, guess, gains.balance)
         _explain(picture, search.kind, guess)
     # Whatever happens, the same place is not the best again.
-    gains.values[size, row, column] = 0
-    reach = int((max(discs[own, 2], guess[2]) + search.radii[-1]) / step) + 2
-    there, here = int(discs[own, 1] / step), int(discs[own, 0] / step)
-    renew_gains(
+    gains.places[best, 1], gains.places[best, 3] = -1, 0
+    reach = int((max(disc[2], guess[2]) + search.radii[-1]) / step) + 2
+    there, here = int(disc[1] / step), int(disc[0] / step)
+    left = renew_gains(
         gains,
-        search,
+        left,
         (min(row, there) - reach, max(row, there) + reach),
         (min(column, here) - reach, max(column, here) + reach),
     )
-    return good
+    return good, left
 
 
-@compiled
+@kernel
 def _follow_hints(
     picture: Picture,
+    planes: Planes,
     search: Search,
     hints: NDArray[np.float64],
     discs: NDArray[np.float64],
     fits: NDArray[np.float64],
+    rays: Rays,
 ) -> int:
     """Find beads where they should be; see `cover`."""
     found = 0
     for k in range(min(hints.shape[0], discs.shape[0])):
-        discs[found] = hints[k, :3]
-        if _left_to_explain(picture, search.kind, discs[found]) < search.least_share:
+        disc, hint = discs[found], hints[k]
+        disc[0], disc[1], disc[2] = hint[0], hint[1], hint[2]
+        if _left_to_explain(picture, search.kind, disc) < search.least_share:
             continue
-        fit_circle(picture, search.hue_sign, discs, found, found + 1, hints[k, 2:], fits[found])
-        dx, dy = discs[found, 0] - hints[k, 0], discs[found, 1] - hints[k, 1]
-        if dx * dx + dy * dy > (_HINT_REACH * hints[k, 2]) ** 2:
+        neighbours = find_neighbours(discs, found, found, rays)
+        fit_circle(planes, search.hue_sign, disc, neighbours, hint[2:], fits[found], rays)
+        dx, dy = disc[0] - hint[0], disc[1] - hint[1]
+        if dx * dx + dy * dy > (_HINT_REACH * hint[2]) ** 2:
             continue
-        if _left_to_explain(picture, search.kind, discs[found]) < search.least_share:
+        if _left_to_explain(picture, search.kind, disc) < search.least_share:
             continue
-        fits[found, 3] = _explain(picture, search.kind, discs[found])
+        fits[found, 3] = _explain(picture, search.kind, disc)
         found += 1
     return found
 
 
-@compiled
+@inlined
 def _span(
     disc: NDArray[np.float64], radius: float, row: int, columns: int
 ) -> tuple[np.uint64, np.uint64]:
@@ -149,12 +176,12 @@ def _span(
     return np.uint64(first), np.uint64(max(first, last))
 
 
-@compiled
+@inlined
 def _rows(disc: NDArray[np.float64], radius: float, rows: int) -> tuple[int, int]:
     return max(int(disc[1] - radius), 0), min(int(disc[1] + radius) + 1, rows)
 
 
-@compiled
+@kernel
 def _uncount(
     picture: Picture, search: Search, disc: NDArray[np.float64], balance: NDArray[np.int32]
 ) -> None:
@@ -169,7 +196,7 @@ def _uncount(
                 balance[i // search.step, j // search.step] -= 1
 
 
-@compiled
+@kernel
 def _explain(picture: Picture, kind: int, disc: NDArray[np.float64]) -> float:
     """Mark the pixels of a disc as explained; the share of it that show its species."""
     columns, radius = picture.shown.shape[1], disc[2] + _RIM_PX
@@ -187,7 +214,7 @@ def _explain(picture: Picture, kind: int, disc: NDArray[np.float64]) -> float:
     return float(taken / (np.pi * disc[2] * disc[2]))
 
 
-@compiled
+@kernel
 def _keep_from_outline(picture: Picture, disc: NDArray[np.float64]) -> None:
     """Keep gray beads from the outline of a coloured one."""
     columns = picture.shown.shape[1]
@@ -206,7 +233,7 @@ def _keep_from_outline(picture: Picture, disc: NDArray[np.float64]) -> None:
             covered[j] |= gray
 
 
-@compiled
+@kernel
 def _left_to_explain(picture: Picture, kind: int, disc: NDArray[np.float64]) -> float:
     """Share of a disc that shows the species, unexplained, less the share that shows floor."""
     columns, radius = picture.shown.shape[1], disc[2]

@@ -231,11 +231,13 @@ def _rounded(floor: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def _detections(discs: NDArray[np.float64], fits: NDArray[np.float64]) -> Detections:
+    # Columns on their own: those of many rows are another type for the compiler than of one.
+    errors, radius_errors, outline_seen, area_seen = np.ascontiguousarray(fits.T)
     return Detections(
         places=discs[:, :2].copy(),
-        place_errors=fits[:, 0],
+        place_errors=errors,
         radii=discs[:, 2].copy(),
-        radius_errors=fits[:, 1],
-        outline_seen=fits[:, 2],
-        area_seen=fits[:, 3],
+        radius_errors=radius_errors,
+        outline_seen=outline_seen,
+        area_seen=area_seen,
     )

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.physics.compiled import compiled, kernel
+from nanorocks_ros.stages.tracking.median import median_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,7 +21,7 @@ _KINK = 11.8
 _BENT = 3.0
 
 
-@compiled
+@kernel
 def fit_line(
     times: NDArray[np.float64],
     places: NDArray[np.float64],
@@ -63,7 +64,7 @@ def fit_line(
     line[5], line[6], line[7], line[8] = 1.0 / total, 1.0 / spread, chi, times.size
 
 
-@compiled
+@kernel
 def fit_flight(
     times: NDArray[np.float64],
     places: NDArray[np.float64],
@@ -91,7 +92,7 @@ def fit_flight(
     line[6] *= worse
 
 
-@compiled
+@kernel
 def extend_flight(
     times: NDArray[np.float64],
     places: NDArray[np.float64],
@@ -166,4 +167,4 @@ def median_square_speed(lines: NDArray[np.float64], known: NDArray[np.bool_]) ->
         if known[i]:
             squares[n] = lines[i, 3] * lines[i, 3] + lines[i, 4] * lines[i, 4]
             n += 1
-    return float(np.median(squares[:n]))
+    return median_of(squares[:n])

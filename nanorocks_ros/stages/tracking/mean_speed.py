@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.stages.tracking.paths import ALL, Series, distances_of, jitter_of, joined
+from nanorocks_ros.stages.tracking.paths import ALL, Series, Wanted, far_enough, jitter_of, joined
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -147,18 +147,12 @@ def mean_speeds_in(
 def _mean_speed(
     series: Series, recent: Series, least_distance: float, species: int, expected: int
 ) -> MeanSpeed | None:
-    last = series.stamps.size - 1
-    jitter = jitter_of(recent, species)
-    lag, distances = 0, None
-    for tried in _lags(last // 2):
-        found = _distances(series, (last, last - tried, last - 2 * tried), species, jitter)
-        if found is None:
-            break
-        lag, distances = tried, found
-        if distances.far_enough(least_distance):
-            break
-    if distances is None:
+    wanted = Wanted(least_distance * least_distance, _LEAST_ERRORS**2, _PLACE_ERRORS**2, _FEWEST)
+    lag, each, *means = far_enough(series, species, jitter_of(recent, species), wanted)
+    if not lag:
         return None
+    distances = _Distances(*each, *means)
+    last = series.stamps.size - 1
     first, middle, end = (int(series.stamps[last - k * lag]) for k in (2, 1, 0))
     window = (end - first) / _NS
     share = distances.both.size / max(expected, 1)
@@ -175,14 +169,6 @@ def _mean_speed(
     )
 
 
-def _lags(longest: int) -> list[int]:
-    """Lags in pictures that grow by a quarter each."""
-    lags = [1] if longest >= 1 else []
-    while lags and lags[-1] < longest:
-        lags.append(min(longest, max(lags[-1] + 1, lags[-1] * 5 // 4)))
-    return lags
-
-
 @dataclass(frozen=True, slots=True)
 class _Distances:
     """Of each bead: in the later half of the window, in the earlier, in both.
@@ -196,12 +182,6 @@ class _Distances:
     square: float
     variance: float
     place_variance: float
-
-    def far_enough(self, least: float) -> bool:
-        enough = max(
-            least * least, _LEAST_ERRORS**2 * self.variance, _PLACE_ERRORS**2 * self.place_variance
-        )
-        return self.square >= enough
 
     def beyond_errors(self) -> bool:
         """Whether distances are beyond what chalk that turns does to places."""
@@ -218,7 +198,7 @@ class _Distances:
         jitter = self._jitter_error(0.5 * (later_time + earlier_time) * half)
         per_time = 2.0 / (later_time + earlier_time)
         bead = np.hypot(self.later - self.earlier, 1e-3 * self.later) * per_time
-        scatter = 0.5 * float(np.sqrt(np.mean(np.square(bead)))) / math.sqrt(self.both.size)
+        scatter = 0.5 * math.sqrt(_mean(bead * bead)) / math.sqrt(self.both.size)
         shared = self._shared_share() * half
         error = math.hypot(jitter * per_time, 0.5 * shortened, 0.8 * scatter, 0.5 * shared)
         return max(half + shortened, 0.0), error
@@ -240,18 +220,13 @@ def _mean_distance(distances: NDArray[np.float64], variance: float) -> float:
 
     Exact for a Maxwellian gas, where the jitter widens a Gaussian by another.
     """
-    square = float(np.mean(np.square(distances)))
+    square = _mean(distances * distances)
     left = square - 4.0 * variance
     if left <= 0.0:
         return 0.0
-    return float(distances.mean()) * math.sqrt(left / square)
+    return _mean(distances) * math.sqrt(left / square)
 
 
-def _distances(
-    series: Series, pictures: tuple[int, int, int], species: int, jitter: float
-) -> _Distances | None:
-    distances, square, variance, place_variance = distances_of(series, pictures, species, jitter)
-    if distances.shape[1] < _FEWEST:
-        return None
-    later, earlier, both = distances
-    return _Distances(later, earlier, both, square, variance, place_variance)
+def _mean(values: NDArray[np.float64]) -> float:
+    """As of numpy, which takes longer to find out over what."""
+    return float(np.add.reduce(values)) / values.size

@@ -1,14 +1,14 @@
-"""Where beads should be, and how likely each of those seen is each of them."""
+"""How likely each of the beads that are seen is each of those that are known."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.physics.compiled import compiled
-from nanorocks_ros.stages.tracking.flight import extend_flight
+from nanorocks_ros.physics.compiled import compiled, inlined, kernel
+from nanorocks_ros.stages.tracking.assignment import Costs, assign
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,233 +29,180 @@ _LARGEST_SIZE_COST = 6.0
 # Of the variance of a change of velocity, what is left when the place is looked for half way
 # between where the bead was and where it would be: its velocity is lost, and no more.
 _HALF_WAY = 0.5
+# Share of the beads that must be out of reach of collisions for a tray to have been shaken.
+_LOST = 0.3
 # A pair that is so much less likely than the best, as a logarithm, is none.
 _WORTH = 10.0
 
 
-@compiled
-def pair_costs(
-    predicted: NDArray[np.float64],
-    variances: NDArray[np.float64],
-    last: NDArray[np.float64],
-    waits: NDArray[np.float64],
-    sizes: NDArray[np.float64],
-    places: NDArray[np.float64],
-    errors: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    radius_errors: NDArray[np.float64],
-    collided: float,
-    fastest: float,
-    shaken_now: bool,
-    costs: NDArray[np.float64],
-) -> None:
-    """Minus the logarithm of the likelihood of every pair; infinite out of reach.
+class Known(NamedTuple):
+    """Beads that are followed.
 
     Parameters
     ----------
     predicted, variances : ndarrays (n, 2), (n,), [px], [px^2]
+        Where they should be, and the variance of a coordinate.
     last : ndarray (n, 2), [px]
-        Where the beads were seen last.
+        Where they were seen last.
     waits : ndarray (n,), [s]
-        Since each track was seen.
-    sizes, radii, radius_errors : ndarrays (n,), (m,), (m,), [px]
-    places, errors : ndarrays (m, 2), (m,), [px]
-    collided : float, [px/s]
-        Usual change of a component of the velocity in a collision.
-    fastest : float, [px/s]
-    shaken_now : bool
-        Whether beads may have got any speed since the last picture.
-    costs : ndarray (n, m)
-        Written.
+        Since then.
+    sizes : ndarray (n,), [px]
+        Radii.
     """
-    worst = errors.max() if errors.size else 0.0
-    for i in range(predicted.shape[0]):
-        reach = fastest * waits[i]
-        far = _REACH2 * (variances[i] + worst * worst + (collided * waits[i]) ** 2)
-        far = max(far, sizes[i] * sizes[i])
-        if shaken_now:
-            far = max(far, reach * reach)
-        for j in range(places.shape[0]):
-            costs[i, j] = math.inf
-            dx = places[j, 0] - predicted[i, 0]
-            dy = places[j, 1] - predicted[i, 1]
-            d2 = dx * dx + dy * dy
-            if d2 > far:
-                continue
-            free = variances[i] + errors[j] * errors[j]
-            # The collision may have been at any time since: on average half way.
-            ax = places[j, 0] - 0.5 * (predicted[i, 0] + last[i, 0])
-            ay = places[j, 1] - 0.5 * (predicted[i, 1] + last[i, 1])
-            a2 = ax * ax + ay * ay
-            hit = free + _HALF_WAY * (collided * waits[i]) ** 2
-            missed = free + (_MISPLACED_BY * sizes[i]) ** 2
-            shaken = free + (0.4 * reach) ** 2
-            near = a2 <= _REACH2 * hit or d2 <= sizes[i] * sizes[i]
-            if not near and not (shaken_now and d2 <= reach * reach):
-                continue
-            likelihood = (1.0 - _COLLIDING) / free * math.exp(-0.5 * d2 / free)
-            likelihood += _COLLIDING / hit * math.exp(-0.5 * a2 / hit)
-            likelihood += _MISPLACED / missed * math.exp(-0.5 * d2 / missed)
-            likelihood += _SHAKEN / shaken * math.exp(-0.5 * d2 / shaken)
-            off = radii[j] - sizes[i]
-            usual = SIZE_JITTER_PX * SIZE_JITTER_PX + radius_errors[j] * radius_errors[j]
-            size = 0.5 * off * off / usual
-            costs[i, j] = min(size, _LARGEST_SIZE_COST) - math.log(likelihood)
-        if places.shape[0]:
-            # A bead that is hidden must not push the others from their places.
-            most = costs[i].min() + _WORTH
-            for j in range(places.shape[0]):
-                if costs[i, j] > most:
-                    costs[i, j] = math.inf
+
+    predicted: NDArray[np.float64]
+    variances: NDArray[np.float64]
+    last: NDArray[np.float64]
+    waits: NDArray[np.float64]
+    sizes: NDArray[np.float64]
+
+
+class Seen(NamedTuple):
+    """Beads in a picture: places (m, 2), errors of a coordinate, radii and their errors, [px]."""
+
+    places: NDArray[np.float64]
+    errors: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    radius_errors: NDArray[np.float64]
 
 
 @compiled
-def most_finite(costs: NDArray[np.float64]) -> float:
-    """The largest cost of a pair that is possible; -1 when none is."""
-    most, found = -math.inf, False
-    for i in range(costs.shape[0]):
-        for j in range(costs.shape[1]):
-            if costs[i, j] < math.inf:
-                most, found = max(most, costs[i, j]), True
-    return most if found else -1.0
+def pair_up(known: Known, seen: Seen, collided: float, fastest: float) -> NDArray[np.int64]:
+    """Which of the beads that are seen is each of those known, or -1.
 
-
-@compiled
-def count_lost(costs: NDArray[np.float64], fresh: NDArray[np.bool_]) -> int:
-    """How many of some tracks have no pair that is possible."""
-    lost = 0
-    for i in range(costs.shape[0]):
-        if fresh[i]:
-            lost += not (costs[i] < math.inf).any()
-    return lost
-
-
-@compiled
-def predict(
-    lines: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    time: float,
-    near_wall: NDArray[np.float64],
-    far_wall: NDArray[np.float64],
-    places: NDArray[np.float64],
-    variances: NDArray[np.float64],
-) -> None:
-    """Where lines lead, (n, 2), and the variance of a coordinate, (n,); walls reflect."""
-    for i in range(lines.shape[0]):
-        after = time - lines[i, 0]
-        moving = lines[i, 6] < math.inf
-        spread = lines[i, 6] if moving else SLOWEST_PX_S * SLOWEST_PX_S
-        variances[i] = lines[i, 5] + spread * after * after
-        for axis in range(2):
-            place = lines[i, 1 + axis] + (lines[i, 3 + axis] * after if moving else 0.0)
-            low, high = near_wall[axis] + radii[i], far_wall[axis] - radii[i]
-            # A bead may be a little beyond where its wall should be.
-            if high > low and not low - 1.0 <= place <= high + 1.0:
-                room = high - low
-                place = low + abs((place - low + room) % (2.0 * room) - room)
-            places[i, axis] = place
-
-
-@compiled
-def extend_all(
-    chosen: NDArray[np.int64],
-    times: NDArray[np.float64],
-    places: NDArray[np.float64],
-    errors: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    lines: NDArray[np.float64],
-    time: float,
-    found: NDArray[np.float64],
-    found_errors: NDArray[np.float64],
-    window: float,
-) -> None:
-    """Add to each track the place chosen for it, if any; see `extend_flight`."""
-    for i in range(chosen.size):
-        j = chosen[i]
-        if j >= 0:
-            counts[i] = extend_flight(
-                times[i],
-                places[i],
-                errors[i],
-                counts[i],
-                lines[i],
-                time,
-                found[j, 0],
-                found[j, 1],
-                found_errors[j],
-                window,
-            )
-
-
-@compiled
-def in_view(
-    shown: NDArray[np.bool_],
-    last: NDArray[np.float64],
-    last_places: NDArray[np.float64],
-    last_errors: NDArray[np.float64],
-    lines: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    radius_errors: NDArray[np.float64],
-    predicted: NDArray[np.float64],
-    variances: NDArray[np.float64],
-    time: float,
-    systematic: float,
-    collisions: tuple[float, float],
-) -> tuple[
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.bool_],
-]:
-    """Fields of `InView` but the first, of those that are shown.
+    Any bead may collide, but when many are not where even a collision could have sent them, the
+    tray was shaken.
 
     Parameters
     ----------
-    shown : ndarray of bool, (n,)
-    last : ndarray (n,), [s]
-        When each was seen last, with the place first in `last_places` and `last_errors`.
-    lines : ndarray (n, 9)
-        Of `fit_flight`.
-    radii, radius_errors : ndarray (n,), [px]
-    predicted, variances : ndarrays (n, 2), (n,)
-        Of `predict`.
-    time : float, [s]
-    systematic : float, [px]
-        Error of all places of a bead together.
-    collisions : tuple of 2 floats, [1/s], [px/s]
-        How often a bead collides, and how much that changes its velocity.
+    known, seen : Known, Seen
+    collided : float, [px/s]
+        Usual change of a component of the velocity in a collision.
+    fastest : float, [px/s]
+
+    Returns
+    -------
+    ndarray of int64, (n,)
     """
-    n = np.count_nonzero(shown)
-    places, errors, velocities = np.empty((n, 2)), np.empty(n), np.empty((n, 2))
-    velocity_errors, seen = np.empty(n), np.empty(n, dtype=np.bool_)
-    rate, kick = collisions
-    row = 0
-    for k in range(shown.size):
-        if not shown[k]:
-            continue
-        seen[row] = last[k] == time
-        if seen[row]:
-            places[row], error = last_places[k, 0], last_errors[k, 0]
-        else:
-            # By collisions that nobody saw; on average one was half way.
-            wait = time - last[k]
-            strayed = min(rate * wait, 1.0) * (kick * wait) * (kick * wait) / 3.0
-            places[row], error = predicted[k], math.sqrt(variances[k] + strayed)
-        errors[row] = math.sqrt(error * error + systematic * systematic)
-        known = abs(lines[k, 6]) < math.inf
-        for axis in range(2):
-            velocities[row, axis] = lines[k, 3 + axis] if known else np.nan
-        velocity_errors[row] = math.sqrt(lines[k, 6]) if known else np.nan
-        row += 1
-    return (
-        places,
-        errors,
-        velocities,
-        velocity_errors,
-        radii[shown],
-        radius_errors[shown],
-        seen,
-    )
+    n, m = known.waits.size, seen.radii.size
+    starts = np.zeros(n + 1, dtype=np.int64)
+    costs = Costs(starts, np.empty(n * m, dtype=np.int64), np.empty(n * m))
+    squares = np.empty(m)
+    most = _pair_costs(known, seen, collided, fastest, False, squares, costs)
+    if _shaken(known.waits, starts):
+        most = _pair_costs(known, seen, collided, fastest, True, squares, costs)
+    # Any pair within reach is better than none.
+    return assign(costs, m, most + 1.0)
+
+
+@kernel
+def _shaken(waits: NDArray[np.float64], starts: NDArray[np.int64]) -> bool:
+    """Whether too many of the beads that were seen in the last picture have no pair."""
+    latest = np.inf
+    for i in range(waits.size):
+        latest = min(latest, waits[i])
+    fresh, lost = 0, 0
+    for i in range(waits.size):
+        if waits[i] <= 1.5 * latest:
+            fresh += 1
+            lost += starts[i] == starts[i + 1]
+    return bool(lost > _LOST * fresh)
+
+
+@kernel
+def _pair_costs(
+    known: Known,
+    seen: Seen,
+    collided: float,
+    fastest: float,
+    shaken_now: bool,
+    squares: NDArray[np.float64],
+    costs: Costs,
+) -> float:
+    """Write minus the logarithm of the likelihood of every pair within reach.
+
+    Parameters
+    ----------
+    known, seen, collided, fastest
+        See `pair_up`.
+    shaken_now : bool
+        Whether beads may have got any speed since the last picture.
+    squares : ndarray (m,)
+        Room.
+    costs : Costs
+        Written.
+
+    Returns
+    -------
+    float
+        The largest cost; -1 when there is no pair.
+    """
+    worst = 0.0
+    for j in range(seen.errors.size):
+        worst = max(worst, seen.errors[j])
+    largest, count = -math.inf, 0
+    for i in range(known.waits.size):
+        wait, variance, size = known.waits[i], known.variances[i], known.sizes[i]
+        reach = fastest * wait
+        far = _REACH2 * (variance + worst * worst + (collided * wait) ** 2)
+        far = max(far, size * size)
+        if shaken_now:
+            far = max(far, reach * reach)
+        x, y = known.predicted[i, 0], known.predicted[i, 1]
+        # Most are far: many at once, without a choice.
+        for j in range(squares.size):
+            dx, dy = seen.places[j, 0] - x, seen.places[j, 1] - y
+            squares[j] = dx * dx + dy * dy
+        first, least = count, math.inf
+        for j in range(squares.size):
+            if squares[j] > far:
+                continue
+            cost = _cost(known, seen, (i, j), squares[j], collided * wait, reach, shaken_now)
+            if cost < math.inf:
+                costs.columns[count], costs.values[count] = j, cost
+                least = min(least, cost)
+                count += 1
+        # A bead that is hidden must not push the others from their places.
+        most = least + _WORTH
+        last, count = count, first
+        for k in range(first, last):
+            if costs.values[k] <= most:
+                costs.columns[count], costs.values[count] = costs.columns[k], costs.values[k]
+                largest = max(largest, costs.values[k])
+                count += 1
+        costs.starts[i + 1] = count
+    return largest if count else -1.0
+
+
+@inlined
+def _cost(
+    known: Known,
+    seen: Seen,
+    pair: tuple[int, int],
+    d2: float,
+    kick: float,
+    reach: float,
+    shaken_now: bool,
+) -> float:
+    """Of one pair, apart by the square root of `d2`; infinite out of reach."""
+    i, j = pair
+    size = known.sizes[i]
+    free = known.variances[i] + seen.errors[j] * seen.errors[j]
+    # The collision may have been at any time since: on average half way.
+    ax = seen.places[j, 0] - 0.5 * (known.predicted[i, 0] + known.last[i, 0])
+    ay = seen.places[j, 1] - 0.5 * (known.predicted[i, 1] + known.last[i, 1])
+    a2 = ax * ax + ay * ay
+    hit = free + _HALF_WAY * kick**2
+    missed = free + (_MISPLACED_BY * size) ** 2
+    shaken = free + (0.4 * reach) ** 2
+    near = a2 <= _REACH2 * hit or d2 <= size * size
+    if not near and not (shaken_now and d2 <= reach * reach):
+        return math.inf
+    likelihood = (1.0 - _COLLIDING) / free * math.exp(-0.5 * d2 / free)
+    likelihood += _COLLIDING / hit * math.exp(-0.5 * a2 / hit)
+    likelihood += _MISPLACED / missed * math.exp(-0.5 * d2 / missed)
+    likelihood += _SHAKEN / shaken * math.exp(-0.5 * d2 / shaken)
+    off = seen.radii[j] - size
+    usual = SIZE_JITTER_PX * SIZE_JITTER_PX + seen.radius_errors[j] * seen.radius_errors[j]
+    unlike = 0.5 * off * off / usual
+    return float(min(unlike, _LARGEST_SIZE_COST) - math.log(likelihood))

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.physics.compiled import compiled, inlined, kernel
+from nanorocks_ros.stages.tracking.median import median_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +23,8 @@ _WORST = 5.0
 _UNEVEN = 0.2
 # Of a Gaussian of unit variance, the median of the squares.
 _MEDIAN_SQUARE = 0.4549
+# Pictures that the jitter takes.
+_EVENLY_APART = 3
 
 ALL = -1
 """Beads of every species."""
@@ -50,6 +53,25 @@ class Series(NamedTuple):
     seen: NDArray[np.bool_]
     places: NDArray[np.float64]
     errors: NDArray[np.float64]
+
+
+class Wanted(NamedTuple):
+    """How far beads should come, on average of the squares, in half of a window.
+
+    Parameters
+    ----------
+    square : float, [m^2]
+    variances, place_variances : float
+        At least so many times those of a coordinate: as it differs from picture to picture, and
+        as a whole.
+    beads : int
+        Fewer say nothing.
+    """
+
+    square: float
+    variances: float
+    place_variances: float
+    beads: int
 
 
 def joined(tracks: Sequence[Tracks]) -> Series:
@@ -81,7 +103,7 @@ def _shown(series: Series, picture: int, species: int) -> NDArray[np.int64]:
     if n == 0:
         return found[:0]
     # A bead half hidden is placed badly; who is hidden does not depend on the speed.
-    worst = _WORST * np.median(errors[:n])
+    worst = _WORST * median_of(errors[:n])
     kept = 0
     for k in range(n):
         if errors[k] <= worst:
@@ -90,18 +112,18 @@ def _shown(series: Series, picture: int, species: int) -> NDArray[np.int64]:
     return found[:kept]
 
 
-@compiled
+@kernel
 def _common(
-    series: Series, pictures: tuple[int, int, int], species: int
-) -> tuple[NDArray[np.int64], int]:
-    """The beads shown in all of three pictures: where each is in each, (3, n), and n."""
-    a = _shown(series, pictures[0], species)
-    b = _shown(series, pictures[1], species)
-    c = _shown(series, pictures[2], species)
-    found = np.empty((3, min(a.size, b.size, c.size)), dtype=np.int64)
+    ids: NDArray[np.int32],
+    a: NDArray[np.int64],
+    b: NDArray[np.int64],
+    c: NDArray[np.int64],
+    found: NDArray[np.int64],
+) -> int:
+    """How many beads are shown in all of three pictures; where each is in each, (3, n)."""
     i, j, k, n = 0, 0, 0, 0
     while i < a.size and j < b.size and k < c.size:
-        x, y, z = series.ids[a[i]], series.ids[b[j]], series.ids[c[k]]
+        x, y, z = ids[a[i]], ids[b[j]], ids[c[k]]
         largest = max(x, y, z)
         if x == largest and y == largest and z == largest:
             found[0, n], found[1, n], found[2, n] = a[i], b[j], c[k]
@@ -110,7 +132,7 @@ def _common(
         i += x < largest
         j += y < largest
         k += z < largest
-    return found, n
+    return n
 
 
 @compiled
@@ -121,26 +143,41 @@ def jitter_of(series: Series, species: int) -> float:
     neighbours has 3/2 of that variance. What all pictures are off by together is no part of it.
     Infinite when there are no three pictures evenly apart.
     """
+    if series.stamps.size < _EVENLY_APART:
+        return math.inf
     squares = np.empty(2 * series.ids.size)
+    found = np.empty((3, series.ids.size), dtype=np.int64)
     n = 0
+    first, second = _shown(series, 0, species), _shown(series, 1, species)
     for picture in range(series.stamps.size - 2):
+        third = _shown(series, picture + 2, species)
         before = series.stamps[picture + 1] - series.stamps[picture]
         after = series.stamps[picture + 2] - series.stamps[picture + 1]
-        if abs(before - after) > _UNEVEN * before:
-            continue
-        found, count = _common(series, (picture, picture + 1, picture + 2), species)
-        for k in range(count):
-            for axis in range(2):
-                ends = series.places[found[0, k], axis] + series.places[found[2, k], axis]
-                off = series.places[found[1, k], axis] - 0.5 * ends
-                squares[n] = off * off
-                n += 1
+        if abs(before - after) <= _UNEVEN * before:
+            count = _common(series.ids, first, second, third, found)
+            n += _off_the_middle(series.places, found[:, :count], squares[n:])
+        first, second = second, third
     if n == 0:
         return math.inf
-    return float(np.median(squares[:n]) / (1.5 * _MEDIAN_SQUARE))
+    return float(median_of(squares[:n]) / (1.5 * _MEDIAN_SQUARE))
 
 
-@compiled
+@kernel
+def _off_the_middle(
+    places: NDArray[np.float64], found: NDArray[np.int64], squares: NDArray[np.float64]
+) -> int:
+    """Squares of what the second place of each is off the middle of the others; how many."""
+    n = 0
+    for k in range(found.shape[1]):
+        for axis in range(2):
+            ends = places[found[0, k], axis] + places[found[2, k], axis]
+            off = places[found[1, k], axis] - 0.5 * ends
+            squares[n] = off * off
+            n += 1
+    return n
+
+
+@inlined
 def _apart(series: Series, here: int, there: int) -> float:
     dx = series.places[here, 0] - series.places[there, 0]
     dy = series.places[here, 1] - series.places[there, 1]
@@ -175,12 +212,29 @@ def distances_of(
     place_variance : float, [m^2]
         Median of the whole.
     """
-    found, n = _common(series, pictures, species)
+    later = _shown(series, pictures[0], species)
+    middle = _shown(series, pictures[1], species)
+    earlier = _shown(series, pictures[2], species)
+    found = np.empty((3, min(later.size, middle.size, earlier.size)), dtype=np.int64)
+    n = _common(series.ids, later, middle, earlier, found)
     distances, variances = np.empty((3, n)), np.empty(n)
     if n == 0:
         return distances, math.nan, math.nan, math.nan
+    square, variance = _measure(series, found, jitter, distances, variances)
+    return distances, square / (2.0 * n), variance / n, median_of(variances)
+
+
+@kernel
+def _measure(
+    series: Series,
+    found: NDArray[np.int64],
+    jitter: float,
+    distances: NDArray[np.float64],
+    variances: NDArray[np.float64],
+) -> tuple[float, float]:
+    """Write distances and variances of the beads found; sums over squares and variances."""
     square, variance = 0.0, 0.0
-    for k in range(n):
+    for k in range(variances.size):
         distances[0, k] = _apart(series, found[0, k], found[1, k])
         distances[1, k] = _apart(series, found[1, k], found[2, k])
         distances[2, k] = _apart(series, found[0, k], found[2, k])
@@ -190,4 +244,44 @@ def distances_of(
             total += series.errors[found[one, k]] ** 2
         variances[k] = total / 3.0
         variance += min(variances[k], jitter)
-    return distances, square / (2.0 * n), variance / n, float(np.median(variances))
+    return square, variance
+
+
+@compiled
+def far_enough(
+    series: Series, species: int, jitter: float, wanted: Wanted
+) -> tuple[int, NDArray[np.float64], float, float, float]:
+    """Distances over the shortest time in which beads come far enough, or the longest there is.
+
+    Parameters
+    ----------
+    series, species, jitter
+        See `distances_of`.
+    wanted : Wanted
+
+    Returns
+    -------
+    int
+        Pictures between the later and the middle one, and between that and the earlier: it
+        grows by a quarter from trial to trial. 0 when there are too few pictures or beads.
+    distances, square, variance, place_variance
+        See `distances_of`.
+    """
+    last = series.stamps.size - 1
+    longest = last // 2
+    lag, square, variance, place_variance = 0, math.nan, math.nan, math.nan
+    distances = np.empty((3, 0))
+    while lag < longest:
+        tried = min(longest, max(lag + 1, lag * 5 // 4))
+        pictures = (last, last - tried, last - 2 * tried)
+        found, found_square, found_variance, found_place_variance = distances_of(
+            series, pictures, species, jitter
+        )
+        if found.shape[1] < wanted.beads:
+            break
+        lag, distances = tried, found
+        square, variance, place_variance = found_square, found_variance, found_place_variance
+        enough = max(wanted.variances * variance, wanted.place_variances * place_variance)
+        if square >= max(wanted.square, enough):
+            break
+    return lag, distances, square, variance, place_variance

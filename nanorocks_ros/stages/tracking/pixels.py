@@ -71,8 +71,8 @@ def look_at_pixels(
     picture : Picture
         Written, but for `covered`.
     """
-    # Flat arrays, unsigned places, whole numbers and choices instead of branches: so the
-    # compiler does many pixels at once, five times faster than one by one.
+    # Flat arrays, unsigned places, short whole numbers and choices instead of branches: so the
+    # compiler does many pixels at once. No product needs more than 16 bits but that of `steps`.
     pixels, empty = color.reshape(-1), floor.reshape(-1)
     darkness, hue, shown = (
         picture.darkness.reshape(-1),
@@ -80,25 +80,32 @@ def look_at_pixels(
         picture.shown.reshape(-1),
     )
     dark_gray = np.uint8(GRAY) if gray_known else np.uint8(UNKNOWN)
-    one, two, three, zero = np.uint64(1), np.uint64(2), np.uint64(3), np.int32(0)
+    one, two, three, zero = np.uint64(1), np.uint64(2), np.uint64(3), np.int16(0)
     for pixel in range(shown.size):
         k = np.uint64(pixel)
         # Signed: differences of uint8 would wrap around.
-        blue, floor_b = np.int32(pixels[three * k]), np.int32(empty[three * k])
-        green, floor_g = np.int32(pixels[three * k + one]), np.int32(empty[three * k + one])
-        red, floor_r = np.int32(pixels[three * k + two]), np.int32(empty[three * k + two])
-        down = max(floor_b - blue, max(floor_g - green, floor_r - red))
-        up = min(blue - floor_b, min(green - floor_g, red - floor_r))
-        level = max(floor_b, max(floor_g, max(floor_r, np.int32(1))))
-        warm = (red - blue) - (floor_r - floor_b)
-        hue[k] = np.int16(warm)
+        blue, floor_b = np.int16(pixels[three * k]), np.int16(empty[three * k])
+        green, floor_g = np.int16(pixels[three * k + one]), np.int16(empty[three * k + one])
+        red, floor_r = np.int16(pixels[three * k + two]), np.int16(empty[three * k + two])
+        b, g, r = np.int16(floor_b - blue), np.int16(floor_g - green), np.int16(floor_r - red)
+        down = max(b, max(g, r))
+        up = min(np.int16(-b), min(np.int16(-g), np.int16(-r)))
+        level = max(floor_b, max(floor_g, max(floor_r, np.int16(1))))
+        warm = np.int16(np.int16(red - blue) - np.int16(floor_r - floor_b))
+        hue[k] = warm
         quiet = (down < _QUIET) & (down > -_QUIET) & (up <= _BRIGHTER) & (level < _SATURATED)
-        steps = np.int32(np.float32(255 * max(down, zero)) / np.float32(level))
-        darkness[k] = np.uint8(max(down, zero) if quiet else min(steps, np.int32(255)))
-        bead = dark_gray if 100 * down > _GRAY_DARK * level else np.uint8(UNKNOWN)
-        bead = np.uint8(BLUE) if -_COLOURED * warm > red + blue else bead
-        bead = np.uint8(RED) if _COLOURED * warm > red + blue else bead
-        bead = np.uint8(FLOOR) if 100 * down <= _DARK * level else bead
+        steps = np.int32(np.float32(255 * np.int32(max(down, zero))) / np.float32(level))
+        calm, loud = np.uint8(max(down, zero)), np.uint8(min(steps, np.int32(255)))
+        darkness[k] = calm if quiet else loud
+        depth, light, colour = (
+            np.int16(100 * down),
+            np.int16(red + blue),
+            np.int16(_COLOURED * warm),
+        )
+        bead = dark_gray if depth > np.int16(_GRAY_DARK * level) else np.uint8(UNKNOWN)
+        bead = np.uint8(BLUE) if np.int16(-colour) > light else bead
+        bead = np.uint8(RED) if colour > light else bead
+        bead = np.uint8(FLOOR) if depth <= np.int16(_DARK * level) else bead
         hidden = (min(floor_b, min(floor_g, floor_r)) >= _SATURATED) | (up > _BRIGHTER)
         bead = np.uint8(UNKNOWN) if hidden else bead
         shown[k] = np.uint8(FLOOR) if quiet else bead

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.stages.tracking.paths import Series, joined
+from nanorocks_ros.stages.tracking.paths import Series
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,7 +47,13 @@ class RecentTracks:
 
     def push(self, tracks: Tracks, since_ns: int) -> None:
         """Add a picture, and forget those before a stamp."""
-        new: list[NDArray[Any]] = list(joined([tracks])[2:])
+        new: list[NDArray[Any]] = [
+            tracks.ids,
+            tracks.species,
+            tracks.seen,
+            tracks.positions + tracks.displacement,
+            tracks.position_errors,
+        ]
         while self._stamps and self._stamps[0] < since_ns:
             self._stamps.popleft()
             self._counts.popleft()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,8 @@ import numpy as np
 
 from nanorocks_ros.records import Quality, Tracks, TrayImage
 from nanorocks_ros.stages.tracking.detect import BeadDetector
-from nanorocks_ros.stages.tracking.link import InView, Linker
+from nanorocks_ros.stages.tracking.link import Linker
+from nanorocks_ros.stages.tracking.view import count_seen, in_metres, room_in_view
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -81,9 +83,9 @@ class Tracker:
         self._last_ns = image.stamp_ns
         time = (image.stamp_ns - self._first_ns) / _NS
         # Beads fly straight past the camera, not past a tray that swings.
-        displacement = np.nan_to_num(np.array(image.displacement))
+        displacement = np.array([_known(one) for one in image.displacement])
         shift = displacement * self._scale
-        registration = float(np.nan_to_num(image.displacement_error)) * self._scale
+        registration = _known(image.displacement_error) * self._scale
         hints = [linker.hints(time, shift) for linker in self._linkers]
         detected = self._detector.detect(image.color, hints)
         for linker, found in zip(self._linkers, detected, strict=True):
@@ -111,31 +113,36 @@ class Tracker:
 
     def _tracks(self, image: TrayImage, time: float, displacement: NDArray[np.float64]) -> Tracks:
         shift = displacement * self._scale
-        parts = [linker.in_view(time, shift) for linker in self._linkers]
-        kinds = np.repeat(np.arange(len(parts), dtype=np.int32), [one.ids.size for one in parts])
-        all_of_them = InView._make(np.concatenate(column) for column in zip(*parts, strict=True))
-        order = np.argsort(all_of_them.ids, kind='stable')
-        beads, species = InView._make(column[order] for column in all_of_them), kinds[order]
-        metre = 1.0 / self._scale
+        view = room_in_view(sum(len(linker) for linker in self._linkers))
+        end = 0
+        for k, linker in enumerate(self._linkers):
+            end = linker.show(time, shift, k, view, end)
+        order = np.argsort(view.ids[:end], kind='stable')
+        beads = in_metres(view, order, 1.0 / self._scale, displacement)
         return Tracks(
             stamp_ns=image.stamp_ns,
             tray=self._tray.number,
             ids=beads.ids,
-            species=species,
+            species=beads.species,
             displacement=displacement,
-            positions=metre * beads.places - displacement,
-            position_errors=metre * beads.errors,
-            velocities=metre * beads.velocities,
-            velocity_errors=metre * beads.velocity_errors,
-            radii=metre * beads.radii,
-            radius_errors=metre * beads.radius_errors,
+            positions=beads.places,
+            position_errors=beads.errors,
+            velocities=beads.velocities,
+            velocity_errors=beads.velocity_errors,
+            radii=beads.radii,
+            radius_errors=beads.radius_errors,
             seen=beads.seen,
             expected=self._expected,
-            quality=image.quality | self._few(species[beads.seen]),
+            quality=image.quality | self._few(beads.species, beads.seen),
         )
 
-    def _few(self, species: NDArray[np.int32]) -> Quality:
+    def _few(self, species: NDArray[np.int32], seen: NDArray[np.bool_]) -> Quality:
         """What the species of the beads that are seen say of how many are not."""
-        counts = np.bincount(species, minlength=self._expected.size)
+        counts = count_seen(species, seen, self._expected.size)
         few = (counts < _FEW * self._expected).any()
         return Quality.FEW_BEADS if few else Quality(0)
+
+
+def _known(value: float) -> float:
+    """The value, or 0 where it is not known."""
+    return 0.0 if math.isnan(value) else value

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
 
-from nanorocks_ros.stages.tracking.assignment import assign
+from nanorocks_ros.stages.tracking.assignment import Costs, assign
+
+
+def _assigned(costs, alone):
+    """Of a matrix of costs, infinite where a pair is not possible."""
+    possible = np.isfinite(costs)
+    starts = np.concatenate([[0], np.cumsum(possible.sum(axis=1))]).astype(np.int64)
+    columns = np.nonzero(possible)[1].astype(np.int64)
+    return assign(Costs(starts, columns, costs[possible]), costs.shape[1], alone)
 
 
 def _total(costs, partner, alone):
@@ -21,7 +29,7 @@ def test_the_total_cost_is_the_least_with_rows_that_may_stay_alone(seed):
         costs = rng.uniform(0.0, 10.0, (n, m))
         costs[rng.random((n, m)) < 0.4] = np.inf
         alone = rng.uniform(1.0, 12.0)
-        partner = assign(costs, alone)
+        partner = _assigned(costs, alone)
         taken = partner[partner >= 0]
         assert np.unique(taken).size == taken.size
         large = np.full((n, m + n), 1e9)
@@ -32,5 +40,5 @@ def test_the_total_cost_is_the_least_with_rows_that_may_stay_alone(seed):
 
 
 def test_nothing_to_pair_is_no_error():
-    assert assign(np.empty((0, 3)), 1.0).size == 0
-    assert assign(np.empty((2, 0)), 1.0).tolist() == [-1, -1]
+    assert _assigned(np.empty((0, 3)), 1.0).size == 0
+    assert _assigned(np.empty((2, 0)), 1.0).tolist() == [-1, -1]
