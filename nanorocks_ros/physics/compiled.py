@@ -7,6 +7,11 @@ and integers, this makes states and pictures bit-identical on every machine.
 from __future__ import annotations
 
 import logging
+import re
+import sys
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numba
@@ -19,6 +24,9 @@ LOGGER = logging.getLogger('nanorocks_ros')
 
 # The functions that take longest to compile, and what they belong to.
 _SLOWEST = {'run_until': 'the simulation', 'cover': 'the tracking'}
+
+# At the left margin: what is imported for the type checker alone is not compiled.
+_IMPORT = re.compile(r'^(?:from|import) ([\w.]+)', re.MULTILINE)
 
 Function = TypeVar('Function', bound='Callable[..., Any]')
 
@@ -67,10 +75,41 @@ def inlined(function: Function) -> Function:
 
 def _compiled(function: Function, options: dict[str, Any]) -> Function:
     try:
-        return _njit(function, {**options, 'cache': True})
+        dispatcher: Any = _njit(function, {**options, 'cache': True})
     except RuntimeError:
         # numba refuses to cache where neither the package nor the home can be written.
         return _njit(function, options)
+    # numba looks at the file of the function only, but what that calls, and the constants that it
+    # uses, are compiled into it: after an update there would be old code in new.
+    with suppress(AttributeError):
+        file = dispatcher._cache._cache_file
+        file._source_stamp = (file._source_stamp, _stamp(function.__module__))
+    return cast('Function', dispatcher)
+
+
+@cache
+def _stamp(module: str) -> tuple[tuple[str, int, int], ...]:
+    """Name, time and size of a module and all of its package that it imports, also indirectly."""
+    package = module.partition('.')[0]
+    found: dict[str, tuple[str, int, int]] = {}
+    left = [module]
+    while left:
+        name = left.pop()
+        path = getattr(sys.modules.get(name), '__file__', None)
+        if name in found or path is None:
+            continue
+        status = Path(path).stat()
+        found[name] = name, status.st_mtime_ns, status.st_size
+        left += [one for one in _imports(path) if one.partition('.')[0] == package]
+    return tuple(found[name] for name in sorted(found))
+
+
+@cache
+def _imports(path: str) -> tuple[str, ...]:
+    try:
+        return tuple(_IMPORT.findall(Path(path).read_text('utf-8')))
+    except (OSError, UnicodeDecodeError):
+        return ()
 
 
 def _njit(function: Function, options: dict[str, Any]) -> Function:
