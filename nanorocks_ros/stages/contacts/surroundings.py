@@ -79,11 +79,11 @@ class Surroundings:
         end, self._end = self._end, self._end + 1
         self._all_times[end] = time
         self._all_displacements[end] = tracks.displacement
-        _add_squares(tracks.velocities, tracks.species, self._all_squares[end])
         self._records.append(tracks)
-        if end:
-            steps = np.diff(self._all_times[max(end - _WARM, self._kept.start) : self._end])
-            self.interval = _median(steps)
+        first = max(end - _WARM, self._kept.start)
+        times = self._all_times[first : self._end]
+        squares = self._all_squares[end]
+        self.interval = _learn(times, tracks.velocities, tracks.species, squares)
 
     def _around(self, time: float, pictures: int) -> slice:
         middle = int(np.searchsorted(self._times, time))
@@ -182,11 +182,6 @@ def _nobody_near(
 
 
 @compiled
-def _median(values: NDArray[np.float64]) -> float:
-    return float(np.median(values))
-
-
-@compiled
 def _between(
     time: float, times: NDArray[np.float64], places: NDArray[np.float64]
 ) -> tuple[float, float]:
@@ -202,16 +197,24 @@ def _between(
 
 
 @compiled
-def _add_squares(
-    velocities: NDArray[np.float64], species: NDArray[np.int32], sums: NDArray[np.float64]
-) -> None:
-    """Of each species, sum of the squares of the velocities and their number, (species, 2)."""
+def _learn(
+    times: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    species: NDArray[np.int32],
+    sums: NDArray[np.float64],
+) -> float:
+    """Time between two pictures, [s]: the middle one of some.
+
+    Writes for each species the sum of the squares of the velocities and their number,
+    (species, 2).
+    """
     sums[:] = 0.0
     for k in range(species.size):
         square = velocities[k, 0] * velocities[k, 0] + velocities[k, 1] * velocities[k, 1]
         if square < np.inf:
             sums[species[k], 0] += square
             sums[species[k], 1] += 1.0
+    return float(np.median(times[1:] - times[:-1])) if times.size > 1 else math.inf
 
 
 class _Slope(NamedTuple):
