@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from enum import IntEnum, IntFlag
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -93,13 +94,19 @@ class Quality(IntFlag):
 NOTHING_WRONG = Quality(0)
 
 
+@cache
+def _names(kind: type[Any]) -> tuple[str, ...]:
+    """Names of the fields of a kind of records."""
+    return tuple(field.name for field in fields(kind))
+
+
 def _freeze_arrays(record: Any) -> None:
-    for field in fields(record):
-        value = getattr(record, field.name)
+    for name in _names(type(record)):
+        value = getattr(record, name)
         if isinstance(value, np.ndarray) and value.flags.writeable:
             view = value.view()
             view.flags.writeable = False
-            object.__setattr__(record, field.name, view)
+            object.__setattr__(record, name, view)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
