@@ -95,13 +95,13 @@ NOTHING_WRONG = Quality(0)
 
 
 @cache
-def _names(kind: type[Any]) -> tuple[str, ...]:
+def _names(kind: Any) -> tuple[str, ...]:
     """Names of the fields of a kind of records."""
     return tuple(field.name for field in fields(kind))
 
 
 def _freeze_arrays(record: Any) -> None:
-    for name in _names(type(record)):
+    for name in _names(record.__class__):
         value = getattr(record, name)
         if isinstance(value, np.ndarray) and value.flags.writeable:
             view = value.view()
