@@ -8,12 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from enum import IntEnum, IntFlag
 from functools import cache
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Iterable
+    from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
@@ -94,20 +94,19 @@ class Quality(IntFlag):
 NOTHING_WRONG = Quality(0)
 
 
+@cache
+def _names(kind: Any) -> tuple[str, ...]:
+    """Names of the fields of a kind of records."""
+    return tuple(field.name for field in fields(kind))
+
+
 def _freeze_arrays(record: Any) -> None:
-    kind: Any = type(record)
-    for name in _names(kind):
+    for name in _names(record.__class__):
         value = getattr(record, name)
         if isinstance(value, np.ndarray) and value.flags.writeable:
             view = value.view()
-            view.setflags(write=False)
+            view.flags.writeable = False
             object.__setattr__(record, name, view)
-
-
-@cache
-def _names(record: Hashable) -> tuple[str, ...]:
-    """Of the fields of a record; asked for anew they cost more than all else about it."""
-    return tuple(one.name for one in fields(cast('Any', record)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

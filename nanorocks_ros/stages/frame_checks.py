@@ -11,6 +11,7 @@ import numpy as np
 
 from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.records import Notice, Quality
+from nanorocks_ros.stages.quantiles import Quantile, middle
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,6 +29,7 @@ _FROZEN_TOLD_NS = NS
 # Compressed anew, a frame stored twice differs a little from itself: by less than such a share of
 # what noise and motion change from frame to frame, where that is so many gray levels.
 _RECODED, _NOISY = 0.1, 0.5
+_USUAL = 0.75
 # Filled rows that count, as a share of the height, beyond those that frames usually end in.
 _HALF = 0.03
 _FEWEST_ROWS = 12
@@ -70,7 +72,9 @@ class FrameChecks:
         self._camera = camera
         self._sample: NDArray[np.uint8] | None = None
         self._image: NDArray[np.uint8] | None = None
-        self._changes: deque[float] = deque(maxlen=_USUAL_FRAMES)
+        self._changes = Quantile(_USUAL, _USUAL_FRAMES)
+        self._usual_change = 0.0
+        self._known = 0
         self._changed_ns = 0
         self._ends: deque[int] = deque(maxlen=_USUAL_FRAMES)
         self._same: deque[int] = deque(maxlen=_USUAL_FRAMES)
@@ -116,7 +120,8 @@ class FrameChecks:
         return (self._notice(frame, text),)
 
     def _blankness(self, sample: NDArray[np.uint8]) -> str:
-        level = float(sample.mean())
+        # Sums of whole numbers, and exact: `numpy.mean` turns each pixel into a float first.
+        level = sum(cv2.sumElems(sample)) / sample.size
         if level < _BLACK:
             return f'black (mean level {level:.1f})'
         return f'white (mean level {level:.1f})' if level > _WHITE else ''
@@ -135,11 +140,11 @@ class FrameChecks:
             # The whole frame is compared only where its sample is the same.
             return np.array_equal(frame.image, self._image)
         # Until copies are known as such, they are half of what is seen.
-        known = len(self._changes) >= _HISTORY
-        usual = float(np.quantile(self._changes, 0.75)) if known else 0.0
+        usual = self._usual_change if self._known >= _HISTORY else 0.0
         if usual >= _NOISY and change <= _RECODED * usual:
             return True
-        self._changes.append(change)
+        self._usual_change = self._changes.push(change)
+        self._known += 1
         return False
 
     def _stands_still(self, frame: Frame, notices: tuple[Notice, ...]) -> Verdict:
@@ -162,13 +167,15 @@ class FrameChecks:
     def _filled_from(self, frame: Frame) -> int:
         """The row from which on the frame holds nothing new, or its height."""
         height = frame.image.shape[0]
-        filled = _filled_rows(frame.image)
-        same = 0 if self._image is None else _rows_the_same(frame.image, self._image)
-        cut = 0
+        image = frame.image.reshape(height, frame.image.shape[1], -1)
+        filled = _filled_rows(image)
+        same = 0
+        if self._image is not None and self._image.shape == frame.image.shape:
+            same = _rows_the_same(image, self._image.reshape(image.shape))
+        cut, least = 0, max(_FEWEST_ROWS, _HALF * height)
         for count, usual, history in ((filled, self._ends, 1), (same, self._same, _HISTORY)):
             # A scene without noise may well end in rows that are alike, frame after frame.
-            more = count - float(np.median(usual)) if len(usual) >= history else 0.0
-            if more >= max(_FEWEST_ROWS, _HALF * height):
+            if count >= least and len(usual) >= history and count - middle(usual) >= least:
                 cut = max(cut, count)
             usual.append(count)
         return int(height - cut)
@@ -183,22 +190,26 @@ def _has_colors(sample: NDArray[np.uint8]) -> bool:
     return False
 
 
+@compiled
 def _filled_rows(image: NDArray[np.uint8]) -> int:
     """Rows at the lower end that are alike, as where a picture broke off; 0 when all are."""
-    few = image[:, ::_COLUMN_STEP]
-    last = few[-1].astype(np.int16)
-    count = 1
-    # In steps: a whole frame has nothing of the kind, and the second row says so.
-    while count < len(few) and np.abs(few[-1 - count] - last).max() <= _FILLED:
-        count += 1
-    return 0 if count == len(few) else count
+    rows, columns, channels = image.shape
+    for count in range(1, rows):
+        for j in range(0, columns, _COLUMN_STEP):
+            for channel in range(channels):
+                other = np.int64(image[rows - 1 - count, j, channel])
+                if abs(other - np.int64(image[rows - 1, j, channel])) > _FILLED:
+                    return count
+    return 0
 
 
+@compiled
 def _rows_the_same(image: NDArray[np.uint8], before: NDArray[np.uint8]) -> int:
     """Rows at the lower end that are those of the frame before, to the last bit."""
-    if image.shape != before.shape:
-        return 0
-    count = 0
-    while count < len(image) and np.array_equal(image[-1 - count], before[-1 - count]):
-        count += 1
-    return count
+    rows, columns, channels = image.shape
+    for count in range(rows):
+        for j in range(columns):
+            for channel in range(channels):
+                if image[rows - 1 - count, j, channel] != before[rows - 1 - count, j, channel]:
+                    return count
+    return int(rows)

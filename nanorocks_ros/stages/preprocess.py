@@ -15,6 +15,7 @@ from nanorocks_ros.records import Frame, Notice, Quality, TrayImage
 from nanorocks_ros.stages.frame_checks import FrameChecks
 from nanorocks_ros.stages.map_check import map_problem
 from nanorocks_ros.stages.picture_checks import picture_quality
+from nanorocks_ros.stages.quantiles import middle
 from nanorocks_ros.stages.shaking import PlateMeter, ShakeCounter
 from nanorocks_ros.stages.stabilise import shift_of_plate
 from nanorocks_ros.stages.tray_crop import TrayCrop
@@ -189,9 +190,8 @@ class Preprocessor:
         known = [one for one in self._crops if math.isfinite(one.velocity_error)]
         if not known:
             return math.nan, math.nan
-        middle = np.median([one.velocity for one in known], axis=0)
-        error = float(np.median([one.velocity_error for one in known]))
-        return math.hypot(float(middle[0]), float(middle[1])), error
+        across, down = (middle([one.velocity[axis] for one in known]) for axis in (0, 1))
+        return math.hypot(across, down), middle([one.velocity_error for one in known])
 
     def _tray_image(
         self,

@@ -24,6 +24,9 @@ _BOUND = 2.0
 # Median of the absolute value of a normal variate.
 _MEDIAN = 0.6745
 _ROUNDING = 0.3
+# A point whose level changes so much more than usual in power is half trusted: something passes
+# in front of it, or light that does not move with the tray.
+_SUSPECT = 3.0
 UNKNOWNS = 4
 
 
@@ -197,6 +200,37 @@ def register(
     found[3] = spread
     found[4] = math.sqrt(total / n)
     return True
+
+
+@compiled
+def learn(
+    values: NDArray[np.float64],
+    seen: int,
+    reference: NDArray[np.float64],
+    powers: NDArray[np.float64],
+    trust: NDArray[np.float64],
+) -> None:
+    """Take the samples of another picture into the reference.
+
+    Parameters
+    ----------
+    values : ndarray, (n,), [gray levels]
+        At the displacement found.
+    seen : int
+        Pictures that are averaged, with this one.
+    reference, powers : ndarray, (n,), [gray levels], [gray levels^2]
+        Means of the values, and of the squares of their differences from it; changed.
+    trust : ndarray, (n,), 0 to 1
+        Written.
+    """
+    for k in range(values.size):
+        difference = values[k] - reference[k]
+        reference[k] += difference / seen
+        powers[k] += (difference * difference - powers[k]) / seen
+    usual = np.median(powers)
+    for k in range(values.size):
+        ratio = powers[k] / (_SUSPECT * usual)
+        trust[k] = 1.0 / (1.0 + ratio * ratio)
 
 
 @compiled

@@ -8,7 +8,6 @@ of its own, which finds the same events in the same images.
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, insort
 from collections import deque
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.stages.quantiles import Quantile, middle
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -107,31 +107,6 @@ def noise_power(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> float:
     return float(_power_of(counts))
 
 
-class _Quantile:
-    """Quantile of the last values, kept in order: `numpy.quantile` sorts them anew each time."""
-
-    def __init__(self, share: float, length: int) -> None:
-        self._share = share
-        self._length = length
-        self._values: deque[float] = deque()
-        self._sorted: list[float] = []
-
-    def push(self, value: float) -> float:
-        """Take a value; the quantile of the last ones, interpolated."""
-        self._values.append(value)
-        insort(self._sorted, value)
-        if len(self._values) > self._length:
-            del self._sorted[bisect_left(self._sorted, self._values.popleft())]
-        place = self._share * (len(self._sorted) - 1)
-        low = int(place)
-        high = min(low + 1, len(self._sorted) - 1)
-        step, rest = self._sorted[high] - self._sorted[low], place - low
-        # Rounded as numpy rounds it.
-        if rest < 0.5:
-            return self._sorted[low] + step * rest
-        return self._sorted[high] - step * (1.0 - rest)
-
-
 class NoiseMeter:
     """Noise of a series of images: the least that was seen.
 
@@ -141,7 +116,7 @@ class NoiseMeter:
 
     def __init__(self) -> None:
         # A frame stored twice has no noise: the least of all will not do.
-        self._recent = _Quantile(_NOISE_QUANTILE, _MEMORY_FRAMES)
+        self._recent = Quantile(_NOISE_QUANTILE, _MEMORY_FRAMES)
         self._pushed = 0
         self._least = math.inf
         self._last: NDArray[np.uint8] | None = None
@@ -182,7 +157,7 @@ class MotionMeter:
     def __init__(self, ratio: float) -> None:
         self._ratio = ratio
         self._recent: deque[float] = deque(maxlen=_MEMORY_FRAMES)
-        self._noise = _Quantile(_NOISE_QUANTILE, _NOISE_FRAMES)
+        self._noise = Quantile(_NOISE_QUANTILE, _NOISE_FRAMES)
         self._last: NDArray[np.uint8] | None = None
         self._last_ns = 0
         self._steps: deque[int] = deque(maxlen=_MEMORY_FRAMES)
@@ -195,7 +170,7 @@ class MotionMeter:
         step, self._last_ns = stamp_ns - self._last_ns, stamp_ns
         if last is None:
             return False
-        usual = float(np.median(self._steps)) if self._steps else step
+        usual = middle(self._steps) if self._steps else step
         self._steps.append(step)
         # Beads come further while frames are missing, and that is no jump. One that happened
         # just then is seen with the next image.

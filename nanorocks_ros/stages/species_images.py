@@ -157,11 +157,16 @@ def _tables(
 def _look_up(
     color: NDArray[np.uint8], tables: NDArray[np.uint8], images: NDArray[np.uint8]
 ) -> None:
-    for i in range(color.shape[0]):
-        for j in range(color.shape[1]):
-            blue = np.int64(color[i, j, 0]) // _PER_STEP
-            green = np.int64(color[i, j, 1]) // _PER_STEP
-            red = np.int64(color[i, j, 2]) // _PER_STEP
-            place = (blue * _STEPS + green) * _STEPS + red
-            for k in range(images.shape[0]):
-                images[k, i, j] = tables[k, place]
+    rows, columns, _ = color.shape
+    places = np.empty(columns, dtype=np.uint32)
+    # Row by row, one species after the other: such short loops are done for many pixels at once.
+    for i in range(rows):
+        for j in range(columns):
+            blue = np.uint32(color[i, j, 0]) // np.uint32(_PER_STEP)
+            green = np.uint32(color[i, j, 1]) // np.uint32(_PER_STEP)
+            red = np.uint32(color[i, j, 2]) // np.uint32(_PER_STEP)
+            places[j] = (blue * _STEPS + green) * _STEPS + red
+        for k in range(images.shape[0]):
+            table, shown = tables[k], images[k, i]
+            for j in range(columns):
+                shown[j] = table[np.uint64(places[j])]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import replace
-from statistics import median
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +33,6 @@ from nanorocks_ros.stages.tracking.mean_speed import (
 )
 from nanorocks_ros.stages.tracking.recent import RecentTracks
 from nanorocks_ros.stages.tracking.tracker import Tracker
-from nanorocks_ros.stages.tracking.view import count_seen
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -95,6 +94,8 @@ class TrackSpeed:
         self._judged_frames = 0
         self._followed: deque[float] = deque(maxlen=_MEMORY_SPEEDS)
         self._steps: deque[float] = deque(maxlen=_MEMORY_SPEEDS)
+        # Medians of these two.
+        self._usually_followed, self._usual_step = 0.0, math.inf
         area = tray.dimensions[0] * tray.dimensions[1]
         self._neighbours = 0.5 * np.sqrt(area / self._counts)
         self._next_ns: int | None = None
@@ -141,17 +142,19 @@ class TrackSpeed:
         ]
 
     def _judge(self, tracks: Tracks) -> None:
-        seen = count_seen(tracks.species, tracks.seen, self._counts.size)
-        self._shares[self._judged_frames % _MEMORY_FRAMES] = seen / self._counts
+        place = self._judged_frames % _MEMORY_FRAMES
+        frames = min(self._judged_frames + 1, _MEMORY_FRAMES)
+        # A track is believed after some pictures only: the first ones show none.
+        least = _least_share(
+            tracks.species, tracks.seen, self._counts, self._shares, place, frames
+        )
         self._judged_frames += 1
         if self.hopeless:
             return
-        # A track is believed after some pictures only: the first ones show none.
-        least = _least_median(self._shares[: self._judged_frames])
         self.judged = self._judged_frames >= _MEMORY_FRAMES
         enough = least >= (_STILL_ENOUGH if self.reliable else _ENOUGH)
         # Where many beads are lost and found again, others are taken for them.
-        followed = bool(self._followed) and median(self._followed) >= RELIABLE_SHARE
+        followed = self._usually_followed >= RELIABLE_SHARE
         self.reliable = self.judged and enough and followed and self._told_apart()
 
     def _speeds(self, shakes: CycleFollower, expected: NDArray[np.int32]) -> list[SpeedEstimate]:
@@ -177,6 +180,8 @@ class TrackSpeed:
         self._followed.append(min(one.share if one else 0.0 for one in each))
         speeds = np.array([speed for speed, _ in species])
         self._steps.append(self._longest_step(speeds, np.diff(series.stamps)))
+        self._usually_followed = float(np.median(self._followed))
+        self._usual_step = float(np.median(self._steps))
         flags, self._flags = self._flags, Quality(0)
         if mean.share < RELIABLE_SHARE:
             flags |= Quality.FEW_BEADS
@@ -201,7 +206,7 @@ class TrackSpeed:
 
     def _told_apart(self) -> bool:
         """Whether beads come less far between two pictures than others are away."""
-        return bool(self._steps) and median(self._steps) <= _FURTHEST_STEP
+        return self._usual_step <= _FURTHEST_STEP
 
     def _longest_step(self, speeds: NDArray[np.float64], intervals_ns: NDArray[np.int64]) -> float:
         """Way of a bead between two pictures over the distance to others, of the worst species."""
@@ -212,9 +217,33 @@ class TrackSpeed:
 
 
 @compiled
-def _least_median(shares: NDArray[np.float64]) -> float:
-    """Of the medians of the columns, the least."""
+def _least_share(
+    species: NDArray[np.int32],
+    seen: NDArray[np.bool_],
+    counts: NDArray[np.int64],
+    shares: NDArray[np.float64],
+    place: int,
+    frames: int,
+) -> float:
+    """Of the shares of the beads of a species that are seen, usually, the least.
+
+    Parameters
+    ----------
+    species : ndarray of int32, (n,)
+    seen : ndarray of bool, (n,)
+    counts : ndarray of int64, (species,)
+        Beads that there are.
+    shares : ndarray (memory, species)
+        Of the last pictures; that of this one is written to its place.
+    place, frames : int
+        How many pictures there are, with this one.
+    """
+    shares[place] = 0.0
+    for k in range(species.size):
+        if seen[k]:
+            shares[place, species[k]] += 1.0
     least = np.inf
-    for k in range(shares.shape[1]):
-        least = min(least, np.median(shares[:, k]))
+    for k in range(counts.size):
+        shares[place, k] /= counts[k]
+        least = min(least, np.median(shares[:frames, k]))
     return least

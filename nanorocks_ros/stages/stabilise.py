@@ -14,8 +14,9 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.experiment.plate import Region
+from nanorocks_ros.stages.quantiles import middle
 from nanorocks_ros.stages.rectify import places_of
-from nanorocks_ros.stages.registration import register, sample, search
+from nanorocks_ros.stages.registration import learn, register, sample, search
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,9 +39,6 @@ _NARROW_REACH = 4
 # What differences may remain, as a share of the contrast, and the largest standard error, [px].
 _MOST_SPREAD = 0.5
 _LARGEST_ERROR = 0.2
-# A point whose level changes so much more than usual in power is half trusted: something passes
-# in front of it, or light that does not move with the tray.
-_SUSPECT = 3.0
 # What interpolation between pixels does to an edge, [px]: measured on simulated swings.
 _INTERPOLATION = 0.02
 _FEWEST_TRAYS = 3
@@ -67,8 +65,11 @@ def shift_of_plate(shifts: Sequence[Shift]) -> Shift | None:
     """Where the plate is that the trays are on: the median of three or more."""
     if len(shifts) < _FEWEST_TRAYS:
         return None
-    x, y, error = np.median([(one.x, one.y, one.error) for one in shifts], axis=0)
-    return Shift(float(x), float(y), float(error))
+    return Shift(
+        middle([one.x for one in shifts]),
+        middle([one.y for one in shifts]),
+        middle([one.error for one in shifts]),
+    )
 
 
 class TrayFollower:
@@ -135,11 +136,7 @@ class TrayFollower:
         self._last = found
         # The average is sharper than any one picture is free of noise.
         self._seen = min(self._seen + 1, _MEMORY)
-        difference = self._values - self._reference
-        self._reference += difference / self._seen
-        self._powers += (difference * difference - self._powers) / self._seen
-        usual = float(np.median(self._powers))
-        self._trust = 1.0 / (1.0 + (self._powers / (_SUSPECT * usual)) ** 2)
+        learn(self._values, self._seen, self._reference, self._powers, self._trust)
         return found
 
     @property

@@ -49,13 +49,16 @@ class SwingMeter:
             Without what errors may add; NaN when the tray was not followed.
         """
         reach = max(_REACH_NS, round(0.5 * estimate.window * NS))
-        near = [
-            (square, noise)
-            for stamp_ns, square, noise in self._squares
-            if abs(stamp_ns - estimate.stamp_ns) <= reach
-        ]
+        near = []
+        # An estimate is of a second ago, and ten are kept.
+        for stamp_ns, square, noise in reversed(self._squares):
+            if stamp_ns < estimate.stamp_ns - reach:
+                break
+            if stamp_ns <= estimate.stamp_ns + reach:
+                near.append((square, noise))
         if not near:
             return UNKNOWN
+        near.reverse()
         square, noise = (sum(column) / len(near) for column in zip(*near, strict=True))
         # The mean of so many squares of noise scatters by itself.
         may_be = noise * (1.0 + _DEVIATIONS / math.sqrt(len(near)))

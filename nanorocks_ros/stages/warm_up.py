@@ -11,8 +11,10 @@ from nanorocks_ros.experiment.view import Straight, View
 from nanorocks_ros.inference.sticking import sticking_estimate
 from nanorocks_ros.inference.sticking_cycle import StickingCycle
 from nanorocks_ros.physics.sticking import slow_contacts
-from nanorocks_ros.records import Frame, Rebound, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.records import Frame, Rebound, SpeedEstimate, SpeedMethod, Tracks, TrayImage
+from nanorocks_ros.stages.bodies.count import BodyCounter
 from nanorocks_ros.stages.clusters import ClusterAutocorrelator
+from nanorocks_ros.stages.contacts.find import ContactFinder
 from nanorocks_ros.stages.cooling import HaffFitter
 from nanorocks_ros.stages.preprocess import Preprocessor
 from nanorocks_ros.stages.shaking import CycleFollower
@@ -108,6 +110,35 @@ def warm_up_cooling() -> None:
     fitter.flush()
 
 
+def warm_up_contacts() -> None:
+    """Follow three beads, of which one comes back from a wall and two from each other."""
+    tray = load_trays()[1]
+    finder, counter = ContactFinder(tray), BodyCounter(PipelineSettings(), tray)
+    radius = 0.5 * tray.diameter
+    for number in range(100):
+        # At 3 mm/s, and 30 pictures a second.
+        away = radius + 1e-4 * abs(number - 44.6)
+        places = [(away, 3e-3), (7.5e-3 - away, 11e-3), (7.5e-3 + away, 11e-3)]
+        tracks = Tracks(
+            stamp_ns=number * 33_333_333,
+            tray=tray.number,
+            ids=np.arange(3, dtype=np.int32),
+            species=np.zeros(3, dtype=np.int32),
+            displacement=np.zeros(2),
+            positions=np.array(places),
+            position_errors=np.full(3, 4e-6),
+            velocities=np.full((3, 2), 2e-3),
+            velocity_errors=np.full(3, 1e-5),
+            radii=np.full(3, radius),
+            radius_errors=np.full(3, 1e-6),
+            seen=np.ones(3, dtype=np.bool_),
+            expected=np.array([3], dtype=np.int32),
+        )
+        finder.push(tracks)
+        counter.push(tracks, 1)
+    finder.flush()
+
+
 def warm_up_speed() -> None:
     """Push a few pictures of moving discs through what measures speeds in colour images."""
     settings = PipelineSettings()
@@ -124,3 +155,4 @@ def warm_up_speed() -> None:
             stamp_ns = number * 33_333_333
             image = TrayImage(stamp_ns=stamp_ns, tray=tray.number, gray=gray, color=color)
             estimator.push(image)
+    warm_up_contacts()

@@ -9,6 +9,7 @@ import pytest
 from nanorocks_ros.experiment.camera import Camera
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.experiment.view import Straight, View
+from nanorocks_ros.stages.interpolation import fill_by_pixels, moved
 from nanorocks_ros.stages.rectify import mix_weights, nodes_of, resample_color, resample_gray
 
 LENS = View(
@@ -91,3 +92,19 @@ def test_the_whole_weights_of_the_gray_mix_keep_their_sum(mix):
     weights = mix_weights(mix)
     assert weights.sum() == round(65536 * sum(mix))
     assert np.abs(weights - 65536 * np.array(mix)).max() < 1.0
+
+
+@pytest.mark.parametrize('scale', [0.3, 0.87, 0.93, 1.0, 1.07, 1.6])
+@pytest.mark.parametrize('tilt', [-0.2, -0.01, 0.0, 0.05])
+@pytest.mark.parametrize('size', [(78, 133), (21, 16), (30, 15), (1, 40)])
+def test_eight_pixels_at_once_are_those_one_by_one_to_the_last_bit(scale, tilt, size):
+    image = picture()
+    nodes = np.zeros((size[0] // 8 + 2, size[1] // 8 + 2, 6))
+    y, x = 8.0 * np.indices(nodes.shape[:2])
+    nodes[..., 0], nodes[..., 1] = 40.3 + scale * x - tilt * y, 45.7 + scale * y + tilt * x
+    color, gray = np.empty((*size, 3), np.uint8), np.empty(size, np.uint8)
+    resample_color(image, nodes, (0.0, 0.0), mix_weights(MIX), color, gray)
+    places = (moved(nodes, (0.0, 0.0), axis, pixels) for axis, pixels in ((0, 320), (1, 240)))
+    expected = np.empty_like(color)
+    fill_by_pixels(image, *places, 0, expected)
+    assert (color == expected).all()

@@ -24,6 +24,7 @@ class Births:
         self._known: set[int] = set()
         self._twice: set[tuple[int, int]] = set()
         self._count = 0
+        self._last: NDArray[np.int64] | None = None
 
     def next_cycle(self) -> None:
         """Count anew."""
@@ -31,6 +32,9 @@ class Births:
 
     def push(self, tracks: Tracks, ids: NDArray[np.int64]) -> None:
         """Take the next picture, with the numbers of its beads, (n,)."""
+        if ids is self._last:
+            return
+        self._last = ids
         numbers = ids.tolist()
         if self._known.issuperset(numbers):
             return

@@ -27,6 +27,7 @@ class Clinging:
     def __init__(self) -> None:
         self._known: set[int] = set()
         self._over: dict[int, int] = {}
+        self._last: NDArray[np.int64] | None = None
 
     def push(
         self, tracks: Tracks, ids: NDArray[np.int64], members: AbstractSet[int]
@@ -46,6 +47,10 @@ class Clinging:
         tuple of (int, int)
             Each bead that clings, and the bead of the body that is nearest to it.
         """
+        # Nobody turned up, and nobody clings.
+        if ids is self._last and not self._over:
+            return ()
+        self._last = ids
         numbers = ids.tolist()
         rows = {number: row for row, number in enumerate(numbers)}
         asked = [one for one in numbers if one in self._over or one not in self._known]

@@ -21,7 +21,7 @@ from nanorocks_ros.stages.bodies.ghosts import Ghosts
 from nanorocks_ros.stages.bodies.pair_table import Beads
 from nanorocks_ros.stages.bodies.pairs import Bond, Pairs
 from nanorocks_ros.stages.bodies.sizes import bodies_of, size_fields
-from nanorocks_ros.stages.bodies.warmth import energies, variances
+from nanorocks_ros.stages.bodies.warmth import learn_energies, of_seen
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -43,8 +43,6 @@ _SURER = 0.3
 # nobody can tell who stays beside whom. Of films without sticking 7 to 100 s in trays 1, 3 and 5,
 # where none of what stays together is one bead found twice; 1 to 3 s in trays 4 and 7.
 _HELD_TOGETHER = 5.0
-# Share of a new mean energy taken over in each picture.
-_ENERGY_SHARE = 0.2
 
 
 class _Picture(NamedTuple):
@@ -77,6 +75,7 @@ class BodyCounter:
         self._tray = tray
         self._largest = largest_chance(tray, self._settings.false_alarms)
         self._rate = encounter_rate(tray)
+        self._alike = np.array([one.diameter_low == one.diameter_high for one in tray.species])
         self._pairs = Pairs(partial(chance, rate=self._rate))
         self._first_ns = 0
         self._last_ns: int | None = None
@@ -94,6 +93,9 @@ class BodyCounter:
         self._doubted: list[Bond] = []
         self._joins = 0
         self._first_merge: int | None = None
+        # Numbers of beads that are seen, those that are hidden, and all of them.
+        none = frozenset[int]()
+        self._present = np.empty(0, dtype=np.int64), none, none
         self._pictures: deque[_Picture] = deque()
         self._waiting: deque[_Picture] = deque()
         self._due_ns: int | None = None
@@ -145,7 +147,8 @@ class BodyCounter:
         # All bodies have the same energy on average, and each bead its share of the whole.
         mean = len(body) / len(sizes)
         own = np.array([sizes[body[one]] for one in beads.ids.tolist()])
-        free = beads._replace(variances=self._usual * mean / own)
+        usual = (self._energies[tracks.species] / tracks.radii**3)[self._rows]
+        free = beads._replace(variances=usual * mean / own)
         hidden = beads.ids.size < self._tray.count
         bonds = self._companions.push(time, free, body, hidden, _SURER * self._allowed())
         self._pairs.adopt(time, beads, bonds)
@@ -180,62 +183,44 @@ class BodyCounter:
 
     def _beads(self, tracks: Tracks, ids: NDArray[np.int64]) -> Beads:
         self._learn(tracks)
-        seen = np.flatnonzero(tracks.seen)
-        seen = seen[np.argsort(ids[seen], kind='stable')]
-        self._usual = (self._energies[tracks.species] / tracks.radii**3)[seen]
-        return Beads(
-            ids=ids[seen],
-            places=tracks.positions[seen],
-            errors=tracks.position_errors[seen],
-            radii=tracks.radii[seen],
-            radius_errors=self._radius_errors(tracks)[seen],
-            variances=self._variances(tracks)[seen],
-            height=self._tray.dimensions[2],
+        self._rows, seen, places, errors, radii, radius_errors, usual = of_seen(
+            self._energies,
+            ids,
+            tracks.positions,
+            tracks.position_errors,
+            tracks.velocities,
+            tracks.velocity_errors,
+            tracks.radii,
+            tracks.radius_errors,
+            tracks.species,
+            tracks.seen,
+            self._alike,
         )
-
-    def _radius_errors(self, tracks: Tracks) -> NDArray[np.float64]:
-        """0 where all beads of a species are alike: their size is known better than measured."""
-        alike = np.array([one.diameter_low == one.diameter_high for one in self._tray.species])
-        return np.where(alike[tracks.species], 0.0, tracks.radius_errors)
+        height = self._tray.dimensions[2]
+        return Beads(seen, places, errors, radii, radius_errors, usual, height)
 
     def _learn(self, tracks: Tracks) -> None:
-        """Energy of a component of the motion of each species, less what errors add.
+        """Follow the energy of a component of the motion of each species.
 
         Of a species of many sizes the large ones are slow: two of them seem to stay together.
         """
-        known, speed, means = energies(
+        speed = learn_energies(
             tracks.velocities,
             tracks.velocity_errors,
             tracks.radii,
             tracks.species,
             tracks.seen,
-            self._energies.size,
-        )
-        if self._pictures and tracks.seen.any():
-            step = (tracks.stamp_ns - self._pictures[-1].stamp_ns) / _NS
-            self._way += speed * step
-        for species in np.flatnonzero(known).tolist():
-            last = self._energies[species]
-            share = _ENERGY_SHARE if last > 0.0 else 1.0
-            self._energies[species] = last + share * (max(means[species], 0.0) - last)
-
-    def _variances(self, tracks: Tracks) -> NDArray[np.float64]:
-        """Mean square of a component of the velocity that a bead has in this gas, there.
-
-        A gas of inelastic beads is cold where it is dense, and there beads stay together.
-        """
-        return variances(
             self._energies,
-            tracks.positions,
-            tracks.velocities,
-            tracks.velocity_errors,
-            tracks.radii,
-            tracks.species,
-            tracks.seen,
         )
+        if self._pictures:
+            self._way += speed * ((tracks.stamp_ns - self._pictures[-1].stamp_ns) / _NS)
 
     def _keep(self, time: float, tracks: Tracks, beads: Beads, ids: NDArray[np.int64]) -> None:
-        known = frozenset(ids.tolist()) | self._ghosts.hidden
+        # In most pictures there are the same as in the one before.
+        if ids is not self._present[0] or self._ghosts.hidden != self._present[1]:
+            hidden = self._ghosts.hidden
+            self._present = ids, hidden, frozenset(ids.tolist()) | hidden
+        known = self._present[2]
         members = {one for pair in self._bonds for one in pair}
         clinging = self._clinging.push(tracks, ids, members)
         picture = _Picture(time, tracks.stamp_ns, beads.ids, beads.places, known, clinging)

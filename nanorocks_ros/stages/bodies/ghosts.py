@@ -32,9 +32,10 @@ class Ghosts:
         self._names: dict[int, int] = {}
         self._species: dict[int, int] = {}
         self._wanted: dict[int, NDArray[np.float64]] = {}
+        self._last = b'', np.empty(0, dtype=np.int64)
 
     def named(self, tracks: Tracks, bonds: Mapping[tuple[int, int], Bond]) -> NDArray[np.int64]:
-        """Numbers of the beads of a picture, (n,).
+        """Numbers of the beads of a picture, (n,): the same array while the tracks are the same.
 
         Parameters
         ----------
@@ -42,6 +43,15 @@ class Ghosts:
         bonds : mapping
             By the numbers of both beads.
         """
+        key, ids = tracks.ids.tobytes(), self._last[1]
+        if key != self._last[0]:
+            ids = self._named(tracks)
+            self._last = key, ids
+        self._wanted = _places_of_hidden(ids, tracks.positions, bonds) if bonds else {}
+        self.hidden = frozenset(self._wanted)
+        return ids
+
+    def _named(self, tracks: Tracks) -> NDArray[np.int64]:
         present = tracks.ids.tolist()
         fresh = [row for row, number in enumerate(present) if number not in self._names]
         if len(self._names) + len(fresh) > len(present):
@@ -50,10 +60,7 @@ class Ghosts:
         for row in fresh:
             name = self._names[present[row]] = self._back(tracks, row, present[row])
             self._species[name] = int(tracks.species[row])
-        ids = np.array([self._names[one] for one in present], dtype=np.int64)
-        self._wanted = _places_of_hidden(ids, tracks.positions, bonds) if bonds else {}
-        self.hidden = frozenset(self._wanted)
-        return ids
+        return np.array([self._names[one] for one in present], dtype=np.int64)
 
     def _back(self, tracks: Tracks, row: int, number: int) -> int:
         """The bead that a new track is, or itself."""

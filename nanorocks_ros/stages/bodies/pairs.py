@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from nanorocks_ros.physics.compiled import compiled
 from nanorocks_ros.stages.bodies.pair_table import (
     HIGH,
     LAST,
@@ -120,13 +121,13 @@ class Pairs:
 
     def _bonds(self, time: float, largest: float) -> list[Bond]:
         keys, numbers, bonded = self._table
-        if not keys.size:
+        # Few stay beside each other for so long.
+        old = _free_for(numbers, bonded, time, _YOUNGEST)
+        if not old.size:
             return []
-        found = (
-            ~bonded & (self._chances(numbers) < largest) & (time - numbers[:, START] >= _YOUNGEST)
-        )
+        old = old[self._chances(numbers[old]) < largest]
         bonds = []
-        for k in np.flatnonzero(found).tolist():
+        for k in old.tolist():
             row = numbers[k]
             bonded[k], row[STAYED] = True, time
             row[OFFSET : OFFSET + 2] = 0.5 * (row[LOW : LOW + 2] + row[HIGH : HIGH + 2])
@@ -137,11 +138,26 @@ class Pairs:
     def _fallen(self, time: float) -> list[tuple[int, int]]:
         """Bodies whose beads, both seen, are apart for too long; they are free pairs again."""
         keys, numbers, bonded = self._table
+        if not bonded.any():
+            return []
         fall = bonded & (numbers[:, LAST] - numbers[:, STAYED] > _BROKEN_TIME)
         for k in np.flatnonzero(fall).tolist():
             bonded[k] = False
             restart(numbers[k], time)
         return [_ids(keys[k]) for k in np.flatnonzero(fall).tolist()]
+
+
+@compiled
+def _free_for(
+    numbers: NDArray[np.float64], bonded: NDArray[np.bool_], time: float, least: float
+) -> NDArray[np.int64]:
+    """Rows of pairs that are no bodies and have been followed for so long, [s]."""
+    found, count = np.empty(bonded.size, dtype=np.int64), 0
+    for k in range(bonded.size):
+        if not bonded[k] and time - numbers[k, START] >= least:
+            found[count] = k
+            count += 1
+    return found[:count]
 
 
 def _ids(key: int) -> tuple[int, int]:

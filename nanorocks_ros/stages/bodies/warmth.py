@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 # the gas, since beads that stick together move alike.
 _NEIGHBOURS = 12
 _COLDEST = 0.1
+# Share of a new mean energy taken over in each picture.
+_ENERGY_SHARE = 0.2
 
 
 @compiled
@@ -29,36 +31,27 @@ def _excess(velocity: NDArray[np.float64], error: float, radius: float) -> float
 
 
 @compiled
-def energies(
+def learn_energies(
     velocities: NDArray[np.float64],
     errors: NDArray[np.float64],
     radii: NDArray[np.float64],
     species: NDArray[np.int32],
     seen: NDArray[np.bool_],
-    count: int,
-) -> tuple[NDArray[np.int64], float, NDArray[np.float64]]:
-    """Mean energy of each species, and mean speed of all beads that are seen.
+    energies: NDArray[np.float64],
+) -> float:
+    """Follow the mean energy of each species; mean speed of all beads that are seen, [m/s].
 
     Parameters
     ----------
     velocities : ndarray (n, 2), [m/s]
-        NaN where not known, as are their errors.
+        NaN where not known, as are their errors; such beads count as resting in the mean speed.
     errors, radii : ndarray (n,), [m/s], [m]
     species : ndarray of int32, (n,)
     seen : ndarray of bool, (n,)
-    count : int
-        Of species.
-
-    Returns
-    -------
-    known : ndarray of int64, (count,)
-        Beads whose energies are known.
-    speed : float, [m/s]
-        Beads without a velocity count as 0.
-    energies : ndarray (count,), [m^5/s^2]
-        Of a component, as of `_excess`.
+    energies : ndarray (species,), [m^5/s^2]
+        Of a component, less what errors add, as of `_excess`; changed where beads are known.
     """
-    known, sums = np.zeros(count, dtype=np.int64), np.zeros(count)
+    known, sums = np.zeros(energies.size, dtype=np.int64), np.zeros(energies.size)
     speed, beads = 0.0, 0
     for k in range(species.size):
         if not seen[k]:
@@ -71,7 +64,70 @@ def energies(
         if abs(energy) < np.inf:
             known[species[k]] += 1
             sums[species[k]] += energy
-    return known, speed / max(beads, 1), sums / np.maximum(known, 1)
+    for k in range(energies.size):
+        if known[k]:
+            last = energies[k]
+            share = _ENERGY_SHARE if last > 0.0 else 1.0
+            energies[k] = last + share * (max(sums[k] / known[k], 0.0) - last)
+    return speed / max(beads, 1)
+
+
+@compiled
+def of_seen(
+    usual: NDArray[np.float64],
+    ids: NDArray[np.int64],
+    places: NDArray[np.float64],
+    place_errors: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    errors: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    radius_errors: NDArray[np.float64],
+    species: NDArray[np.int32],
+    seen: NDArray[np.bool_],
+    alike: NDArray[np.bool_],
+) -> tuple[
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+]:
+    """The beads that are seen, in the order of their numbers.
+
+    Parameters
+    ----------
+    usual, places, velocities, errors, radii, species, seen
+        As of `variances`.
+    ids : ndarray of int64, (n,)
+    place_errors, radius_errors : ndarray (n,), [m]
+    alike : ndarray of bool, (species,)
+        Whose beads are all of one size, which is known better than measured.
+
+    Returns
+    -------
+    rows : ndarray of int64, (k,)
+        Which beads these are.
+    ids, places, errors, radii, radius_errors, variances
+        As in `nanorocks_ros.stages.bodies.pair_table.Beads`.
+    """
+    found = variances(usual, places, velocities, errors, radii, species, seen)
+    rows = np.flatnonzero(seen)
+    rows = rows[np.argsort(ids[rows], kind='mergesort')]
+    measured = radius_errors[rows]
+    for k in range(rows.size):
+        if alike[species[rows[k]]]:
+            measured[k] = 0.0
+    return (
+        rows,
+        ids[rows],
+        places[rows],
+        place_errors[rows],
+        radii[rows],
+        measured,
+        found[rows],
+    )
 
 
 @compiled
@@ -91,7 +147,7 @@ def variances(
     Parameters
     ----------
     usual : ndarray (species,), [m^5/s^2]
-        Energies of `energies`, followed from picture to picture.
+        Energies of `learn_energies`, followed from picture to picture.
     places : ndarray (n, 2), [m]
     velocities, errors, radii, species, seen
         As there.

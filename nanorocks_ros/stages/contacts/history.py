@@ -9,7 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nanorocks_ros.stages.contacts.flights import LINE, Line
-from nanorocks_ros.stages.contacts.ways import KINK, LONGEST, Scatter, Ways, begin, finish, follow
+from nanorocks_ros.stages.contacts.scatter import Scatter
+from nanorocks_ros.stages.contacts.ways import (
+    KINK,
+    LONGEST,
+    Places,
+    Ways,
+    begin,
+    finish,
+    follow,
+)
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
@@ -79,9 +88,12 @@ class Histories:
         self._slots: dict[int, int] = {}
         self._free = list(range(_SLOTS))[::-1]
         self._ways = Ways.empty(_SLOTS)
-        # Of each slot.
+        # Of each slot; sizes are radii and the errors they were measured with.
         self._species = np.zeros(_SLOTS, dtype=np.int32)
         self._sizes = np.zeros((_SLOTS, 2))
+        # Tracks and their species in the last picture, and where they are; -1 is nowhere.
+        self._named = b'', b''
+        self._rows = np.empty(0, dtype=np.int64)
 
     def push(self, time: float, tracks: Tracks, gap: float) -> list[Kink]:
         """Take the next picture, at a time in s.
@@ -98,26 +110,47 @@ class Histories:
         list of Kink
             Those of which the flights before and after are both known now.
         """
-        rows = np.flatnonzero(tracks.seen & self._round[tracks.species])
-        species, numbers = tracks.species[rows], tracks.ids[rows].tolist()
-        slots = np.array([self._slot(one) for one in numbers], dtype=np.int64)
-        self._species[slots] = species
-        sizes = self._measured(species, tracks.radii[rows], tracks.radius_errors[rows])
-        self._sizes[slots] = sizes
-        lines = np.empty((rows.size, KINK))
-        places = (tracks.positions + tracks.displacement)[rows]
-        errors = tracks.position_errors[rows]
-        radii = sizes[:, 0].copy()
+        gone = self._assigned(tracks)
+        lines = np.empty((tracks.ids.size, KINK))
         turned = follow(
-            self._ways, self._scatter, time, gap, slots, species, places, errors, radii, lines
+            self._ways,
+            self._scatter,
+            time,
+            gap,
+            self._rows,
+            Places(
+                tracks.species,
+                tracks.positions,
+                tracks.displacement,
+                tracks.position_errors,
+                tracks.radii,
+                tracks.radius_errors,
+                tracks.seen,
+            ),
+            self._known_radii,
+            self._sizes,
+            lines,
         )
-        found = [self._kink(numbers[k], lines[k].copy()) for k in np.flatnonzero(turned).tolist()]
-        gone = self._slots.keys() - set(tracks.ids.tolist())
-        return found + self._finished(sorted(gone))
+        found = [self._kink(int(tracks.ids[k]), lines[k].copy()) for k in turned.tolist()]
+        return found + self._finished(gone)
 
     def flush(self) -> list[Kink]:
         """The kinks whose flights afterwards end with the recording."""
         return self._finished(sorted(self._slots))
+
+    def _assigned(self, tracks: Tracks) -> list[int]:
+        """Give each round bead a slot, and say which tracks are no more; few pictures differ."""
+        named = tracks.ids.tobytes(), tracks.species.tobytes()
+        if named == self._named:
+            return []
+        self._named = named
+        numbers = tracks.ids.tolist()
+        rounds = self._round[tracks.species].tolist()
+        rows = [self._slot(one) if fit else -1 for one, fit in zip(numbers, rounds, strict=True)]
+        self._rows = np.array(rows, dtype=np.int64)
+        used = self._rows >= 0
+        self._species[self._rows[used]] = tracks.species[used]
+        return sorted(self._slots.keys() - set(numbers))
 
     def _slot(self, number: int) -> int:
         slot = self._slots.get(number)
@@ -135,24 +168,15 @@ class Histories:
         self._sizes = np.concatenate([self._sizes, np.zeros_like(self._sizes)])
         self._free = list(range(slots, 2 * slots))[::-1]
 
-    def _measured(
-        self, species: NDArray[np.int32], radii: NDArray[np.float64], errors: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Radii and their errors, (n, 2); those of a species that are alike are known."""
-        known = self._known_radii[species]
-        alike = ~np.isnan(known)
-        return np.column_stack(
-            [
-                np.where(alike, known, radii),
-                np.where(alike, 0.0, np.hypot(errors, _OUTLINE * radii)),
-            ]
-        )
-
     def _kink(self, number: int, row: NDArray[np.float64]) -> Kink:
         slot = self._slots[number]
-        radius, error = self._sizes[slot].tolist()
+        radius, measured = self._sizes[slot].tolist()
+        species = int(self._species[slot])
+        # The size of a species whose beads are alike is known.
+        alike = not math.isnan(self._known_radii[species])
+        error = 0.0 if alike else float(np.hypot(measured, _OUTLINE * radius))
         lines, rest = row[: 2 * LINE].reshape(2, LINE), row[2 * LINE :].tolist()
-        return Kink(number, int(self._species[slot]), radius, error, lines, *rest)
+        return Kink(number, species, radius, error, lines, *rest)
 
     def _finished(self, numbers: list[int]) -> list[Kink]:
         """The last kinks of tracks that have ended."""

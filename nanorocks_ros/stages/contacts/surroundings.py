@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.stages.contacts.swings import powers, slope_of, swing_terms
 
 if TYPE_CHECKING:
     from nanorocks_ros.records import Tracks
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
 # when it does anything else.
 _WIDE, _NARROW = 45, 4
 _FEWEST = 2 * _NARROW
-# Frequencies of a swing that are tried, [1/s].
-_FREQUENCIES = np.geomspace(0.5, 6.0, 40)
 # By how much a swing must lower chi square to be believed: it has eight numbers more.
 _SWINGS = 20.0
 # Fourth differences see noise but no swing; their variance is so many times that of the noise.
@@ -79,11 +78,11 @@ class Surroundings:
         end, self._end = self._end, self._end + 1
         self._all_times[end] = time
         self._all_displacements[end] = tracks.displacement
-        _add_squares(tracks.velocities, tracks.species, self._all_squares[end])
         self._records.append(tracks)
-        if end:
-            steps = np.diff(self._all_times[max(end - _WARM, self._kept.start) : self._end])
-            self.interval = _median(steps)
+        first = max(end - _WARM, self._kept.start)
+        times = self._all_times[first : self._end]
+        squares = self._all_squares[end]
+        self.interval = _learn(times, tracks.velocities, tracks.species, squares)
 
     def _around(self, time: float, pictures: int) -> slice:
         middle = int(np.searchsorted(self._times, time))
@@ -103,8 +102,8 @@ class Surroundings:
         if times[wide].size < _FEWEST:
             return np.zeros(2), math.inf
         noise = float(np.sqrt(np.mean(np.diff(places[wide], 4, axis=0) ** 2) / _FOURTH))
-        rest = _slope(_powers(times[wide], 1), places[wide])
-        swing = _slope(_swing(times[wide], places[wide]), places[wide])
+        rest = slope_of(powers(times[wide], 1), places[wide])
+        swing = slope_of(swing_terms(times[wide], places[wide]), places[wide])
         if rest.left - swing.left < _SWINGS * noise**2:
             # A swing too weak to be seen may still be there.
             return rest.velocity, noise * math.hypot(rest.factor, 0.5 * swing.factor)
@@ -113,7 +112,7 @@ class Surroundings:
             scatter = math.sqrt(swing.left / (2 * times[wide].size))
             error = _LASTING * max(noise, scatter) * swing.factor
             return swing.velocity, math.hypot(error, _MISSCALED * math.hypot(*swing.velocity))
-        other = _slope(_powers(times[narrow], 3), places[narrow])
+        other = slope_of(powers(times[narrow], 3), places[narrow])
         return other.velocity, _LASTING * noise * other.factor
 
     def displacement(self, time: float) -> tuple[float, float]:
@@ -182,11 +181,6 @@ def _nobody_near(
 
 
 @compiled
-def _median(values: NDArray[np.float64]) -> float:
-    return float(np.median(values))
-
-
-@compiled
 def _between(
     time: float, times: NDArray[np.float64], places: NDArray[np.float64]
 ) -> tuple[float, float]:
@@ -202,60 +196,21 @@ def _between(
 
 
 @compiled
-def _add_squares(
-    velocities: NDArray[np.float64], species: NDArray[np.int32], sums: NDArray[np.float64]
-) -> None:
-    """Of each species, sum of the squares of the velocities and their number, (species, 2)."""
+def _learn(
+    times: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    species: NDArray[np.int32],
+    sums: NDArray[np.float64],
+) -> float:
+    """Time between two pictures, [s]: the middle one of some.
+
+    Writes for each species the sum of the squares of the velocities and their number,
+    (species, 2).
+    """
     sums[:] = 0.0
     for k in range(species.size):
         square = velocities[k, 0] * velocities[k, 0] + velocities[k, 1] * velocities[k, 1]
         if square < np.inf:
             sums[species[k], 0] += square
             sums[species[k], 1] += 1.0
-
-
-class _Slope(NamedTuple):
-    """Slope at time 0 of what was fitted.
-
-    Parameters
-    ----------
-    velocity : ndarray (2,), [m/s]
-    left : float, [m^2]
-        Sum of the squares that are left.
-    factor : float, [1/s]
-        Error of the slope over that of a place.
-    """
-
-    velocity: NDArray[np.float64]
-    left: float
-    factor: float
-
-
-def _slope(terms: NDArray[np.float64], places: NDArray[np.float64]) -> _Slope:
-    """Fit terms, (pictures, n), of which the second alone has a slope at 0, of 1."""
-    inverse = np.linalg.pinv(terms)
-    found = inverse @ places
-    left = float(np.sum((places - terms @ found) ** 2))
-    return _Slope(found[1], left, float(np.linalg.norm(inverse[1])))
-
-
-def _powers(times: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
-    return np.vander(times, degree + 1, increasing=True)
-
-
-def _swing(times: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Terms of a swing that dies away about a resting place, of the frequency that fits best.
-
-    The first slope is that of its sine, divided by the angular frequency.
-    """
-    omega = 2.0 * math.pi * _FREQUENCIES[:, None]
-    sine, cosine = np.sin(omega * times), np.cos(omega * times)
-    # Terms in t sin have no slope at 0; that in t cos has one, and is taken off the sine's.
-    decay = times * cosine - sine / omega
-    ones = np.ones_like(sine)
-    terms = np.stack([ones, sine / omega, cosine, decay, times * sine], axis=2)
-    turned = terms.transpose(0, 2, 1)
-    projected = turned @ places
-    explained = projected * (np.linalg.pinv(turned @ terms, hermitian=True) @ projected)
-    best: NDArray[np.float64] = terms[np.argmax(explained.sum(axis=(1, 2)))]
-    return best
+    return float(np.median(times[1:] - times[:-1])) if times.size > 1 else math.inf

@@ -29,22 +29,24 @@ class Waiting:
     def __init__(self) -> None:
         self._kinks: list[Kink] = []
         self._table = np.empty((0, _NUMBERS))
+        self._earliest = math.inf
 
     def forget(self, horizon: float) -> None:
         """Give up those before a time, [s]."""
-        late = self._table[:, 0] > horizon
-        if not late.all():
-            self._keep(late)
+        if self._earliest <= horizon:
+            self._keep(self._table[:, 0] > horizon)
 
     def _keep(self, which: NDArray[np.bool_]) -> None:
         self._kinks = [self._kinks[k] for k in np.flatnonzero(which).tolist()]
         self._table = self._table[which]
+        self._earliest = float(self._table[:, 0].min(initial=math.inf))
 
     def add(self, kink: Kink, when: Meeting, interval: float) -> None:
         """Wait for the other bead of a turn; pictures are that far apart, [s]."""
         self._kinks.append(kink)
         row = _row(kink, when)
         row[2] += interval
+        self._earliest = min(self._earliest, when.time)
         self._table = np.concatenate([self._table, row[None]])
 
     def remove(self, kink: Kink) -> None:

@@ -14,6 +14,7 @@ from nanorocks_ros.stages.contacts.flights import (
     line_through,
     set_errors,
 )
+from nanorocks_ros.stages.contacts.scatter import Scatter, learn
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,10 +40,6 @@ _LEAST_VARIANCE = 0.25
 _SAME = 0.5
 # Places that the best break may move when all of the flight behind it is known.
 _MOVED = 2
-# Flights from which the scatter of places is learnt, their fewest places, and how far they lead
-# in errors of a place: beads at rest are always misplaced alike.
-_FLIGHTS, _FEWEST_PLACES, _LEAST_WAY = 200, 8, 8.0
-_FEWEST_FLIGHTS = 10
 
 
 class Ways(NamedTuple):
@@ -81,38 +78,23 @@ class Ways(NamedTuple):
         return Ways(*(np.concatenate([one, np.zeros_like(one)]) for one in self))
 
 
-class Scatter(NamedTuple):
-    """How places scatter about straight flights, over what their errors say, by species.
-
-    Parameters
-    ----------
-    known : ndarray (species, flights)
-        Of the last flights, one after the other and then round again.
-    counts : ndarray of int64, (species,)
-        Flights so far.
-    variances : ndarray (species,)
-        Their median.
-    """
-
-    known: NDArray[np.float64]
-    counts: NDArray[np.int64]
-    variances: NDArray[np.float64]
-
-    @classmethod
-    def unknown(cls, species: int) -> Scatter:
-        """Before the first flight."""
-        return cls(
-            np.zeros((species, _FLIGHTS)),
-            np.zeros(species, dtype=np.int64),
-            np.ones(species),
-        )
-
-
 @compiled
 def begin(ways: Ways, slot: int) -> None:
     """Forget what was in a slot."""
     ways.ends[slot] = ways.firsts[slot] = 0
     ways.befores[slot] = -1
+
+
+class Places(NamedTuple):
+    """The beads of a picture, as `nanorocks_ros.records.Tracks` has them."""
+
+    species: NDArray[np.int32]
+    positions: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    errors: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    radius_errors: NDArray[np.float64]
+    seen: NDArray[np.bool_]
 
 
 @compiled
@@ -122,13 +104,12 @@ def follow(
     time: float,
     gap: float,
     slots: NDArray[np.int64],
-    species: NDArray[np.int32],
-    places: NDArray[np.float64],
-    errors: NDArray[np.float64],
-    radii: NDArray[np.float64],
+    beads: Places,
+    known_radii: NDArray[np.float64],
+    sizes: NDArray[np.float64],
     kinks: NDArray[np.float64],
-) -> NDArray[np.bool_]:
-    """Take the next places of some tracks.
+) -> NDArray[np.int64]:
+    """Take the next places of the tracks that are seen.
 
     Parameters
     ----------
@@ -138,41 +119,72 @@ def follow(
     gap : float, [s]
         Without a place for longer, what happened is not known.
     slots : ndarray of int64, (n,)
-    species : ndarray of int32, (n,)
-    places : ndarray (n, 2), [m]
-        Past the camera.
-    errors : ndarray (n,), [m]
-        Of a coordinate.
-    radii : ndarray (n,), [m]
+        Of each track; -1 for one that is not followed.
+    beads : Places
+    known_radii : ndarray (species,), [m]
+        NaN where the beads of a species are not alike.
+    sizes : ndarray (slots, 2), [m]
+        Written: radii, and the errors they are measured with.
     kinks : ndarray (n, KINK)
         Written where flights before and after a kink are both known now.
 
     Returns
     -------
-    ndarray of bool, (n,)
-        Which these are.
+    ndarray of int64, (kinks,)
+        Which of the tracks these are.
     """
-    found = np.zeros(slots.size, dtype=np.bool_)
-    flight = np.empty(LINE)
+    found, count = np.empty(slots.size, dtype=np.int64), 0
+    flight, place = np.empty(LINE), np.empty(2)
     for k in range(slots.size):
-        slot, variance = slots[k], scatter.variances[species[k]]
-        end = ways.ends[slot]
-        lost = end > 0 and time - ways.times[slot, end - 1] > gap
-        if lost:
-            found[k] = finish(ways, slot, variance, radii[k], kinks[k])
-            begin(ways, slot)
-        if ways.ends[slot] == _ROOM:
-            _make_room(ways, slot)
-        end = ways.ends[slot]
-        ways.times[slot, end], ways.errors[slot, end] = time, errors[k]
-        ways.places[slot, end] = places[k]
-        ways.ends[slot] += 1
-        if found[k]:
+        slot = slots[k]
+        if slot < 0 or not beads.seen[k]:
             continue
-        found[k], ended = _cut(ways, slot, variance, radii[k], kinks[k], flight)
-        if ended:
-            _learn(scatter, species[k], flight)
-    return found
+        radius = known_radii[beads.species[k]]
+        if radius != radius:
+            radius = beads.radii[k]
+        sizes[slot, 0], sizes[slot, 1] = radius, beads.radius_errors[k]
+        for c in range(2):
+            place[c] = beads.positions[k, c] + beads.displacement[c]
+        variance = scatter.variances[beads.species[k]]
+        turned = _lost(ways, slot, time, gap, variance, radius, kinks[k])
+        _add(ways, slot, time, place, beads.errors[k])
+        if not turned:
+            turned, ended = _cut(ways, slot, variance, radius, kinks[k], flight)
+            if ended:
+                learn(scatter, beads.species[k], flight)
+        if turned:
+            found[count] = k
+            count += 1
+    return found[:count]
+
+
+@compiled
+def _lost(
+    ways: Ways,
+    slot: int,
+    time: float,
+    gap: float,
+    variance: float,
+    radius: float,
+    kink: NDArray[np.float64],
+) -> bool:
+    """Whether a track that was not seen for too long ends with a kink; it starts afresh."""
+    end = ways.ends[slot]
+    if end == 0 or not time - ways.times[slot, end - 1] > gap:
+        return False
+    turned = finish(ways, slot, variance, radius, kink)
+    begin(ways, slot)
+    return turned
+
+
+@compiled
+def _add(ways: Ways, slot: int, time: float, place: NDArray[np.float64], error: float) -> None:
+    if ways.ends[slot] == _ROOM:
+        _make_room(ways, slot)
+    end = ways.ends[slot]
+    ways.times[slot, end], ways.errors[slot, end] = time, error
+    ways.places[slot, end] = place
+    ways.ends[slot] += 1
 
 
 @compiled
@@ -256,21 +268,6 @@ def _kink(
     kink[2 * LINE + 1] = ways.times[slot, first]
     kink[2 * LINE + 2] = shared
     return True
-
-
-@compiled
-def _learn(scatter: Scatter, species: int, flight: NDArray[np.float64]) -> None:
-    """Scatter of places over what their errors say; those hold what pictures share, too."""
-    used = flight[8]
-    speed2 = flight[3] * flight[3] + flight[4] * flight[4]
-    if used < _FEWEST_PLACES or speed2 < _LEAST_WAY * _LEAST_WAY * flight[6]:
-        return
-    count = scatter.counts[species]
-    scatter.known[species, count % _FLIGHTS] = flight[7] / (2.0 * used - 4.0)
-    scatter.counts[species] = count + 1
-    if count + 1 >= _FEWEST_FLIGHTS:
-        known = scatter.known[species, : min(count + 1, _FLIGHTS)]
-        scatter.variances[species] = np.median(known)
 
 
 @compiled
