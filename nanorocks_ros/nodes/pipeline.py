@@ -105,6 +105,7 @@ class PipelineNode(NanorocksNode):
     def _adopt(self, settings, pipeline):
         self._background.drain()
         self._settings, self._pipeline = settings, pipeline
+        pipeline.prepare()
         self._picture = TracksPicture(self, calibrated(settings).preprocess.pixels_per_metre)
 
     def _straighten(self):
@@ -112,11 +113,15 @@ class PipelineNode(NanorocksNode):
         self._view = self._camera.view
         if self.recorder is not None:
             self.recorder.lens(self._camera.lens_message)
-        self._pipeline = self._build(self._settings)
+        self._rebuild()
 
     def _name_source(self, where, view=None):
         self._where, self._view = where, view
+        self._rebuild()
+
+    def _rebuild(self):
         self._pipeline = self._build(self._settings)
+        self._pipeline.prepare()
 
     def _play_simulated(self):
         if self._simulation.tray not in self._settings.trays:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -132,6 +133,7 @@ class SlowContacts:
         return np.asarray(share @ self.rates)
 
 
+@lru_cache(maxsize=16)
 def slow_contacts(
     tray: Tray, restitution: float = 0.89, wall_restitution: float = 0.97
 ) -> SlowContacts:

@@ -127,6 +127,9 @@ class Pipeline:
         self.preprocessor = Preprocessor(settings, trays, camera, view)
         self.trays = {number: TrayStages(settings, tray) for number, tray in trays.items()}
 
+    def prepare(self) -> None:
+        """Do now what the first frame would have to wait for."""
+
     def push(self, frame: Frame) -> tuple[Result, ...]:
         """Everything that follows from the next frame, tray images first.
 

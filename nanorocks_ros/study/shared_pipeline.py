@@ -64,7 +64,7 @@ class SharedPipeline(Pipeline):
     settings, camera, view
         As of `Pipeline`.
     workers : sequence of TrayProcess
-        At least one; their stages are made anew with the first frame.
+        At least one; their stages are made anew by `prepare`, or with the first frame.
 
     Raises
     ------
@@ -84,6 +84,11 @@ class SharedPipeline(Pipeline):
         self._workers = workers
         self._shares = shares_of(tuple(trays_of(self._settings).values()), len(workers))
         self._begun = False
+
+    def prepare(self) -> None:
+        """Have the stages made in the processes, which must not work for another pipeline."""
+        if not self._begun:
+            self._ask((), None)
 
     def follow(
         self, records: Sequence[TrayImage | Notice], wanted: Mapping[int, Wanted] | None = None
