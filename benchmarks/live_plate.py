@@ -154,14 +154,14 @@ def _browsers(port: int) -> subprocess.Popen:
 
 def _run(bag: Path, run: str, folder: str) -> None:
     import rclpy
-    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.experimental.events_executor import EventsExecutor
 
     from nanorocks_ros.nodes._node import NanorocksNode
     from nanorocks_ros.nodes._shell import message_class, qos_of
     from nanorocks_ros.wire import topics
 
     node = NanorocksNode('benchmark')
-    executor = SingleThreadedExecutor()
+    executor = EventsExecutor()
     executor.add_node(node)
     tally = _Tally(node)
     everything, record, port = run == 'everything', f'{folder}/recorded', _free_port()

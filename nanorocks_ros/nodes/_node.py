@@ -87,7 +87,15 @@ _FAREWELL_S = 3.5
 
 
 class NanorocksNode(Node):
-    """A node under the namespace ``nanorocks`` that keeps count of what it does."""
+    """A node under the namespace ``nanorocks`` that keeps count of what it does.
+
+    Attributes
+    ----------
+    hears_much : bool
+        Whether there are dozens of topics that it listens to, and no guard condition.
+    """
+
+    hears_much = False
 
     def __init__(self, name):
         super().__init__(name, namespace=topics.NAMESPACE.strip('/'))
@@ -101,6 +109,8 @@ class NanorocksNode(Node):
         self.counts = {'received': 0, 'published': 0, 'refused': 0}
         self.busy_s = []
         self.state = {}
+        # Whether images are published, too.
+        self.pictures = True
         # Whoever wants to keep what is sent.
         self.recorder = None
         # What is wrong, but keeps nothing from going on.
@@ -254,7 +264,7 @@ class NanorocksNode(Node):
                 self.send(topics.STATE, array_message(record.state(), epoch_ns), record.tray)
             for topic, field in _IMAGES[type(record)]:
                 pixels = getattr(record, field)
-                if pixels is not None and self.wanted(topic, record.tray):
+                if pixels is not None and self.pictures and self.wanted(topic, record.tray):
                     frame_id = f'tray_{record.tray}'
                     message = image_message(record.stamp_ns, frame_id, pixels)
                     self.send(topic, message, record.tray)

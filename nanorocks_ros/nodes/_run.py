@@ -98,9 +98,25 @@ def use_large_segments():
         os.environ.setdefault(_PROFILES, str(profile))
 
 
-def _spin(name, interrupts):
+def _executor(node):
+    """What takes the messages of a node.
+
+    The usual one makes a new set of all that a node may wait for before each wait: of a node
+    that hears of dozens of topics that is most of the work. The other knows no guard conditions.
+    """
     from rclpy.executors import SingleThreadedExecutor
 
+    if node.hears_much:
+        try:
+            from rclpy.experimental.events_executor import EventsExecutor
+        except ImportError:
+            # Older patches of Jazzy.
+            return SingleThreadedExecutor()
+        return EventsExecutor()
+    return SingleThreadedExecutor()
+
+
+def _spin(name, interrupts):
     module = import_module(f'nanorocks_ros.nodes.{name}')
     if interrupts.asked:
         return 0
@@ -108,7 +124,7 @@ def _spin(name, interrupts):
     node = getattr(module, f'{name.title().replace("_", "")}Node')()
     node.refuse_unknown_parameters()
     interrupts.at_once = False
-    executor = SingleThreadedExecutor()
+    executor = _executor(node)
     executor.add_node(node)
     try:
         while not node.done and not interrupts.asked:

@@ -36,6 +36,8 @@ _EPOCH_NS = 0
 class DashboardNode(NanorocksNode):
     """Hands results and diagnostics to the page, and pictures while somebody looks."""
 
+    hears_much = True
+
     def __init__(self):
         super().__init__('dashboard')
         settings = self.declare(DashboardSettings())

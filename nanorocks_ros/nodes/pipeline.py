@@ -27,6 +27,9 @@ from nanorocks_ros.stages.warm_up import (
 from nanorocks_ros.study.shared_pipeline import SharedPipeline, started, worker_count
 from nanorocks_ros.wire import topics
 
+# With more frames behind than these, pictures are published of one frame in so many.
+_BEHIND, _SHOWN_BEHIND = 3, 10
+
 
 class PipelineNode(NanorocksNode):
     """Composes the stages; records pass between them in memory.
@@ -51,6 +54,7 @@ class PipelineNode(NanorocksNode):
         self._page = LivePage(self, page, self._settings.trays_file) if shown else None
         self._epoch = Epoch(self, may_set=True, follow=self._source == 'topic')
         self._recorded = None
+        self._frames = 0
         self._where = self._source
         self._camera, self._view = None, None
         self._workers = started(worker_count(workers, len(self._settings.trays)))
@@ -167,28 +171,34 @@ class PipelineNode(NanorocksNode):
     def _push(self, frame):
         if self.recorder is not None:
             self.recorder.epoch(self._epoch.ns)
+        waiting = self._background.waiting
+        # Who only looks must not keep the graph from measuring.
+        self._frames += 1
+        shown = waiting <= _BEHIND or self._frames % _SHOWN_BEHIND == 0
         wanted = {
             number: Wanted(
-                self.wanted(topics.MOTION, number),
+                self.wanted(topics.MOTION, number) and shown,
                 self._picture.wanted(number),
-                self.wanted(topics.AUTOCORRELATION, number),
+                self.wanted(topics.AUTOCORRELATION, number) and shown,
             )
             for number in self._pipeline.trays
         }
-        self._background.put((self._pipeline.preprocessor.push(frame), wanted))
-        self.state['frames waiting for the trays'] = self._background.waiting
+        self._background.put((self._pipeline.preprocessor.push(frame), wanted, shown))
+        self.state['frames waiting for the trays'] = waiting
 
     def _follow(self, job):
-        return self._pipeline.follow(*job)
+        records, wanted, shown = job
+        return self._pipeline.follow(records, wanted), shown
 
-    def _publish(self, records):
+    def _publish(self, found):
+        records, self.pictures = found
         image = None
         for record in records:
             if isinstance(record, TrayImage):
                 image = record
             if isinstance(record, Tracks):
                 # What follows from an image comes right after it.
-                self._picture.send(image, record)
+                self._picture.send(image, record, self.pictures)
             else:
                 self.publish_result(record, self._epoch.ns)
 

@@ -89,7 +89,8 @@ TRACKS = Topic(
     name='tray_{tray}/tracks',
     type=IMAGE,
     depth=10,
-    doc='the tray with its beads and the ways they came, bgr8; hidden beads are magenta',
+    doc='the tray with its beads and the ways they came, bgr8, ten a second; hidden beads are '
+    'magenta',
 )
 CLUSTER = Topic(name='tray_{tray}/cluster', type=ARRAY, depth=1000, doc='ClusterEstimate')
 AUTOCORRELATION = Topic(
