@@ -86,11 +86,15 @@ class PipelineNode(NanorocksNode):
         of_source = {'simulator': (self._simulation,), 'bag': (self._bag,), 'topic': ()}
         kept = provenance(self._source, self._settings, *of_source[self._source])
         # Who plays as fast as it goes waits for the disk as well.
-        patient = self._source != 'topic' and self._pacing.rate == 0.0
-        self.recorder = GraphRecorder(self, record, kept, self._settings.trays, patient)
+        self.recorder = GraphRecorder(self, record, kept, self._settings.trays, self._patient)
         lens = self._recorded.lens_message() if self._recorded is not None else None
         if lens is not None:
             self.recorder.lens(lens)
+
+    @property
+    def _patient(self):
+        """Whether the frames come as fast as they are taken."""
+        return self._source != 'topic' and self._pacing.rate == 0.0
 
     def _offer_everything(self):
         self.offer((topics.EPOCH,))
@@ -174,7 +178,7 @@ class PipelineNode(NanorocksNode):
         waiting = self._background.waiting
         # Who only looks must not keep the graph from measuring.
         self._frames += 1
-        shown = waiting <= _BEHIND or self._frames % _SHOWN_BEHIND == 0
+        shown = self._patient or waiting <= _BEHIND or self._frames % _SHOWN_BEHIND == 0
         wanted = {
             number: Wanted(
                 self.wanted(topics.MOTION, number) and shown,
