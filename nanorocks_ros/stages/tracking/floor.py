@@ -163,6 +163,7 @@ def renew_floor(
                 if gray_known and step < -0.08 * floor[i, j, k]:
                     share = _SLOW_SHARE
                 floor[i, j, k] += share * step
-                levels[i, j, k] = np.uint8(floor[i, j, k] + 0.5)
+                # A light that became brighter may have taken the floor beyond white.
+                levels[i, j, k] = np.uint8(min(floor[i, j, k] + 0.5, 255.0))
             sure[i, j] = True
     return shown / known
