@@ -66,8 +66,9 @@ class StickingMeter:
         with suppress(NanorocksError):
             # Without a theory of the tray merges are counted, but no speed follows from them.
             contacts = slow_contacts(tray)
-            # Its curve is worked out now, while no image waits.
-            contacts.slower_between(1.0, settings.sticking.measure)
+            # Its curve is worked out now, while no image waits; a single bead has none.
+            if contacts.rates.any():
+                contacts.slower_between(1.0, settings.sticking.measure)
             self._make_rates = partial(MergeRates, contacts, tray.count, settings.sticking.measure)
         self._restart()
 
