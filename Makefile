@@ -44,11 +44,13 @@ test: venv ## Run all tests, then those of the core with the oldest dependencies
 	@$(RUN) python -m pytest $(ALONE) $(PYTEST_ARGS)
 	@$(MAKE) test-oldest
 
-# What takes minutes and only goes through, once more, what other tests go through. The simulation is
-# the same, bit by bit, with all dependencies: it is tested once.
-ONCE := test/validation test/simulation \
+# What takes minutes and only goes through, once more, what other tests go through: those of the
+# stages as a whole go through their parts and the inference. The simulation is the same, bit by
+# bit, with all dependencies.
+ONCE := test/validation test/simulation test/inference test/dashboard \
+        test/stages/bodies test/stages/contacts test/stages/tracking \
         test/study/test_reproduce.py test/study/test_batch.py test/cli/test_figure_cor.py \
-        test/dashboard/test_page.py test/test_contributing.py
+        test/test_contributing.py
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 PATH="$(CURDIR)/$(OLDEST)/bin:$$PATH" python -m pytest \
