@@ -47,7 +47,7 @@ test: venv ## Run all tests, then those of the core with the oldest dependencies
 # What takes minutes and only goes through, once more, what other tests go through: those of the
 # stages as a whole go through their parts and the inference. The simulation is the same, bit by
 # bit, with all dependencies.
-ONCE := test/validation test/simulation test/inference test/dashboard \
+ONCE := test/validation test/simulation test/inference test/dashboard/test_page.py \
         test/stages/bodies test/stages/contacts test/stages/tracking \
         test/study/test_reproduce.py test/study/test_batch.py test/cli/test_figure_cor.py \
         test/test_contributing.py
