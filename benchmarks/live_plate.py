@@ -23,6 +23,7 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -109,9 +110,12 @@ def filmed_plate(folder: str, seconds: float, known: str) -> Path:
     return bag
 
 
-def _start(*arguments: str) -> subprocess.Popen:
+def _start(left: ExitStack, *arguments: str) -> subprocess.Popen:
     command = [sys.executable, '-m', 'nanorocks_ros.nodes', *arguments]
-    return subprocess.Popen(command)
+    process = subprocess.Popen(command)
+    # Whatever happens here, nobody goes on playing.
+    left.callback(process.kill)
+    return process
 
 
 def _spin(executor, seconds: float, stop=lambda: False) -> None:
@@ -152,7 +156,7 @@ def _browsers(port: int) -> subprocess.Popen:
     return subprocess.Popen([sys.executable, '-c', call], stdout=subprocess.PIPE)
 
 
-def _run(bag: Path, run: str, folder: str) -> None:
+def _run(bag: Path, run: str, folder: str, left: ExitStack) -> None:
     import rclpy
     from rclpy.experimental.events_executor import EventsExecutor
 
@@ -168,7 +172,7 @@ def _run(bag: Path, run: str, folder: str) -> None:
     transport = 'compressed' if everything else run
     more = ['-p', f'record:={record}', '-p', 'dashboard:=true', '-p', f'dashboard_port:={port}']
     pipeline = _start(
-        'pipeline', '--ros-args', '-p', 'source:=topic', '-p', f'transport:={transport}',
+        left, 'pipeline', '--ros-args', '-p', 'source:=topic', '-p', f'transport:={transport}',
         '-p', f'trays:={list(_TRAYS)}', '-p', 'preprocess.layout:=plate',
         '-p', 'preprocess.pixels_per_metre:=12500.0', *(more if everything else ()),
     )  # fmt: skip
@@ -176,7 +180,7 @@ def _run(bag: Path, run: str, folder: str) -> None:
     _spin(executor, _SETTLE_S, lambda: node.count_subscribers(camera.absolute()) > 0)
     browsers = _browsers(port) if everything else None
     player = _start(
-        'bag_player', '--ros-args', '-p', f'bag:={bag}', '-p', 'listeners:=2',
+        left, 'bag_player', '--ros-args', '-p', f'bag:={bag}', '-p', 'listeners:=2',
         '-p', f'duration:={_SECONDS}',
     )  # fmt: skip
     # The player waits for a second listener, which comes when this node hears the truth.
@@ -253,4 +257,5 @@ def report() -> None:
         bag = filmed_plate(folder, _SECONDS + 5.0, os.environ.get('LIVE_PLATE_BAG', ''))
         for run in _RUNS:
             rclpy.init()
-            _run(bag, run, folder)
+            with ExitStack() as left:
+                _run(bag, run, folder, left)

@@ -15,6 +15,8 @@ _FEWEST, _MOST = 15, 60
 _STEADY, _DIFFERENCE = 0.7, 0.2
 # An interval has a gap in it when it is so many times the median.
 _GAP = 1.6
+# Nothing comes for longer when a camera pauses or a player seeks: no frame is missing then, [ns].
+_PAUSE_NS = 5_000_000_000
 
 
 class Gaps:
@@ -38,6 +40,8 @@ class Gaps:
         if last_ns is None or stamp_ns <= last_ns:
             return 0
         interval = stamp_ns - last_ns
+        if interval > _PAUSE_NS:
+            return 0
         usual = self._usual()
         if usual is None or interval < _GAP * usual:
             self._in_turn = 0

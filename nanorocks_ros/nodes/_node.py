@@ -103,7 +103,7 @@ class NanorocksNode(Node):
         self._outputs = {}
         self._events = NowAndThen()
         self._declared = {}
-        self._refused = {}
+        self._said = {}
         self.done = False
         self.exit_code = 0
         self.counts = {'received': 0, 'published': 0, 'refused': 0}
@@ -341,19 +341,23 @@ class NanorocksNode(Node):
     def refuse(self, error):
         """Say what was wrong with an input, once in a while, and go on."""
         self.counts['refused'] += 1
-        now = time.monotonic()
         text = str(error)
-        if now - self._refused.get(text, -_THROTTLE_S) >= _THROTTLE_S:
-            self._refused[text] = now
+        if self._due(text, _THROTTLE_S):
             self.get_logger().error(text)
         self.state['last refusal'] = text
+
+    def _due(self, what, pause_s):
+        """Whether something was not said for a while, and is now."""
+        now = time.monotonic()
+        due = now - self._said.get(what, -pause_s) >= pause_s
+        if due:
+            self._said[what] = now
+        return due
 
     def tell_missing(self, topic, count):
         """Say, once in a while, how many frames did not come so far."""
         self.state['frames missing'] = count
-        now = time.monotonic()
-        if now - self._refused.get('missing', -_MISSING_S) >= _MISSING_S:
-            self._refused['missing'] = now
+        if self._due('frames missing', _MISSING_S):
             self.get_logger().warning(
                 f'{topic}: {count} frames missing so far, by their stamps: lost on the way, or '
                 'this machine is too slow; follow fewer trays, see docs/doctor.md'

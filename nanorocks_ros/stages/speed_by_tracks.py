@@ -25,6 +25,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.stages.bodies.count import BodyCounter
 from nanorocks_ros.stages.contacts.find import ContactFinder
+from nanorocks_ros.stages.quantiles import middle
 from nanorocks_ros.stages.shaking import NS, CycleFollower
 from nanorocks_ros.stages.tracking.mean_speed import (
     JITTER_PICTURES,
@@ -180,8 +181,8 @@ class TrackSpeed:
         self._followed.append(min(one.share if one else 0.0 for one in each))
         speeds = np.array([speed for speed, _ in species])
         self._steps.append(self._longest_step(speeds, np.diff(series.stamps)))
-        self._usually_followed = float(np.median(self._followed))
-        self._usual_step = float(np.median(self._steps))
+        self._usually_followed = middle(self._followed)
+        self._usual_step = middle(self._steps)
         flags, self._flags = self._flags, Quality(0)
         if mean.share < RELIABLE_SHARE:
             flags |= Quality.FEW_BEADS
@@ -210,9 +211,7 @@ class TrackSpeed:
 
     def _longest_step(self, speeds: NDArray[np.float64], intervals_ns: NDArray[np.int64]) -> float:
         """Way of a bead between two pictures over the distance to others, of the worst species."""
-        intervals_ns.sort()
-        middle = (intervals_ns.size - 1) // 2, intervals_ns.size // 2
-        picture = float(intervals_ns[middle[0]] + intervals_ns[middle[1]]) / 2 / NS
+        picture = middle(intervals_ns.tolist()) / NS
         return float(np.max(np.nan_to_num(speeds) * picture / self._neighbours))
 
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from nanorocks_ros.errors import NanorocksError, RecordingError
 from nanorocks_ros.recordings.content import FileState, content_hash, file_states
-from nanorocks_ros.recordings.reader import open_bag
 from nanorocks_ros.study.archive import Arrays, write_archive, write_whole
 from nanorocks_ros.study.campaign_cycles import SIZE_MEASURES, CycleSummary, cycles_of
 from nanorocks_ros.study.export import as_json, write_results
@@ -148,7 +147,7 @@ def _analysed(task: BagTask) -> BagOutcome:
         'format': 1,
         'bag': str(task.path),
         'content': content,
-        'film': open_bag(task.path).metadata.get('source_sha256', ''),
+        'film': analysis.metadata.get('source_sha256', ''),
         'question': task.question,
         **_summary(analysis),
     }

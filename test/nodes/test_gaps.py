@@ -45,3 +45,8 @@ def test_a_camera_without_a_rate_misses_nothing():
 def test_time_that_goes_back_is_no_gap():
     once = np.arange(40) / 30.0
     assert sum(counted([*(100.0 + once), *once])) == 0
+
+
+def test_a_pause_is_no_gap():
+    once = np.arange(40) / 30.0
+    assert sum(counted([*once, *(60.0 + once)])) == 0
