@@ -53,7 +53,8 @@ ONCE := test/validation test/simulation test/inference test/dashboard/test_page.
         test/test_contributing.py
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
-	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 PATH="$(CURDIR)/$(OLDEST)/bin:$$PATH" python -m pytest \
+	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba" \
+	    PATH="$(CURDIR)/$(OLDEST)/bin:$$PATH" python -m pytest \
 	    $(SIDE_BY_SIDE) $(patsubst %,--ignore=%,$(ONCE)) $(PYTEST_ARGS)
 
 lint: venv ## Check style, format, types and which module may import which
