@@ -67,7 +67,8 @@ def measure_plate(path: str) -> None:
     decode = _timed(lambda: _decode(Path(path)))
     settings = with_values(PipelineSettings(), PLATE, 'benchmark')
     before = _peak_mb()
-    whole = _timed(lambda: analyse(path, settings, progress=note))
+    folder = Path(path).parent
+    whole = _timed(lambda: analyse(path, settings, progress=note, scratch=folder))
     third = min(at for at in peaks if at >= 1.0)
     frames = BagFrames(path).count
     print(json.dumps([frames, decode, whole, before, peaks[third], _peak_mb()]))

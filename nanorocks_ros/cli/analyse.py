@@ -6,6 +6,7 @@ import json
 import math
 import sys
 from pathlib import Path
+from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.experiment.settings import PipelineSettings
@@ -74,13 +75,20 @@ def run(options: argparse.Namespace) -> int:
 
 def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.study.export import as_json, write_results
+    from nanorocks_ros.study.export import check_results_folder, write_results
     from nanorocks_ros.study.offline import analyse
+    from nanorocks_ros.study.results_json import as_json
 
     source = Path(options.bags[0])
+    folder = Path(options.output or f'{str(source).rstrip("/")}_results')
+    scratch = Path(gettempdir()) if options.no_output else check_results_folder(folder)
     with Progress('analysing') as progress:
         analysis = analyse(
-            source, settings, image_topic=options.image_topic, progress=progress.count
+            source,
+            settings,
+            image_topic=options.image_topic,
+            progress=progress.count,
+            scratch=scratch,
         )
     for notice in analysis.notices:
         print(f'nanorocks: {notice}', file=sys.stderr)
@@ -89,7 +97,6 @@ def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
     else:
         _print(analysis)
     if not options.no_output:
-        folder = Path(options.output or f'{str(source).rstrip("/")}_results')
         write_results(analysis, folder, source, settings, options.format)
         print(f'nanorocks: results in {folder}', file=sys.stderr)
     if analysis.error is not None:
@@ -106,7 +113,7 @@ def _print(analysis: Analysis) -> None:
 
 
 def _print_cycles(results: TrayResults) -> None:
-    from nanorocks_ros.study.export import last_of_each_cycle
+    from nanorocks_ros.study.results_json import last_of_each_cycle
 
     cycles = last_of_each_cycle(results.cors)
     if not cycles:

@@ -135,13 +135,14 @@ def _analysed(options: argparse.Namespace, bag: Path, folder: Path) -> Path:
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.experiment.settings import PipelineSettings, with_values
-    from nanorocks_ros.study.export import write_results
+    from nanorocks_ros.study.export import check_results_folder, write_results
     from nanorocks_ros.study.offline import analyse
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
     settings = with_values(settings, {'trays': [options.tray]}, '--tray')
+    scratch = check_results_folder(folder)
     with Progress('analysing') as progress:
-        analysis = analyse(bag, settings, progress=progress.count)
+        analysis = analyse(bag, settings, progress=progress.count, scratch=scratch)
     for notice in analysis.notices:
         print(f'nanorocks: {notice}', file=sys.stderr)
     write_results(analysis, folder, bag, settings)

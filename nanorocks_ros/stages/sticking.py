@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 _FEWEST_SPEEDS = 4
 # A merge is used in what is said of an instant when it was known that much later at the latest.
 _KNOWN_NS = 1_000_000_000
+# Counts of bodies are kept that long; nobody asks of an instant more than seconds ago.
+_KEPT_NS = 20 * NS
 # Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
 _ROUNDING_NS = 1_000_000
 
@@ -91,9 +93,14 @@ class StickingMeter:
             cycle.merges.append(record)
         elif isinstance(record, BodyEstimate):
             insort(cycle.bodies, record, key=_stamp)
+            # Half of them at once, for what is left has to move up.
+            last_ns = cycle.bodies[-1].stamp_ns
+            if last_ns - cycle.bodies[0].stamp_ns > 2 * _KEPT_NS:
+                del cycle.bodies[: bisect_left(cycle.bodies, last_ns - _KEPT_NS, key=_stamp)]
         else:
             cycle.start_ns = record.cycle_start_ns
-            if np.isfinite(record.mean_projected_speed):
+            # Before the first shaking event there may be hours, and no cycle.
+            if cycle.start_ns is not None and np.isfinite(record.mean_projected_speed):
                 cycle.stamps_ns.append(record.stamp_ns)
                 cycle.speeds.append(record.mean_projected_speed)
         # Of earlier cycles nothing more is asked, once the next is on its way.

@@ -16,8 +16,9 @@ from nanorocks_ros.errors import NanorocksError, RecordingError
 from nanorocks_ros.recordings.content import FileState, content_hash, file_states
 from nanorocks_ros.study.archive import Arrays, write_archive, write_whole
 from nanorocks_ros.study.campaign_cycles import SIZE_MEASURES, CycleSummary, cycles_of
-from nanorocks_ros.study.export import as_json, write_results
+from nanorocks_ros.study.export import write_results
 from nanorocks_ros.study.offline import Analysis, analyse
+from nanorocks_ros.study.results_json import as_json
 from nanorocks_ros.study.shown import shown
 from nanorocks_ros.study.spool import SpoolError
 

@@ -27,10 +27,11 @@ from nanorocks_ros.experiment.settings import (
 )
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.recordings.reader import open_bag
-from nanorocks_ros.study.export import as_json, write_results
+from nanorocks_ros.study.export import write_results
 from nanorocks_ros.study.film_bag import START_NS
 from nanorocks_ros.study.film_scene import SceneRecorder
 from nanorocks_ros.study.offline import analyse
+from nanorocks_ros.study.results_json import as_json
 from nanorocks_ros.study.tasks import Workers, run_tasks
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.beads import beads_from_array
@@ -260,9 +261,9 @@ def film_and_analyse(task: CycleTask) -> str:
     recorder = SceneRecorder(task.simulation, scene, task.plan.seconds)
     recorder.into_bag(film, CompressionSettings(), _QUALITY, partial(_note, part, 0))
     settings = plate_settings()
-    found = analyse(film, settings, progress=partial(_note, part, 1))
+    found = analyse(film, settings, progress=partial(_note, part, 1), scratch=part)
     write_results(found, part / RESULTS, film, settings)
-    by_paper = analyse(film, paper_settings(), progress=partial(_note, part, 2))
+    by_paper = analyse(film, paper_settings(), progress=partial(_note, part, 2), scratch=part)
     write_results(by_paper, part / PAPER, film, paper_settings())
     summary = {
         'default': as_json(found),

@@ -30,11 +30,21 @@ class SpoolFile:
     ----------
     folder : Path
         On a disk with room.
+
+    Raises
+    ------
+    SpoolError
+        When nothing can be written there.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._file = TemporaryFile(dir=folder)  # noqa: SIM115  # closed with the last spool
+        try:
+            self._file = TemporaryFile(dir=folder)  # noqa: SIM115  # closed with the last spool
+        except OSError as error:
+            raise SpoolError(
+                str(folder), f'cannot be written ({error.strerror})', 'pass a writable --output'
+            ) from error
 
     def add(self, content: bytes) -> tuple[int, int]:
         """Keep some bytes; where they are.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sticking_records import NS, STICKING, TRAY, cooling, merge, ns, speed
+from sticking_records import NS, STICKING, TRAY, cooling, count, merge, ns, speed
 
 from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.records import BodyEstimate, Merge, SpeedEstimate, StickingStatus
@@ -78,3 +78,11 @@ def test_time_that_goes_back_starts_afresh():
     stage = meter([*cooling(), speed(1.0, 1e-3, 0, 0.0)])
     assert stage.onset(1, ns(39.0)) is None
     assert stage.of_all(2, ns(39.0)) is None
+
+
+def test_of_a_tray_that_is_shaken_no_more_only_the_last_counts_are_kept():
+    records = [count(time, TRAY.count - time / 1000.0, 1) for time in np.arange(0.0, 200.0, 0.5)]
+    found = meter([speed(0.5, 1e-3, 1, 0.0), *records])
+    for back in (0.0, 5.0, 15.0):
+        assert found.bodies(1, ns(199.5 - back)) == records[-1 - round(2 * back)]
+    assert found.bodies(1, ns(100.0)) is None

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.recordings.reader import open_bag
-from nanorocks_ros.records import CorEstimate, CorRelation, CorStatus, SpeedEstimate, SpeedMethod
-from nanorocks_ros.study.export import FORMATS, as_json, write_results
+from nanorocks_ros.records import (
+    CorEstimate,
+    CorRelation,
+    CorStatus,
+    Merge,
+    SpeedEstimate,
+    SpeedMethod,
+)
+from nanorocks_ros.study.export import FORMATS, write_results
 from nanorocks_ros.study.offline import _LISTS, Analysis, TrayResults
+from nanorocks_ros.study.results_json import as_json
+from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import from_array, layout
 
 NS = 1_000_000_000
@@ -98,3 +107,41 @@ def test_every_kind_of_result_goes_into_the_bag_and_into_the_tables(tmp_path):
     tables = {one.stem.removeprefix('tray_5_') for one in (tmp_path / 'results').glob('*.csv')}
     assert {one.rpartition('/')[2] for one in bag.topics} == {*tables, 'epoch'}
     assert len(tables) == len(_LISTS)
+
+
+def test_records_that_came_in_another_order_stand_by_their_stamps_in_the_bag(tmp_path):
+    came = [3, 1, 2, 7, 5, 7, 4, 6, 9, 8]
+    merges = [
+        Merge(
+            stamp_ns=stamp * NS,
+            known_ns=10 * NS,
+            tray=5,
+            cycle=1,
+            tracks=np.array([number, 99], dtype=np.int32),
+            joins=True,
+        )
+        for number, stamp in enumerate(came)
+    ]
+    found = Analysis(epoch_ns=0, trays={5: TrayResults(merges=merges)})
+    write_results(found, tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
+    bag = open_bag(tmp_path / 'results' / 'results_bag')
+    topic = topics.MERGE.absolute(5)
+    stored = [
+        from_array(Merge, bag.deserialize(one).data, tray=5, epoch_ns=0, where=topic)
+        for one in bag.messages([topic])
+    ]
+    assert [one.stamp_ns // NS for one in stored] == sorted(came)
+    # Those of one stamp as they came in.
+    order = sorted(range(len(came)), key=came.__getitem__)
+    assert [one.tracks.tolist() for one in stored] == [[number, 99] for number in order]
+
+
+def test_tables_in_parquet_are_put_together_of_pieces(tmp_path):
+    pytest.importorskip('pyarrow')
+    from pyarrow import parquet
+
+    speeds = [replace(SPEED, stamp_ns=number * NS) for number in range(2500)]
+    found = Analysis(epoch_ns=0, trays={5: TrayResults(speeds=speeds)})
+    write_results(found, tmp_path / 'out', tmp_path / 'bag', PipelineSettings(), 'parquet')
+    table = parquet.read_table(tmp_path / 'out' / 'tray_5_speed.parquet')
+    assert table['time'].to_pylist() == list(range(2500))

@@ -19,9 +19,10 @@ from nanorocks_ros.recordings.messages import image_message, time_message
 from nanorocks_ros.recordings.reader import open_bag
 from nanorocks_ros.recordings.writer import BagWriter
 from nanorocks_ros.records import CorEstimate, SpeedEstimate
-from nanorocks_ros.study.export import BAG_NAME, as_json, write_results
+from nanorocks_ros.study.export import BAG_NAME, write_results
 from nanorocks_ros.study.offline import analyse
 from nanorocks_ros.study.results_bag import offered
+from nanorocks_ros.study.results_json import as_json
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import from_array, layout
 
@@ -248,6 +249,22 @@ def test_input_that_cannot_be_used_is_exit_code_1_and_one_line(capsys, tmp_path,
     line = error_of(capsys)
     assert str(path) in line
     assert message.lower() in line.lower()
+
+
+def test_where_results_cannot_go_is_said_before_anything_is_analysed(capsys, tmp_path):
+    thesis = tmp_path / 'thesis'
+    thesis.mkdir()
+    (thesis / 'chapter.txt').write_text('precious')
+    for output, message in (
+        (thesis, f'{thesis}: exists and holds no results of ours; pass another --output'),
+        ('/proc/out', '/proc: cannot be written'),
+    ):
+        assert run('analyse', SAMPLE, '-o', output) == 1
+        printed = capsys.readouterr()
+        assert not printed.out
+        assert message in printed.err
+        assert '--output' in printed.err
+    assert (thesis / 'chapter.txt').read_text() == 'precious'
 
 
 def test_a_bag_without_the_camera_says_which_topics_it_has(capsys, tmp_path):
