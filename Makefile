@@ -35,27 +35,27 @@ help: ## List the targets
 demo: venv ## Simulate a tray, watch it cool, estimate the coefficient of restitution
 	@$(RUN) python $(VENV)/lib/nanorocks_ros/demo
 
-# Nodes talk to one another in real time, so their tests have the machine for themselves.
-ALONE := test/nodes test/test_colcon.py
-SIDE_BY_SIDE := --numprocesses auto --dist loadfile $(patsubst %,--ignore=%,$(ALONE))
+# Nodes talk to one another in real time: not beside what keeps all cores busy for minutes.
+NODES := test/nodes test/test_colcon.py
+SIDE_BY_SIDE := --numprocesses auto --dist loadfile
 
 test: venv ## Run all tests, then those of the core with the oldest dependencies
-	@$(RUN) python -m pytest $(SIDE_BY_SIDE) $(PYTEST_ARGS)
-	@$(RUN) python -m pytest $(ALONE) $(PYTEST_ARGS)
+	@$(RUN) python -m pytest $(SIDE_BY_SIDE) $(patsubst %,--ignore=%,$(NODES)) $(PYTEST_ARGS)
+	@$(RUN) python -m pytest $(SIDE_BY_SIDE) $(NODES) $(PYTEST_ARGS)
 	@$(MAKE) test-oldest
 
-# What takes minutes and only goes through, once more, what other tests go through: those of the
-# stages as a whole go through their parts and the inference. The simulation is the same, bit by
-# bit, with all dependencies.
-ONCE := test/validation test/simulation test/inference test/dashboard/test_page.py \
-        test/stages/bodies test/stages/contacts test/stages/tracking \
-        test/study/test_reproduce.py test/study/test_batch.py test/cli/test_figure_cor.py \
-        test/test_contributing.py
+# What takes minutes and only goes through, once more, what other tests go through: analyses of
+# whole bags go through all stages and the inference. The simulation is the same, bit by bit, with
+# all dependencies.
+ONCE := test/validation test/simulation test/inference test/stages test/dashboard/test_page.py \
+        test/study/test_reproduce.py test/study/test_batch.py test/study/test_plate_fit.py \
+        test/study/test_cluster_curve.py test/study/test_area_calibration.py \
+        test/cli/test_figure_cor.py test/test_contributing.py
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba" \
 	    PATH="$(CURDIR)/$(OLDEST)/bin:$$PATH" python -m pytest \
-	    $(SIDE_BY_SIDE) $(patsubst %,--ignore=%,$(ONCE)) $(PYTEST_ARGS)
+	    $(SIDE_BY_SIDE) $(patsubst %,--ignore=%,$(NODES) $(ONCE)) $(PYTEST_ARGS)
 
 lint: venv ## Check style, format, types and which module may import which
 	@$(RUN) ruff check .

@@ -25,9 +25,27 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.simulation.film import film
 from nanorocks_ros.stages.warm_up import warm_up, warm_up_counting, warm_up_speed
 
-# Two runs of the tests at once must not hear one another; 101 is the last safe number.
-_DOMAINS = itertools.cycle(random.Random(os.getpid()).sample(range(1, 102), 101))
 _PATIENCE_S = 40.0
+# With more, ports are those that the system gives to anybody.
+_LAST_DOMAIN = 101
+
+
+def _domains():
+    """Domains of this process; two runs of the tests at once take theirs in another order."""
+    workers = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
+    own = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
+    numbers = [one for one in range(1, _LAST_DOMAIN + 1) if one % workers == own]
+    random.Random(os.getpid()).shuffle(numbers)
+    return itertools.cycle(numbers)
+
+
+_DOMAINS = _domains()
+
+
+@pytest.fixture
+def domain():
+    """A ROS domain on which nobody else is."""
+    return next(_DOMAINS)
 
 
 @pytest.fixture(scope='session', autouse=True)
@@ -118,9 +136,8 @@ class Graph:
 
 
 @pytest.fixture
-def graph(tmp_path, monkeypatch):
+def graph(tmp_path, monkeypatch, domain):
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    domain = next(_DOMAINS)
     context = Context()
     rclpy.init(args=[], context=context, domain_id=domain)
     node = Node('listener', context=context, namespace='nanorocks')

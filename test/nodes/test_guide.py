@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import os
-import random
 import re
 import signal
 import subprocess
@@ -61,7 +60,7 @@ def make_film(path, bag, frames):
 class Shell:
     """Runs blocks in a folder, with the environment of the guide."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, domain):
         self._folder = folder
         self._going_on = []
         self._environment = {
@@ -69,7 +68,7 @@ class Shell:
             'PATH': f'{sys.prefix}/bin:{os.environ["PATH"]}',
             'AMENT_PREFIX_PATH': sys.prefix,
             'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-            'ROS_DOMAIN_ID': str(random.Random(os.getpid() + 1).randrange(1, 102)),
+            'ROS_DOMAIN_ID': str(domain),
             'OPENBLAS_NUM_THREADS': '1',
         }
 
@@ -115,12 +114,12 @@ class Shell:
                 os.killpg(process.pid, signal.SIGKILL)
 
 
-def test_the_guide_does_what_it_says(root, tmp_path):
+def test_the_guide_does_what_it_says(root, tmp_path, domain):
     make_film(tmp_path / 'film.avi', root / 'bags/tray_1_sample', FRAMES)
     (tmp_path / 'videos').mkdir()
     for name in ('run 1.avi', 'läuft.avi'):
         make_film(tmp_path / 'videos' / name, root / 'bags/tray_1_sample', FEW_FRAMES)
-    shell = Shell(tmp_path)
+    shell = Shell(tmp_path, domain)
     said = {}
     try:
         for mark, block in commands((root / 'docs/guide.md').read_text(encoding='utf-8')):
