@@ -112,6 +112,8 @@ class SpeedEstimator:
         else:
             if method == 'auto':
                 self._structure.watch(image)
+            if not self._idle:
+                self._structure.rest()
             self._idle = True
         return tuple(self._finished(one) for one in found if self._in_order(one))
 

@@ -76,6 +76,11 @@ class StructureSpeed:
         self._flags = Quality(0)
         return estimates
 
+    def rest(self) -> None:
+        """Hold no images while there is no use for them."""
+        if self._motions is not None:
+            self._motions.shaken()
+
     def watch(self, image: TrayImage) -> None:
         """See no more of an image than what the noise is, for when it will be needed."""
         self._watched = (self._watched + 1) % _WATCHED

@@ -150,7 +150,10 @@ class StructureFunction:
             self._next_sample_ns += round(self._settings.interval * NS)
             self._next_sample_ns = max(self._next_sample_ns, stamp_ns + 1)
             found = self._sample(cycle, noise_power, self._centred)
-        if not self._keys or stamp_ns - self._keys[-1][0] >= self._key_interval_ns:
+        if self._response.pairs >= _PAIRS_KEPT:
+            # All is learnt.
+            self._keys.clear()
+        elif not self._keys or stamp_ns - self._keys[-1][0] >= self._key_interval_ns:
             self._learn(stamp_ns, gray, noise_power)
             self._keep(stamp_ns, gray)
         return found
@@ -228,7 +231,7 @@ class StructureFunction:
         return max(0, int(np.argmin(np.append(low_enough, False))) - 1)
 
     def _learn(self, stamp_ns: int, gray: NDArray[np.uint8], noise_power: float) -> None:
-        if not self._keys or self._response.pairs >= _PAIRS_KEPT:
+        if not self._keys:
             return
         if not self.ready:
             self._guess(gray, noise_power)

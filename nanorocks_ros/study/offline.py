@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -79,7 +80,7 @@ class Analysis:
     ----------
     epoch_ns : int
         What times count from.
-    stamps_ns : list of int
+    stamps_ns : sequence of int, [ns]
         Of the frames analysed.
     trays : dict of int to TrayResults
     notices : list of str
@@ -96,7 +97,7 @@ class Analysis:
 
     epoch_ns: int
     trays: dict[int, TrayResults]
-    stamps_ns: list[int] = field(default_factory=list)
+    stamps_ns: array[int] = field(default_factory=lambda: array('q'))
     notices: list[str] = field(default_factory=list)
     complete: bool = True
     error: FrameError | None = None

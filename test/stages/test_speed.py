@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import weakref
 from dataclasses import replace
 
 import cv2
@@ -260,6 +261,18 @@ def test_tracks_are_relied_upon_where_nearly_all_beads_are_followed(run):
     found = pushed(run[0], 'auto')
     assert {one.method for one in found} == {SpeedMethod.TRACKING}
     assert not any(one.quality & Quality.FEW_BEADS for one in found)
+
+
+def test_images_are_not_kept_for_a_method_that_is_not_used(run):
+    estimator = SpeedEstimator(PipelineSettings(), TRAY)
+    kept = []
+    for image in run[0]:
+        fresh = replace(image, gray=image.gray.copy(), color=image.color.copy())
+        kept += [weakref.ref(fresh.gray), weakref.ref(fresh.color)]
+        estimator.push(fresh)
+    del fresh
+    # A dozen are the running mean of the mask, and the last one.
+    assert sum(one() is not None for one in kept) <= 12
 
 
 def test_without_colour_the_structure_function_steps_in(run):

@@ -21,14 +21,20 @@ class Births:
     """Follows which beads were not there before."""
 
     def __init__(self) -> None:
+        # In this cycle, and before that.
+        self._seen: set[int] = set()
         self._known: set[int] = set()
         self._twice: set[tuple[int, int]] = set()
         self._count = 0
         self._last: NDArray[np.int64] | None = None
 
     def next_cycle(self) -> None:
-        """Count anew."""
+        """Count anew, and forget beads that were not there in the whole cycle that is over."""
         self._count = 0
+        self._twice = {pair for pair in self._twice if self._seen.issuperset(pair)}
+        self._known = self._seen
+        self._seen = set()
+        self._last = None
 
     def push(self, tracks: Tracks, ids: NDArray[np.int64]) -> None:
         """Take the next picture, with the numbers of its beads, (n,)."""
@@ -36,6 +42,7 @@ class Births:
             return
         self._last = ids
         numbers = ids.tolist()
+        self._seen.update(numbers)
         if self._known.issuperset(numbers):
             return
         fresh = [row for row, number in enumerate(numbers) if number not in self._known]
