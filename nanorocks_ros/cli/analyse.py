@@ -81,7 +81,7 @@ def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
 
     source = Path(options.bags[0])
     folder = Path(options.output or f'{str(source).rstrip("/")}_results')
-    scratch = Path(gettempdir()) if options.no_output else check_results_folder(folder)
+    scratch = _temporary() if options.no_output else check_results_folder(folder)
     with Progress('analysing') as progress:
         analysis = analyse(
             source,
@@ -102,6 +102,14 @@ def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
     if analysis.error is not None:
         raise analysis.error
     return 0
+
+
+def _temporary() -> Path | None:
+    """Where records may lie meanwhile; in memory where the system has no place for such."""
+    try:
+        return Path(gettempdir())
+    except OSError:
+        return None
 
 
 def _print(analysis: Analysis) -> None:

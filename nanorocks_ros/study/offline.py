@@ -80,7 +80,7 @@ class Analysis:
     ----------
     epoch_ns : int
         What times count from.
-    stamps_ns : sequence of int, [ns]
+    stamps_ns : array of 64-bit int, [ns]
         Of the frames analysed.
     trays : dict of int to TrayResults
     notices : list of str
