@@ -73,7 +73,7 @@ class PreprocessSettings:
     check_map: bool = _setting(
         True,
         'look whether the trays are where they should be; where they are plainly somewhere else '
-        'no restitution is given',
+        'neither restitution nor cluster size is given',
     )
     shake_speed: float = _setting(
         0.001,

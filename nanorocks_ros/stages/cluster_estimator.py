@@ -8,11 +8,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.records import (
+    UNKNOWN,
     Autocorrelation,
     BodyEstimate,
     ClusterEstimate,
     Merge,
     Notice,
+    Quality,
+    SizeStatus,
     SpeedEstimate,
     StickingStatus,
     TrayImage,
@@ -66,7 +69,8 @@ class ClusterEstimator:
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._images = ClusterAutocorrelator(settings, tray)
         self._sticking = StickingMeter(settings, tray)
-        self._held: deque[ClusterEstimate] = deque()
+        # With whether the scale of the picture is wrong.
+        self._held: deque[tuple[ClusterEstimate, bool]] = deque()
         self._last_ns: int | None = None
         self._of_cycle: tuple[tuple[int, int], StickingEstimate | None] | None = None
 
@@ -99,22 +103,26 @@ class ClusterEstimator:
         if self._last_ns is not None and record.stamp_ns <= self._last_ns:
             found += self.flush()
         self._last_ns = record.stamp_ns
+        wrong_scale = bool(record.quality & Quality.WRONG_SCALE)
         for one in self._images.push(record):
             if isinstance(one, ClusterEstimate):
-                self._held.append(one)
+                self._held.append((_without_size(one) if wrong_scale else one, wrong_scale))
             else:
                 found.append(one)
-        while self._held and record.stamp_ns - self._held[0].stamp_ns >= _HELD_NS:
-            found.append(self._completed(self._held.popleft()))
+        while self._held and record.stamp_ns - self._held[0][0].stamp_ns >= _HELD_NS:
+            found.append(self._completed(*self._held.popleft()))
         return tuple(found)
 
     def flush(self) -> tuple[ClusterEstimate, ...]:
         """The estimates of the last two seconds."""
         left, self._held = list(self._held), deque()
-        return tuple(self._completed(one) for one in left)
+        return tuple(self._completed(*one) for one in left)
 
-    def _completed(self, estimate: ClusterEstimate) -> ClusterEstimate:
+    def _completed(self, estimate: ClusterEstimate, wrong_scale: bool) -> ClusterEstimate:
         cycle, stamp_ns = estimate.cycle, estimate.stamp_ns
+        if wrong_scale:
+            # Nor are beads and merges what they seem to be.
+            return estimate
         fields: dict[str, Any] = {}
         bodies = self._sticking.bodies(cycle, stamp_ns)
         if bodies is not None and stamp_ns - bodies.stamp_ns <= _RECENT_NS:
@@ -157,6 +165,18 @@ class ClusterEstimator:
         if self._of_cycle is None or self._of_cycle[0] != key:
             self._of_cycle = key, self._sticking.of_cycle(cycle, whole_ns)
         return self._of_cycle[1]
+
+
+def _without_size(estimate: ClusterEstimate) -> ClusterEstimate:
+    """The same of a picture whose scale is wrong, of which nobody can tell the size of a bead."""
+    return replace(
+        estimate,
+        size_status=SizeStatus.NOTHING,
+        cluster_size=UNKNOWN,
+        cluster_size_error=UNKNOWN,
+        cluster_size_lower=UNKNOWN,
+        cluster_size_upper=UNKNOWN,
+    )
 
 
 def _combined(*sizes: tuple[float, float]) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from nanorocks_ros.inference.merge_terms import MergeRates, MergeTerms
 from nanorocks_ros.inference.sticking import StickingEstimate, estimate_by
 from nanorocks_ros.inference.sticking_cycle import StickingCycle, sticking_cycle
 from nanorocks_ros.physics.sticking import slow_contacts
-from nanorocks_ros.records import BodyEstimate, Merge, SpeedEstimate
+from nanorocks_ros.records import BodyEstimate, Merge, Quality, SpeedEstimate
 from nanorocks_ros.stages.shaking import NS
 
 if TYPE_CHECKING:
@@ -43,6 +43,8 @@ class _Cycle:
 
     number: int
     start_ns: int | None = None
+    # Speeds and places are wrong by nobody knows how much.
+    wrong_scale: bool = False
     stamps_ns: list[int] = field(default_factory=list)
     speeds: list[float] = field(default_factory=list)
     merges: list[Merge] = field(default_factory=list)
@@ -99,6 +101,7 @@ class StickingMeter:
                 del cycle.bodies[: bisect_left(cycle.bodies, last_ns - _KEPT_NS, key=_stamp)]
         else:
             cycle.start_ns = record.cycle_start_ns
+            cycle.wrong_scale |= bool(record.quality & Quality.WRONG_SCALE)
             # Before the first shaking event there may be hours, and no cycle.
             if cycle.start_ns is not None and np.isfinite(record.mean_projected_speed):
                 cycle.stamps_ns.append(record.stamp_ns)
@@ -172,7 +175,7 @@ class StickingMeter:
     def _seen(self, cycle: int, stamp_ns: int) -> StickingCycle | None:
         own = self._cycles.get(cycle)
         # Without counts of bodies nobody looked for merges.
-        if own is None or own.start_ns is None or not own.bodies:
+        if own is None or own.start_ns is None or own.wrong_scale or not own.bodies:
             return None
         used = int(np.searchsorted(own.stamps_ns, stamp_ns + _ROUNDING_NS))
         if used < _FEWEST_SPEEDS:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy import stats
 
-from nanorocks_ros.records import CorStatus
+from nanorocks_ros.records import CorStatus, Quality
 from nanorocks_ros.study.result_tables import read_columns
 
 if TYPE_CHECKING:
@@ -114,6 +114,7 @@ def cycles_of(folder: Path, tray: int, measure: SizeMeasure) -> list[CycleSummar
             'mean_projected_speed',
             'mean_projected_speed_error',
         ),
+        ('quality',),
     )
     cors = _table(
         folder / f'tray_{tray}_cor.csv',
@@ -160,6 +161,9 @@ def _peak(
     speeds: dict[str, NDArray[np.float64]], own: NDArray[np.bool_], start: float
 ) -> dict[str, float]:
     early = own & (speeds['time'] - start <= _PEAK) & np.isfinite(speeds['mean_projected_speed'])
+    if 'quality' in speeds:
+        # Wrong by nobody knows how much.
+        early &= (speeds['quality'].astype(np.int64) & Quality.WRONG_SCALE) == 0
     if not early.any():
         return {'peak_speed': math.nan, 'peak_speed_error': math.nan}
     values = speeds['mean_projected_speed'][early]

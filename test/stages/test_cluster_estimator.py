@@ -16,6 +16,8 @@ from nanorocks_ros.records import (
     BodyEstimate,
     ClusterEstimate,
     Merge,
+    Quality,
+    SpeedEstimate,
     StickingStatus,
     TrayImage,
 )
@@ -115,3 +117,35 @@ def test_time_that_goes_back_gives_out_what_was_held():
     stamps = [one.stamp_ns for one in (*once, *held) if isinstance(one, ClusterEstimate)]
     assert stamps == sorted(stamps)
     assert stamps[-1] > ns(4.5)
+
+
+def test_where_the_scale_is_wrong_nothing_is_said_of_clusters_and_sticking():
+    records = as_they_come([*cooling(until=12.0), *images(12.0)], {})
+    assert math.isfinite(estimates(records)[-1].sticking_speed)
+    wrong = [
+        replace(one, quality=Quality.WRONG_SCALE)
+        if isinstance(one, TrayImage | SpeedEstimate)
+        else one
+        for one in records
+    ]
+    found = estimates(wrong)
+    assert len(found) > 40
+    for one in found:
+        assert math.isnan(one.cluster_size)
+        assert math.isnan(one.combined_size)
+        assert math.isnan(one.bodies)
+        assert math.isnan(one.onset)
+        assert one.sticking_status is StickingStatus.UNKNOWN
+        assert math.isnan(one.sticking_speed)
+
+
+def test_a_cycle_with_a_wrong_scale_tells_no_sticking_speed_even_once_it_is_right_again():
+    records = as_they_come([*cooling(until=12.0), *images(12.0)], {})
+    first = next(k for k, one in enumerate(records) if isinstance(one, SpeedEstimate))
+    records[first] = replace(records[first], quality=Quality.WRONG_SCALE)
+    stage = ClusterEstimator(PipelineSettings(), TRAY)
+    found = [one for record in records for one in stage.push(record)]
+    assert {one.sticking_status for one in found if isinstance(one, ClusterEstimate)} == {
+        StickingStatus.UNKNOWN
+    }
+    assert stage.cycles == ()

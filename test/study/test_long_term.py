@@ -10,7 +10,12 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.experiment.settings import PipelineSettings
+from nanorocks_ros.records import Quality, SpeedEstimate, SpeedMethod
+from nanorocks_ros.study.campaign_cycles import SIZE_MEASURES, cycles_of
+from nanorocks_ros.study.export import write_results
 from nanorocks_ros.study.long_term import in_period, read_campaign, write_campaign
+from nanorocks_ros.study.offline import Analysis, TrayResults
 from nanorocks_ros.study.result_tables import read_columns
 
 sys.path.append(str(Path(__file__).parent))
@@ -126,3 +131,28 @@ def test_a_recording_that_is_named_twice_is_refused(folders):
 def test_a_folder_that_holds_no_results_is_named(tmp_path):
     with pytest.raises(RecordingError, match='holds no tray_K_speed'):
         read_campaign([tmp_path])
+
+
+def test_speeds_measured_at_a_wrong_scale_are_no_peaks(tmp_path):
+    def speed(time, cycle, quality):
+        return SpeedEstimate(
+            stamp_ns=round(time * 1e9),
+            tray=1,
+            cycle=cycle,
+            cycle_start_ns=cycle * 60_000_000_000,
+            mean_projected_speed=PEAK,
+            mean_projected_speed_error=1e-4,
+            window=0.1,
+            method=SpeedMethod.TRACKING,
+            quality=quality,
+        )
+
+    speeds = [
+        *(speed(61.0 + k, 1, Quality.WRONG_SCALE | Quality.UNCERTAIN) for k in range(3)),
+        *(speed(121.0 + k, 2, Quality.UNCERTAIN) for k in range(3)),
+    ]
+    analysis = Analysis(epoch_ns=0, trays={1: TrayResults(speeds=speeds)})
+    write_results(analysis, tmp_path / 'results', Path('bag'), PipelineSettings())
+    first, second = cycles_of(tmp_path / 'results', 1, SIZE_MEASURES[-1])
+    assert math.isnan(first.peak_speed)
+    assert second.peak_speed == pytest.approx(PEAK)
