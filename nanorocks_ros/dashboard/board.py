@@ -70,6 +70,13 @@ class Series:
             self.rows = self.rows[:-1:2] + self.rows[-1:]
             self.generation += 1
 
+    def cut(self, time: float) -> None:
+        """Take back what is later."""
+        kept = [row for row in self.rows if row[0] is None or row[0] <= time]
+        if len(kept) < len(self.rows):
+            self.rows = kept
+            self.generation += 1
+
     def since(self, told: tuple[int, int]) -> tuple[int, list[Row]]:
         """Where new points begin, and the points."""
         generation, count = told
@@ -126,7 +133,15 @@ class TrayBoard:
     def take(self, record: Shown, now_s: float) -> None:
         """Note a record."""
         name, columns = _COLUMNS[type(record)]
-        if record.stamp_ns < self._stamps.get(name, record.stamp_ns) - _BACK_NS:
+        # A merge that became known later ends the window where beads began to stick.
+        ended = (
+            isinstance(record, CorEstimate)
+            and record.status is not CorStatus.COOLING
+            and record.cycle == self.cycle
+        )
+        if ended:
+            self.series[name].cut(record.stamp_ns / NS)
+        elif record.stamp_ns < self._stamps.get(name, record.stamp_ns) - _BACK_NS:
             self.finals.clear()
             self._finals_version += 1
             self._begin(record.cycle)

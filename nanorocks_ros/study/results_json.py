@@ -21,15 +21,27 @@ def _known(value: float) -> float | None:
 def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
     """The final estimate of every cycle, or its last where none is final."""
     latest: dict[tuple[int, int], CorEstimate] = {}
-    passes, last_stamp_ns = 0, None
+    passes = 0
+    last: CorEstimate | None = None
     for one in cors:
         # Time went back: cycles are counted from 1 again, and are others.
-        passes += last_stamp_ns is not None and one.stamp_ns < last_stamp_ns
-        last_stamp_ns = one.stamp_ns
+        if last is not None and one.stamp_ns < last.stamp_ns and not _ended_by_merge(last, one):
+            passes += 1
+        last = one
         before = latest.get((passes, one.cycle))
         if before is None or before.status is not CorStatus.FINAL:
             latest[passes, one.cycle] = one
     return list(latest.values())
+
+
+def _ended_by_merge(last: CorEstimate, one: CorEstimate) -> bool:
+    """Whether an earlier stamp is that of a merge, known later, which ended the cycle's window."""
+    final = CorStatus.FINAL
+    return (
+        one.cycle == last.cycle
+        and last.status is not final
+        and one.status is not CorStatus.COOLING
+    )
 
 
 def as_json(analysis: Analysis, *, series: bool = True) -> dict[str, Any]:

@@ -130,6 +130,23 @@ def test_a_source_that_starts_again_starts_the_page_again(board):
     assert told['finals'] == []
 
 
+def test_a_merge_that_became_known_later_ends_the_curve_and_nothing_else(board):
+    cursor = Cursor()
+    board.take(speed(2.0), 0.0)
+    board.take(cor(10.0, status=CorStatus.FINAL, value=0.8), 0.0)
+    for k in range(5):
+        board.take(speed(62.0 + k, cycle=2, start=61.0), 0.0)
+        board.take(cor(62.0 + k, cycle=2), 0.0)
+    board.news(cursor, 0.0)
+    board.take(cor(64.5, cycle=2, status=CorStatus.FINAL, value=0.88), 0.0)
+    told = board.news(cursor, 0.0)['trays']['1']
+    assert 'speed' not in told
+    assert told['cor']['from'] == 0
+    assert [row[0] for row in told['cor']['rows']] == [62.0, 63.0, 64.0, 64.5]
+    assert [one[:2] for one in told['finals']] == [[1, 0.8], [2, 0.88]]
+    assert len(board.news(Cursor(), 0.0)['trays']['1']['speed']['rows']) == 5
+
+
 def test_whoever_hears_estimates_before_speeds_knows_when_the_tray_was_shaken(board):
     board.take(cor(5.0), 0.0)
     assert board.news(Cursor(), 0.0)['trays']['1']['start'] == pytest.approx(1.0)

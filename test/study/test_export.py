@@ -21,7 +21,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.study.export import FORMATS, write_results
 from nanorocks_ros.study.offline import _LISTS, Analysis, TrayResults
-from nanorocks_ros.study.results_json import as_json
+from nanorocks_ros.study.results_json import as_json, last_of_each_cycle
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.layouts import from_array, layout
 
@@ -145,3 +145,22 @@ def test_tables_in_parquet_are_put_together_of_pieces(tmp_path):
     write_results(found, tmp_path / 'out', tmp_path / 'bag', PipelineSettings(), 'parquet')
     table = parquet.read_table(tmp_path / 'out' / 'tray_5_speed.parquet')
     assert table['time'].to_pylist() == list(range(2500))
+
+
+def test_a_cycle_that_a_merge_ended_in_hindsight_is_one_cycle_and_a_second_pass_is_another():
+    cooling, final = CorStatus.COOLING, CorStatus.FINAL
+    course = [
+        *((1, 5.0 + 0.5 * k, cooling) for k in range(5)),
+        (1, 5.6, final),
+        *((2, 65.0 + 0.5 * k, cooling) for k in range(3)),
+        (2, 65.2, CorStatus.UNDETERMINED),
+        (1, 5.0, cooling),
+        (1, 5.4, final),
+        (1, 5.0, cooling),
+    ]
+    cors = [
+        replace(COR, cycle=cycle, stamp_ns=round(time * NS), status=status)
+        for cycle, time, status in course
+    ]
+    found = [(one.cycle, one.stamp_ns / NS, one.status) for one in last_of_each_cycle(cors)]
+    assert found == [course[5], course[9], course[11], course[12]]
