@@ -12,6 +12,7 @@ from nanorocks_ros.errors import FitError, RecordingError
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.inference.evidence import Evidence
 from nanorocks_ros.inference.sticking_cycle import StickingCycle
+from nanorocks_ros.records import Quality
 from nanorocks_ros.stages.pipeline import TrayStages, trays_of
 from nanorocks_ros.study.archive import read_archive
 from nanorocks_ros.study.batch_task import EVIDENCE
@@ -160,13 +161,17 @@ def combined(
 
 
 def _measure(results: Sequence[BagResults]) -> tuple[str, str]:
-    """The best measure of cluster sizes that every tray of every recording with cycles has."""
+    """The best measure of cluster sizes that every tray of every recording with cycles has.
+
+    Of a tray filmed at a wrong scale no size is known, and nobody else's is given up for that.
+    """
     last = SIZE_MEASURES[-1]
     trays = [
         tray['by_cycle']
         for one in results
         for tray in one.summary['trays'].values()
         if tray['by_cycle'].get(last.column)
+        and not any(cycle['quality'] & Quality.WRONG_SCALE for cycle in tray['cycles'])
     ]
     for one in SIZE_MEASURES:
         if trays and all(one.column in tray for tray in trays):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import io
 import json
 import multiprocessing
@@ -12,6 +13,7 @@ import signal
 import threading
 import time
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +25,7 @@ from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.settings import PipelineSettings, with_values
 from nanorocks_ros.recordings.find_bags import find_bags
+from nanorocks_ros.records import Quality
 from nanorocks_ros.study.batch import BagResults, BatchPlan, run_batch
 from nanorocks_ros.study.combined import combined
 from nanorocks_ros.study.films import ImportSettings
@@ -132,6 +135,14 @@ def test_each_bag_has_the_results_it_has_alone_and_a_tray_what_all_cycles_say(do
     last = alone.trays[1].cors[-1]
     for name in ('restitution', 'restitution_error', 'wall_restitution', 'wall_restitution_error'):
         assert getattr(mean, name) == pytest.approx(getattr(last, f'mean_{name}'), rel=1e-4)
+    # One filmed at a wrong scale, of which no size is known, costs the others none of theirs.
+    wrong = copy.deepcopy(batch[0].summary)
+    for cycle in wrong['trays']['1']['cycles']:
+        cycle['quality'] |= Quality.WRONG_SCALE
+    sizes = wrong['trays']['1']['by_cycle']
+    wrong['trays']['1']['by_cycle'] = {'correlation_length': sizes['correlation_length']}
+    both = combined([*batch, replace(batch[0], summary=wrong)], PipelineSettings())
+    assert both.size_unit == combined(batch, PipelineSettings()).size_unit == '1'
     tray = found['trays']['1']
     cycles = [one for bag in found['bags'] for one in bag['trays']['1']['cycles']]
     assert tray['cycles'] == len(cycles) >= tray['cycles_read'] == 2
