@@ -203,9 +203,11 @@ def test_ctrl_c_ends_it_and_says_what_is_left(tmp_path):
         env={**os.environ, 'OPENBLAS_NUM_THREADS': '1'},
     )
     try:
-        while not (tmp_path / 'bag').exists() and process.poll() is None:
+        # Until there are frames in it: the first ones wait for the camera to be compiled.
+        film = tmp_path / 'bag' / 'bag.mcap'
+        while not film.exists() or film.stat().st_size < 100_000:
+            assert process.poll() is None
             time.sleep(0.05)
-        time.sleep(0.2)
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=30)
     finally:
