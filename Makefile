@@ -46,11 +46,12 @@ test: venv ## Run all tests, then those of the core with the oldest dependencies
 
 # What takes minutes and only goes through, once more, what other tests go through: analyses of
 # whole bags go through all stages and the inference. The simulation is the same, bit by bit, with
-# all dependencies.
+# all dependencies, and one command of it is enough.
 ONCE := test/validation test/simulation test/inference test/stages test/dashboard/test_page.py \
-        test/study/test_reproduce.py test/study/test_batch.py test/study/test_plate_fit.py \
-        test/study/test_cluster_curve.py test/study/test_area_calibration.py \
-        test/cli/test_figure_cor.py test/test_contributing.py
+        test/physics/test_confined.py test/study/test_reproduce.py test/study/test_batch.py \
+        test/study/test_plate_fit.py test/study/test_cluster_curve.py test/study/test_sweep.py \
+        test/study/test_area_calibration.py test/study/test_calibrate.py test/cli/test_sweep.py \
+        test/cli/test_figure_cor.py test/cli/test_simulate_scene.py test/test_contributing.py
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba" \
