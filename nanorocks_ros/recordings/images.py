@@ -31,6 +31,21 @@ def stamp_ns_of(message: Any) -> int:
     return int(stamp.sec) * NS + int(stamp.nanosec)
 
 
+def usable_stamp_ns(message: Any, where: str) -> int:
+    """The same where a frame can be put in order by it.
+
+    Raises
+    ------
+    FrameError
+        For the stamp 0 of drivers that give none, and for times before 1970.
+    """
+    stamp_ns = stamp_ns_of(message)
+    if stamp_ns > 0:
+        return stamp_ns
+    what = f'a frame of {stamp_ns / NS:g} s since 1970' if stamp_ns else 'a frame without a stamp'
+    raise FrameError(where, what, 'let the driver of the camera stamp its frames')
+
+
 def _bytes_of(data: Any) -> NDArray[np.uint8]:
     # Neither numpy arrays (rosbags) nor array.array (rclpy) are copied.
     return np.frombuffer(data, dtype=np.uint8) if len(data) else np.empty(0, dtype=np.uint8)
@@ -65,7 +80,8 @@ def frame_from_image(message: Any, where: str) -> Frame:
     Raises
     ------
     FrameError
-        For other encodings than bgr8, rgb8 and mono8, and for sizes that do not fit the data.
+        For other encodings than bgr8, rgb8 and mono8, for sizes that do not fit the data, and
+        without a stamp.
     """
     encoding = str(message.encoding)
     channels = _channels(encoding, where)
@@ -81,7 +97,7 @@ def frame_from_image(message: Any, where: str) -> Frame:
         )
     rows = data.reshape(height, step)[:, :row]
     image = rows.reshape(height, width, channels) if channels > 1 else rows
-    return Frame(stamp_ns=stamp_ns_of(message), encoding=encoding, image=image)
+    return Frame(stamp_ns=usable_stamp_ns(message, where), encoding=encoding, image=image)
 
 
 def frame_from_compressed(message: Any, where: str) -> Frame:
@@ -102,10 +118,10 @@ def frame_from_compressed(message: Any, where: str) -> Frame:
     Raises
     ------
     FrameError
-        When the picture cannot be decoded or ends too early.
+        When the picture cannot be decoded, ends too early or has no stamp.
     """
     data = _bytes_of(message.data)
-    stamp_ns = stamp_ns_of(message)
+    stamp_ns = usable_stamp_ns(message, where)
     # A JPEG that lost its end is decoded by OpenCV all the same, with gray where the rest was.
     whole = data[:2].tobytes() != _JPEG_START or is_whole_jpeg(data.data)
     image = _decoded(data) if whole else None

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import FrameError, RecordingError
-from nanorocks_ros.recordings.images import frame_from_compressed, frame_from_image
+from nanorocks_ros.recordings.images import (
+    frame_from_compressed,
+    frame_from_image,
+    usable_stamp_ns,
+)
 from nanorocks_ros.recordings.lens import view_from_message
 from nanorocks_ros.recordings.reader import BagMessage, BagReader, open_bag
 from nanorocks_ros.records import Frame, GroundTruth
@@ -33,6 +38,8 @@ class BagFrames:
     reader : BagReader
     topic : str
         The camera topic that was found.
+    notices : list of str
+        What was wrong with messages beside the frames.
 
     Raises
     ------
@@ -42,6 +49,7 @@ class BagFrames:
 
     def __init__(self, path: str | Path, image_topic: str = '') -> None:
         self.reader: BagReader = open_bag(path)
+        self.notices: list[str] = []
         wanted = (
             (image_topic,)
             if image_topic
@@ -62,12 +70,24 @@ class BagFrames:
         return f'{self.reader.path}: {self.topic}'
 
     def epoch_ns(self) -> int | None:
-        """What `time` counts from: as recorded, else the first frame; None without frames."""
-        name = topics.EPOCH.absolute()
-        for message in self._first(name):
-            return _nanoseconds(self.reader.deserialize(message))
+        """What `time` counts from: as recorded, else the first frame; None without frames.
+
+        Raises
+        ------
+        RecordingError
+            When there are frames, but none that can be used.
+        """
+        for message in self._first(topics.EPOCH.absolute()):
+            with suppress(RecordingError):
+                return _nanoseconds(self.reader.deserialize(message))
+        refusal = None
         for message in self._first(self.topic):
-            return _nanoseconds(self.reader.deserialize(message).header.stamp)
+            try:
+                return usable_stamp_ns(self.reader.deserialize(message), self.where)
+            except (FrameError, RecordingError) as error:
+                refusal = refusal or error
+        if refusal is not None:
+            raise RecordingError(refusal.where, refusal.what, refusal.do)
         return None
 
     def _first(self, topic: str) -> Iterator[BagMessage]:
@@ -128,6 +148,9 @@ class BagFrames:
                 yield message, read(self.reader.deserialize(message), self.where)
             except FrameError as error:
                 yield message, error
+            except RecordingError as error:
+                # Of the others nothing is known to be wrong.
+                yield message, FrameError(error.where, error.what, error.do)
 
     def truth(self, epoch_ns: int) -> dict[int, list[GroundTruth]]:
         """What the simulator knew, by tray; empty for a real recording."""
@@ -137,16 +160,22 @@ class BagFrames:
             if name.endswith('/truth') and info.type == topics.ARRAY and topics.tray_of(name)
         ]
         found: dict[int, list[GroundTruth]] = {}
+        refusals: list[RecordingError | FrameError] = []
         for message in self.reader.messages(names) if names else ():
             tray = topics.tray_of(message.topic) or 0
-            record = from_array(
-                GroundTruth,
-                self.reader.deserialize(message).data,
-                tray=tray,
-                epoch_ns=epoch_ns,
-                where=message.topic,
+            try:
+                values = self.reader.deserialize(message).data
+                record = from_array(
+                    GroundTruth, values, tray=tray, epoch_ns=epoch_ns, where=message.topic
+                )
+            except (FrameError, RecordingError) as error:
+                refusals.append(error)
+            else:
+                found.setdefault(tray, []).append(record)
+        if refusals:
+            self.notices.append(
+                f'{len(refusals)} messages of the truth cannot be used, the first: {refusals[0]}'
             )
-            found.setdefault(tray, []).append(record)
         return found
 
 

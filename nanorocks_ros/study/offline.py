@@ -200,7 +200,7 @@ def analyse(
         result.trays[number].evidence = stages.cooling.evidence
         result.trays[number].sticking = stages.clusters.cycles
     # Known only after reading: where a damaged bag ends.
-    result.notices[:0] = bag.reader.notices
+    result.notices[:0] = [*bag.reader.notices, *bag.notices]
     result.complete = result.complete and bag.reader.complete
     return result
 

@@ -164,3 +164,16 @@ def test_a_quality_out_of_range_is_refused(quality):
 def test_arrays_that_are_no_pictures_are_not_encoded(image):
     with pytest.raises(FrameError, match='is no picture'):
         encode_jpeg(image, 90)
+
+
+@pytest.mark.parametrize(
+    ('stamp_ns', 'message'),
+    [(0, 'a frame without a stamp'), (-5_000_000_000, 'a frame of -5 s since 1970')],
+)
+def test_a_frame_without_a_usable_stamp_is_refused_raw_and_compressed(stamp_ns, message):
+    raw = image_message(stamp_ns, 'camera', 'mono8', smooth(1))
+    jpeg = compressed_image_message(stamp_ns, 'camera', 'jpeg', encode_jpeg(smooth(), 90))
+    for read, one in ((frame_from_image, raw), (frame_from_compressed, jpeg)):
+        with pytest.raises(FrameError, match=message) as refused:
+            read(one, WHERE)
+        assert 'let the driver of the camera stamp its frames' in str(refused.value)

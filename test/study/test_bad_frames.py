@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.calibration import CameraInfo
 from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.recordings.messages import camera_info_message, image_message, time_message
+from nanorocks_ros.recordings.reader import open_bag
 from nanorocks_ros.recordings.writer import BagWriter
 from nanorocks_ros.study.bag_frames import BagFrames
 from nanorocks_ros.study.offline import analyse
@@ -17,6 +20,7 @@ from nanorocks_ros.study.results_bag import offered
 from nanorocks_ros.wire import topics
 
 NS = 1_000_000_000
+SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
 
 
 def picture(number):
@@ -97,3 +101,71 @@ def test_a_lens_of_pictures_of_another_size_is_refused(tmp_path, capsys):
     assert main(['analyse', str(path), '--no-output']) == 1
     line = capsys.readouterr().err.strip().splitlines()[-1]
     assert 'the frame is 210x210 px, the calibration of the camera for 420x420 px' in line
+
+
+def changed_sample(path, topic, number, change):
+    """The first 90 frames of the sample bag, one message of a topic changed."""
+    source, seen = open_bag(SAMPLE), 0
+    names = [topics.RAW_COMPRESSED.absolute(), topics.TRUTH.absolute(1)]
+    table = {
+        names[0]: offered(topics.RAW_COMPRESSED),
+        names[1]: offered(topics.TRUTH),
+    }
+    with BagWriter(path, table, metadata={}) as bag:
+        for message in source.messages(names, end_ns=source.start_ns + 3 * NS):
+            content = bytes(message.cdr)
+            seen += message.topic == topic
+            if message.topic == topic and seen == number:
+                content = change(content)
+            bag.write_raw(message.topic, message.log_time_ns, content)
+    return path
+
+
+def test_one_message_that_is_none_costs_one_frame(tmp_path):
+    name = topics.RAW_COMPRESSED.absolute()
+    path = changed_sample(tmp_path / 'bag', name, 40, lambda content: content[:20])
+    found = analyse(path, PipelineSettings())
+    whole = analyse(
+        changed_sample(tmp_path / 'whole', name, 0, lambda content: content), PipelineSettings()
+    )
+    assert found.refused == 1
+    assert found.frames == whole.frames - 1
+    assert not found.complete
+    assert any('1 frames could not be used' in one for one in found.notices)
+
+
+def test_a_first_message_that_is_none_does_not_take_the_epoch_away(tmp_path):
+    name = topics.RAW_COMPRESSED.absolute()
+    path = changed_sample(tmp_path / 'bag', name, 1, lambda content: content[:6])
+    assert BagFrames(path).epoch_ns() > NS
+    assert analyse(path, PipelineSettings()).refused == 1
+
+
+def test_a_message_of_the_truth_that_is_none_is_told_and_the_rest_is_taken(tmp_path):
+    name = topics.TRUTH.absolute(1)
+    path = changed_sample(tmp_path / 'bag', name, 5, lambda content: content[:30])
+    found = analyse(path, PipelineSettings())
+    assert found.refused == 0
+    assert len(found.trays[1].truth) > 20
+    assert any('1 messages of the truth cannot be used' in one for one in found.notices)
+
+
+def without_stamps(path, frames):
+    names = (topics.RAW,)
+    with BagWriter(path, {one.absolute(): offered(one) for one in names}, metadata={}) as bag:
+        for number in range(30):
+            stamp_ns = 0 if number in frames else NS + number * NS // 30
+            message = image_message(stamp_ns, 'camera', 'mono8', picture(number))
+            bag.write(topics.RAW.absolute(), NS + number * NS // 30, message)
+    return path
+
+
+def test_frames_without_a_stamp_are_refused_and_set_no_epoch(tmp_path, capsys):
+    found = analyse(without_stamps(tmp_path / 'bag', {0, 7}), PipelineSettings())
+    assert found.refused == 2
+    assert found.epoch_ns == NS + NS // 30
+    assert found.seconds < 1.0
+    path = without_stamps(tmp_path / 'none', range(30))
+    assert main(['analyse', str(path), '--no-output']) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert 'a frame without a stamp; let the driver of the camera stamp its frames' in line
