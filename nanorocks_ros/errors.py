@@ -34,6 +34,10 @@ class RecordingError(NanorocksError):
     """A bag or video that cannot be read or written."""
 
 
+class UnwritableError(RecordingError):
+    """Results for which there is no room, or no permission."""
+
+
 class FrameError(NanorocksError):
     """A camera frame that cannot be used: encoding, size, stamp."""
 

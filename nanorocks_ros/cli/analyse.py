@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.records import CorRelation, CorStatus, Quality
 
@@ -80,7 +81,9 @@ def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
     from nanorocks_ros.study.results_json import as_json
 
     source = Path(options.bags[0])
-    folder = Path(options.output or f'{str(source).rstrip("/")}_results')
+    # `.` has no name of its own.
+    named = source if source.name not in ('', '..') else source.resolve()
+    folder = Path(options.output or f'{named}_results')
     scratch = _temporary() if options.no_output else check_results_folder(folder)
     with Progress('analysing') as progress:
         analysis = analyse(
@@ -90,17 +93,25 @@ def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
             progress=progress.count,
             scratch=scratch,
         )
+    error: NanorocksError | None = analysis.error
+    written = ''
+    if not options.no_output:
+        # First: whoever reads what is printed may soon have enough of it.
+        try:
+            write_results(analysis, folder, source, settings, options.format)
+            written = f'nanorocks: results in {folder}'
+        except NanorocksError as unwritten:
+            error = unwritten
     for notice in analysis.notices:
         print(f'nanorocks: {notice}', file=sys.stderr)
     if options.json:
         print(json.dumps(as_json(analysis), allow_nan=False))
     else:
         _print(analysis)
-    if not options.no_output:
-        write_results(analysis, folder, source, settings, options.format)
-        print(f'nanorocks: results in {folder}', file=sys.stderr)
-    if analysis.error is not None:
-        raise analysis.error
+    if written:
+        print(written, file=sys.stderr)
+    if error is not None:
+        raise error
     return 0
 
 

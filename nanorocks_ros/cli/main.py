@@ -103,6 +103,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.close()
         return 0
     except OSError as error:
-        print(f'nanorocks: {error.strerror}; make room, or write elsewhere', file=sys.stderr)
+        where = '' if error.filename is None else f'{os.fsdecode(error.filename)}: '
+        text = f'{where}{error.strerror or error}; make room, or write elsewhere'
+        print(f'nanorocks: {text.encode(errors="backslashreplace").decode()}', file=sys.stderr)
         return EXIT_INPUT
     return code

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
 _MAGIC = MAGIC, ROS1_MAGIC, SQLITE_MAGIC
 _METADATA = 'metadata.yaml'
+# Of ROS 1 as well: whoever reads one says what to do with it.
+_RECORDINGS = {*STORAGE_SUFFIXES, '.bag'}
+# What a system keeps on a disk for itself.
+_OF_THE_DISK = {'lost+found', 'System Volume Information', '$RECYCLE.BIN'}
 _SPLIT = re.compile(r'_\d+$')
 
 
@@ -104,18 +108,26 @@ def _inside(folder: Path, found: FoundBags) -> list[Path]:
     """Recordings in a folder and in its folders; what else there is, is nobody's concern."""
     bags = []
     for path in sorted(folder.iterdir(), key=_in_order):
-        if path.name.startswith('.'):
+        if path.name.startswith('.') or path.name in _OF_THE_DISK:
             continue
-        if path.is_dir() and not path.is_symlink():
-            if (path / RESULTS_MARK).exists():
-                found.left_out.append(f'{path}: holds results')
-            elif _is_bag(path):
-                bags.append(path)
-            else:
-                bags += _inside(path, found)
-        elif path.suffix in STORAGE_SUFFIXES or (path.is_dir() and _is_bag(path)):
-            bags.append(path)
+        try:
+            bags += _recordings_at(path, found)
+        except OSError as error:
+            # There may be recordings in it; those beside it are read all the same.
+            found.missing[str(path)] = RecordingError(
+                str(path), f'cannot be read ({error.strerror})', 'make it readable'
+            )
     return bags
+
+
+def _recordings_at(path: Path, found: FoundBags) -> list[Path]:
+    if path.is_dir() and not path.is_symlink():
+        if (path / RESULTS_MARK).exists():
+            found.left_out.append(f'{path}: holds results')
+            return []
+        return [path] if _is_bag(path) else _inside(path, found)
+    is_file = path.suffix in _RECORDINGS
+    return [path] if is_file or (path.is_dir() and _is_bag(path)) else []
 
 
 def _is_bag(folder: Path) -> bool:
@@ -129,7 +141,7 @@ def _is_bag(folder: Path) -> bool:
 
 
 def _is_storage(path: Path) -> bool:
-    if path.suffix in {*STORAGE_SUFFIXES, '.bag'}:
+    if path.suffix in _RECORDINGS:
         return True
     try:
         with path.open('rb') as stream:

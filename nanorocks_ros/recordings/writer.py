@@ -23,7 +23,7 @@ from rosbags.rosbag2.storage_mcap import McapWriter
 from rosbags.serde import SerdeError
 from rosbags.typesys import TypesysError
 
-from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.errors import RecordingError, UnwritableError
 from nanorocks_ros.recordings.message_types import register, standard_types
 from nanorocks_ros.recordings.qos import OfferedQos
 
@@ -290,8 +290,8 @@ class BagWriter:
             str(self.path), 'exists already and is not overwritten', 'pass another path'
         )
 
-    def _unwritable(self, error: OSError) -> RecordingError:
-        return RecordingError(
+    def _unwritable(self, error: OSError) -> UnwritableError:
+        return UnwritableError(
             str(self.path),
             f'cannot be written ({error.strerror})',
             'pass another path, or make room there',

@@ -20,11 +20,11 @@ from nanorocks_ros.study.archive import write_whole
 from nanorocks_ros.study.batch_task import (
     DONE,
     PARTIAL,
-    SUMMARY,
     BagOutcome,
     BagTask,
     read_summary,
 )
+from nanorocks_ros.study.export import SUMMARY
 from nanorocks_ros.study.hold import hold_folder
 from nanorocks_ros.study.shown import shown
 

@@ -12,22 +12,21 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from nanorocks_ros.errors import NanorocksError, RecordingError
+from nanorocks_ros.errors import NanorocksError, RecordingError, UnwritableError
 from nanorocks_ros.recordings.content import FileState, content_hash, file_states
 from nanorocks_ros.study.archive import Arrays, write_archive, write_whole
 from nanorocks_ros.study.campaign_cycles import SIZE_MEASURES, CycleSummary, cycles_of
-from nanorocks_ros.study.export import write_results
+from nanorocks_ros.study.export import EVIDENCE, SUMMARY, write_results
 from nanorocks_ros.study.offline import Analysis, analyse
 from nanorocks_ros.study.results_json import as_json
 from nanorocks_ros.study.shown import shown
-from nanorocks_ros.study.spool import SpoolError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from nanorocks_ros.experiment.settings import PipelineSettings
 
-SUMMARY, EVIDENCE, TROUBLE = 'bag.json', 'evidence.npz', 'trouble.txt'
+TROUBLE = 'trouble.txt'
 DONE, PARTIAL, FAILED, UNWRITTEN = 'done', 'partial', 'failed', 'unwritten'
 # How far a recording has come is said so often, [s].
 _NOTE = 1.0
@@ -98,7 +97,7 @@ def analyse_bag(task: BagTask) -> BagOutcome:
     cv2.setNumThreads(1)
     try:
         return _analysed(task)
-    except SpoolError as error:
+    except UnwritableError as error:
         return BagOutcome(state=UNWRITTEN, reason=shown(str(error)))
     except NanorocksError as error:
         return BagOutcome(state=FAILED, reason=shown(str(error)))
@@ -159,10 +158,7 @@ def _analysed(task: BagTask) -> BagOutcome:
         write_archive(folder / EVIDENCE, _evidence(analysis))
         write_whole(folder / SUMMARY, json.dumps(summary, allow_nan=False).encode())
 
-    try:
-        write_results(analysis, task.folder, task.path, task.settings, more=more)
-    except RecordingError as error:
-        return BagOutcome(state=UNWRITTEN, reason=shown(str(error)))
+    write_results(analysis, task.folder, task.path, task.settings, more=more)
     return replace(_outcome(summary, files), frames=analysis.frames)
 
 

@@ -15,9 +15,9 @@ from nanorocks_ros.inference.sticking_cycle import StickingCycle
 from nanorocks_ros.records import Quality
 from nanorocks_ros.stages.pipeline import TrayStages, trays_of
 from nanorocks_ros.study.archive import read_archive
-from nanorocks_ros.study.batch_task import EVIDENCE
 from nanorocks_ros.study.campaign import mean_of
 from nanorocks_ros.study.campaign_cycles import SIZE_MEASURES, CycleSummary
+from nanorocks_ros.study.export import EVIDENCE
 from nanorocks_ros.study.long_term import Campaign, campaign_of
 
 if TYPE_CHECKING:

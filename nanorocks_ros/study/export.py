@@ -5,6 +5,9 @@ from __future__ import annotations
 import heapq
 import itertools
 import json
+import os
+import re
+import shutil
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -12,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros import __version__
-from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.errors import RecordingError, UnwritableError
 from nanorocks_ros.experiment.settings import rows
 from nanorocks_ros.recordings.messages import float_array_message, time_message
 from nanorocks_ros.recordings.results import RESULTS_MARK, write_csv
@@ -29,9 +32,18 @@ if TYPE_CHECKING:
     from nanorocks_ros.study.offline import Analysis, TrayResults
 
 BAG_NAME = 'results_bag'
+# Beside the tables in a batch.
+SUMMARY, EVIDENCE = 'bag.json', 'evidence.npz'
 
 FORMATS = ('csv', 'parquet')
 """Forms of the tables of results; the first unless another is asked for."""
+
+_TABLES = 'speed', 'cluster', 'cor', 'rebound', 'collision', 'bodies', 'merge'
+# What an earlier analysis wrote, also that of a batch: it would not belong to the new one.
+_OURS = re.compile(
+    rf'{re.escape(RESULTS_MARK)}|{BAG_NAME}|{re.escape(SUMMARY)}|{re.escape(EVIDENCE)}'
+    rf'|tray_\d+_({"|".join(_TABLES)})\.({"|".join(FORMATS)})'
+)
 
 # Rows of a table that are put together in memory.
 _PIECE = 1000
@@ -68,7 +80,8 @@ def write_results(
 ) -> None:
     """Tables and a results bag in a folder of their own, complete or not at all.
 
-    Earlier results in the same folder are replaced, once the new ones are complete.
+    Earlier results in the same folder are replaced, once the new ones are complete; what else
+    lies there stays.
 
     Parameters
     ----------
@@ -106,24 +119,45 @@ def write_results(
             if more is not None:
                 more(fresh)
             if folder.exists():
+                _keep_others(folder, fresh)
                 folder.rename(Path(scratch) / 'earlier')
             fresh.rename(folder)
     except OSError as error:
-        raise RecordingError(
+        raise UnwritableError(
             str(folder), f'cannot be written: {error.strerror}', 'pass a writable --output'
         ) from error
 
 
+def _keep_others(folder: Path, fresh: Path) -> None:
+    """Take over what somebody put beside earlier results: a figure, notes."""
+    for one in folder.iterdir():
+        if _OURS.fullmatch(one.name) or (fresh / one.name).exists():
+            continue
+        if one.is_dir() and not one.is_symlink():
+            shutil.copytree(one, fresh / one.name, symlinks=True, copy_function=_linked)
+        else:
+            _linked(one, fresh / one.name)
+
+
+def _linked(source: str | Path, target: str | Path) -> None:
+    """A second name of a file, or a copy of it where there can be none."""
+    try:
+        os.link(source, target, follow_symlinks=False)
+    except OSError:
+        shutil.copy2(source, target, follow_symlinks=False)
+
+
 def _tables(results: TrayResults) -> dict[str, Sequence[ArrayRecord]]:
-    return {
-        'speed': results.speeds,
-        'cluster': results.clusters,
-        'cor': results.cors,
-        'rebound': results.rebounds,
-        'collision': results.collisions,
-        'bodies': results.bodies,
-        'merge': results.merges,
-    }
+    records = (
+        results.speeds,
+        results.clusters,
+        results.cors,
+        results.rebounds,
+        results.collisions,
+        results.bodies,
+        results.merges,
+    )
+    return dict(zip(_TABLES, records, strict=True))
 
 
 def _write_table(

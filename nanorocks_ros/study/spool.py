@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
-from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.errors import UnwritableError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,7 +19,7 @@ Item = TypeVar('Item')
 _BLOCK = 256
 
 
-class SpoolError(RecordingError):
+class SpoolError(UnwritableError):
     """There is no room for what was measured."""
 
 

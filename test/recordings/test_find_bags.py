@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -110,3 +112,27 @@ def test_the_state_tells_a_change_even_where_size_and_time_are_put_back(flight):
     file.write_bytes(content)
     os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
     assert file_states(file) != before
+
+
+def test_a_recording_of_ros_1_is_found_for_whoever_says_what_to_do_with_it(flight):
+    (flight / 'day_2' / 'old.bag').write_bytes(b'#ROSBAG V2.0\n')
+    assert names(find_bags([str(flight / 'day_2')]), flight) == ['day_2/old.bag', 'day_2/run_2']
+
+
+def test_a_folder_that_cannot_be_read_costs_no_other_recording(flight, monkeypatch):
+    closed = flight / 'day_1' / 'closed'
+    for one in (closed, flight / 'day_1' / 'lost+found'):
+        one.mkdir()
+    listed = Path.iterdir
+
+    def iterdir(folder):
+        if folder.name in ('closed', 'lost+found'):
+            raise PermissionError(errno.EACCES, 'Permission denied', str(folder))
+        return listed(folder)
+
+    monkeypatch.setattr(Path, 'iterdir', iterdir)
+    found = find_bags([str(flight / 'day_1')])
+    assert len(found.bags) == 3
+    assert is_collection(flight / 'day_1')
+    assert set(found.missing) == {str(closed)}
+    assert 'cannot be read (Permission denied)' in str(found.missing[str(closed)])

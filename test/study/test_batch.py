@@ -26,6 +26,7 @@ from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.settings import PipelineSettings, with_values
 from nanorocks_ros.recordings.find_bags import find_bags
 from nanorocks_ros.records import Quality
+from nanorocks_ros.study import batch_task
 from nanorocks_ros.study.batch import BagResults, BatchPlan, run_batch
 from nanorocks_ros.study.combined import combined
 from nanorocks_ros.study.films import ImportSettings
@@ -269,6 +270,34 @@ def test_a_worker_that_is_killed_costs_its_own_bag_and_no_other(tiny, tmp_path):
     (failure,) = batch.failed
     assert 'was killed, for lack of memory perhaps' in failure.reason
     assert len(batch.results) == 1
+
+
+def test_results_that_fit_no_bag_are_a_matter_of_that_recording_alone(tiny, tmp_path, monkeypatch):
+    bags = [shutil.copytree(tiny, tmp_path / name) for name in ('a_odd', 'b_good')]
+    (tmp_path / 'out').mkdir()
+    written = batch_task.write_results
+
+    def write_results(analysis, folder, source, *rest, **named):
+        if source.name == 'a_odd':
+            raise RecordingError(str(source), 'stamp -1 ns lies before 1970', 'give others')
+        written(analysis, folder, source, *rest, **named)
+
+    monkeypatch.setattr(batch_task, 'write_results', write_results)
+    outcomes = [
+        batch_task.analyse_bag(
+            batch_task.BagTask(
+                path=one,
+                folder=tmp_path / 'out' / one.name,
+                settings=PipelineSettings(),
+                image_topic='',
+                question='',
+                note=tmp_path / 'note',
+            )
+        )
+        for one in bags
+    ]
+    assert [one.state for one in outcomes] == [batch_task.FAILED, batch_task.DONE]
+    assert 'lies before 1970' in outcomes[0].reason
 
 
 def test_what_is_done_outlives_an_interruption_and_a_full_disk(tiny, films, tmp_path):

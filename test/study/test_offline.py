@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import csv
+import errno
 import itertools
 import json
 import math
+import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -117,7 +121,16 @@ def test_results_are_written_as_tables_and_as_a_bag(analysis, tmp_path):
 def test_earlier_results_are_replaced_and_anything_else_is_left_alone(analysis, tmp_path):
     folder = tmp_path / 'out'
     write_results(analysis, folder, SAMPLE, PipelineSettings())
+    # What somebody put beside them stays.
+    (folder / 'notes.txt').write_text('precious')
+    (folder / 'figures').mkdir()
+    (folder / 'figures' / 'decay.png').write_bytes(b'picture')
+    (folder / 'tray_5_speed.parquet').write_bytes(b'of an earlier analysis')
     write_results(analysis, folder, SAMPLE, PipelineSettings())
+    assert (folder / 'notes.txt').read_text() == 'precious'
+    assert (folder / 'figures' / 'decay.png').read_bytes() == b'picture'
+    assert not (folder / 'tray_5_speed.parquet').exists()
+    assert open_bag(folder / BAG_NAME).complete
     other = tmp_path / 'thesis'
     other.mkdir()
     (other / 'chapter.txt').write_text('precious')
@@ -371,3 +384,41 @@ def test_nothing_but_our_own_results_is_ever_removed(analysis, tmp_path):
         write_results(analysis, tmp_path / 'out', SAMPLE, PipelineSettings())
     assert (beside / 'thesis.txt').read_text() == 'precious'
     assert sorted(one.name for one in tmp_path.iterdir()) == ['out', 'out.part']
+
+
+def test_results_are_written_though_nobody_reads_what_is_printed(tmp_path):
+    path = raw_bag(tmp_path / 'bag', at_30_hz(40))
+    code = 'from nanorocks_ros.cli.main import main; raise SystemExit(main())'
+    reading, writing = os.pipe()
+    os.close(reading)
+    ended = subprocess.run(
+        [sys.executable, '-c', code, 'analyse', path, '--json', '-o', tmp_path / 'out'],
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    os.close(writing)
+    assert 'Traceback' not in ended.stderr
+    assert open_bag(tmp_path / 'out' / BAG_NAME).complete
+
+
+def test_a_result_that_cannot_be_written_is_printed_all_the_same(tmp_path, capsys, monkeypatch):
+    path = raw_bag(tmp_path / 'bag', at_30_hz(40))
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    monkeypatch.setattr('nanorocks_ros.study.export._write_bag', full)
+    assert run('analyse', path, '--json', '-o', tmp_path / 'out') == 1
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)['frames'] == 40
+    assert 'cannot be written: No space left on device' in printed.err.splitlines()[-1]
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_bag_without_a_name_has_its_results_beside_it(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(raw_bag(tmp_path / 'bag', at_30_hz(40)))
+    assert run('analyse', '.') == 0
+    assert (tmp_path / 'bag_results' / BAG_NAME).is_dir()
+    assert f'results in {tmp_path}/bag_results' in capsys.readouterr().err
