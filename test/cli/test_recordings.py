@@ -99,6 +99,20 @@ def test_info_says_what_is_wrong_and_what_to_do(tmp_path, capsys):
     assert cut['remedy'] == f'nanorocks salvage {path} -o NEW copies what can be read'
 
 
+@pytest.mark.parametrize(('key', 'remedy'), [
+    ('import', 'import it again'), ('salvage', 'salvage the damaged bag again'),
+])  # fmt: skip
+def test_info_says_that_the_making_of_a_bag_was_interrupted(tmp_path, capsys, key, remedy):
+    path = write_bag(tmp_path / 'bag', metadata={key: 'unfinished'})
+    _, out, _ = called(capsys, 'info', path, '--json')
+    found = json.loads(out)
+    assert found['complete'] is False
+    (part,) = [one for one in found['health'] if 'holds only part of' in one['what']]
+    assert part['remedy'] == remedy
+    _, out, _ = called(capsys, 'info', path)
+    assert 'NOT complete' in out
+
+
 def test_films_within_messages_are_told_from_pictures(tmp_path, capsys):
     path = write_bag(tmp_path / 'bag', pictures=lambda number: b'\0\0\0\1\x67' + bytes(99))
     _, out, _ = called(capsys, 'info', path, '--json')

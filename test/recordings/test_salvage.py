@@ -238,3 +238,31 @@ def test_rows_behind_a_hole_of_thousands_are_found(tmp_path):
     file.write_bytes(content)
     found = salvage(path, tmp_path / 'new', lambda *_: None)
     assert found.recovered > 1000
+
+
+def interrupted(source, target):
+    """Ctrl-C before the end."""
+
+    def progress(done, total):
+        if done > total // 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        salvage(source, target, progress)
+
+
+def test_an_interrupted_salvage_does_not_pass_as_whole(tmp_path, record):
+    path = record(tmp_path / 'run')
+    interrupted(path, tmp_path / 'part')
+    part = open_bag(tmp_path / 'part')
+    assert 40 <= len(list(part.messages())) < 81
+    assert part.metadata['salvage'] == 'unfinished'
+    assert not part.complete
+    said = 'holds only part of what was salvaged, since that was interrupted'
+    assert part.notices == (f'{tmp_path / "part"}: {said}',)
+    # Nor does a copy of it.
+    found = salvage(tmp_path / 'part', tmp_path / 'copy', lambda *_: None)
+    assert found.notices == part.notices
+    assert not open_bag(tmp_path / 'copy').complete
+    salvaged(path, tmp_path / 'new')
+    assert open_bag(tmp_path / 'new').metadata['salvage'] == 'complete'
