@@ -14,7 +14,8 @@ from nanorocks_ros.recordings.mcap_blocks import (
     indexed_after,
     load,
 )
-from nanorocks_ros.recordings.mcap_index import McapIndex, read_index, recorder_notes, scan
+from nanorocks_ros.recordings.mcap_index import McapIndex, read_index, recorder_notes
+from nanorocks_ros.recordings.mcap_scan import scan
 from nanorocks_ros.recordings.qos import recorded_qos
 from nanorocks_ros.recordings.storage import BagMessage, TopicInfo
 
