@@ -20,6 +20,7 @@ from nanorocks_ros.recordings.mcap_blocks import (
     stream_of,
     walk,
 )
+from nanorocks_ros.recordings.storage import LAST_NS
 
 if TYPE_CHECKING:
     from typing import BinaryIO
@@ -42,6 +43,8 @@ class McapIndex:
         Log times of the first and last message.
     lost : dict of int to int
         Messages lost in each damaged block, by its offset.
+    untimely : dict of int to int
+        Messages with a time that cannot be, by the offset of their block; they are left out.
     ended : bool
         The file has the end that it was meant to have.
     bytes_unread : int
@@ -56,9 +59,17 @@ class McapIndex:
     start_ns: int | None = None
     end_ns: int | None = None
     lost: dict[int, int] = field(default_factory=dict)
+    untimely: dict[int, int] = field(default_factory=dict)
     ended: bool = False
     bytes_unread: int = 0
     metadata_at: list[tuple[int, int]] = field(default_factory=list)
+
+    def timely(self, block: int, messages: list[StoredMessage]) -> list[StoredMessage]:
+        """Those with a time that can be; the others of a block are counted as lost."""
+        found = [message for message in messages if message.log_time_ns <= LAST_NS]
+        if len(found) < len(messages):
+            self.untimely[block] = len(messages) - len(found)
+        return found
 
     def count(self, messages: list[StoredMessage]) -> None:
         """Take messages into account."""
@@ -128,6 +139,7 @@ def _from_summary(summary: memoryview, size: int) -> McapIndex | None:
         and set(index.counts) <= set(index.catalogue.channels)
         and all(b.offset >= len(MAGIC) and b.offset + b.length <= size for b in index.blocks)
         and (index.blocks or not statistics.message_count)
+        and statistics.message_end_time <= LAST_NS
     )
     if not reliable:
         return None

@@ -154,6 +154,7 @@ class _Scan:
             return
         self._uncounted = len(messages)
         self._damaged = None
+        messages = self.index.timely(start, messages)
         if not messages:
             return
         self.index.count(messages)

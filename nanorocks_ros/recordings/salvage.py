@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-# Recordings count signed nanoseconds; what is later was damaged.
-_LAST_NS = 2**63 - 1
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Salvage:
@@ -90,7 +87,7 @@ def salvage(source: Path, target: Path, progress: Callable[[int, int], None]) ->
     begun = {**reader.metadata, SALVAGE: UNFINISHED}
     with BagWriter(target, table, metadata=begun) as bag:
         for message in reader.messages():
-            if message.topic not in table or message.log_time_ns > _LAST_NS:
+            if message.topic not in table:
                 continue
             bag.write_raw(message.topic, message.log_time_ns, message.cdr)
             recovered += 1

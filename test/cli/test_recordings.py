@@ -11,6 +11,7 @@ import sys
 import cv2
 import numpy as np
 import pytest
+from mcap.writer import Writer as McapWriter
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.recordings.messages import compressed_image_message, float_array_message
@@ -97,6 +98,26 @@ def test_info_says_what_is_wrong_and_what_to_do(tmp_path, capsys):
     assert found['messages_lost'] == 200 - sum(one['count'] for one in found['topics']) > 0
     (cut,) = [one for one in found['health'] if 'cut short' in one['what']]
     assert cut['remedy'] == f'nanorocks salvage {path} -o NEW copies what can be read'
+
+
+def test_info_and_salvage_leave_out_messages_of_a_time_that_cannot_be(tmp_path, capsys):
+    path = tmp_path / 'x.mcap'
+    writer = McapWriter(str(path))
+    writer.start()
+    schema = writer.register_schema('std_msgs/msg/Empty', 'ros2msg', b'')
+    channel = writer.register_channel('/empty', 'cdr', schema)
+    for stamp in (START_NS, START_NS + STEP_NS, START_NS | 1 << 63):
+        writer.add_message(channel, stamp, b'\0\1\0\0\0', stamp)
+    writer.finish()
+    code, out, _ = called(capsys, 'info', path, '--json')
+    found = json.loads(out)
+    assert code == 0
+    assert (found['messages_lost'], found['complete'], found['duration']) == (1, False, 0.04)
+    assert any('1 messages have a time that cannot be' in one['what'] for one in found['health'])
+    assert called(capsys, 'info', path)[0] == 0
+    _, out, _ = called(capsys, 'salvage', path, '-o', tmp_path / 'new', '--json')
+    found = json.loads(out)
+    assert (found['messages_recovered'], found['messages_lost']) == (2, 1)
 
 
 @pytest.mark.parametrize(('key', 'remedy'), [
