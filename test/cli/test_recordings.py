@@ -211,6 +211,17 @@ def test_a_wrong_call_of_import_is_exit_code_2(tmp_path, capsys, arguments):
     assert not (tmp_path / 'bag').exists()
 
 
+@pytest.mark.parametrize('arguments', [
+    ['--rate', '1e-8'], ['--rate', '1', '--start', '2038-01-19T03:14:05Z'],
+])  # fmt: skip
+def test_a_film_beyond_what_a_ros_time_holds_is_refused(tmp_path, capsys, arguments):
+    folder = images(tmp_path / 'images', 20)
+    code, _, last = called(capsys, 'import', folder, '-o', tmp_path / 'bag', *arguments)
+    assert code == 1
+    assert 'a stamp lies beyond what a ROS time holds, which ends on 2038-01-19; ' in last
+    assert last.endswith('pass an earlier --start, or the true --rate')
+
+
 def test_each_ends_with_what_could_not_be_imported(tmp_path, capsys):
     folder = tmp_path / 'films'
     folder.mkdir()
