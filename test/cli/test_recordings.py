@@ -7,6 +7,7 @@ import os
 import resource
 import subprocess
 import sys
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -172,6 +173,32 @@ def test_salvage_prints_what_programs_rely_on(tmp_path, capsys):
     code, _, last = called(capsys, 'salvage', path, '-o', new)
     assert code == 1
     assert last.endswith('exists already and is not overwritten; pass another path')
+
+
+# --- names of any bytes ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('command', ['import', 'import --each', 'salvage', 'info'])
+def test_names_that_are_no_utf_8_are_shown_all_the_same(tmp_path, command):
+    """Where standard output takes nothing but UTF-8."""
+    place = os.fsencode(tmp_path) + b'/lat\xe9\n'
+    os.mkdir(place)
+    folder = Path(os.fsdecode(place))
+    bag = write_bag(folder / 'bag')
+    arguments = {
+        'info': [bag],
+        'salvage': [bag, '-o', folder / 'new'],
+    }.get(command) or [images(folder / 'images'), '--rate', '30', '-o', folder / 'new']
+    code = 'from nanorocks_ros.cli.main import main; exit(main())'
+    done = subprocess.run(
+        [sys.executable, '-c', code, *command.split(), *(str(one) for one in arguments)],
+        env={**os.environ, 'PYTHONIOENCODING': 'utf-8:strict'},
+        timeout=120,
+        check=False,
+        capture_output=True,
+    )
+    assert done.returncode == 0, done.stderr.decode()
+    assert b'imported, ' in done.stdout or b'lat\\udce9\\n/' in done.stdout
 
 
 # --- what cannot be used --------------------------------------------------------------------
