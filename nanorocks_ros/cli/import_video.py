@@ -94,8 +94,7 @@ def _run_one(
 
     with Progress('importing') as progress:
         imported = import_films(paths, output, settings, progress.part)
-    for notice in imported.notices:
-        print(f'nanorocks: {notice}', file=sys.stderr)
+    _tell(imported)
     print(json.dumps(as_json(imported)) if options.json else _text(imported))
     return 0
 
@@ -113,8 +112,7 @@ def _run_each(
         except KeyboardInterrupt as interruption:
             raise KeyboardInterrupt('the same command goes on with what is left') from interruption
     for imported in found.imported:
-        for notice in imported.notices:
-            print(f'nanorocks: {notice}', file=sys.stderr)
+        _tell(imported)
     if options.json:
         print(json.dumps(_each_as_json(found)))
     else:
@@ -124,11 +122,20 @@ def _run_each(
     return _tell_failures(found)
 
 
+def _tell(imported: Imported) -> None:
+    from nanorocks_ros.study.shown import shown
+
+    for notice in imported.notices:
+        print(f'nanorocks: {shown(notice)}', file=sys.stderr)
+
+
 def _tell_failures(found: ImportedEach) -> int:
     if not found.failed:
         return 0
+    from nanorocks_ros.study.shown import shown
+
     for error in found.failed.values():
-        print(f'nanorocks: {error}', file=sys.stderr)
+        print(f'nanorocks: {shown(str(error))}', file=sys.stderr)
     total = len(found.failed) + len(found.imported) + len(found.skipped)
     print(
         f'nanorocks: {len(found.failed)} of {total} videos could not be imported, listed above; '
@@ -139,9 +146,11 @@ def _tell_failures(found: ImportedEach) -> int:
 
 
 def _text(imported: Imported) -> str:
+    from nanorocks_ros.study.shown import shown
+
     dropped = imported.duplicates_dropped
     return (
-        f'{imported.bag}: {imported.frames} frames, {imported.duration:.3f} s'
+        f'{shown(imported.bag)}: {imported.frames} frames, {imported.duration:.3f} s'
         f'{f", {dropped} duplicates dropped" if dropped else ""}, '
         f'{imported.provenance["pictures"]}'
     )

@@ -24,11 +24,12 @@ def run(options: argparse.Namespace) -> int:
     """Salvage, print; the exit code."""
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.recordings.salvage import salvage
+    from nanorocks_ros.study.shown import shown
 
     with Progress('salvaging') as progress:
         found = salvage(Path(options.bag), Path(options.output), progress.count)
     for notice in found.notices:
-        print(f'nanorocks: {notice}', file=sys.stderr)
+        print(f'nanorocks: {shown(notice)}', file=sys.stderr)
     if options.json:
         values = {
             'messages_recovered': found.recovered,
@@ -38,5 +39,6 @@ def run(options: argparse.Namespace) -> int:
         }
         print(json.dumps(values))
     else:
-        print(f'{found.bag}: {found.recovered} messages recovered, {found.lost} known to be lost')
+        lost = f'{found.lost} known to be lost'
+        print(f'{shown(found.bag)}: {found.recovered} messages recovered, {lost}')
     return 0

@@ -14,7 +14,8 @@ from nanorocks_ros.recordings.mcap_blocks import (
     indexed_after,
     load,
 )
-from nanorocks_ros.recordings.mcap_index import McapIndex, read_index, recorder_notes, scan
+from nanorocks_ros.recordings.mcap_index import McapIndex, read_index, recorder_notes
+from nanorocks_ros.recordings.mcap_scan import scan
 from nanorocks_ros.recordings.qos import recorded_qos
 from nanorocks_ros.recordings.storage import BagMessage, TopicInfo
 
@@ -74,12 +75,12 @@ class McapFile:
     @property
     def complete(self) -> bool:
         """Nothing is known to be missing, so far."""
-        return self._index.ended and not self._index.lost
+        return self._index.ended and not self._index.lost and not self._index.untimely
 
     @property
     def messages_lost(self) -> int:
         """Messages known to be lost, so far; those beyond a cut are not known."""
-        return sum(self._index.lost.values())
+        return sum(self._index.lost.values()) + sum(self._index.untimely.values())
 
     @property
     def notices(self) -> tuple[str, ...]:
@@ -88,10 +89,15 @@ class McapFile:
         if not self._index.ended:
             notices.append(f'{self.path}: {self._salvaged()}')
         if self._index.lost:
-            blocks = len(self._index.lost)
+            blocks, lost = len(self._index.lost), sum(self._index.lost.values())
             notices.append(
                 f'{self.path}: {blocks} damaged {"block was" if blocks == 1 else "blocks were"} '
-                f'skipped, at least {self.messages_lost} messages are lost'
+                f'skipped, at least {lost} messages are lost'
+            )
+        if self._index.untimely:
+            count = sum(self._index.untimely.values())
+            notices.append(
+                f'{self.path}: {count} messages have a time that cannot be and were left out'
             )
         return tuple(notices)
 
@@ -158,6 +164,7 @@ class McapFile:
         except DamagedError:
             self._index.lost[block.offset] = indexed_after(stream, block)
             return []
+        messages = self._index.timely(block.offset, messages)
         orphans = sum(m.channel not in self._index.catalogue.channels for m in messages)
         if orphans:
             self._index.lost[block.offset] = orphans

@@ -14,6 +14,7 @@ from rosbags.typesys import TypesysError
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.bag_folder import Contents, contents
 from nanorocks_ros.recordings.message_types import register, standard_types
+from nanorocks_ros.recordings.provenance import Unfinished, unfinished
 from nanorocks_ros.recordings.storage import BagMessage, StorageFile, TopicInfo
 
 if TYPE_CHECKING:
@@ -92,10 +93,20 @@ class BagReader:
     def complete(self) -> bool:
         """Nothing is known to be missing, so far."""
         whole = all(file.complete for file in self._contents.files)
-        return whole and self._contents.complete and not self._undone
+        return whole and self._contents.complete and not self._undone and not self.unfinished
+
+    @property
+    def unfinished(self) -> tuple[Unfinished, ...]:
+        """What was interrupted when it was made of a film or of another recording."""
+        return unfinished(self.metadata)
 
     @property
     def notices(self) -> tuple[str, ...]:
+        """What was never written, what was salvaged and what is lost, so far."""
+        return (*(f'{self.path}: {one.what}' for one in self.unfinished), *self.damage)
+
+    @property
+    def damage(self) -> tuple[str, ...]:
         """What was salvaged and what is lost, so far."""
         notices = [*self._contents.notices]
         for file in self._contents.files:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.recordings.provenance import COMPLETE, SALVAGE, UNFINISHED
 from nanorocks_ros.recordings.qos import OfferedQos
 from nanorocks_ros.recordings.reader import open_bag
 from nanorocks_ros.recordings.writer import BagWriter, OfferedTopic
@@ -14,9 +15,6 @@ from nanorocks_ros.recordings.writer import BagWriter, OfferedTopic
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
-
-# Recordings count signed nanoseconds; what is later was damaged.
-_LAST_NS = 2**63 - 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +41,8 @@ class Salvage:
 
 def salvage(source: Path, target: Path, progress: Callable[[int, int], None]) -> Salvage:
     """Copy every message that can be read into a new recording; the old one is only read.
+
+    When it is interrupted, the new one holds what was written until then, and says so.
 
     Parameters
     ----------
@@ -84,14 +84,18 @@ def salvage(source: Path, target: Path, progress: Callable[[int, int], None]) ->
         for name, info in reader.topics.items()
     }
     recovered = 0
-    with BagWriter(target, table, metadata=reader.metadata) as bag:
+    begun = {**reader.metadata, SALVAGE: UNFINISHED}
+    with BagWriter(target, table, metadata=begun) as bag:
         for message in reader.messages():
-            if message.topic not in table or message.log_time_ns > _LAST_NS:
+            if message.topic not in table:
                 continue
             bag.write_raw(message.topic, message.log_time_ns, message.cdr)
             recovered += 1
             progress(min(recovered, held), held)
         lost = max(reader.messages_lost, (reader.expected or 0) - recovered, held - recovered)
+        # What was lost to an earlier interruption does not come back.
+        in_part = reader.metadata.get(SALVAGE) == UNFINISHED
+        bag.remark(SALVAGE, UNFINISHED if in_part else COMPLETE)
         bag.remark('salvaged_from', source.name)
         bag.remark('salvage_lost', str(lost))
         for number, notice in enumerate(reader.notices):

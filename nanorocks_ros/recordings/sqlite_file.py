@@ -3,33 +3,32 @@
 from __future__ import annotations
 
 import sqlite3
+from array import array
 from collections import Counter
 from contextlib import closing
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.qos import recorded_qos
+from nanorocks_ros.recordings.sqlite_rows import readable_rows
 from nanorocks_ros.recordings.storage import BagMessage, TopicInfo
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
 MAGIC = b'SQLite format 3\x00'
 # SQLite's integers have 64 bits, one of them for the sign.
 _FOREVER = 2**63 - 1
 _IN_ORDER = (
-    'SELECT topic_id, timestamp, data FROM messages '
+    'SELECT id, topic_id, timestamp, data FROM messages '
     'WHERE topic_id IN ({}) AND timestamp BETWEEN ? AND ? ORDER BY timestamp, id'
 )
-# All of a row, so that one that lost its end is not taken for whole.
-_ROWS = (
-    'SELECT id, timestamp, topic_id FROM messages '
-    "WHERE id BETWEEN ? AND ? AND length(CAST(data AS BLOB) || x'') >= 0"
-)
 _ONE = 'SELECT data FROM messages WHERE id = ?'
-# Rows of a damaged file that are asked for together, and how often there may be none.
-_BATCH, _MISSES = 256, 8
 
 
 class SqliteFile:
@@ -58,8 +57,10 @@ class SqliteFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._damage = ''
-        self._rows: list[tuple[int, int, int]] | None = None
-        self._lost = 0
+        self._rows: NDArray[np.int64] | None = None
+        # Rows that were counted and are not found any more, and numbers of those found in vain.
+        self._missing = 0
+        self._unreadable: set[int] = set()
         try:
             with closing(self._connect()) as database:
                 try:
@@ -88,18 +89,14 @@ class SqliteFile:
 
     def _read_damaged(self, database: sqlite3.Connection, error: sqlite3.Error) -> None:
         """Note which rows can still be read, in order of time."""
-        rows = sorted(
-            (stamp, number, topic)
-            for number, stamp, topic in _readable_rows(database)
-            if isinstance(stamp, int) and isinstance(topic, int)
-        )
-        if not rows:
+        rows = readable_rows(database, self.path.stat().st_size, whole=True)
+        if not rows.size:
             raise error
         self._rows = rows
-        self._numbers, self.topics = _topics(database, Counter(topic for _, _, topic in rows))
-        self.start_ns, self.end_ns = rows[0][0], rows[-1][0]
+        self._numbers, self.topics = _topics(database, Counter(rows[:, 2].tolist()))
+        self.start_ns, self.end_ns = int(rows[0, 0]), int(rows[-1, 0])
         # Rows are counted from 1.
-        self._lost = max(number for _, number, _ in rows) - len(rows)
+        self._missing = int(rows[:, 1].max()) - len(rows)
         self._damage = f'damaged, {len(rows)} messages can still be read ({error})'
 
     def _connect(self) -> sqlite3.Connection:
@@ -113,12 +110,17 @@ class SqliteFile:
     @property
     def notices(self) -> tuple[str, ...]:
         """What is lost, so far."""
-        return (f'{self.path}: {self._damage}',) if self._damage else ()
+        if not self._damage:
+            return ()
+        said = [f'{self.path}: {self._damage}']
+        if self._unreadable:
+            said.append(f'{self.path}: {len(self._unreadable)} messages could not be read')
+        return tuple(said)
 
     @property
     def messages_lost(self) -> int:
         """Messages between others that are lost; how many lie behind the damage is not known."""
-        return self._lost
+        return self._missing + len(self._unreadable)
 
     def messages(
         self,
@@ -126,7 +128,7 @@ class SqliteFile:
         start_ns: int | None = None,
         end_ns: int | None = None,
     ) -> Iterator[BagMessage]:
-        """The messages of some topics, or all, in order of log time, up to any damage.
+        """The messages of some topics, or all, in order of log time, but those that are damaged.
 
         Parameters
         ----------
@@ -156,58 +158,59 @@ class SqliteFile:
     ) -> Iterator[tuple[int, int, bytes]]:
         """Topic, log time and content of each message."""
         with closing(self._connect()) as database:
+            given = array('q')
             if self._rows is None:
+                query = _IN_ORDER.format(','.join('?' * len(wanted)))
                 try:
-                    yield from database.execute(
-                        _IN_ORDER.format(','.join('?' * len(wanted))), (*wanted, *span)
-                    )
+                    for number, topic, stamp, content in database.execute(query, (*wanted, *span)):
+                        given.append(number)
+                        yield topic, stamp, content
+                    return
                 except sqlite3.Error as error:
-                    self._damage = f'damaged, what follows is lost ({error})'
-                return
-            database.execute('PRAGMA writable_schema=ON')
-            for stamp, row, topic in self._rows:
-                if topic in wanted and span[0] <= stamp <= span[1]:
-                    try:
-                        content = database.execute(_ONE, (row,)).fetchone()
-                    except sqlite3.Error:
-                        self._lost += 1
-                        continue
-                    yield topic, stamp, content[0]
+                    self._turn_to_rows(database, error)
+            yield from self._row_by_row(database, wanted, span, given)
 
+    def _turn_to_rows(self, database: sqlite3.Connection, error: sqlite3.Error) -> None:
+        """From here on by single rows: SQLite goes no further than to the first damage."""
+        database.execute('PRAGMA writable_schema=ON')
+        self._rows = readable_rows(database, self.path.stat().st_size, whole=False)
+        held = sum(info.count for info in self.topics.values())
+        self._missing = max(0, held - len(self._rows))
+        self._damage = f'damaged, what can be read is read row by row ({error})'
 
-def _readable_rows(database: sqlite3.Connection) -> Iterator[tuple[int, int, int]]:
-    """Number, log time and topic of every row of a damaged file that can be read."""
-    start, misses = 1, 0
-    while misses < _MISSES:
-        found = list(_between(database, start, start + _BATCH - 1))
-        yield from found
-        misses = 0 if found else misses + 1
-        start += _BATCH
-
-
-def _between(
-    database: sqlite3.Connection, first: int, last: int
-) -> Iterator[tuple[int, int, int]]:
-    try:
-        yield from database.execute(_ROWS, (first, last)).fetchall()
-    except sqlite3.Error:
-        if first < last:
-            middle = (first + last) // 2
-            yield from _between(database, first, middle)
-            yield from _between(database, middle + 1, last)
+    def _row_by_row(
+        self,
+        database: sqlite3.Connection,
+        wanted: tuple[int, ...],
+        span: tuple[int, int],
+        given: array[int],
+    ) -> Iterator[tuple[int, int, bytes]]:
+        """Those of the rows that can be read and were not given yet."""
+        assert self._rows is not None
+        stamps, numbers, kinds = self._rows.T
+        due = (
+            (stamps >= span[0])
+            & (stamps <= span[1])
+            & np.isin(kinds, np.array(wanted, dtype=np.int64))
+            & ~np.isin(numbers, np.array(given, dtype=np.int64))
+        )
+        database.execute('PRAGMA writable_schema=ON')
+        for place in np.flatnonzero(due):
+            stamp, number, topic = self._rows[place].tolist()
+            try:
+                found = database.execute(_ONE, (number,)).fetchone()
+            except sqlite3.Error:
+                found = None
+            if found is None:
+                self._unreadable.add(number)
+            else:
+                yield topic, stamp, found[0]
 
 
 def _topics(
     database: sqlite3.Connection, counts: Mapping[int, int]
 ) -> tuple[dict[int, str], dict[str, TopicInfo]]:
-    definitions: dict[str, tuple[str, str]] = {}
-    tables = database.execute("SELECT name FROM sqlite_master WHERE type='table'")
-    # Older recordings keep no definitions.
-    if ('message_definitions',) in tables.fetchall():
-        rows = database.execute(
-            'SELECT topic_type, encoding, encoded_message_definition FROM message_definitions'
-        )
-        definitions = {name: (encoding, text) for name, encoding, text in rows}
+    definitions = _definitions(database)
     numbers: dict[int, str] = {}
     topics: dict[str, TopicInfo] = {}
     columns = {row[1] for row in database.execute('PRAGMA table_info(topics)')}
@@ -228,3 +231,18 @@ def _topics(
             qos=recorded_qos(qos or ''),
         )
     return numbers, topics
+
+
+def _definitions(database: sqlite3.Connection) -> dict[str, tuple[str, str]]:
+    """Format and text of the definition of each type; empty where they are lost."""
+    tables = database.execute("SELECT name FROM sqlite_master WHERE type='table'")
+    # Older recordings keep no definitions.
+    if ('message_definitions',) not in tables.fetchall():
+        return {}
+    try:
+        rows = database.execute(
+            'SELECT topic_type, encoding, encoded_message_definition FROM message_definitions'
+        ).fetchall()
+    except sqlite3.Error:
+        return {}
+    return {name: (encoding, text) for name, encoding, text in rows}

@@ -11,6 +11,9 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.recordings.qos import OfferedQos
 
+# Recordings count signed nanoseconds since 1970; what is earlier or later was damaged.
+LAST_NS = 2**63 - 1
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TopicInfo:

@@ -11,6 +11,7 @@ not yet written.
 from __future__ import annotations
 
 import os
+import struct
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,7 +42,17 @@ _CHUNK_NS = 1_000_000_000
 _LEVEL = 1
 # Of a type whose definition is not understood.
 _UNKNOWN_DIGEST = f'RIHS01_{"0" * 64}'
-_UNFIT = (SerdeError, AttributeError, TypeError, ValueError, LookupError, AssertionError)
+_UNFIT = (
+    SerdeError,
+    struct.error,
+    AttributeError,
+    TypeError,
+    ValueError,
+    LookupError,
+    AssertionError,
+)
+# A ROS time counts seconds with 32 bits, one of them for the sign.
+_END_OF_TIME_NS = 2**31 * 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,12 +172,15 @@ class BagWriter:
         Raises
         ------
         RecordingError
-            When the topic was not announced, the message does not fit it, or the disk is full.
+            When the topic was not announced, the message does not fit it, its stamp no ROS
+            time, or the disk is full.
         """
         connection = self._connection(topic)
         try:
             cdr = self._store.serialize_cdr(message, connection.msgtype)
         except _UNFIT as error:
+            if isinstance(error, struct.error) and stamp_ns >= _END_OF_TIME_NS:
+                raise self._too_late(topic) from error
             raise RecordingError(
                 f'{self.path}: {topic}',
                 f'{type(message).__name__} is no {connection.msgtype} ({error})',
@@ -283,6 +297,13 @@ class BagWriter:
             rihs01=digest,
             serialization_format=offered.encoding,
             offered_qos_profiles=[offered.qos.profile()],
+        )
+
+    def _too_late(self, topic: str) -> RecordingError:
+        return RecordingError(
+            f'{self.path}: {topic}',
+            'a stamp lies beyond what a ROS time holds, which ends on 2038-01-19',
+            'pass an earlier --start, or the true --rate',
         )
 
     def _exists(self) -> RecordingError:

@@ -193,13 +193,10 @@ def _look(found: BagInfo, reader: BagReader, message: BagMessage) -> None:
 
 def _health(found: BagInfo, reader: BagReader) -> list[Ailment]:
     again = f'nanorocks salvage {found.path} -o NEW copies what can be read'
-    ailments = [Ailment(notice, again) for notice in reader.notices]
-    if found.messages_lost and not reader.notices:
+    ailments = [Ailment(notice, again) for notice in reader.damage]
+    if found.messages_lost and not reader.damage:
         ailments.append(Ailment(f'{found.messages_lost} messages are missing', again))
-    if found.metadata.get('import') == 'unfinished':
-        ailments.append(
-            Ailment('it was imported in part: the import was interrupted', 'import it again')
-        )
+    ailments += [Ailment(f'it {one.what}', one.remedy) for one in reader.unfinished]
     ailments += found.health
     return ailments + _camera_ailments(found)
 

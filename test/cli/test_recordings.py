@@ -7,10 +7,12 @@ import os
 import resource
 import subprocess
 import sys
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from mcap.writer import Writer as McapWriter
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.recordings.messages import compressed_image_message, float_array_message
@@ -99,6 +101,40 @@ def test_info_says_what_is_wrong_and_what_to_do(tmp_path, capsys):
     assert cut['remedy'] == f'nanorocks salvage {path} -o NEW copies what can be read'
 
 
+def test_info_and_salvage_leave_out_messages_of_a_time_that_cannot_be(tmp_path, capsys):
+    path = tmp_path / 'x.mcap'
+    writer = McapWriter(str(path))
+    writer.start()
+    schema = writer.register_schema('std_msgs/msg/Empty', 'ros2msg', b'')
+    channel = writer.register_channel('/empty', 'cdr', schema)
+    for stamp in (START_NS, START_NS + STEP_NS, START_NS | 1 << 63):
+        writer.add_message(channel, stamp, b'\0\1\0\0\0', stamp)
+    writer.finish()
+    code, out, _ = called(capsys, 'info', path, '--json')
+    found = json.loads(out)
+    assert code == 0
+    assert (found['messages_lost'], found['complete'], found['duration']) == (1, False, 0.04)
+    assert any('1 messages have a time that cannot be' in one['what'] for one in found['health'])
+    assert called(capsys, 'info', path)[0] == 0
+    _, out, _ = called(capsys, 'salvage', path, '-o', tmp_path / 'new', '--json')
+    found = json.loads(out)
+    assert (found['messages_recovered'], found['messages_lost']) == (2, 1)
+
+
+@pytest.mark.parametrize(('key', 'remedy'), [
+    ('import', 'import it again'), ('salvage', 'salvage the damaged bag again'),
+])  # fmt: skip
+def test_info_says_that_the_making_of_a_bag_was_interrupted(tmp_path, capsys, key, remedy):
+    path = write_bag(tmp_path / 'bag', metadata={key: 'unfinished'})
+    _, out, _ = called(capsys, 'info', path, '--json')
+    found = json.loads(out)
+    assert found['complete'] is False
+    (part,) = [one for one in found['health'] if 'holds only part of' in one['what']]
+    assert part['remedy'] == remedy
+    _, out, _ = called(capsys, 'info', path)
+    assert 'NOT complete' in out
+
+
 def test_films_within_messages_are_told_from_pictures(tmp_path, capsys):
     path = write_bag(tmp_path / 'bag', pictures=lambda number: b'\0\0\0\1\x67' + bytes(99))
     _, out, _ = called(capsys, 'info', path, '--json')
@@ -139,6 +175,32 @@ def test_salvage_prints_what_programs_rely_on(tmp_path, capsys):
     assert last.endswith('exists already and is not overwritten; pass another path')
 
 
+# --- names of any bytes ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('command', ['import', 'import --each', 'salvage', 'info'])
+def test_names_that_are_no_utf_8_are_shown_all_the_same(tmp_path, command):
+    """Where standard output takes nothing but UTF-8."""
+    place = os.fsencode(tmp_path) + b'/lat\xe9\n'
+    os.mkdir(place)
+    folder = Path(os.fsdecode(place))
+    bag = write_bag(folder / 'bag')
+    arguments = {
+        'info': [bag],
+        'salvage': [bag, '-o', folder / 'new'],
+    }.get(command) or [images(folder / 'images'), '--rate', '30', '-o', folder / 'new']
+    code = 'from nanorocks_ros.cli.main import main; exit(main())'
+    done = subprocess.run(
+        [sys.executable, '-c', code, *command.split(), *(str(one) for one in arguments)],
+        env={**os.environ, 'PYTHONIOENCODING': 'utf-8:strict'},
+        timeout=120,
+        check=False,
+        capture_output=True,
+    )
+    assert done.returncode == 0, done.stderr.decode()
+    assert b'imported, ' in done.stdout or b'lat\\udce9\\n/' in done.stdout
+
+
 # --- what cannot be used --------------------------------------------------------------------
 
 BAD = {
@@ -174,6 +236,17 @@ def test_a_wrong_call_of_import_is_exit_code_2(tmp_path, capsys, arguments):
     assert code == 2
     assert '; ' in last
     assert not (tmp_path / 'bag').exists()
+
+
+@pytest.mark.parametrize('arguments', [
+    ['--rate', '1e-8'], ['--rate', '1', '--start', '2038-01-19T03:14:05Z'],
+])  # fmt: skip
+def test_a_film_beyond_what_a_ros_time_holds_is_refused(tmp_path, capsys, arguments):
+    folder = images(tmp_path / 'images', 20)
+    code, _, last = called(capsys, 'import', folder, '-o', tmp_path / 'bag', *arguments)
+    assert code == 1
+    assert 'a stamp lies beyond what a ROS time holds, which ends on 2038-01-19; ' in last
+    assert last.endswith('pass an earlier --start, or the true --rate')
 
 
 def test_each_ends_with_what_could_not_be_imported(tmp_path, capsys):

@@ -539,3 +539,27 @@ def test_a_long_bag_is_read_chunk_by_chunk(tmp_path, record, monkeypatch):
             for given, _ in enumerate(bag.messages(), start=1):
                 assert sum(loaded) - given <= 2 * max(loaded)
         assert len(loaded) >= 8
+
+
+@pytest.mark.parametrize('chunked', [True, False])
+@pytest.mark.parametrize('ended', [True, False])
+def test_messages_of_a_time_that_cannot_be_are_left_out_and_counted(tmp_path, chunked, ended):
+    path = tmp_path / 'x.mcap'
+    writer = McapWriter(str(path), use_chunking=chunked, enable_crcs=False)
+    writer.start()
+    schema = writer.register_schema('std_msgs/msg/Empty', 'ros2msg', b'')
+    channel = writer.register_channel('/empty', 'cdr', schema)
+    for stamp in (5, 6, 2**63 + 7, 8, 2**64 - 1, 2**63 - 1):
+        writer.add_message(channel, stamp, b'\0\1\0\0\0', stamp)
+    writer.finish()
+    if not ended:
+        path.write_bytes(path.read_bytes()[:-40])
+    bag = open_bag(path)
+    for _ in range(2):
+        assert [one.log_time_ns for one in bag.messages()] == [5, 6, 8, 2**63 - 1]
+        assert bag.messages_lost == 2
+        assert not bag.complete
+        assert (
+            bag.notices[-1] == f'{path}: 2 messages have a time that cannot be and were left out'
+        )
+    assert (bag.start_ns, bag.end_ns) == (5, 2**63 - 1)

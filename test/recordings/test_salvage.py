@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import sqlite3
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -133,13 +135,13 @@ def test_messages_that_nobody_understands_are_copied_too(tmp_path, encoding, tex
     )
 
 
-def write_sqlite(path, count):
+def write_sqlite(path, count, size=3000):
     store = get_typestore(Stores.ROS2_JAZZY)
     noise = np.random.default_rng(1)
     with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
         connection = writer.add_connection(CAMERA, IMAGE, typestore=store)
         for stamp in range(1, count + 1):
-            message = compressed_image_message(stamp, 'camera', 'jpeg', noise.bytes(3000))
+            message = compressed_image_message(stamp, 'camera', 'jpeg', noise.bytes(size))
             writer.write(connection, stamp, store.serialize_cdr(message, IMAGE))
     return path
 
@@ -174,3 +176,93 @@ def test_where_nothing_is_left_nothing_is_made(tmp_path, content):
     with pytest.raises(RecordingError, match='holds no message that can be recovered'):
         salvage(tmp_path / 'x.mcap', tmp_path / 'new', lambda *_: None)
     assert not (tmp_path / 'new').exists()
+
+
+@pytest.mark.parametrize('share', [0.05, 0.2, 0.5, 0.9])
+def test_a_damaged_page_of_a_sqlite_file_costs_its_own_rows_alone(tmp_path, share):
+    path = write_sqlite(tmp_path / 'run', 400, size=60_000)
+    everything = list(open_bag(path).messages())
+    file = next(path.glob('*.db3'))
+    content = bytearray(file.read_bytes())
+    start = int(share * len(content)) // 4096 * 4096
+    content[start : start + 4096] = bytes(4096)
+    file.write_bytes(content)
+    bag = open_bag(path)
+    for _ in range(2):
+        found = list(bag.messages())
+        assert [one for one in everything if one in found] == found
+        assert len(found) >= 400 - 8
+        assert len(found) + bag.messages_lost == 400
+    assert not bag.complete
+    found, messages = salvaged(path, tmp_path / 'new')
+    assert len(messages) >= 400 - 8
+    assert found.recovered + found.lost == 400
+
+
+def test_of_a_sqlite_file_whose_index_is_damaged_nothing_is_lost(tmp_path):
+    path = write_sqlite(tmp_path / 'run', 2000, size=30)
+    everything = list(open_bag(path).messages())
+    file = next(path.glob('*.db3'))
+    content = bytearray(file.read_bytes())
+    leaves = [place for place in range(0, len(content), 4096) if content[place] == 0x0A]
+    content[leaves[-2] : leaves[-2] + 4096] = bytes(4096)
+    file.write_bytes(content)
+    found, messages = salvaged(path, tmp_path / 'new')
+    assert messages == everything
+    assert found.lost == 0
+    assert 'damaged' in found.notices[0]
+
+
+def test_definitions_that_are_lost_cost_no_messages(tmp_path):
+    path = write_sqlite(tmp_path / 'run', 20)
+    everything = list(open_bag(path).messages())
+    file = next(path.glob('*.db3'))
+    with closing(sqlite3.connect(file)) as database:
+        ((page,),) = database.execute(
+            "SELECT rootpage FROM sqlite_master WHERE name = 'message_definitions'"
+        )
+    content = bytearray(file.read_bytes())
+    content[(page - 1) * 4096 : page * 4096] = bytes(4096)
+    file.write_bytes(content)
+    assert salvaged(path, tmp_path / 'new')[1] == everything
+
+
+def test_rows_behind_a_hole_of_thousands_are_found(tmp_path):
+    path = write_sqlite(tmp_path / 'run', 6000, size=30)
+    file = next(path.glob('*.db3'))
+    with closing(sqlite3.connect(file)) as database, database:
+        database.execute('DELETE FROM messages WHERE id BETWEEN 100 AND 5000')
+    content = bytearray(file.read_bytes())
+    leaves = [place for place in range(0, len(content), 4096) if content[place] == 0x0D]
+    content[leaves[-2] : leaves[-2] + 4096] = bytes(4096)
+    file.write_bytes(content)
+    found = salvage(path, tmp_path / 'new', lambda *_: None)
+    assert found.recovered > 1000
+
+
+def interrupted(source, target):
+    """Ctrl-C before the end."""
+
+    def progress(done, total):
+        if done > total // 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        salvage(source, target, progress)
+
+
+def test_an_interrupted_salvage_does_not_pass_as_whole(tmp_path, record):
+    path = record(tmp_path / 'run')
+    interrupted(path, tmp_path / 'part')
+    part = open_bag(tmp_path / 'part')
+    assert 40 <= len(list(part.messages())) < 81
+    assert part.metadata['salvage'] == 'unfinished'
+    assert not part.complete
+    said = 'holds only part of what was salvaged, since that was interrupted'
+    assert part.notices == (f'{tmp_path / "part"}: {said}',)
+    # Nor does a copy of it.
+    found = salvage(tmp_path / 'part', tmp_path / 'copy', lambda *_: None)
+    assert found.notices == part.notices
+    assert not open_bag(tmp_path / 'copy').complete
+    salvaged(path, tmp_path / 'new')
+    assert open_bag(tmp_path / 'new').metadata['salvage'] == 'complete'

@@ -186,6 +186,25 @@ def test_a_negative_stamp_is_refused(tmp_path, topics):
         bag.write(EPOCH, -1, time_message(0))
 
 
+def test_a_stamp_that_no_ros_time_holds_is_refused(tmp_path, topics):
+    last_ns = (2**31 - 1) * 1_000_000_000
+    with BagWriter(tmp_path / 'run', topics, metadata={}) as bag:
+        bag.write(EPOCH, last_ns, time_message(last_ns))
+        with pytest.raises(RecordingError, match=r'beyond what a ROS time holds, .*; .*--rate'):
+            bag.write(EPOCH, last_ns + 1_000_000_000, time_message(last_ns + 1_000_000_000))
+    assert [one.log_time_ns for one in open_bag(tmp_path / 'run').messages()] == [last_ns]
+
+
+def test_a_number_that_does_not_fit_its_field_is_refused(tmp_path, topics):
+    message = time_message(7)
+    message.nanosec = -1
+    with (
+        pytest.raises(RecordingError, match=r'Time is no builtin_interfaces/msg/Time \('),
+        BagWriter(tmp_path / 'run', topics, metadata={}) as bag,
+    ):
+        bag.write(EPOCH, 7, message)
+
+
 def test_after_an_exception_what_was_written_is_readable(tmp_path, topics):
     def record_until_it_fails():
         with BagWriter(tmp_path / 'run', topics, metadata={}) as writer:

@@ -508,7 +508,10 @@ def test_an_interrupted_import_leaves_a_bag_that_can_be_read(tmp_path):
     said = interrupted([str(folder), '-o', str(bag), *options], bag)
     assert said.startswith('nanorocks: interrupted; what was written until now')
     left = open_bag(bag)
-    assert left.complete
+    assert not left.complete
+    assert left.notices == (
+        f'{bag}: holds only part of the film, since its import was interrupted',
+    )
     assert left.metadata['import'] == 'unfinished'
     assert 0 < left.topics[CAMERA].count < 1500
 

@@ -39,10 +39,10 @@ def analysis():
     return analyse(SAMPLE, PipelineSettings())
 
 
-def raw_bag(path, stamps, pictures=None, encoding='mono8', topic=topics.RAW):
+def raw_bag(path, stamps, pictures=None, encoding='mono8', topic=topics.RAW, metadata=None):
     """A bag of raw gray pictures: a bright square that moves to the right."""
     table = {topics.EPOCH.absolute(): offered(topics.EPOCH), topic.absolute(): offered(topic)}
-    with BagWriter(path, table, metadata={}) as bag:
+    with BagWriter(path, table, metadata=metadata or {}) as bag:
         bag.write(topics.EPOCH.absolute(), stamps[0], time_message(stamps[0]))
         for number, stamp_ns in enumerate(stamps):
             pixels = np.full((210, 210), 120, np.uint8)
@@ -312,6 +312,18 @@ def test_a_bag_cut_short_is_analysed_up_to_the_cut(capsys, tmp_path):
     assert 0.4 * whole < found['frames'] < 0.8 * whole
     assert not found['complete']
     assert any('salvaged' in line or 'lost' in line for line in printed.err.splitlines())
+
+
+@pytest.mark.parametrize('key', ['import', 'salvage'])
+def test_of_a_bag_whose_making_was_interrupted_it_is_said(capsys, tmp_path, key):
+    path = raw_bag(tmp_path / 'bag', at_30_hz(60), metadata={key: 'unfinished'})
+    assert run('analyse', path, '--json', '--no-output') == 0
+    printed = capsys.readouterr()
+    found = json.loads(printed.out)
+    assert found['frames'] == 60
+    assert not found['complete']
+    assert 'holds only part of' in found['notices'][0]
+    assert 'holds only part of' in printed.err
 
 
 @pytest.mark.parametrize(
