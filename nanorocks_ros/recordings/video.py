@@ -12,9 +12,9 @@ import numpy as np
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.film import NS, FilmInfo, Shot, StoredPicture, form_of
 from nanorocks_ros.recordings.images import is_decodable
-from nanorocks_ros.recordings.instants import instant
 from nanorocks_ros.recordings.jpeg import is_whole_jpeg, jpeg_head, with_huffman_tables
 from nanorocks_ros.recordings.pyav import pyav
+from nanorocks_ros.recordings.streams import FORMATS, rate_told, start_ns, step_ns
 from nanorocks_ros.recordings.upright import UPRIGHT, Turn, turn_of, turned, words_of
 
 if TYPE_CHECKING:
@@ -23,20 +23,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-_ENDINGS = 'mp4 m4v mov avi mkv webm mts m2ts ts mpg mpeg wmv mxf 3gp ogv mjpeg mjpg y4m'
-VIDEOS = frozenset(f'.{ending}' for ending in _ENDINGS.split())
-"""Endings of the files that a folder of videos is looked through for."""
-
-# The library makes a film of texts and of noise, too, where it is let.
-_CONTAINERS = 'mov,mp4,m4a,3gp,3g2,mj2 matroska,webm avi mpegts mpeg asf mxf flv ogg nut dv ivf'
-_STREAMS = 'mjpeg h264 hevc yuv4mpegpipe'
-_FORMATS = frozenset([*_CONTAINERS.split(), *_STREAMS.split()])
 # Nothing is fetched because a playlist says so.
 _ONLY_FILES = {'protocol_whitelist': 'file,crypto,data'}
-# Cameras without a clock begin in 1904 or 1970; stamps of messages end in 2038.
-_FIRST_NS, _LAST_NS = 315_532_800 * NS, (2**31 - 1) * NS
-# Whose clock knows its zone comes first.
-_START_TAGS = ('com.apple.quicktime.creationdate', 'creation_time')
 _CAMERA_TAGS = ('make', 'model', 'comment', 'encoder', 'location')
 
 
@@ -46,6 +34,8 @@ class Video:
     Parameters
     ----------
     path : Path
+    rate : Fraction or None, [1/s]
+        Of the camera; None: as the video says.
     threads : int
         That decode it; 0: as many as there are cores.
 
@@ -58,12 +48,12 @@ class Video:
     Raises
     ------
     ConfigurationError
-        When PyAV is not installed.
+        When PyAV is not installed, or nothing says when the pictures were taken.
     RecordingError
         When it is no video.
     """
 
-    def __init__(self, path: Path, threads: int = 0) -> None:
+    def __init__(self, path: Path, rate: Fraction | None = None, threads: int = 0) -> None:
         self.broken = 0
         self._threads = threads
         self._av = pyav(str(path))
@@ -71,7 +61,8 @@ class Video:
         self._turn = UPRIGHT
         with self._opened(path) as container:
             stream = container.streams.video[0]
-            self.info = self._described(path, container, stream)
+            told = None if rate else rate_told(path, container, stream)
+            self.info = self._described(path, container, stream, told)
 
     def _opened(self, path: Path) -> Any:
         try:
@@ -88,12 +79,14 @@ class Video:
                 'check that it was copied whole, or pass another',
             ) from error
         streams = container.streams.video
-        if not streams or container.format.name not in _FORMATS:
+        if not streams or container.format.name not in FORMATS:
             container.close()
             raise RecordingError(str(path), 'holds no film', 'pass a video')
         return container
 
-    def _described(self, path: Path, container: Any, stream: Any) -> FilmInfo:
+    def _described(
+        self, path: Path, container: Any, stream: Any, rate: Fraction | None
+    ) -> FilmInfo:
         first, packet = self._first(path, container, stream)
         self._turn = turn_of(first)
         width, height = first.width, first.height
@@ -103,8 +96,9 @@ class Video:
             codec=stream.codec_context.name,
             width=height if self._turn[0] == 0 else width,
             height=width if self._turn[0] == 0 else height,
-            step_ns=_step_ns(stream),
-            start_ns=_start_ns({**stream.metadata, **container.metadata}),
+            step_ns=round(NS / rate) if rate else step_ns(stream),
+            rate=rate,
+            start_ns=start_ns({**stream.metadata, **container.metadata}),
             expected=max(0, stream.frames),
             tags={k: v for k, v in container.metadata.items() if k.lower() in _CAMERA_TAGS},
         )
@@ -237,29 +231,18 @@ class _VideoPicture:
 
 
 def _remarks(info: FilmInfo, turn: Turn) -> tuple[str, ...]:
-    if turn == UPRIGHT:
-        return ()
-    again = '; its JPEGs are compressed anew for that' if info.codec == 'mjpeg' else ''
-    return (f'{info.path}: {words_of(turn)}, as its rotation flag says{again}',)
+    remarks = []
+    if info.rate:
+        rate = f'{float(info.rate):.6g}'
+        remarks.append(f'{info.path}: has no times; its stream says {rate} pictures per second')
+    if turn != UPRIGHT:
+        again = '; its JPEGs are compressed anew for that' if info.codec == 'mjpeg' else ''
+        remarks.append(f'{info.path}: {words_of(turn)}, as its rotation flag says{again}')
+    return tuple(remarks)
 
 
 def _reason(error: Exception) -> str:
     return str(getattr(error, 'strerror', None) or error)
-
-
-def _step_ns(stream: Any) -> int:
-    for rate in (stream.average_rate, stream.guessed_rate):
-        if rate:
-            return round(NS / Fraction(rate))
-    return 0
-
-
-def _start_ns(tags: dict[str, str]) -> int | None:
-    for name in _START_TAGS:
-        found = instant(tags.get(name, ''))
-        if found is not None and _FIRST_NS <= found < _LAST_NS:
-            return found
-    return None
 
 
 def _shown_ns(source: Any, stream: Any) -> int | None:

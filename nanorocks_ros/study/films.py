@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.recordings.image_folder import ImageFolder, images_in
-from nanorocks_ros.recordings.video import VIDEOS, Video
+from nanorocks_ros.recordings.streams import VIDEOS
+from nanorocks_ros.recordings.video import Video
 from nanorocks_ros.study.film_bag import check_quality
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def open_film(path: Path, settings: ImportSettings) -> Film:
     Raises
     ------
     ConfigurationError
-        When nothing says when images were taken, or the library for videos is missing.
+        When nothing says when pictures were taken, or the library for videos is missing.
     RecordingError
         When it is neither.
     """
@@ -74,7 +75,7 @@ def open_film(path: Path, settings: ImportSettings) -> Film:
         if not path.exists():
             raise RecordingError(str(path), 'does not exist', 'pass a video or a folder of images')
         if not path.is_dir():
-            return Video(path, settings.threads)
+            return Video(path, settings.rate, settings.threads)
         if images_in(path):
             return ImageFolder(path, settings.rate)
         held = videos_in(path)

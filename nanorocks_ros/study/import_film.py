@@ -205,7 +205,7 @@ class _Import:
         self._tell_repairs(film, steady, repeats)
 
     def _timed(self, film: Film) -> Iterator[tuple[int | None, Shot]]:
-        rate = self._settings.rate
+        rate = self._settings.rate or film.info.rate
         for number, shot in enumerate(film.shots()):
             # With those that were lost: the camera took them.
             time_ns = shot.time_ns if rate is None else round((number + film.broken) * NS / rate)

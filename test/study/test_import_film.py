@@ -18,12 +18,17 @@ import pytest
 from PIL import Image
 from videos import (
     HEIGHT,
+    NS,
+    START_NS,
+    STARTED,
     STEP,
     WIDTH,
+    imported,
     number_of,
     packets_of,
     picture,
     turn_video,
+    write_images,
     write_video,
 )
 
@@ -36,22 +41,7 @@ from nanorocks_ros.study.films import ImportSettings
 from nanorocks_ros.study.import_each import films_of, import_each
 from nanorocks_ros.study.import_film import as_json, import_films
 
-NS = 1_000_000_000
-START_NS = 1_700_000_000 * NS
-STARTED = ImportSettings(start_ns=START_NS)
 CAMERA = '/nanorocks/camera/image_raw/compressed'
-
-
-def imported(paths, bag, settings=STARTED):
-    shares = []
-    found = import_films([paths] if isinstance(paths, os.PathLike) else paths, bag, settings,
-                         shares.append)  # fmt: skip
-    assert shares == sorted(shares)
-    assert shares[-1] <= 1.0
-    frames = list(BagFrames(bag).frames())
-    assert len(frames) == found.frames
-    times = [(one.stamp_ns - START_NS) / 1e6 for one in frames]
-    return found, [number_of(one.image) for one in frames], times
 
 
 @pytest.mark.parametrize('name', ['a.mp4', 'a.avi', 'a.mov', 'a.mkv'])
@@ -268,13 +258,6 @@ def test_the_calibration_goes_into_the_camera_info(tmp_path):
 
 
 # --- folders of images ----------------------------------------------------------------------
-
-
-def write_images(folder, names):
-    folder.mkdir()
-    for number, name in enumerate(names):
-        cv2.imwrite(str(folder / name), picture(number))
-    return folder
 
 
 RATE = ImportSettings(start_ns=START_NS, rate=Fraction(10))

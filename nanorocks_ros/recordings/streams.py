@@ -1,0 +1,98 @@
+"""What a video file says of the film in it: its format, its rate, and when it was taken."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.recordings.film import NS
+from nanorocks_ros.recordings.instants import instant
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+_ENDINGS = 'mp4 m4v mov avi mkv webm mts m2ts ts mpg mpeg wmv mxf 3gp ogv mjpeg mjpg y4m'
+VIDEOS = frozenset(f'.{ending}' for ending in _ENDINGS.split())
+"""Endings of the files that a folder of videos is looked through for."""
+
+# The library makes a film of texts and of noise, too, where it is let.
+_CONTAINERS = 'mov,mp4,m4a,3gp,3g2,mj2 matroska,webm avi mpegts mpeg asf mxf flv ogg nut dv ivf'
+# Nothing but pictures: the library stamps them at 25 per second where it knows no better.
+_CODED, _JPEGS, _PLAIN = ('h264', 'hevc'), 'mjpeg', 'yuv4mpegpipe'
+FORMATS = frozenset([*_CONTAINERS.split(), *_CODED, _JPEGS, _PLAIN])
+"""Formats of files that are taken for films, as the library names them."""
+
+_PLAIN_HEAD_BYTES = 256
+# Streams cut out of films of a variable rate say the ticks of a clock instead, [1/s].
+_TICKING = 1000
+# Cameras without a clock begin in 1904 or 1970; stamps of messages end in 2038.
+_FIRST_NS, _LAST_NS = 315_532_800 * NS, (2**31 - 1) * NS
+# Whose clock knows its zone comes first.
+_START_TAGS = ('com.apple.quicktime.creationdate', 'creation_time')
+
+
+def rate_told(path: Path, container: Any, stream: Any) -> Fraction | None:
+    """The rate that a film without times says, [1/s]; None where pictures have times.
+
+    Parameters
+    ----------
+    path : Path
+    container, stream : objects of PyAV
+
+    Raises
+    ------
+    ConfigurationError
+        When there are neither times nor a rate.
+    """
+    form = container.format.name
+    if form == _PLAIN and _plain_tells(path):
+        return None
+    if form not in (*_CODED, _JPEGS, _PLAIN):
+        return None
+    # Of the codec: what its stream says, and nothing where it does not; those of the stream
+    # are then the 25 of the library.
+    rate = stream.codec_context.framerate if form in _CODED else None
+    if rate and rate < _TICKING:
+        return Fraction(rate)
+    raise ConfigurationError(
+        str(path),
+        'has no times, and does not say at which rate it was taken',
+        'pass --rate, in pictures per second',
+    )
+
+
+def _plain_tells(path: Path) -> bool:
+    """Whether the head of uncompressed video gives a rate; 0:0 means that it is not known."""
+    with path.open('rb') as file:
+        words = file.readline(_PLAIN_HEAD_BYTES).split()
+    rates = [word[1:].split(b':') for word in words[1:] if word.startswith(b'F')]
+    return any(all(part.strip(b'0') for part in one) for one in rates)
+
+
+def step_ns(stream: Any) -> int:
+    """The usual time between two pictures, [ns]; 0 when unknown.
+
+    Parameters
+    ----------
+    stream : object of PyAV
+    """
+    for rate in (stream.average_rate, stream.guessed_rate):
+        if rate:
+            return round(NS / Fraction(rate))
+    return 0
+
+
+def start_ns(tags: dict[str, str]) -> int | None:
+    """When a film was taken, since 1970, [ns]; None where nothing says so.
+
+    Parameters
+    ----------
+    tags : dict of str to str
+        What the camera wrote into it.
+    """
+    for name in _START_TAGS:
+        found = instant(tags.get(name, ''))
+        if found is not None and _FIRST_NS <= found < _LAST_NS:
+            return found
+    return None

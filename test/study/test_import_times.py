@@ -1,0 +1,71 @@
+"""When the pictures of a film were taken, where the film says it badly or not at all."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import av
+import pytest
+from videos import HEIGHT, START_NS, STARTED, WIDTH, imported, picture
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.study.films import ImportSettings
+from nanorocks_ros.study.import_film import import_films
+
+FAST = ImportSettings(start_ns=START_NS, rate=Fraction(100))
+QUIET = {'x265-params': 'log-level=none'}
+SILENT = {'x265-params': 'log-level=none:vui-timing-info=0'}
+
+
+def write_raw(path, numbers, rate=50, **options):
+    """Pictures and nothing else, in the format that the name says."""
+    codec = {'.h264': 'libx264', '.hevc': 'libx265', '.mjpeg': 'mjpeg'}[path.suffix]
+    with av.open(str(path), 'w') as container:
+        stream = container.add_stream(codec, rate=rate, options=options)
+        stream.width, stream.height = WIDTH, HEIGHT
+        stream.pix_fmt = 'yuvj420p' if codec == 'mjpeg' else 'yuv420p'
+        for number in numbers:
+            frame = av.VideoFrame.from_ndarray(picture(number), format='bgr24')
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    return path
+
+
+# --- films without times --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(('name', 'options'), [('a.h264', {'bf': '2'}), ('a.hevc', QUIET)])
+def test_a_raw_stream_has_the_rate_that_it_says(tmp_path, name, options):
+    film = write_raw(tmp_path / name, range(12), **options)
+    found, numbers, times = imported(film, tmp_path / 'bag')
+    assert numbers == list(range(12))
+    assert times == [20 * k for k in range(12)]
+    assert any('has no times; its stream says 50 pictures per second' in one
+               for one in found.notices)  # fmt: skip
+
+
+@pytest.mark.parametrize(('name', 'options'), [
+    ('a.mjpeg', {}), ('a.hevc', SILENT), ('a.h264', {'rate': 1000}),
+])  # fmt: skip
+def test_a_raw_stream_that_says_no_rate_needs_one(tmp_path, name, options):
+    film = write_raw(tmp_path / name, range(6), **options)
+    with pytest.raises(ConfigurationError, match=r'a\..*: has no times.*; pass --rate'):
+        import_films([film], tmp_path / 'bag', STARTED, lambda _: None)
+    assert not (tmp_path / 'bag').exists()
+    _, numbers, times = imported(film, tmp_path / 'bag', FAST)
+    assert numbers == list(range(6))
+    assert times == [10 * k for k in range(6)]
+
+
+@pytest.mark.parametrize(('said', 'step'), [('F50:1', 20), ('F0:0', None), ('Ip', None)])
+def test_uncompressed_video_says_its_rate_in_its_head_or_needs_one(tmp_path, said, step):
+    levels = [bytes([level]) * (16 * 16 * 3 // 2) for level in (10, 80, 160)]
+    film = tmp_path / 'a.y4m'
+    film.write_bytes(f'YUV4MPEG2 W16 H16 {said} C420jpeg\n'.encode()
+                     + b''.join(b'FRAME\n' + one for one in levels))  # fmt: skip
+    if step is None:
+        with pytest.raises(ConfigurationError, match='has no times'):
+            import_films([film], tmp_path / 'bag', STARTED, lambda _: None)
+    else:
+        found = import_films([film], tmp_path / 'bag', STARTED, lambda _: None)
+        assert found.duration == pytest.approx(2 * step / 1e3)
