@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.recordings.image_folder import ImageFolder, images_in
+from nanorocks_ros.recordings.instants import instant_text
 from nanorocks_ros.recordings.streams import VIDEOS
 from nanorocks_ros.recordings.video import Video
 from nanorocks_ros.study.film_bag import check_quality
@@ -59,6 +60,14 @@ class ImportSettings:
                 'lies before 1970 or after 2038, when stamps of messages end',
                 'give another instant',
             )
+
+    def given(self) -> dict[str, str]:
+        """Those that change times and lens, by their flags, as a bag keeps them; or empty."""
+        return {
+            'rate': str(self.rate) if self.rate else '',
+            'calibration': self.calibration_name,
+            'start': '' if self.start_ns is None else instant_text(self.start_ns),
+        }
 
 
 def open_film(path: Path, settings: ImportSettings) -> Film:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from nanorocks_ros.errors import ConfigurationError, NanorocksError, RecordingError
 from nanorocks_ros.recordings.image_folder import images_in
 from nanorocks_ros.recordings.names import natural
-from nanorocks_ros.recordings.reader import open_bag
 from nanorocks_ros.study.films import videos_in
+from nanorocks_ros.study.import_again import check_same_settings, check_same_source
 from nanorocks_ros.study.import_film import Imported, import_films
 
 if TYPE_CHECKING:
@@ -145,7 +145,8 @@ def _import_one(
 ) -> None:
     bag = found.folder / name
     if bag.exists():
-        _check_same(bag, film)
+        check_same_source(bag, film)
+        check_same_settings(bag, settings)
         found.skipped.append(bag)
         return
     part = found.folder / _UNFINISHED / name
@@ -160,16 +161,3 @@ def _import_one(
         ) from error
     imported.bag = bag
     found.imported.append(imported)
-
-
-def _check_same(bag: Path, film: Path) -> None:
-    """Refuse to take the bag of another film for that of this one."""
-    kept = open_bag(bag).metadata
-    size = sum(one.stat().st_size for one in (images_in(film) if film.is_dir() else [film]))
-    if kept.get('import') != 'complete' or kept.get('source') != film.name:
-        what = f'is there already, but not as the bag of {film.name}'
-    elif kept.get('source_bytes') != str(size):
-        what = f'was made of another {film.name} ({kept.get("source_bytes")} bytes, not {size})'
-    else:
-        return
-    raise RecordingError(str(bag), what, 'delete it, or pass another folder')

@@ -258,19 +258,14 @@ class _Import:
         infos = [film.info for film in self._films]
         settings = self._settings
         unchanged = all(one.as_stored for one in infos)
-        given = {
-            'rate': str(settings.rate) if settings.rate else '',
-            'calibration': settings.calibration_name,
-            'start': '' if settings.start_ns is None else instant_text(settings.start_ns),
-        }
         return {
             'nanorocks_ros': __version__,
             'import': 'unfinished',
             'source': ', '.join(one.path.name for one in infos),
             'source_bytes': ' '.join(str(size) for size in self._sizes),
             'codec': ', '.join(one.codec for one in infos),
-            'pictures': 'as stored' if unchanged else f'JPEG of quality {settings.quality}',
-            **{f'import.{name}': value for name, value in given.items() if value},
+            'pictures': 'as stored' if unchanged else picture_words(settings),
+            **{f'import.{name}': value for name, value in settings.given().items() if value},
             **{f'camera.{k}': v for one in infos[:1] for k, v in one.tags.items()},
         }
 
@@ -307,6 +302,11 @@ def _in_order(
             yield first_ns, future.result()
     for stamp_ns, future in waiting:
         yield stamp_ns, future.result()
+
+
+def picture_words(settings: ImportSettings) -> str:
+    """How pictures were compressed, as provenance says it."""
+    return f'JPEG of quality {settings.quality}'
 
 
 def as_json(imported: Imported) -> dict[str, Any]:

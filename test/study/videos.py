@@ -22,6 +22,19 @@ NS = 1_000_000_000
 START_NS = 1_700_000_000 * NS
 STARTED = ImportSettings(start_ns=START_NS)
 
+CALIBRATION = f"""
+camera_info:
+  width: {WIDTH}
+  height: {HEIGHT}
+  distortion_model: equidistant
+  d: [0.01, 0.002, 0.0, 0.0]
+  k: [80.0, 0, 47.5, 0, 80.0, 31.5, 0, 0, 1]
+  p: [81.0, 0, 47.5, 0, 0, 81.0, 31.5, 0, 0, 0, 1, 0]
+pixels_per_metre: 1000.0
+trays:
+  1: [8, 8, 40, 40]
+"""
+
 
 def picture(number, width=WIDTH, height=HEIGHT):
     """A disc that moves, and the number in black and white blocks at the top."""
