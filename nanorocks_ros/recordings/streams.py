@@ -12,16 +12,27 @@ from nanorocks_ros.recordings.instants import instant
 if TYPE_CHECKING:
     from pathlib import Path
 
-_ENDINGS = 'mp4 m4v mov avi mkv webm mts m2ts ts mpg mpeg wmv mxf 3gp ogv mjpeg mjpg y4m'
-VIDEOS = frozenset(f'.{ending}' for ending in _ENDINGS.split())
-"""Endings of the files that a folder of videos is looked through for."""
-
 # The library makes a film of texts and of noise, too, where it is let.
 _CONTAINERS = 'mov,mp4,m4a,3gp,3g2,mj2 matroska,webm avi mpegts mpeg asf mxf flv ogg nut dv ivf'
 # Nothing but pictures: the library stamps them at 25 per second where it knows no better.
 _CODED, _JPEGS, _PLAIN = ('h264', 'hevc'), 'mjpeg', 'yuv4mpegpipe'
 FORMATS = frozenset([*_CONTAINERS.split(), *_CODED, _JPEGS, _PLAIN])
 """Formats of files that are taken for films, as the library names them."""
+
+_ENDINGS = (
+    'mp4 m4v mov qt 3gp 3g2 mj2 f4v mkv webm avi divx ts mts m2ts m2t mpg mpeg vob asf wmv mxf '
+    'flv ogv ogm nut dv dif ivf h264 264 avc hevc h265 265 mjpeg mjpg y4m'
+)
+VIDEOS = frozenset(f'.{ending}' for ending in _ENDINGS.split())
+"""Endings of the files that a folder of videos is looked through for: those of all formats."""
+
+# Films that are not read, and what films that are read begin with, whatever their names.
+_OTHERS = frozenset(
+    ['.m1v', '.m2v', '.mpv', '.rm', '.rmvb', '.amv', '.cine', '.r3d', '.braw', '.obu', '.vvc']
+)
+_HEAD_BYTES = 16
+_STARTS = (b'\x1aE\xdf\xa3', b'FLV\x01', b'nut/multimedia', b'YUV4MPEG2 ', b'0&\xb2u\x8ef\xcf\x11')
+_QUICKTIME, _NO_FILMS = b'ftyp', (b'heic', b'heix', b'mif1', b'avif', b'crx ', b'M4A ', b'M4B ')
 
 _PLAIN_HEAD_BYTES = 256
 # Streams cut out of films of a variable rate say the ticks of a clock instead, [1/s].
@@ -30,6 +41,25 @@ _TICKING = 1000
 _FIRST_NS, _LAST_NS = 315_532_800 * NS, (2**31 - 1) * NS
 # Whose clock knows its zone comes first.
 _START_TAGS = ('com.apple.quicktime.creationdate', 'creation_time')
+
+
+def looks_like_film(path: Path) -> bool:
+    """Whether a file that has not the ending of a film may be one all the same.
+
+    Raises
+    ------
+    OSError
+        When it cannot be read.
+    """
+    if path.suffix.lower() in _OTHERS:
+        return True
+    if path.suffix.lower() == '.mka' or not path.is_file():
+        return False
+    with path.open('rb') as file:
+        head = file.read(_HEAD_BYTES)
+    if head[4:8] == _QUICKTIME:
+        return head[8:12] not in _NO_FILMS
+    return head.startswith(_STARTS) or (head[:4] == b'RIFF' and head[8:11] == b'AVI')
 
 
 def rate_told(path: Path, container: Any, stream: Any) -> Fraction | None:

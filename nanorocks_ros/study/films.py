@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.recordings.image_folder import ImageFolder, images_in
 from nanorocks_ros.recordings.instants import instant_text
-from nanorocks_ros.recordings.streams import VIDEOS
 from nanorocks_ros.recordings.video import Video
 from nanorocks_ros.study.film_bag import check_quality
+from nanorocks_ros.study.find_films import look_into
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -87,7 +87,7 @@ def open_film(path: Path, settings: ImportSettings) -> Film:
             return Video(path, settings.rate, settings.threads)
         if images_in(path):
             return ImageFolder(path, settings.rate)
-        held = videos_in(path)
+        held = look_into(path).films
     except OSError as error:
         raise RecordingError(
             str(path), f'cannot be read ({error.strerror})', 'check its permissions'
@@ -99,16 +99,6 @@ def open_film(path: Path, settings: ImportSettings) -> Film:
             'name the parts of one recording, or add --each to make a bag of each',
         )
     raise RecordingError(str(path), 'holds no video and no image', 'pass another folder')
-
-
-def videos_in(folder: Path) -> list[Path]:
-    """The videos in a folder, and the folders of images in it, in no order."""
-    return [
-        one
-        for one in folder.iterdir()
-        if not one.name.startswith('.')
-        and (bool(images_in(one)) if one.is_dir() else one.suffix.lower() in VIDEOS)
-    ]
 
 
 def check_sizes(films: Sequence[Film], settings: ImportSettings) -> None:

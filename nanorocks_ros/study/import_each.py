@@ -6,18 +6,15 @@ import shutil
 from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError, NanorocksError, RecordingError
-from nanorocks_ros.recordings.image_folder import images_in
-from nanorocks_ros.recordings.names import natural
-from nanorocks_ros.study.films import videos_in
 from nanorocks_ros.study.import_again import check_same_settings, check_same_source
 from nanorocks_ros.study.import_film import Imported, import_films
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from pathlib import Path
 
     from nanorocks_ros.study.films import ImportSettings
 
@@ -43,31 +40,6 @@ class ImportedEach:
     imported: list[Imported] = field(default_factory=list)
     skipped: list[Path] = field(default_factory=list)
     failed: dict[Path, NanorocksError] = field(default_factory=dict)
-
-
-def films_of(paths: Sequence[Path]) -> list[Path]:
-    """The films that paths stand for: a folder of videos for those in it, sorted naturally.
-
-    Raises
-    ------
-    RecordingError
-        When a folder holds none, or cannot be read.
-    """
-    films = []
-    for path in paths:
-        try:
-            if not path.is_dir() or images_in(path):
-                films.append(path)
-                continue
-            held = sorted(videos_in(path), key=lambda one: natural(one.name))
-        except OSError as error:
-            raise RecordingError(
-                str(path), f'cannot be read ({error.strerror})', 'check its permissions'
-            ) from error
-        if not held:
-            raise RecordingError(str(path), 'holds no video and no image', 'pass another folder')
-        films += held
-    return films
 
 
 def import_each(

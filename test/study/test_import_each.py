@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from dataclasses import replace
@@ -17,10 +18,12 @@ from videos import (
     write_video,
 )
 
+from nanorocks_ros.cli.main import main
 from nanorocks_ros.experiment.calibration_file import load_calibration
 from nanorocks_ros.study.bag_frames import BagFrames
 from nanorocks_ros.study.films import ImportSettings
-from nanorocks_ros.study.import_each import films_of, import_each
+from nanorocks_ros.study.find_films import films_of
+from nanorocks_ros.study.import_each import import_each
 from nanorocks_ros.study.import_film import import_films
 
 NS = 1_000_000_000
@@ -34,7 +37,7 @@ def test_each_video_of_a_folder_becomes_a_bag_and_bad_ones_stop_nothing(tmp_path
     (folder / 'run 2.avi').write_bytes(b'no video')
     (folder / 'read me.txt').write_text('left alone')
     write_images(folder / 'stills', [f'{1_700_000_000_000 + 40 * k}.jpg' for k in range(3)])
-    films = films_of([folder])
+    films = films_of([folder]).films
     assert [one.stem for one in films] == ['run 1', 'run 2', 'run 9', 'run 10', 'stills']
     told = []
     found = import_each(films, tmp_path / 'bags', STARTED, lambda *one: told.append(one))
@@ -130,3 +133,31 @@ def test_a_bag_of_another_calibration_is_not_taken_for_what_is_wanted(tmp_path):
     assert '--calibration was lens.yaml, is not given' in said(STARTED)
     other = settings(CALIBRATION.replace('0.01', '0.02'))
     assert '--calibration was lens.yaml, is one of that name with other contents' in said(other)
+
+
+# --- what is looked for -----------------------------------------------------------------------
+
+
+def test_films_of_all_formats_are_found_and_what_may_be_one_is_named(tmp_path, capsys):
+    folder = tmp_path / 'films'
+    folder.mkdir()
+    for name, codec in (('a.mp4', 'mpeg4'), ('b.asf', 'mpeg4'), ('c.flv', 'flv1'),
+                        ('d.NUT', 'ffv1'), ('e.h264', 'libx264')):  # fmt: skip
+        path = write_video(folder / name.lower(), range(3), codec=codec)
+        path.rename(folder / name)
+    for name in ('notes.txt', 'lens.yaml', 'times.json', '.hidden.mov'):
+        (folder / name).write_text('no film')
+    shutil.copy(folder / 'a.mp4', folder / 'copy of a')
+    (folder / 'thumb.jpg').write_bytes(b'beside a film, a picture is none')
+    (folder / 'old.m2v').write_bytes(b'of a format that is not read')
+    code = main(['import', str(folder), '--each', '-o', str(tmp_path / 'bags'), '--rate', '25',
+                 '--json'])  # fmt: skip
+    out, err = capsys.readouterr()
+    assert code == 0
+    printed = json.loads(out)
+    assert [os.path.basename(one['bag']) for one in printed['imported']] == list('abcde')
+    others = ['copy of a', 'old.m2v', 'thumb.jpg']
+    assert [os.path.basename(one) for one in printed['left_out']] == others
+    assert f'left out 3 files that may be films or pictures of one, but not by their names ' \
+        f'({", ".join(others)})' in err  # fmt: skip
+    assert 'notes' not in err
