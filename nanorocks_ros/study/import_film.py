@@ -190,18 +190,18 @@ class _Import:
 
     def _shots_of(self, film: Film, number: int) -> Iterator[Stamped[Shot]]:
         """The pictures of a film with their stamps, each once."""
-        steady: Steady[Shot] = Steady(film.info.step_ns or self._step_ns)
+        rate = self._settings.rate
+        step_ns = round(NS / rate) if rate else film.info.step_ns
+        steady: Steady[Shot] = Steady(step_ns or self._step_ns)
         repeats = Repeats()
         shift_ns: int | None = None
-        timed = self._timed(film)
-        last_ns = None
-        for stamp_ns, shot in repeats.without(steady.stamps(timed)):
+        for stamp_ns, shot in repeats.without(steady.stamps(self._timed(film))):
             if shift_ns is None:
                 shift_ns = self._start_ns(film, number) - stamp_ns
-            elif last_ns is not None:
-                self._step_ns = stamp_ns + shift_ns - last_ns
-            last_ns = self._end_ns = stamp_ns + shift_ns
-            yield Stamped(last_ns, shot)
+            yield Stamped(stamp_ns + shift_ns, shot)
+        # The film goes on to the last picture read, were it the same as those before it.
+        if shift_ns is not None and steady.last_ns is not None:
+            self._end_ns, self._step_ns = steady.last_ns + shift_ns, steady.usual_ns()
         self._tell_repairs(film, steady, repeats)
 
     def _timed(self, film: Film) -> Iterator[tuple[int | None, Shot]]:

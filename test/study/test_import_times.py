@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import av
 import pytest
-from videos import HEIGHT, START_NS, STARTED, WIDTH, imported, picture
+from videos import HEIGHT, START_NS, STARTED, STEP, WIDTH, imported, picture, write_video
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.study.films import ImportSettings
@@ -69,3 +69,31 @@ def test_uncompressed_video_says_its_rate_in_its_head_or_needs_one(tmp_path, sai
     else:
         found = import_films([film], tmp_path / 'bag', STARTED, lambda _: None)
         assert found.duration == pytest.approx(2 * step / 1e3)
+
+
+# --- parts ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(('ending', 'dropped'), [
+    ([4] * 10, 9), ([4, 4], 1), ([4], 0),
+])  # fmt: skip
+def test_a_part_that_ends_standing_still_ends_when_it_does(tmp_path, ending, dropped):
+    first = [0, 1, 2, 3, *ending]
+    lossless = {'codec': 'ffv1', 'form': 'bgr0'}
+    films = [
+        write_video(tmp_path / f'{k}.mkv', numbers, **lossless)
+        for k, numbers in enumerate((first, range(5, 8)))
+    ]
+    found, numbers, times = imported(films, tmp_path / 'bag')
+    assert numbers == list(range(8))
+    assert found.duplicates_dropped == dropped
+    assert times[5:] == [STEP * (len(first) + k) for k in range(3)]
+
+
+def test_a_part_of_which_all_is_stored_twice_is_followed_at_once(tmp_path):
+    stored = [number for number in range(10) for _ in range(2)]
+    films = [
+        write_video(tmp_path / f'{k}.mkv', stored, codec='ffv1', form='bgr0') for k in range(2)
+    ]
+    _, _, times = imported(films, tmp_path / 'bag')
+    assert times == [2 * STEP * k for k in range(20)]
