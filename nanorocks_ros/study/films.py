@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.recordings.film import NS
 from nanorocks_ros.recordings.image_folder import ImageFolder, images_in
 from nanorocks_ros.recordings.instants import instant_text
 from nanorocks_ros.recordings.video import Video
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.recordings.film import Film
 
 _LAST_NS = 2**31 * 10**9
+# Clocks of containers count whole seconds.
+_UNSURE_NS = 3 * NS // 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,3 +132,27 @@ def check_sizes(films: Sequence[Film], settings: ImportSettings) -> None:
             f'{first.path} has {first.width}x{first.height} px',
             'pass the calibration of this camera at this size',
         )
+
+
+def check_order(films: Sequence[Film], settings: ImportSettings) -> None:
+    """Refuse parts of a film of which one was taken before the one that it is to follow.
+
+    Times of creation are those of the beginning or of the end, as the camera likes it; both rise.
+
+    Raises
+    ------
+    RecordingError
+    """
+    if settings.start_ns is not None:
+        return
+    known = [
+        (film.info.path, film.info.start_ns) for film in films if film.info.start_ns is not None
+    ]
+    for (before, before_ns), (path, start_ns) in itertools.pairwise(known):
+        if start_ns < before_ns - _UNSURE_NS:
+            raise RecordingError(
+                str(path),
+                f'was taken at {instant_text(start_ns)}, before {before} at '
+                f'{instant_text(before_ns)}, which it is to follow',
+                'pass the parts in order of time, or --start, by which each follows the other',
+            )

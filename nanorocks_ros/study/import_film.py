@@ -18,7 +18,7 @@ from nanorocks_ros.recordings.provenance import checksum
 from nanorocks_ros.recordings.repeats import Repeats
 from nanorocks_ros.recordings.steady import Stamped, Steady
 from nanorocks_ros.recordings.writer import BagWriter
-from nanorocks_ros.study.films import ImportSettings, check_sizes, open_film
+from nanorocks_ros.study.films import ImportSettings, check_order, check_sizes, open_film
 from nanorocks_ros.study.results_bag import offered
 from nanorocks_ros.wire import topics
 
@@ -107,6 +107,7 @@ def import_films(
     """
     films = [open_film(path, settings) for path in paths]
     check_sizes(films, settings)
+    check_order(films, settings)
     # Now, not after the work.
     if os.path.lexists(bag):
         raise RecordingError(

@@ -8,7 +8,7 @@ import av
 import pytest
 from videos import HEIGHT, START_NS, STARTED, STEP, WIDTH, imported, picture, write_video
 
-from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.study.films import ImportSettings
 from nanorocks_ros.study.import_film import import_films
 
@@ -97,3 +97,28 @@ def test_a_part_of_which_all_is_stored_twice_is_followed_at_once(tmp_path):
     ]
     _, _, times = imported(films, tmp_path / 'bag')
     assert times == [2 * STEP * k for k in range(20)]
+
+
+def created(path, second):
+    tags = {'creation_time': f'2023-11-14T22:13:{second:02}Z'}
+    return write_video(path, range(second, second + 3), tags=tags)
+
+
+def test_parts_in_the_wrong_order_are_refused(tmp_path):
+    films = [created(tmp_path / f'{second}.mp4', second) for second in (30, 20)]
+    with pytest.raises(RecordingError) as caught:
+        import_films(films, tmp_path / 'bag', ImportSettings(), lambda _: None)
+    said = str(caught.value)
+    assert said.startswith(f'{films[1]}: was taken at 2023-11-14T22:13:20Z, before {films[0]} at ')
+    assert 'pass the parts in order of time, or --start' in said
+    assert not (tmp_path / 'bag').exists()
+    _, numbers, times = imported(films, tmp_path / 'bag')
+    assert numbers == [30, 31, 32, 20, 21, 22]
+    assert times == [STEP * k for k in range(6)]
+
+
+@pytest.mark.parametrize('seconds', [(20, 20, 20), (21, 20, 22)])
+def test_clocks_that_count_seconds_are_no_contradiction(tmp_path, seconds):
+    films = [created(tmp_path / f'{k}.mp4', second) for k, second in enumerate(seconds)]
+    found = import_films(films, tmp_path / 'bag', ImportSettings(), lambda _: None)
+    assert found.frames == 9
