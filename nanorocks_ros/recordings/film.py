@@ -9,7 +9,6 @@ from nanorocks_ros.recordings.images import decoded_gray, encode_jpeg
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from fractions import Fraction
     from pathlib import Path
 
     import numpy as np
@@ -113,8 +112,6 @@ class FilmInfo:
         Of the pictures in the bag: upright.
     step_ns : int, [ns]
         Usual time between two pictures; 0 when unknown.
-    rate : Fraction or None, [1/s]
-        Of a film whose pictures have no times; they follow one another evenly.
     start_ns : int or None, [ns]
         When it was taken, since 1970.
     as_stored : bool
@@ -133,7 +130,6 @@ class FilmInfo:
     width: int
     height: int
     step_ns: int = 0
-    rate: Fraction | None = None
     start_ns: int | None = None
     as_stored: bool = False
     expected: int = 0

@@ -62,7 +62,11 @@ class Video:
         with self._opened(path) as container:
             stream = container.streams.video[0]
             told = None if rate else rate_told(path, container, stream)
-            self.info = self._described(path, container, stream, told)
+            self._rate = rate or told
+            self.info = self._described(path, container, stream)
+        if told is not None:
+            said = f'has no times; its stream says {float(told):.6g} pictures per second'
+            self.info.remarks += (f'{path}: {said}',)
 
     def _opened(self, path: Path) -> Any:
         try:
@@ -84,9 +88,7 @@ class Video:
             raise RecordingError(str(path), 'holds no film', 'pass a video')
         return container
 
-    def _described(
-        self, path: Path, container: Any, stream: Any, rate: Fraction | None
-    ) -> FilmInfo:
+    def _described(self, path: Path, container: Any, stream: Any) -> FilmInfo:
         first, packet = self._first(path, container, stream)
         self._turn = turn_of(first)
         width, height = first.width, first.height
@@ -96,8 +98,7 @@ class Video:
             codec=stream.codec_context.name,
             width=height if self._turn[0] == 0 else width,
             height=width if self._turn[0] == 0 else height,
-            step_ns=round(NS / rate) if rate else step_ns(stream),
-            rate=rate,
+            step_ns=round(NS / self._rate) if self._rate else step_ns(stream),
             start_ns=start_ns({**stream.metadata, **container.metadata}),
             expected=max(0, stream.frames),
             tags={k: v for k, v in container.metadata.items() if k.lower() in _CAMERA_TAGS},
@@ -138,12 +139,19 @@ class Video:
         """
         with self._opened(self.info.path) as container:
             stream = container.streams.video[0]
-            if self.info.as_stored:
-                yield from self._packets(container, stream)
-                return
-            stream.thread_type = 'AUTO'
-            stream.codec_context.thread_count = self._threads
-            yield from self._frames(container, stream)
+            for number, shot in enumerate(self._stored_or_decoded(container, stream)):
+                if self._rate is None:
+                    yield shot
+                    continue
+                # With those that were lost: the camera took them.
+                yield shot._replace(time_ns=round((number + self.broken) * NS / self._rate))
+
+    def _stored_or_decoded(self, container: Any, stream: Any) -> Iterator[Shot]:
+        if self.info.as_stored:
+            return self._packets(container, stream)
+        stream.thread_type = 'AUTO'
+        stream.codec_context.thread_count = self._threads
+        return self._frames(container, stream)
 
     def _packets(self, container: Any, stream: Any) -> Iterator[Shot]:
         for packet, done in self._read(container, stream):
@@ -231,14 +239,10 @@ class _VideoPicture:
 
 
 def _remarks(info: FilmInfo, turn: Turn) -> tuple[str, ...]:
-    remarks = []
-    if info.rate:
-        rate = f'{float(info.rate):.6g}'
-        remarks.append(f'{info.path}: has no times; its stream says {rate} pictures per second')
-    if turn != UPRIGHT:
-        again = '; its JPEGs are compressed anew for that' if info.codec == 'mjpeg' else ''
-        remarks.append(f'{info.path}: {words_of(turn)}, as its rotation flag says{again}')
-    return tuple(remarks)
+    if turn == UPRIGHT:
+        return ()
+    again = '; its JPEGs are compressed anew for that' if info.codec == 'mjpeg' else ''
+    return (f'{info.path}: {words_of(turn)}, as its rotation flag says{again}',)
 
 
 def _reason(error: Exception) -> str:

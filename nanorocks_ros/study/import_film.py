@@ -191,12 +191,11 @@ class _Import:
 
     def _shots_of(self, film: Film, number: int) -> Iterator[Stamped[Shot]]:
         """The pictures of a film with their stamps, each once."""
-        rate = self._settings.rate
-        step_ns = round(NS / rate) if rate else film.info.step_ns
-        steady: Steady[Shot] = Steady(step_ns or self._step_ns)
+        steady: Steady[Shot] = Steady(film.info.step_ns or self._step_ns)
         repeats = Repeats()
         shift_ns: int | None = None
-        for stamp_ns, shot in repeats.without(steady.stamps(self._timed(film))):
+        timed = ((shot.time_ns, shot) for shot in film.shots())
+        for stamp_ns, shot in repeats.without(steady.stamps(timed)):
             if shift_ns is None:
                 shift_ns = self._start_ns(film, number) - stamp_ns
             yield Stamped(stamp_ns + shift_ns, shot)
@@ -204,13 +203,6 @@ class _Import:
         if shift_ns is not None and steady.last_ns is not None:
             self._end_ns, self._step_ns = steady.last_ns + shift_ns, steady.usual_ns()
         self._tell_repairs(film, steady, repeats)
-
-    def _timed(self, film: Film) -> Iterator[tuple[int | None, Shot]]:
-        rate = self._settings.rate or film.info.rate
-        for number, shot in enumerate(film.shots()):
-            # With those that were lost: the camera took them.
-            time_ns = shot.time_ns if rate is None else round((number + film.broken) * NS / rate)
-            yield time_ns, shot
 
     def _start_ns(self, film: Film, number: int) -> int:
         """When the first picture of a film was taken; known ones are told."""

@@ -6,7 +6,17 @@ from fractions import Fraction
 
 import av
 import pytest
-from videos import HEIGHT, START_NS, STARTED, STEP, WIDTH, imported, picture, write_video
+from videos import (
+    HEIGHT,
+    START_NS,
+    STARTED,
+    STEP,
+    WIDTH,
+    imported,
+    picture,
+    write_images,
+    write_video,
+)
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.study.films import ImportSettings
@@ -122,3 +132,27 @@ def test_clocks_that_count_seconds_are_no_contradiction(tmp_path, seconds):
     films = [created(tmp_path / f'{k}.mp4', second) for k, second in enumerate(seconds)]
     found = import_films(films, tmp_path / 'bag', ImportSettings(), lambda _: None)
     assert found.frames == 9
+
+
+# --- numbered images ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(('names', 'times', 'said'), [
+    (['f_7', 'f_8', 'f_9', 'f_12', 'f_13'], [0, 10, 20, 50, 60],
+     '2 images are missing by their numbers; the time that they took is kept'),
+    (['c2_010_l', 'c2_020_l', 'c2_050_l', 'c2_060_l'], [0, 10, 40, 50],
+     '2 images are missing by their numbers'),
+    (['f_10', 'f_20', 'f_30'], [0, 10, 20], ''),
+    (['a_1', 'a_2', 'b_7'], [0, 10, 20], ''),
+    (['a', 'b', 'c'], [0, 10, 20], ''),
+    (['f_1', 'f_4', 'f_11', 'f_13'], [0, 10, 20, 30],
+     'the numbers of its images do not rise evenly'),
+])  # fmt: skip
+def test_images_that_are_missing_by_their_numbers_took_their_time(tmp_path, names, times, said):
+    folder = write_images(tmp_path / 'images', [f'{name}.png' for name in names])
+    found, numbers, stamps = imported(folder, tmp_path / 'bag', FAST)
+    assert numbers == list(range(len(names)))
+    assert stamps == times
+    notices = [one for one in found.notices if 'numbers' in one]
+    assert len(notices) == bool(said)
+    assert said in ''.join(notices)
