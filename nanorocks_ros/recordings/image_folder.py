@@ -113,7 +113,7 @@ class ImageFolder:
         Shot
         """
         for number, (file, time_ns) in enumerate(zip(self.info.files, self._times, strict=True)):
-            picture = _picture(file)
+            picture = _picture(file, (self.info.width, self.info.height))
             if picture is None:
                 self.broken += 1
                 continue
@@ -156,7 +156,8 @@ def _is_stored(file: Path) -> bool:
         return True
 
 
-def _picture(file: Path) -> StoredPicture | _Drawn | None:
+def _picture(file: Path, size: tuple[int, int]) -> StoredPicture | _Drawn | None:
+    """The picture in a file; None where it is damaged, or of another size: (width, height)."""
     image = None
     if _is_stored(file):
         try:
@@ -165,14 +166,19 @@ def _picture(file: Path) -> StoredPicture | _Drawn | None:
             return None
         head = jpeg_head(content)
         if head is not None:
-            whole = is_whole_jpeg(content)
+            if not is_whole_jpeg(content) or (head.width, head.height) != size:
+                return None
             content = with_huffman_tables(content, head)
-            return StoredPicture(form_of('jpeg', head.channels), content) if whole else None
+            return StoredPicture(form_of('jpeg', head.channels), content)
         image = _opened(file)
-        if content.startswith(b'\x89PNG') and image is not None:
+        if image is not None and content.startswith(b'\x89PNG') and _size(image) == size:
             return StoredPicture(form_of('png', image.ndim), content)
     image = _opened(file) if image is None else image
-    return None if image is None else _Drawn(image)
+    return _Drawn(image) if image is not None and _size(image) == size else None
+
+
+def _size(image: NDArray[np.uint8]) -> tuple[int, int]:
+    return image.shape[1], image.shape[0]
 
 
 def _times(
