@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.recordings.film import NS
 from nanorocks_ros.recordings.instants import instant
 
@@ -37,6 +37,8 @@ _QUICKTIME, _NO_FILMS = b'ftyp', (b'heic', b'heix', b'mif1', b'avif', b'crx ', b
 _PLAIN_HEAD_BYTES = 256
 # Streams cut out of films of a variable rate say the ticks of a clock instead, [1/s].
 _TICKING = 1000
+# Sides of pixels: what comes of rounding the size of a display, and what no lens stretches to.
+_ROUNDED, _LONGEST = Fraction(1, 200), Fraction(4)
 # Cameras without a clock begin in 1904 or 1970; stamps of messages end in 2038.
 _FIRST_NS, _LAST_NS = 315_532_800 * NS, (2**31 - 1) * NS
 # Whose clock knows its zone comes first.
@@ -98,6 +100,36 @@ def _plain_tells(path: Path) -> bool:
         words = file.readline(_PLAIN_HEAD_BYTES).split()
     rates = [word[1:].split(b':') for word in words[1:] if word.startswith(b'F')]
     return any(all(part.strip(b'0') for part in one) for one in rates)
+
+
+def square_size(path: Path, stream: Any, sides: tuple[int, int]) -> tuple[int, int]:
+    """Width and height of pictures once their pixels are square, [px].
+
+    The shorter side of the pixels is stretched, so that no detail is lost.
+
+    Parameters
+    ----------
+    path : Path
+    stream : object of PyAV
+    sides : tuple of int, [px]
+        Width and height as they are stored.
+
+    Raises
+    ------
+    RecordingError
+        When the pixels are of a shape that no camera has.
+    """
+    ratio = Fraction(stream.sample_aspect_ratio or 1)
+    if abs(ratio - 1) <= _ROUNDED:
+        return sides
+    if not 1 / _LONGEST <= ratio <= _LONGEST:
+        raise RecordingError(
+            str(path),
+            f'says that its pixels are {ratio.numerator}:{ratio.denominator}, wide to high',
+            'write a copy of it that says what they are',
+        )
+    width, height = sides
+    return (round(width * ratio), height) if ratio > 1 else (width, round(height / ratio))
 
 
 def step_ns(stream: Any) -> int:

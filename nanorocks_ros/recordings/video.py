@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from collections import deque
 from fractions import Fraction
-from threading import Lock
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.film import NS, FilmInfo, Shot, StoredPicture, form_of
 from nanorocks_ros.recordings.images import is_decodable
 from nanorocks_ros.recordings.jpeg import is_whole_jpeg, jpeg_head, with_huffman_tables
 from nanorocks_ros.recordings.pyav import pyav
-from nanorocks_ros.recordings.streams import FORMATS, rate_told, start_ns, step_ns
-from nanorocks_ros.recordings.upright import UPRIGHT, Turn, turn_of, turned, words_of
+from nanorocks_ros.recordings.streams import FORMATS, rate_told, square_size, start_ns, step_ns
+from nanorocks_ros.recordings.upright import UPRIGHT, turn_of, words_of
+from nanorocks_ros.recordings.video_picture import VideoPicture
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
-
-    from numpy.typing import NDArray
 
 # Nothing is fetched because a playlist says so.
 _ONLY_FILES = {'protocol_whitelist': 'file,crypto,data'}
@@ -59,6 +55,7 @@ class Video:
         self._av = pyav(str(path))
         self._bytes = path.stat().st_size
         self._turn = UPRIGHT
+        self._sides = self._square = (0, 0)
         with self._opened(path) as container:
             stream = container.streams.video[0]
             told = None if rate else rate_told(path, container, stream)
@@ -91,7 +88,8 @@ class Video:
     def _described(self, path: Path, container: Any, stream: Any) -> FilmInfo:
         first, packet = self._first(path, container, stream)
         self._turn = turn_of(first)
-        width, height = first.width, first.height
+        self._sides = first.width, first.height
+        width, height = self._square = square_size(path, stream, self._sides)
         info = FilmInfo(
             path=path,
             files=(path,),
@@ -103,8 +101,9 @@ class Video:
             expected=max(0, stream.frames),
             tags={k: v for k, v in container.metadata.items() if k.lower() in _CAMERA_TAGS},
         )
-        info.as_stored = self._turn == UPRIGHT and self._is_jpeg(packet, info)
-        info.remarks = _remarks(info, self._turn)
+        as_they_are = self._turn == UPRIGHT and self._square == self._sides
+        info.as_stored = as_they_are and self._is_jpeg(packet, info)
+        info.remarks = self._remarks(info)
         return info
 
     def _first(self, path: Path, container: Any, stream: Any) -> tuple[Any, bytes]:
@@ -129,6 +128,18 @@ class Video:
         if head is None or (head.width, head.height) != (info.width, info.height):
             return False
         return is_decodable(with_huffman_tables(content, head))
+
+    def _remarks(self, info: FilmInfo) -> tuple[str, ...]:
+        again = '; its JPEGs are compressed anew for that' if info.codec == 'mjpeg' else ''
+        said = []
+        if self._square != self._sides:
+            stored, square = (
+                f'{width}x{height} px' for width, height in (self._sides, self._square)
+            )
+            said.append(f'its pixels are not square; stretched from {stored} to {square}')
+        if self._turn != UPRIGHT:
+            said.append(f'{words_of(self._turn)}, as its rotation flag says')
+        return tuple(f'{info.path}: {one}{again}' for one in said)
 
     def shots(self) -> Iterator[Shot]:
         """The pictures that can be used, in the order of the film.
@@ -184,12 +195,11 @@ class Video:
                 if frame.is_corrupt or not self._fits(frame):
                     self.broken += 1
                     continue
-                yield Shot(time_ns, _VideoPicture(frame, self._turn), done)
+                yield Shot(time_ns, VideoPicture(frame, self._square, self._turn), done)
 
     def _fits(self, picture: Any) -> bool:
         """Whether it has the size that the film began with."""
-        sides = self.info.width, self.info.height
-        return (picture.width, picture.height) == (sides[::-1] if self._turn[0] == 0 else sides)
+        return bool((picture.width, picture.height) == self._sides)
 
     def _read(self, container: Any, stream: Any) -> Iterator[tuple[Any, float]]:
         packets = container.demux(stream)
@@ -205,44 +215,6 @@ class Video:
             if packet.pos is not None and self._bytes:
                 done = min(1.0, max(done, packet.pos / self._bytes))
             yield packet, done
-
-
-class _VideoPicture:
-    """A decoded frame; its colours are worked out when they are asked for."""
-
-    def __init__(self, frame: Any, turn: Turn) -> None:
-        self._frame = frame
-        self._turn = turn
-        self._gray: NDArray[np.uint8] | None = None
-        # Two threads that convert one frame at a time wait for each other for ever.
-        self._converting = Lock()
-
-    def gray(self) -> NDArray[np.uint8]:
-        with self._converting:
-            if self._gray is None:
-                self._gray = self._brightness()
-            return self._gray
-
-    def _brightness(self) -> NDArray[np.uint8]:
-        plane, name = self._frame.planes[0], self._frame.format.name
-        if (name.startswith(('yuv4', 'yuvj4')) and name.endswith('p')) or name in ('gray', 'nv12'):
-            rows = np.frombuffer(plane, np.uint8)
-            rows = rows.reshape(plane.height, plane.line_size)
-            return rows[: self._frame.height, : self._frame.width]
-        return np.asarray(self._frame.to_ndarray(format='gray'))
-
-    def pixels(self) -> NDArray[np.uint8]:
-        form = 'gray' if self._frame.format.name.startswith('gray') else 'bgr24'
-        with self._converting:
-            pixels = np.asarray(self._frame.to_ndarray(format=form))
-        return turned(pixels, self._turn)
-
-
-def _remarks(info: FilmInfo, turn: Turn) -> tuple[str, ...]:
-    if turn == UPRIGHT:
-        return ()
-    again = '; its JPEGs are compressed anew for that' if info.codec == 'mjpeg' else ''
-    return (f'{info.path}: {words_of(turn)}, as its rotation flag says{again}',)
 
 
 def _reason(error: Exception) -> str:
