@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
+from collections import Counter
+from contextlib import suppress
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.recordings.film import NS
 from nanorocks_ros.recordings.instants import instant
+from nanorocks_ros.recordings.pyav import pyav
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
 # The library makes a film of texts and of noise, too, where it is let.
@@ -34,6 +39,12 @@ _HEAD_BYTES = 16
 _STARTS = (b'\x1aE\xdf\xa3', b'FLV\x01', b'nut/multimedia', b'YUV4MPEG2 ', b'0&\xb2u\x8ef\xcf\x11')
 _QUICKTIME, _NO_FILMS = b'ftyp', (b'heic', b'heix', b'mif1', b'avif', b'crx ', b'M4A ', b'M4B ')
 
+# Flags of pictures that go with a film or with sound, as the library sets them: attached ones
+# and those for a time line.
+_COVERS = 0x400 | 0x800
+# Packets of a file with several films that are looked at, and the share of the most pictures
+# that a film has to have to be taken before others.
+_LOOKED_AT, _AS_LONG = 2000, 0.9
 _PLAIN_HEAD_BYTES = 256
 # Streams cut out of films of a variable rate say the ticks of a clock instead, [1/s].
 _TICKING = 1000
@@ -62,6 +73,54 @@ def looks_like_film(path: Path) -> bool:
     if head[4:8] == _QUICKTIME:
         return head[8:12] not in _NO_FILMS
     return head.startswith(_STARTS) or (head[:4] == b'RIFF' and head[8:11] == b'AVI')
+
+
+def film_among(path: Path, container: Any) -> tuple[int, tuple[str, ...]]:
+    """Which of the video streams is the film, and what the user should know of it.
+
+    Parameters
+    ----------
+    path : Path
+    container : object of PyAV
+        Is read on where there is a choice.
+
+    Raises
+    ------
+    RecordingError
+        When there are but pictures that go with sound.
+    """
+    streams = container.streams.video
+    places = [place for place, one in enumerate(streams) if not _is_cover(one)]
+    if not places:
+        raise RecordingError(str(path), 'holds no film, only a picture', 'pass a video')
+    counts = _pictures_in(path, container, [streams[place] for place in places])
+    # Of films that differ by the pictures at their ends, the first.
+    place = next(
+        place
+        for place, count in zip(places, counts, strict=True)
+        if count >= _AS_LONG * max(counts)
+    )
+    if len(streams) == 1:
+        return place, ()
+    said = f'holds {len(streams)} video streams; number {place + 1} is taken for the film'
+    return place, (f'{path}: {said}',)
+
+
+def _is_cover(stream: Any) -> bool:
+    # Old versions of the library do not say it, others as a number or as an enumeration.
+    what = getattr(stream, 'disposition', 0)
+    return bool(int(getattr(what, 'value', what)) & _COVERS)
+
+
+def _pictures_in(path: Path, container: Any, streams: Sequence[Any]) -> list[int]:
+    """How many pictures each stream has in the part of the file that is looked at."""
+    if len(streams) == 1:
+        return [1]
+    counts = Counter[int]()
+    with suppress(pyav(str(path)).FFmpegError, EOFError):
+        for packet in itertools.islice(container.demux(*streams), _LOOKED_AT):
+            counts[packet.stream.index] += packet.size > 0
+    return [counts[one.index] for one in streams]
 
 
 def rate_told(path: Path, container: Any, stream: Any) -> Fraction | None:

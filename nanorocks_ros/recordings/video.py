@@ -11,7 +11,14 @@ from nanorocks_ros.recordings.film import NS, FilmInfo, Shot, StoredPicture, for
 from nanorocks_ros.recordings.images import is_decodable
 from nanorocks_ros.recordings.jpeg import is_whole_jpeg, jpeg_head, with_huffman_tables
 from nanorocks_ros.recordings.pyav import pyav
-from nanorocks_ros.recordings.streams import FORMATS, rate_told, square_size, start_ns, step_ns
+from nanorocks_ros.recordings.streams import (
+    FORMATS,
+    film_among,
+    rate_told,
+    square_size,
+    start_ns,
+    step_ns,
+)
 from nanorocks_ros.recordings.upright import UPRIGHT, turn_of, words_of
 from nanorocks_ros.recordings.video_picture import VideoPicture
 
@@ -57,13 +64,17 @@ class Video:
         self._turn = UPRIGHT
         self._sides = self._square = (0, 0)
         with self._opened(path) as container:
-            stream = container.streams.video[0]
+            self._place, remarks = film_among(path, container)
+        # Again from its beginning.
+        with self._opened(path) as container:
+            stream = container.streams.video[self._place]
             told = None if rate else rate_told(path, container, stream)
             self._rate = rate or told
             self.info = self._described(path, container, stream)
         if told is not None:
             said = f'has no times; its stream says {float(told):.6g} pictures per second'
-            self.info.remarks += (f'{path}: {said}',)
+            remarks += (f'{path}: {said}',)
+        self.info.remarks = remarks + self.info.remarks
 
     def _opened(self, path: Path) -> Any:
         try:
@@ -149,7 +160,7 @@ class Video:
         Shot
         """
         with self._opened(self.info.path) as container:
-            stream = container.streams.video[0]
+            stream = container.streams.video[self._place]
             for number, shot in enumerate(self._stored_or_decoded(container, stream)):
                 if self._rate is None:
                     yield shot

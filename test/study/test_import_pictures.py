@@ -89,3 +89,41 @@ def test_pixels_that_no_camera_has_are_refused(tmp_path):
     film = stretch_video(tmp_path / 'a.mp4', Fraction(9))
     with pytest.raises(RecordingError, match=r'says that its pixels are 9:1, wide to high; '):
         import_films([film], tmp_path / 'bag', STARTED, lambda _: None)
+
+
+# --- several streams ------------------------------------------------------------------------
+
+
+def write_streams(path, *streams):
+    """A video of several streams: codec, numbers of the pictures, whether it goes with another."""
+    with av.open(str(path), 'w') as container:
+        added = []
+        for codec, numbers, cover in streams:
+            stream = container.add_stream(codec, rate=25)
+            stream.width, stream.height = WIDTH, HEIGHT
+            stream.pix_fmt = 'yuvj420p' if codec == 'mjpeg' else 'yuv420p'
+            if cover:
+                stream.disposition = av.stream.Disposition.attached_pic
+            added.append((stream, numbers))
+        for stream, numbers in added:
+            for number in numbers:
+                frame = av.VideoFrame.from_ndarray(picture(number), format='bgr24')
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode())
+    return path
+
+
+COVER, FILM, OTHER = ('mjpeg', [99], True), ('mpeg4', range(12), False), ('mpeg4', [50], False)
+
+
+@pytest.mark.parametrize('streams', [
+    (COVER, FILM), (FILM, COVER), (OTHER, FILM), (FILM, OTHER),
+    (FILM, ('mpeg4', range(40, 53), False)),
+])  # fmt: skip
+@pytest.mark.parametrize('name', ['a.mkv', 'a.mp4'])
+def test_the_film_is_taken_not_the_picture_beside_it(tmp_path, name, streams):
+    film = write_streams(tmp_path / name, *streams)
+    found, numbers, times = imported(film, tmp_path / 'bag')
+    assert numbers == list(range(12))
+    np.testing.assert_allclose(times, [40 * k for k in range(12)], atol=0.6)
+    assert any('holds 2 video streams; number ' in one for one in found.notices)
