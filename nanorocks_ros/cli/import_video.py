@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.study.import_each import ImportedEach
     from nanorocks_ros.study.import_film import Imported
 
+# Of the files that were left out.
+_NAMED = 3
+
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
@@ -103,22 +106,33 @@ def _run_each(
     options: argparse.Namespace, settings: ImportSettings, paths: list[Path], output: Path
 ) -> int:
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.study.import_each import films_of, import_each
+    from nanorocks_ros.study.find_films import films_of
+    from nanorocks_ros.study.import_each import import_each
 
     with Progress('importing') as progress:
-        films = films_of(paths)
+        searched = films_of(paths)
         try:
-            found = import_each(films, output, settings, lambda done, _: progress.part(done))
+            found = import_each(
+                searched.films, output, settings, lambda done, _: progress.part(done)
+            )
         except KeyboardInterrupt as interruption:
             raise KeyboardInterrupt('the same command goes on with what is left') from interruption
     for imported in found.imported:
         _tell(imported)
     if options.json:
-        print(json.dumps(_each_as_json(found)))
+        print(json.dumps(_each_as_json(found, searched.left_out)))
     else:
         for imported in found.imported:
             print(_text(imported))
         print(f'{len(found.imported)} imported, {len(found.skipped)} were there already')
+    if searched.left_out:
+        names = ', '.join(one.name for one in searched.left_out[:_NAMED])
+        more = ', ...' if len(searched.left_out) > _NAMED else ''
+        print(
+            f'nanorocks: left out {len(searched.left_out)} files that may be films or pictures '
+            f'of one, but not by their names ({names}{more}); pass those that are films by name',
+            file=sys.stderr,
+        )
     return _tell_failures(found)
 
 
@@ -156,7 +170,7 @@ def _text(imported: Imported) -> str:
     )
 
 
-def _each_as_json(found: ImportedEach) -> dict[str, Any]:
+def _each_as_json(found: ImportedEach, left_out: list[Path]) -> dict[str, Any]:
     from nanorocks_ros.study.import_film import as_json
 
     return {
@@ -166,6 +180,7 @@ def _each_as_json(found: ImportedEach) -> dict[str, Any]:
         'bag': str(found.folder),
         'imported': [as_json(one) for one in found.imported],
         'skipped': [str(one) for one in found.skipped],
+        'left_out': [str(one) for one in left_out],
         'failed': [
             {'video': str(film), 'reason': str(error)} for film, error in found.failed.items()
         ],

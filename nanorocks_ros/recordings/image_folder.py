@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+import statistics
 from typing import TYPE_CHECKING
 
 import cv2
@@ -14,7 +15,7 @@ from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.recordings.film import NS, FilmInfo, Shot, StoredPicture, form_of
 from nanorocks_ros.recordings.instants import instant
 from nanorocks_ros.recordings.jpeg import is_whole_jpeg, jpeg_head, with_huffman_tables
-from nanorocks_ros.recordings.names import natural
+from nanorocks_ros.recordings.names import natural, numbers_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -89,7 +90,7 @@ class ImageFolder:
                 'holds no image that can be decoded',
                 'check that they were copied whole',
             )
-        self._times, how = _times(path, files, rate)
+        self._times, remarks = _times(path, files, rate)
         steps = np.diff(np.array(self._times, dtype=np.int64))
         self.info = FilmInfo(
             path=path,
@@ -101,7 +102,7 @@ class ImageFolder:
             start_ns=None if rate else self._times[0],
             as_stored=all(_is_stored(one) for one in files),
             expected=len(files),
-            remarks=() if rate else (f'{path}: the images were taken when {how} say',),
+            remarks=remarks,
         )
 
     def shots(self) -> Iterator[Shot]:
@@ -112,7 +113,7 @@ class ImageFolder:
         Shot
         """
         for number, (file, time_ns) in enumerate(zip(self.info.files, self._times, strict=True)):
-            picture = _picture(file)
+            picture = _picture(file, (self.info.width, self.info.height))
             if picture is None:
                 self.broken += 1
                 continue
@@ -155,7 +156,8 @@ def _is_stored(file: Path) -> bool:
         return True
 
 
-def _picture(file: Path) -> StoredPicture | _Drawn | None:
+def _picture(file: Path, size: tuple[int, int]) -> StoredPicture | _Drawn | None:
+    """The picture in a file; None where it is damaged, or of another size: (width, height)."""
     image = None
     if _is_stored(file):
         try:
@@ -164,20 +166,29 @@ def _picture(file: Path) -> StoredPicture | _Drawn | None:
             return None
         head = jpeg_head(content)
         if head is not None:
-            whole = is_whole_jpeg(content)
+            if not is_whole_jpeg(content) or (head.width, head.height) != size:
+                return None
             content = with_huffman_tables(content, head)
-            return StoredPicture(form_of('jpeg', head.channels), content) if whole else None
+            return StoredPicture(form_of('jpeg', head.channels), content)
         image = _opened(file)
-        if content.startswith(b'\x89PNG') and image is not None:
+        if image is not None and content.startswith(b'\x89PNG') and _size(image) == size:
             return StoredPicture(form_of('png', image.ndim), content)
     image = _opened(file) if image is None else image
-    return None if image is None else _Drawn(image)
+    return _Drawn(image) if image is not None and _size(image) == size else None
 
 
-def _times(path: Path, files: Sequence[Path], rate: Fraction | None) -> tuple[list[int], str]:
-    """When each image was taken, and what says so."""
+def _size(image: NDArray[np.uint8]) -> tuple[int, int]:
+    return image.shape[1], image.shape[0]
+
+
+def _times(
+    path: Path, files: Sequence[Path], rate: Fraction | None
+) -> tuple[list[int], tuple[str, ...]]:
+    """When each image was taken, and what is to be said of it."""
     if rate is not None:
-        return [round(number * NS / rate) for number in range(len(files))], '--rate'
+        places, said = _places(files)
+        remarks = (f'{path}: {said}',) if said else ()
+        return [round(place * NS / rate) for place in places], remarks
     for how, times in (
         ('their names', [_time_in_name(one.stem) for one in files]),
         ('their EXIF notes', [_time_in_exif(one) for one in files]),
@@ -185,12 +196,28 @@ def _times(path: Path, files: Sequence[Path], rate: Fraction | None) -> tuple[li
         known = [one for one in times if one is not None]
         rising = all(one < other for one, other in itertools.pairwise(known))
         if len(known) == len(files) and rising and len(files) > 1:
-            return known, how
+            return known, (f'{path}: the images were taken when {how} say',)
     raise ConfigurationError(
         str(path),
         'nothing says when its images were taken: neither their names nor EXIF do, all of them',
         'pass --rate, in images per second',
     )
+
+
+def _places(files: Sequence[Path]) -> tuple[Sequence[int], str]:
+    """Where each image stands in a row that goes on where numbers are missing, and what to say."""
+    row = range(len(files))
+    numbers = numbers_of([one.stem for one in files])
+    if numbers is None:
+        return row, ''
+    steps = [other - one for one, other in itertools.pairwise(numbers)]
+    usual = statistics.median_low(steps)
+    if usual < 1 or 2 * steps.count(usual) < len(steps) or any(one % usual for one in steps):
+        return row, 'the numbers of its images do not rise evenly; they are stamped one by one'
+    places = [(one - numbers[0]) // usual for one in numbers]
+    lost = places[-1] - row[-1]
+    said = f'{lost} images are missing by their numbers; the time that they took is kept'
+    return places, said if lost else ''
 
 
 def _time_in_name(stem: str) -> int | None:

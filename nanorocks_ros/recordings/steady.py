@@ -56,11 +56,13 @@ class Steady(Generic[Item]):
     step_ns : int, [ns], > 0
         Usual time between two pictures, until the pictures tell.
     repairs : Repairs
+    last_ns : int or None, [ns]
+        Stamp given last.
     """
 
     step_ns: int
     repairs: Repairs = field(default_factory=Repairs)
-    _last_ns: int | None = None
+    last_ns: int | None = None
     _shift_ns: int = 0
     _steps: deque[int] = field(default_factory=lambda: deque(maxlen=_HISTORY))
 
@@ -89,15 +91,16 @@ class Steady(Generic[Item]):
         time_ns, item = waiting[place]
         del waiting[place]
         stamp_ns = self._stamp(time_ns, self._later(waiting))
-        if self._last_ns is not None:
-            self._steps.append(stamp_ns - self._last_ns)
-        self._last_ns = stamp_ns
+        if self.last_ns is not None:
+            self._steps.append(stamp_ns - self.last_ns)
+        self.last_ns = stamp_ns
         return Stamped(stamp_ns, item)
 
     def _later(self, waiting: deque[tuple[int | None, Item]]) -> list[int]:
         return [one + self._shift_ns for one, _ in waiting if one is not None]
 
-    def _usual_ns(self) -> int:
+    def usual_ns(self) -> int:
+        """The time between two pictures that is usual of late, [ns]."""
         if not self._steps:
             return self.step_ns
         return sorted(self._steps)[len(self._steps) // 2]
@@ -105,9 +108,9 @@ class Steady(Generic[Item]):
     def _place(self, waiting: deque[tuple[int | None, Item]]) -> int:
         """Which of those that wait is next: the first, unless others belong before it."""
         first = waiting[0][0]
-        if first is None or self._last_ns is None or len(waiting) < 2:
+        if first is None or self.last_ns is None or len(waiting) < 2:
             return 0
-        lower, upper = self._last_ns - self._shift_ns, first
+        lower, upper = self.last_ns - self._shift_ns, first
         before = [
             place
             for place, (time, _) in enumerate(waiting)
@@ -120,34 +123,34 @@ class Steady(Generic[Item]):
         return min(before, key=lambda place: waiting[place][0] or 0)
 
     def _is_far(self, time_ns: int, waiting: deque[tuple[int | None, Item]], before: int) -> bool:
-        assert self._last_ns is not None
-        jump = time_ns - self._last_ns > _JUMP * self._usual_ns()
+        assert self.last_ns is not None
+        jump = time_ns - self.last_ns > _JUMP * self.usual_ns()
         return jump and 2 * before >= len(waiting) - 1
 
     def _stamp(self, time_ns: int | None, later: list[int]) -> int:
-        if self._last_ns is None:
+        if self.last_ns is None:
             return time_ns or 0
-        usual = self._usual_ns()
+        usual = self.usual_ns()
         if time_ns is None:
             self.repairs.missing += 1
             return self._between(later, usual)
         time_ns += self._shift_ns
-        ahead = [one for one in later if one > self._last_ns]
-        if time_ns > self._last_ns:
+        ahead = [one for one in later if one > self.last_ns]
+        if time_ns > self.last_ns:
             wrong = [one for one in ahead if one < time_ns]
             if not wrong:
                 return time_ns
         elif len(ahead) * 2 < len(later):
             self.repairs.set_back += 1
-            self._shift_ns += self._last_ns + usual - time_ns
-            return self._last_ns + usual
+            self._shift_ns += self.last_ns + usual - time_ns
+            return self.last_ns + usual
         self.repairs.replaced += 1
         return self._between(later, usual)
 
     def _between(self, later: list[int], usual: int) -> int:
         """A stamp behind the last one and before the next."""
-        assert self._last_ns is not None
-        following = min((one for one in later if one > self._last_ns), default=None)
+        assert self.last_ns is not None
+        following = min((one for one in later if one > self.last_ns), default=None)
         if following is None:
-            return self._last_ns + usual
-        return self._last_ns + max(1, min(usual, (following - self._last_ns) // 2))
+            return self.last_ns + usual
+        return self.last_ns + max(1, min(usual, (following - self.last_ns) // 2))

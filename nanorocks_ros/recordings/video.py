@@ -4,39 +4,30 @@ from __future__ import annotations
 
 from collections import deque
 from fractions import Fraction
-from threading import Lock
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.film import NS, FilmInfo, Shot, StoredPicture, form_of
 from nanorocks_ros.recordings.images import is_decodable
-from nanorocks_ros.recordings.instants import instant
 from nanorocks_ros.recordings.jpeg import is_whole_jpeg, jpeg_head, with_huffman_tables
 from nanorocks_ros.recordings.pyav import pyav
-from nanorocks_ros.recordings.upright import UPRIGHT, Turn, turn_of, turned, words_of
+from nanorocks_ros.recordings.streams import (
+    FORMATS,
+    film_among,
+    rate_told,
+    square_size,
+    start_ns,
+    step_ns,
+)
+from nanorocks_ros.recordings.upright import UPRIGHT, turn_of, words_of
+from nanorocks_ros.recordings.video_picture import VideoPicture
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
-_ENDINGS = 'mp4 m4v mov avi mkv webm mts m2ts ts mpg mpeg wmv mxf 3gp ogv mjpeg mjpg y4m'
-VIDEOS = frozenset(f'.{ending}' for ending in _ENDINGS.split())
-"""Endings of the files that a folder of videos is looked through for."""
-
-# The library makes a film of texts and of noise, too, where it is let.
-_CONTAINERS = 'mov,mp4,m4a,3gp,3g2,mj2 matroska,webm avi mpegts mpeg asf mxf flv ogg nut dv ivf'
-_STREAMS = 'mjpeg h264 hevc yuv4mpegpipe'
-_FORMATS = frozenset([*_CONTAINERS.split(), *_STREAMS.split()])
 # Nothing is fetched because a playlist says so.
 _ONLY_FILES = {'protocol_whitelist': 'file,crypto,data'}
-# Cameras without a clock begin in 1904 or 1970; stamps of messages end in 2038.
-_FIRST_NS, _LAST_NS = 315_532_800 * NS, (2**31 - 1) * NS
-# Whose clock knows its zone comes first.
-_START_TAGS = ('com.apple.quicktime.creationdate', 'creation_time')
 _CAMERA_TAGS = ('make', 'model', 'comment', 'encoder', 'location')
 
 
@@ -46,6 +37,8 @@ class Video:
     Parameters
     ----------
     path : Path
+    rate : Fraction or None, [1/s]
+        Of the camera; None: as the video says.
     threads : int
         That decode it; 0: as many as there are cores.
 
@@ -58,20 +51,30 @@ class Video:
     Raises
     ------
     ConfigurationError
-        When PyAV is not installed.
+        When PyAV is not installed, or nothing says when the pictures were taken.
     RecordingError
         When it is no video.
     """
 
-    def __init__(self, path: Path, threads: int = 0) -> None:
+    def __init__(self, path: Path, rate: Fraction | None = None, threads: int = 0) -> None:
         self.broken = 0
         self._threads = threads
         self._av = pyav(str(path))
         self._bytes = path.stat().st_size
         self._turn = UPRIGHT
+        self._sides = self._square = (0, 0)
         with self._opened(path) as container:
-            stream = container.streams.video[0]
+            self._place, remarks = film_among(path, container)
+        # Again from its beginning.
+        with self._opened(path) as container:
+            stream = container.streams.video[self._place]
+            told = None if rate else rate_told(path, container, stream)
+            self._rate = rate or told
             self.info = self._described(path, container, stream)
+        if told is not None:
+            said = f'has no times; its stream says {float(told):.6g} pictures per second'
+            remarks += (f'{path}: {said}',)
+        self.info.remarks = remarks + self.info.remarks
 
     def _opened(self, path: Path) -> Any:
         try:
@@ -88,7 +91,7 @@ class Video:
                 'check that it was copied whole, or pass another',
             ) from error
         streams = container.streams.video
-        if not streams or container.format.name not in _FORMATS:
+        if not streams or container.format.name not in FORMATS:
             container.close()
             raise RecordingError(str(path), 'holds no film', 'pass a video')
         return container
@@ -96,20 +99,22 @@ class Video:
     def _described(self, path: Path, container: Any, stream: Any) -> FilmInfo:
         first, packet = self._first(path, container, stream)
         self._turn = turn_of(first)
-        width, height = first.width, first.height
+        self._sides = first.width, first.height
+        width, height = self._square = square_size(path, stream, self._sides)
         info = FilmInfo(
             path=path,
             files=(path,),
             codec=stream.codec_context.name,
             width=height if self._turn[0] == 0 else width,
             height=width if self._turn[0] == 0 else height,
-            step_ns=_step_ns(stream),
-            start_ns=_start_ns({**stream.metadata, **container.metadata}),
+            step_ns=round(NS / self._rate) if self._rate else step_ns(stream),
+            start_ns=start_ns({**stream.metadata, **container.metadata}),
             expected=max(0, stream.frames),
             tags={k: v for k, v in container.metadata.items() if k.lower() in _CAMERA_TAGS},
         )
-        info.as_stored = self._turn == UPRIGHT and self._is_jpeg(packet, info)
-        info.remarks = _remarks(info, self._turn)
+        as_they_are = self._turn == UPRIGHT and self._square == self._sides
+        info.as_stored = as_they_are and self._is_jpeg(packet, info)
+        info.remarks = self._remarks(info)
         return info
 
     def _first(self, path: Path, container: Any, stream: Any) -> tuple[Any, bytes]:
@@ -135,6 +140,18 @@ class Video:
             return False
         return is_decodable(with_huffman_tables(content, head))
 
+    def _remarks(self, info: FilmInfo) -> tuple[str, ...]:
+        again = '; its JPEGs are compressed anew for that' if info.codec == 'mjpeg' else ''
+        said = []
+        if self._square != self._sides:
+            stored, square = (
+                f'{width}x{height} px' for width, height in (self._sides, self._square)
+            )
+            said.append(f'its pixels are not square; stretched from {stored} to {square}')
+        if self._turn != UPRIGHT:
+            said.append(f'{words_of(self._turn)}, as its rotation flag says')
+        return tuple(f'{info.path}: {one}{again}' for one in said)
+
     def shots(self) -> Iterator[Shot]:
         """The pictures that can be used, in the order of the film.
 
@@ -143,13 +160,20 @@ class Video:
         Shot
         """
         with self._opened(self.info.path) as container:
-            stream = container.streams.video[0]
-            if self.info.as_stored:
-                yield from self._packets(container, stream)
-                return
-            stream.thread_type = 'AUTO'
-            stream.codec_context.thread_count = self._threads
-            yield from self._frames(container, stream)
+            stream = container.streams.video[self._place]
+            for number, shot in enumerate(self._stored_or_decoded(container, stream)):
+                if self._rate is None:
+                    yield shot
+                    continue
+                # With those that were lost: the camera took them.
+                yield shot._replace(time_ns=round((number + self.broken) * NS / self._rate))
+
+    def _stored_or_decoded(self, container: Any, stream: Any) -> Iterator[Shot]:
+        if self.info.as_stored:
+            return self._packets(container, stream)
+        stream.thread_type = 'AUTO'
+        stream.codec_context.thread_count = self._threads
+        return self._frames(container, stream)
 
     def _packets(self, container: Any, stream: Any) -> Iterator[Shot]:
         for packet, done in self._read(container, stream):
@@ -182,12 +206,11 @@ class Video:
                 if frame.is_corrupt or not self._fits(frame):
                     self.broken += 1
                     continue
-                yield Shot(time_ns, _VideoPicture(frame, self._turn), done)
+                yield Shot(time_ns, VideoPicture(frame, self._square, self._turn), done)
 
     def _fits(self, picture: Any) -> bool:
         """Whether it has the size that the film began with."""
-        sides = self.info.width, self.info.height
-        return (picture.width, picture.height) == (sides[::-1] if self._turn[0] == 0 else sides)
+        return bool((picture.width, picture.height) == self._sides)
 
     def _read(self, container: Any, stream: Any) -> Iterator[tuple[Any, float]]:
         packets = container.demux(stream)
@@ -205,61 +228,8 @@ class Video:
             yield packet, done
 
 
-class _VideoPicture:
-    """A decoded frame; its colours are worked out when they are asked for."""
-
-    def __init__(self, frame: Any, turn: Turn) -> None:
-        self._frame = frame
-        self._turn = turn
-        self._gray: NDArray[np.uint8] | None = None
-        # Two threads that convert one frame at a time wait for each other for ever.
-        self._converting = Lock()
-
-    def gray(self) -> NDArray[np.uint8]:
-        with self._converting:
-            if self._gray is None:
-                self._gray = self._brightness()
-            return self._gray
-
-    def _brightness(self) -> NDArray[np.uint8]:
-        plane, name = self._frame.planes[0], self._frame.format.name
-        if (name.startswith(('yuv4', 'yuvj4')) and name.endswith('p')) or name in ('gray', 'nv12'):
-            rows = np.frombuffer(plane, np.uint8)
-            rows = rows.reshape(plane.height, plane.line_size)
-            return rows[: self._frame.height, : self._frame.width]
-        return np.asarray(self._frame.to_ndarray(format='gray'))
-
-    def pixels(self) -> NDArray[np.uint8]:
-        form = 'gray' if self._frame.format.name.startswith('gray') else 'bgr24'
-        with self._converting:
-            pixels = np.asarray(self._frame.to_ndarray(format=form))
-        return turned(pixels, self._turn)
-
-
-def _remarks(info: FilmInfo, turn: Turn) -> tuple[str, ...]:
-    if turn == UPRIGHT:
-        return ()
-    again = '; its JPEGs are compressed anew for that' if info.codec == 'mjpeg' else ''
-    return (f'{info.path}: {words_of(turn)}, as its rotation flag says{again}',)
-
-
 def _reason(error: Exception) -> str:
     return str(getattr(error, 'strerror', None) or error)
-
-
-def _step_ns(stream: Any) -> int:
-    for rate in (stream.average_rate, stream.guessed_rate):
-        if rate:
-            return round(NS / Fraction(rate))
-    return 0
-
-
-def _start_ns(tags: dict[str, str]) -> int | None:
-    for name in _START_TAGS:
-        found = instant(tags.get(name, ''))
-        if found is not None and _FIRST_NS <= found < _LAST_NS:
-            return found
-    return None
 
 
 def _shown_ns(source: Any, stream: Any) -> int | None:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.recordings.film import NS
 from nanorocks_ros.recordings.image_folder import ImageFolder, images_in
-from nanorocks_ros.recordings.video import VIDEOS, Video
+from nanorocks_ros.recordings.instants import instant_text
+from nanorocks_ros.recordings.video import Video
 from nanorocks_ros.study.film_bag import check_quality
+from nanorocks_ros.study.find_films import look_into
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,6 +23,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.recordings.film import Film
 
 _LAST_NS = 2**31 * 10**9
+# Clocks of containers count whole seconds.
+_UNSURE_NS = 3 * NS // 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +65,14 @@ class ImportSettings:
                 'give another instant',
             )
 
+    def given(self) -> dict[str, str]:
+        """Those that change times and lens, by their flags, as a bag keeps them; or empty."""
+        return {
+            'rate': str(self.rate) if self.rate else '',
+            'calibration': self.calibration_name,
+            'start': '' if self.start_ns is None else instant_text(self.start_ns),
+        }
+
 
 def open_film(path: Path, settings: ImportSettings) -> Film:
     """Open a video or a folder of images.
@@ -66,7 +80,7 @@ def open_film(path: Path, settings: ImportSettings) -> Film:
     Raises
     ------
     ConfigurationError
-        When nothing says when images were taken, or the library for videos is missing.
+        When nothing says when pictures were taken, or the library for videos is missing.
     RecordingError
         When it is neither.
     """
@@ -74,10 +88,10 @@ def open_film(path: Path, settings: ImportSettings) -> Film:
         if not path.exists():
             raise RecordingError(str(path), 'does not exist', 'pass a video or a folder of images')
         if not path.is_dir():
-            return Video(path, settings.threads)
+            return Video(path, settings.rate, settings.threads)
         if images_in(path):
             return ImageFolder(path, settings.rate)
-        held = videos_in(path)
+        held = look_into(path).films
     except OSError as error:
         raise RecordingError(
             str(path), f'cannot be read ({error.strerror})', 'check its permissions'
@@ -89,16 +103,6 @@ def open_film(path: Path, settings: ImportSettings) -> Film:
             'name the parts of one recording, or add --each to make a bag of each',
         )
     raise RecordingError(str(path), 'holds no video and no image', 'pass another folder')
-
-
-def videos_in(folder: Path) -> list[Path]:
-    """The videos in a folder, and the folders of images in it, in no order."""
-    return [
-        one
-        for one in folder.iterdir()
-        if not one.name.startswith('.')
-        and (bool(images_in(one)) if one.is_dir() else one.suffix.lower() in VIDEOS)
-    ]
 
 
 def check_sizes(films: Sequence[Film], settings: ImportSettings) -> None:
@@ -128,3 +132,27 @@ def check_sizes(films: Sequence[Film], settings: ImportSettings) -> None:
             f'{first.path} has {first.width}x{first.height} px',
             'pass the calibration of this camera at this size',
         )
+
+
+def check_order(films: Sequence[Film], settings: ImportSettings) -> None:
+    """Refuse parts of a film of which one was taken before the one that it is to follow.
+
+    Times of creation are those of the beginning or of the end, as the camera likes it; both rise.
+
+    Raises
+    ------
+    RecordingError
+    """
+    if settings.start_ns is not None:
+        return
+    known = [
+        (film.info.path, film.info.start_ns) for film in films if film.info.start_ns is not None
+    ]
+    for (before, before_ns), (path, start_ns) in itertools.pairwise(known):
+        if start_ns < before_ns - _UNSURE_NS:
+            raise RecordingError(
+                str(path),
+                f'was taken at {instant_text(start_ns)}, before {before} at '
+                f'{instant_text(before_ns)}, which it is to follow',
+                'pass the parts in order of time, or --start, by which each follows the other',
+            )

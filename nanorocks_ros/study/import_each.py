@@ -6,18 +6,15 @@ import shutil
 from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError, NanorocksError, RecordingError
-from nanorocks_ros.recordings.image_folder import images_in
-from nanorocks_ros.recordings.names import natural
-from nanorocks_ros.recordings.reader import open_bag
-from nanorocks_ros.study.films import videos_in
+from nanorocks_ros.study.import_again import check_same_settings, check_same_source
 from nanorocks_ros.study.import_film import Imported, import_films
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from pathlib import Path
 
     from nanorocks_ros.study.films import ImportSettings
 
@@ -43,31 +40,6 @@ class ImportedEach:
     imported: list[Imported] = field(default_factory=list)
     skipped: list[Path] = field(default_factory=list)
     failed: dict[Path, NanorocksError] = field(default_factory=dict)
-
-
-def films_of(paths: Sequence[Path]) -> list[Path]:
-    """The films that paths stand for: a folder of videos for those in it, sorted naturally.
-
-    Raises
-    ------
-    RecordingError
-        When a folder holds none, or cannot be read.
-    """
-    films = []
-    for path in paths:
-        try:
-            if not path.is_dir() or images_in(path):
-                films.append(path)
-                continue
-            held = sorted(videos_in(path), key=lambda one: natural(one.name))
-        except OSError as error:
-            raise RecordingError(
-                str(path), f'cannot be read ({error.strerror})', 'check its permissions'
-            ) from error
-        if not held:
-            raise RecordingError(str(path), 'holds no video and no image', 'pass another folder')
-        films += held
-    return films
 
 
 def import_each(
@@ -145,7 +117,8 @@ def _import_one(
 ) -> None:
     bag = found.folder / name
     if bag.exists():
-        _check_same(bag, film)
+        check_same_source(bag, film)
+        check_same_settings(bag, settings)
         found.skipped.append(bag)
         return
     part = found.folder / _UNFINISHED / name
@@ -160,16 +133,3 @@ def _import_one(
         ) from error
     imported.bag = bag
     found.imported.append(imported)
-
-
-def _check_same(bag: Path, film: Path) -> None:
-    """Refuse to take the bag of another film for that of this one."""
-    kept = open_bag(bag).metadata
-    size = sum(one.stat().st_size for one in (images_in(film) if film.is_dir() else [film]))
-    if kept.get('import') != 'complete' or kept.get('source') != film.name:
-        what = f'is there already, but not as the bag of {film.name}'
-    elif kept.get('source_bytes') != str(size):
-        what = f'was made of another {film.name} ({kept.get("source_bytes")} bytes, not {size})'
-    else:
-        return
-    raise RecordingError(str(bag), what, 'delete it, or pass another folder')

@@ -18,7 +18,7 @@ from nanorocks_ros.recordings.provenance import checksum
 from nanorocks_ros.recordings.repeats import Repeats
 from nanorocks_ros.recordings.steady import Stamped, Steady
 from nanorocks_ros.recordings.writer import BagWriter
-from nanorocks_ros.study.films import ImportSettings, check_sizes, open_film
+from nanorocks_ros.study.films import ImportSettings, check_order, check_sizes, open_film
 from nanorocks_ros.study.results_bag import offered
 from nanorocks_ros.wire import topics
 
@@ -107,6 +107,7 @@ def import_films(
     """
     films = [open_film(path, settings) for path in paths]
     check_sizes(films, settings)
+    check_order(films, settings)
     # Now, not after the work.
     if os.path.lexists(bag):
         raise RecordingError(
@@ -193,23 +194,15 @@ class _Import:
         steady: Steady[Shot] = Steady(film.info.step_ns or self._step_ns)
         repeats = Repeats()
         shift_ns: int | None = None
-        timed = self._timed(film)
-        last_ns = None
+        timed = ((shot.time_ns, shot) for shot in film.shots())
         for stamp_ns, shot in repeats.without(steady.stamps(timed)):
             if shift_ns is None:
                 shift_ns = self._start_ns(film, number) - stamp_ns
-            elif last_ns is not None:
-                self._step_ns = stamp_ns + shift_ns - last_ns
-            last_ns = self._end_ns = stamp_ns + shift_ns
-            yield Stamped(last_ns, shot)
+            yield Stamped(stamp_ns + shift_ns, shot)
+        # The film goes on to the last picture read, were it the same as those before it.
+        if shift_ns is not None and steady.last_ns is not None:
+            self._end_ns, self._step_ns = steady.last_ns + shift_ns, steady.usual_ns()
         self._tell_repairs(film, steady, repeats)
-
-    def _timed(self, film: Film) -> Iterator[tuple[int | None, Shot]]:
-        rate = self._settings.rate
-        for number, shot in enumerate(film.shots()):
-            # With those that were lost: the camera took them.
-            time_ns = shot.time_ns if rate is None else round((number + film.broken) * NS / rate)
-            yield time_ns, shot
 
     def _start_ns(self, film: Film, number: int) -> int:
         """When the first picture of a film was taken; known ones are told."""
@@ -258,19 +251,14 @@ class _Import:
         infos = [film.info for film in self._films]
         settings = self._settings
         unchanged = all(one.as_stored for one in infos)
-        given = {
-            'rate': str(settings.rate) if settings.rate else '',
-            'calibration': settings.calibration_name,
-            'start': '' if settings.start_ns is None else instant_text(settings.start_ns),
-        }
         return {
             'nanorocks_ros': __version__,
             'import': 'unfinished',
             'source': ', '.join(one.path.name for one in infos),
             'source_bytes': ' '.join(str(size) for size in self._sizes),
             'codec': ', '.join(one.codec for one in infos),
-            'pictures': 'as stored' if unchanged else f'JPEG of quality {settings.quality}',
-            **{f'import.{name}': value for name, value in given.items() if value},
+            'pictures': 'as stored' if unchanged else picture_words(settings),
+            **{f'import.{name}': value for name, value in settings.given().items() if value},
             **{f'camera.{k}': v for one in infos[:1] for k, v in one.tags.items()},
         }
 
@@ -307,6 +295,11 @@ def _in_order(
             yield first_ns, future.result()
     for stamp_ns, future in waiting:
         yield stamp_ns, future.result()
+
+
+def picture_words(settings: ImportSettings) -> str:
+    """How pictures were compressed, as provenance says it."""
+    return f'JPEG of quality {settings.quality}'
 
 
 def as_json(imported: Imported) -> dict[str, Any]:

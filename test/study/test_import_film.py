@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -17,13 +16,16 @@ import numpy as np
 import pytest
 from PIL import Image
 from videos import (
-    HEIGHT,
+    CALIBRATION,
+    NS,
+    START_NS,
+    STARTED,
     STEP,
-    WIDTH,
-    number_of,
+    imported,
     packets_of,
     picture,
     turn_video,
+    write_images,
     write_video,
 )
 
@@ -33,25 +35,9 @@ from nanorocks_ros.recordings.jpeg import jpeg_head
 from nanorocks_ros.recordings.reader import open_bag
 from nanorocks_ros.study.bag_frames import BagFrames
 from nanorocks_ros.study.films import ImportSettings
-from nanorocks_ros.study.import_each import films_of, import_each
 from nanorocks_ros.study.import_film import as_json, import_films
 
-NS = 1_000_000_000
-START_NS = 1_700_000_000 * NS
-STARTED = ImportSettings(start_ns=START_NS)
 CAMERA = '/nanorocks/camera/image_raw/compressed'
-
-
-def imported(paths, bag, settings=STARTED):
-    shares = []
-    found = import_films([paths] if isinstance(paths, os.PathLike) else paths, bag, settings,
-                         shares.append)  # fmt: skip
-    assert shares == sorted(shares)
-    assert shares[-1] <= 1.0
-    frames = list(BagFrames(bag).frames())
-    assert len(frames) == found.frames
-    times = [(one.stamp_ns - START_NS) / 1e6 for one in frames]
-    return found, [number_of(one.image) for one in frames], times
 
 
 @pytest.mark.parametrize('name', ['a.mp4', 'a.avi', 'a.mov', 'a.mkv'])
@@ -233,20 +219,6 @@ def test_a_rotation_flag_is_applied_and_reported(tmp_path, turn, rotation, codec
     assert any('as its rotation flag says' in one for one in found.notices)
 
 
-CALIBRATION = f"""
-camera_info:
-  width: {WIDTH}
-  height: {HEIGHT}
-  distortion_model: equidistant
-  d: [0.01, 0.002, 0.0, 0.0]
-  k: [80.0, 0, 47.5, 0, 80.0, 31.5, 0, 0, 1]
-  p: [81.0, 0, 47.5, 0, 0, 81.0, 31.5, 0, 0, 0, 1, 0]
-pixels_per_metre: 1000.0
-trays:
-  1: [8, 8, 40, 40]
-"""
-
-
 def test_the_calibration_goes_into_the_camera_info(tmp_path):
     (tmp_path / 'lens.yaml').write_text(CALIBRATION)
     calibration = load_calibration(tmp_path / 'lens.yaml')
@@ -268,13 +240,6 @@ def test_the_calibration_goes_into_the_camera_info(tmp_path):
 
 
 # --- folders of images ----------------------------------------------------------------------
-
-
-def write_images(folder, names):
-    folder.mkdir()
-    for number, name in enumerate(names):
-        cv2.imwrite(str(folder / name), picture(number))
-    return folder
 
 
 RATE = ImportSettings(start_ns=START_NS, rate=Fraction(10))
@@ -416,56 +381,6 @@ def test_notes_that_are_not_utf8_are_kept_as_they_can_be_shown(tmp_path):
     video.write_bytes(video.read_bytes().replace(b'Muenster', 'M\xfcnsterx'.encode('latin-1')))
     imported(video, tmp_path / 'bag')
     assert open_bag(tmp_path / 'bag').metadata['camera.COMMENT'] == r'M\xfcnsterx'
-
-
-# --- a bag of each --------------------------------------------------------------------------
-
-
-def test_each_video_of_a_folder_becomes_a_bag_and_bad_ones_stop_nothing(tmp_path):
-    folder = tmp_path / 'videos'
-    folder.mkdir()
-    for k in (10, 9, 1):
-        write_video(folder / f'run {k}.avi', range(k, k + 3))
-    (folder / 'run 2.avi').write_bytes(b'no video')
-    (folder / 'read me.txt').write_text('left alone')
-    write_images(folder / 'stills', [f'{1_700_000_000_000 + 40 * k}.jpg' for k in range(3)])
-    films = films_of([folder])
-    assert [one.stem for one in films] == ['run 1', 'run 2', 'run 9', 'run 10', 'stills']
-    told = []
-    found = import_each(films, tmp_path / 'bags', STARTED, lambda *one: told.append(one))
-    assert [one.bag.name for one in found.imported] == ['run 1', 'run 9', 'run 10', 'stills']
-    assert list(found.failed) == [folder / 'run 2.avi']
-    assert told[-1] == (1.0, 'stills')
-    frames = BagFrames(tmp_path / 'bags' / 'run 9').frames()
-    assert [number_of(one.image) for one in frames] == [9, 10, 11]
-    # Once more: nothing is made twice, and what failed is tried again.
-    write_video(folder / 'run 2.avi', range(2))
-    before = {one: one.stat().st_mtime_ns for one in (tmp_path / 'bags').rglob('*.mcap')}
-    again = import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
-    assert [one.bag.name for one in again.imported] == ['run 2']
-    assert len(again.skipped) == 4
-    assert not again.failed
-    assert all(one.stat().st_mtime_ns == stamp for one, stamp in before.items())
-    assert sorted(os.listdir(tmp_path / 'bags')) == sorted(one.stem for one in films)
-
-
-def test_a_bag_of_another_video_is_not_taken_for_ours(tmp_path):
-    films = [write_video(tmp_path / 'a.avi', range(3))]
-    import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
-    write_video(tmp_path / 'a.avi', range(5))
-    found = import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
-    assert 'was made of another a.avi' in str(found.failed[films[0]])
-    shutil.rmtree(tmp_path / 'bags' / 'a')
-    write_video(tmp_path / 'b.avi', range(3))
-    import_films([tmp_path / 'b.avi'], tmp_path / 'bags' / 'a', STARTED, lambda _: None)
-    found = import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
-    assert 'is there already, but not as the bag of a.avi' in str(found.failed[films[0]])
-
-
-def test_videos_that_differ_in_their_ending_alone_get_bags_of_their_own(tmp_path):
-    films = [write_video(tmp_path / name, range(2)) for name in ('a.avi', 'a.mkv')]
-    found = import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
-    assert [one.bag.name for one in found.imported] == ['a_avi', 'a_mkv']
 
 
 # --- as a command ---------------------------------------------------------------------------

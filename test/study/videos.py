@@ -2,17 +2,38 @@
 
 from __future__ import annotations
 
+import os
 from fractions import Fraction
 
 import av
 import cv2
 import numpy as np
 
+from nanorocks_ros.study.bag_frames import BagFrames
+from nanorocks_ros.study.films import ImportSettings
+from nanorocks_ros.study.import_film import import_films
+
 WIDTH, HEIGHT = 96, 64
 _BITS = 8
 _BLOCK = 8
 TICKS = 1000
 STEP = 40
+NS = 1_000_000_000
+START_NS = 1_700_000_000 * NS
+STARTED = ImportSettings(start_ns=START_NS)
+
+CALIBRATION = f"""
+camera_info:
+  width: {WIDTH}
+  height: {HEIGHT}
+  distortion_model: equidistant
+  d: [0.01, 0.002, 0.0, 0.0]
+  k: [80.0, 0, 47.5, 0, 80.0, 31.5, 0, 0, 1]
+  p: [81.0, 0, 47.5, 0, 0, 81.0, 31.5, 0, 0, 0, 1, 0]
+pixels_per_metre: 1000.0
+trays:
+  1: [8, 8, 40, 40]
+"""
 
 
 def picture(number, width=WIDTH, height=HEIGHT):
@@ -71,3 +92,24 @@ def turn_video(path, a, b, c, d):
     place = content.index(_UPRIGHT, content.index(b'tkhd'))
     path.write_bytes(content[:place] + matrix.astype('>i4').tobytes() + content[place + 36 :])
     return path
+
+
+def write_images(folder, names):
+    """A folder of the pictures 0, 1, ... under these names."""
+    folder.mkdir()
+    for number, name in enumerate(names):
+        cv2.imwrite(str(folder / name), picture(number))
+    return folder
+
+
+def imported(paths, bag, settings=STARTED):
+    """What became of films, the numbers of the pictures in the bag, and their times [1/1000 s]."""
+    shares = []
+    found = import_films([paths] if isinstance(paths, os.PathLike) else paths, bag, settings,
+                         shares.append)  # fmt: skip
+    assert shares == sorted(shares)
+    assert shares[-1] <= 1.0
+    frames = list(BagFrames(bag).frames())
+    assert len(frames) == found.frames
+    times = [(one.stamp_ns - START_NS) / 1e6 for one in frames]
+    return found, [number_of(one.image) for one in frames], times
