@@ -12,7 +12,8 @@ from std_srvs.srv import Trigger
 from nanorocks_ros.experiment.settings import BagSettings, PacingSettings, PlayerSettings, rows
 from nanorocks_ros.experiment.settings import problem as wrong_with
 from nanorocks_ros.nodes._node import NanorocksNode
-from nanorocks_ros.nodes._pacing import NS, Pacer
+from nanorocks_ros.nodes._pace import NS
+from nanorocks_ros.nodes._pacing import Pacer
 from nanorocks_ros.nodes._playback import Playback, stamp_in
 from nanorocks_ros.nodes._shell import compressed_message, image_message, time_message
 from nanorocks_ros.nodes._sources import path_of_bag

@@ -110,7 +110,11 @@ def test_a_player_pauses_steps_seeks_and_goes_on_and_its_clock_says_so(graph):
     graph.until(lambda: len(remote.frames) > 20)
     assert remote.frames[4:] == stamps[61 : 61 + len(remote.frames) - 4]
     assert sorted(remote.ticks()) == remote.clock[:5]
-    assert remote.order('toggle_paused').success
+    answer = remote.order('toggle_paused')
+    assert answer.success
+    remote.ticks()
+    (held_ns,) = set(remote.ticks())
+    assert answer.message == f'paused at {(held_ns - start_ns) / NS:.3f} s'
     assert remote.set('position', 15.5).successful
     assert set(remote.ticks()) == {start_ns + 15 * NS + NS // 2}
     assert remote.order('resume').success
