@@ -7,7 +7,6 @@ from dataclasses import replace
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.nodes._shell import image_message
-from nanorocks_ros.recordings.replay import played_part
 from nanorocks_ros.simulation.film import film
 from nanorocks_ros.study.bag_frames import BagFrames
 from nanorocks_ros.wire import topics
@@ -44,14 +43,11 @@ class Simulated:
         return tuple(replace(one, stamp_ns=one.stamp_ns + self._start_ns) for one in moment)
 
 
-def recorded_moments(bag, settings, duration):
+def recorded_moments(bag, part):
     """Log time and (frame, None, its message) of each frame of the part that is played."""
-    part = played_part(bag.reader, settings.start, duration)
-    while True:
-        for message, frame in bag.recorded_frames(*part):
+    for first_ns in part.turns():
+        for message, frame in bag.recorded_frames(first_ns, part.last_ns):
             yield message.log_time_ns, (frame, None, message)
-        if not settings.loop:
-            return
 
 
 def publish_moment(node, moment, epoch_ns):
