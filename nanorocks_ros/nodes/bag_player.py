@@ -9,6 +9,7 @@ from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
+from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.experiment.settings import BagSettings, PacingSettings, PlayerSettings, rows
 from nanorocks_ros.experiment.settings import problem as wrong_with
 from nanorocks_ros.nodes._node import NanorocksNode
@@ -89,27 +90,40 @@ class BagPlayerNode(NanorocksNode):
         if message is None:
             self._tell_latched(stamp_ns)
             return
-        self._playback.send(message)
         if message.topic not in self._camera:
+            self._playback.send(message)
             return
-        self._pacer.takers.sent(stamp_in(message.cdr))
+        try:
+            self._send_frame(message)
+        except FrameError as error:
+            self.refuse(error)
+
+    def _send_frame(self, message):
+        stamp_ns = stamp_in(message)
+        self._playback.send(message)
+        self._pacer.takers.sent(stamp_ns)
         # Who asks for the camera in the other form gets it.
         if self._camera == [_CAMERA[1]] and self.wanted(topics.RAW):
             self.timed(self._decoded, message)
         if self._camera == [_CAMERA[0]] and self.wanted(topics.RAW_COMPRESSED):
             self.timed(self._encoded, message)
 
+    def _content(self, message):
+        try:
+            return self._reader.deserialize(message)
+        except RecordingError as error:
+            # One of many: the others are played.
+            raise FrameError(error.where, error.what, error.do) from error
+
     def _decoded(self, message):
-        content = self._reader.deserialize(message)
-        frame = frame_from_compressed(content, message.topic)
+        frame = frame_from_compressed(self._content(message), message.topic)
         image = image_message(frame.stamp_ns, 'camera', frame.image)
         self.send(topics.RAW, image)
         # Let go only when there is the next one, see _camera.py.
         self._last = frame, image
 
     def _encoded(self, message):
-        content = self._reader.deserialize(message)
-        frame = frame_from_image(content, message.topic)
+        frame = frame_from_image(self._content(message), message.topic)
         jpeg = jpeg_of(frame, _JPEG_QUALITY)
         self.send(topics.RAW_COMPRESSED, compressed_message(frame.stamp_ns, 'camera', jpeg))
 
