@@ -52,6 +52,7 @@ class PipelineNode(NanorocksNode):
         shown = self.declare(st.LivePageSettings()).dashboard
         workers = self.declare(st.WorkSettings()).workers
         self.refuse_unknown_parameters()
+        _sources.refuse_unused(self._source, self._bag, self._pacing)
         self._page = LivePage(self, page, self._settings.trays_file) if shown else None
         self._epoch = Epoch(self, may_set=True, follow=self._source == 'topic')
         self._recorded = None

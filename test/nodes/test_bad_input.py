@@ -33,6 +33,7 @@ def lines_with(output, text):
         ('speed_estimator', 'trays:=[9]', 'trays: 9 is outside [1, 8]'),
         ('pipeline', 'speed.method:=guess', "'guess' is none of auto"),
         ('pipeline', 'simulation.tray:=3', 'parameter simulation.tray: 3 is not among trays'),
+        ('pipeline', 'bag:=x', 'parameter bag: given, but source is simulator; set source:=bag'),
         ('preprocessor', 'trays_file:=/nowhere.yaml', '/nowhere.yaml: No such file'),
         ('simulator', 'noise:=-1.0', 'parameter noise'),
         ('bag_player', 'rate:=1.0', 'parameter bag: is empty; give the path of a bag'),
