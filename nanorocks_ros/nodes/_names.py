@@ -31,7 +31,7 @@ def unknown_parameters(given, declared):
         one on the command line if this node has it.
     """
     anywhere = _of_all_nodes()
-    direct = _on_the_command_line(sys.argv)
+    direct = on_the_command_line()
     wrong = [
         name
         for name in sorted(given)
@@ -57,8 +57,8 @@ def _of_all_nodes():
     return {prefix + name for prefix in _PREFIXES for name in names} | {'use_sim_time'}
 
 
-def _on_the_command_line(arguments):
+def on_the_command_line():
     """Names set by ``-p NAME:=VALUE`` or ``-p NODE:NAME:=VALUE``."""
-    after = itertools.pairwise(arguments)
+    after = itertools.pairwise(sys.argv)
     rules = (rule.split(':=', 1)[0] for flag, rule in after if flag in _FLAGS)
     return {name.rsplit(':', 1)[-1] for name in rules}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from nanorocks_ros.nodes._pace import NS, Pace
 from nanorocks_ros.nodes._takers import Takers
 
 # How soon to look again at the soonest, and at the latest: somebody may resume meanwhile.
@@ -13,7 +14,6 @@ _LATEST_S = 0.02
 _SLICE_S = 0.005
 # Until those who are known know their publishers as well: the first frames were lost otherwise.
 _SETTLE_S = 1.0
-NS = 1_000_000_000
 
 
 class Pacer:
@@ -46,13 +46,12 @@ class Pacer:
         self._emit = emit
         self._pacing = pacing
         self._finished = finished
-        self._next = next(moments, None)
-        self._first_ns = self._next[0] if self._next is not None else 0
-        self._position_ns = self._first_ns
-        self._since = None
         self._started = False
         self._complete = None
-        self.rate = pacing.rate
+        self._pace = Pace(pacing.rate)
+        self._look_ahead()
+        self._first_ns = self._next[0] if self._next is not None else 0
+        self._pace.go_to(self._first_ns)
         self.paused = paused
         self.takers = Takers(node)
         self.set_rate(pacing.rate)
@@ -61,27 +60,23 @@ class Pacer:
     @property
     def now_ns(self):
         """What time it is in the recording."""
-        if self._since is None or self.rate == 0.0:
-            return self._position_ns
-        passed_ns = round((time.monotonic() - self._since) * self.rate * NS)
-        ahead_ns = self._next[0] if self._next is not None else self._position_ns
-        return max(self._position_ns, min(self._position_ns + passed_ns, ahead_ns))
+        return self._pace.now_ns
 
     def pause(self):
         """Hold the time of the recording."""
-        self._anchor(self.now_ns)
         self.paused = True
+        self._pace.hold()
 
     def resume(self):
         """Go on."""
         self.paused = False
-        self._anchor(self.now_ns)
+        if self._started:
+            self._pace.run()
 
     def set_rate(self, rate):
         """Go on at another rate."""
-        position_ns = self.now_ns
         self.rate = rate
-        self._anchor(position_ns)
+        self._pace.set_rate(rate)
         if rate == 0.0:
             self.takers.listen()
 
@@ -95,8 +90,8 @@ class Pacer:
             What time it is there.
         """
         self._moments = moments
-        self._next = next(moments, None)
-        self._anchor(position_ns)
+        self._look_ahead()
+        self._pace.go_to(position_ns)
 
     def step(self, last):
         """Emit moments up to the first for which `last` holds; whether there was any."""
@@ -107,9 +102,9 @@ class Pacer:
                 return True
         return False
 
-    def _anchor(self, position_ns):
-        self._position_ns = position_ns
-        self._since = time.monotonic() if self._started and not self.paused else None
+    def _look_ahead(self):
+        self._next = next(self._moments, None)
+        self._pace.next_ns = None if self._next is None else self._next[0]
 
     def _tick(self):
         if not self._started:
@@ -117,7 +112,7 @@ class Pacer:
                 self._look_again_in(_LATEST_S)
                 return
             self._started = True
-            self._anchor(self._position_ns)
+            self._pace.run()
         end = time.monotonic() + _SLICE_S
         while self._is_due():
             self._advance()
@@ -140,7 +135,7 @@ class Pacer:
             return _LATEST_S
         if self.rate == 0.0:
             return _SOON_S
-        return min(max(self._due() - time.monotonic(), _SOON_S), _LATEST_S)
+        return min(max(self._pace.wait_s(), _SOON_S), _LATEST_S)
 
     def _all_listen(self):
         wanted = self._pacing.listeners
@@ -154,21 +149,15 @@ class Pacer:
     def _is_due(self):
         if self._next is None or self.paused:
             return False
-        stamp_ns = self._next[0]
-        if 0.0 < self._pacing.duration <= (stamp_ns - self._first_ns) / NS:
+        if 0.0 < self._pacing.duration <= (self._next[0] - self._first_ns) / NS:
             self._next = None
             return False
         if self.rate == 0.0:
             return self.takers.ready()
-        return stamp_ns < self._position_ns or time.monotonic() >= self._due()
-
-    def _due(self):
-        return self._since + (self._next[0] - self._position_ns) / NS / self.rate
+        return self._pace.wait_s() == 0.0
 
     def _advance(self):
         stamp_ns, moment = self._next
         self._emit(stamp_ns, moment)
-        self._next = next(self._moments, None)
-        back = stamp_ns < self._position_ns
-        if back or self.rate == 0.0 or self._since is None:
-            self._anchor(stamp_ns)
+        self._pace.reached(stamp_ns)
+        self._look_ahead()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import struct
 
+from rclpy.exceptions import NameValidationException
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from nanorocks_ros.errors import FrameError
 from nanorocks_ros.nodes._node import RESULT_TOPICS
 from nanorocks_ros.nodes._shell import message_class, qos_of
 from nanorocks_ros.wire import topics
@@ -71,7 +73,13 @@ class Playback:
         if info.qos is not None:
             _adapt(qos, info.qos, at_least=ours is not None)
         published = name.removeprefix(f'{topics.NAMESPACE}/')
-        self._publishers[name] = self._node.publisher(kind, published, qos)
+        try:
+            self._publishers[name] = self._node.publisher(kind, published, qos)
+        except NameValidationException:
+            self._node.get_logger().warning(
+                f'{name}: not a name that ROS allows; it is not played'
+            )
+            return
         if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
             self.latched.append(name)
         if ours in _WORKED_OUT:
@@ -98,8 +106,22 @@ def _adapt(qos, recorded, at_least):
     qos.durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
 
 
-def stamp_in(cdr):
-    """The stamp [ns] in the header with which a serialised message begins."""
-    order = '<' if cdr[1] & 1 else '>'
-    seconds, nanoseconds = struct.unpack_from(_STAMP.format(order), cdr, 4)
+def stamp_in(message):
+    """The stamp [ns] in the header with which a message of a bag begins.
+
+    Raises
+    ------
+    FrameError
+        When it is too short for one.
+    """
+    cdr = message.cdr
+    try:
+        order = '<' if cdr[1] & 1 else '>'
+        seconds, nanoseconds = struct.unpack_from(_STAMP.format(order), cdr, 4)
+    except (IndexError, struct.error) as error:
+        raise FrameError(
+            message.topic,
+            f'a message of {len(cdr)} bytes is no {message.type}',
+            'record it again or pass another bag',
+        ) from error
     return seconds * NS + nanoseconds

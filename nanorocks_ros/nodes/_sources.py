@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.settings import BagSettings
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+from nanorocks_ros.nodes._names import on_the_command_line
 from nanorocks_ros.nodes._shell import image_message
-from nanorocks_ros.recordings.replay import played_part
 from nanorocks_ros.simulation.film import film
 from nanorocks_ros.study.bag_frames import BagFrames
 from nanorocks_ros.wire import topics
@@ -44,14 +45,11 @@ class Simulated:
         return tuple(replace(one, stamp_ns=one.stamp_ns + self._start_ns) for one in moment)
 
 
-def recorded_moments(bag, settings, duration):
+def recorded_moments(bag, part):
     """Log time and (frame, None, its message) of each frame of the part that is played."""
-    part = played_part(bag.reader, settings.start, duration)
-    while True:
-        for message, frame in bag.recorded_frames(*part):
+    for first_ns in part.turns():
+        for message, frame in bag.recorded_frames(first_ns, part.last_ns):
             yield message.log_time_ns, (frame, None, message)
-        if not settings.loop:
-            return
 
 
 def publish_moment(node, moment, epoch_ns):
@@ -62,6 +60,37 @@ def publish_moment(node, moment, epoch_ns):
         node.send(topics.RAW, message)
     if truth is not None:
         node.publish_result(truth, epoch_ns)
+
+
+def refuse_unused(source, bag, pacing):
+    """Refuse what says how a bag is played where none is.
+
+    A file may serve the whole graph, a player beside this node, too; but whoever names a bag
+    does not want a simulation.
+
+    Parameters
+    ----------
+    source : str
+    bag : BagSettings
+    pacing : PacingSettings
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    if source == 'bag':
+        return
+    given = [name for name, value in asdict(bag).items() if value != getattr(BagSettings(), name)]
+    if source == 'topic' and pacing.duration > 0.0:
+        given.append('duration')
+    meant = on_the_command_line() | ({'bag'} if source == 'simulator' else set())
+    for name in given:
+        if name in meant:
+            raise ConfigurationError(
+                f'parameter {name}',
+                f'given, but source is {source}',
+                'set source:=bag, or leave it out',
+            )
 
 
 def path_of_bag(settings):

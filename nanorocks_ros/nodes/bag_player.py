@@ -9,16 +9,19 @@ from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
+from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.experiment.settings import BagSettings, PacingSettings, PlayerSettings, rows
 from nanorocks_ros.experiment.settings import problem as wrong_with
 from nanorocks_ros.nodes._node import NanorocksNode
-from nanorocks_ros.nodes._pacing import NS, Pacer
+from nanorocks_ros.nodes._pace import NS
+from nanorocks_ros.nodes._pacing import Pacer
+from nanorocks_ros.nodes._part import Part
 from nanorocks_ros.nodes._playback import Playback, stamp_in
 from nanorocks_ros.nodes._shell import compressed_message, image_message, time_message
 from nanorocks_ros.nodes._sources import path_of_bag
 from nanorocks_ros.recordings.images import frame_from_compressed, frame_from_image, jpeg_of
 from nanorocks_ros.recordings.reader import open_bag
-from nanorocks_ros.recordings.replay import latest, played_part
+from nanorocks_ros.recordings.replay import latest
 from nanorocks_ros.study.bag_frames import BagFrames
 from nanorocks_ros.wire import topics
 
@@ -33,26 +36,26 @@ class BagPlayerNode(NanorocksNode):
 
     def __init__(self):
         super().__init__('bag_player')
-        self._settings = self.declare(BagSettings())
+        settings = self.declare(BagSettings())
         player = self.declare(PlayerSettings(), fixed=False)
         pacing = self.declare(PacingSettings(), fixed=False)
         self.refuse_unknown_parameters()
-        self._reader = open_bag(path_of_bag(self._settings))
-        for notice in self._reader.notices:
-            self.get_logger().warning(notice)
+        self._reader = open_bag(path_of_bag(settings))
         self._reader.require_topic(list(self._reader.topics))
-        self._part = played_part(self._reader, self._settings.start, pacing.duration)
+        self._part = Part(self, self._reader, settings, pacing.duration)
         self._last = None
         self._clock_ns = None
         self._clock_output = self.create_publisher(Clock, '/clock', QoSProfile(depth=10))
         self._playback = Playback(self, self._reader, player.results)
+        self._part.require(self._playback.names, 'message')
+        self._part.tell_missing()
         self._camera = [name for name in _CAMERA if self._has_messages(name)]
         self._epoch_ns = BagFrames(self._reader.path).epoch_ns() if self._camera else None
         self._expect_to_be_alone()
-        self._tell_latched(self._part[0])
+        self._tell_latched(self._part.first_ns)
         self._pacer = Pacer(
             self,
-            self._moments(self._part[0]),
+            self._moments(self._part.first_ns),
             self._emit,
             replace(pacing, duration=0.0),
             self.finish,
@@ -74,41 +77,53 @@ class BagPlayerNode(NanorocksNode):
     # What is played
 
     def _moments(self, first_ns):
-        while True:
-            for message in self._reader.messages(self._playback.names, first_ns, self._part[1]):
+        names, last_ns = self._playback.names, self._part.last_ns
+        for turn, begin_ns in enumerate(self._part.turns(first_ns)):
+            if turn > 0:
+                # Between the last message and the first.
+                yield begin_ns, None
+            for message in self._reader.messages(names, begin_ns, last_ns):
                 yield message.log_time_ns, message
-            if not self._settings.loop:
-                return
-            first_ns = self._part[0]
-            # Between the last message and the first.
-            yield first_ns, None
 
     def _emit(self, stamp_ns, message):
         self._tell_time(stamp_ns)
         if message is None:
             self._tell_latched(stamp_ns)
             return
-        self._playback.send(message)
         if message.topic not in self._camera:
+            self._playback.send(message)
             return
-        self._pacer.takers.sent(stamp_in(message.cdr))
+        try:
+            self._send_frame(message)
+        except FrameError as error:
+            self.refuse(error)
+
+    def _send_frame(self, message):
+        stamp_ns = stamp_in(message)
+        self._playback.send(message)
+        self._pacer.takers.sent(stamp_ns)
         # Who asks for the camera in the other form gets it.
         if self._camera == [_CAMERA[1]] and self.wanted(topics.RAW):
             self.timed(self._decoded, message)
         if self._camera == [_CAMERA[0]] and self.wanted(topics.RAW_COMPRESSED):
             self.timed(self._encoded, message)
 
+    def _content(self, message):
+        try:
+            return self._reader.deserialize(message)
+        except RecordingError as error:
+            # One of many: the others are played.
+            raise FrameError(error.where, error.what, error.do) from error
+
     def _decoded(self, message):
-        content = self._reader.deserialize(message)
-        frame = frame_from_compressed(content, message.topic)
+        frame = frame_from_compressed(self._content(message), message.topic)
         image = image_message(frame.stamp_ns, 'camera', frame.image)
         self.send(topics.RAW, image)
         # Let go only when there is the next one, see _camera.py.
         self._last = frame, image
 
     def _encoded(self, message):
-        content = self._reader.deserialize(message)
-        frame = frame_from_image(content, message.topic)
+        frame = frame_from_image(self._content(message), message.topic)
         jpeg = jpeg_of(frame, _JPEG_QUALITY)
         self.send(topics.RAW_COMPRESSED, compressed_message(frame.stamp_ns, 'camera', jpeg))
 
@@ -125,11 +140,8 @@ class BagPlayerNode(NanorocksNode):
         if stamp_ns is None or stamp_ns != self._clock_ns:
             self._clock_output.publish(Clock(clock=time_message(now_ns)))
         self._clock_ns = now_ns
-        self.state['position [s]'] = f'{self._seconds(now_ns):.3f}'
+        self.state['position [s]'] = f'{self._part.seconds(now_ns):.3f}'
         self.state['paused'] = str(self._pacer.paused).lower()
-
-    def _seconds(self, stamp_ns):
-        return (stamp_ns - self._reader.start_ns) / NS
 
     # What it is told to do
 
@@ -148,7 +160,7 @@ class BagPlayerNode(NanorocksNode):
 
     def _answer(self, response, success=True):
         response.success = success
-        where = f'{self._seconds(self._pacer.now_ns):.3f} s'
+        where = f'{self._part.seconds(self._pacer.now_ns):.3f} s'
         response.message = f'{"paused" if self._pacer.paused else "playing"} at {where}'
         return response
 
@@ -189,7 +201,8 @@ class BagPlayerNode(NanorocksNode):
         return SetParametersResult(successful=True)
 
     def _wrong_with_position(self, seconds):
-        first, last = (self._seconds(stamp_ns) for stamp_ns in self._part)
+        part = self._part
+        first, last = (part.seconds(stamp_ns) for stamp_ns in (part.first_ns, part.last_ns))
         if not first <= seconds <= last:
             return f'{seconds:g} s is not in the part that is played, {first:g} to {last:g} s'
         return None
@@ -205,4 +218,4 @@ class BagPlayerNode(NanorocksNode):
         self._pacer.restart(self._moments(stamp_ns), stamp_ns)
         self._tell_time(stamp_ns)
         self._tell_latched(stamp_ns)
-        self.get_logger().info(f'went to {self._seconds(stamp_ns):.3f} s')
+        self.get_logger().info(f'went to {self._part.seconds(stamp_ns):.3f} s')

@@ -14,6 +14,7 @@ from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._live_page import LivePage
 from nanorocks_ros.nodes._node import RESULT_TOPICS, NanorocksNode
 from nanorocks_ros.nodes._pacing import Pacer
+from nanorocks_ros.nodes._part import Part
 from nanorocks_ros.nodes._recorder import GraphRecorder, provenance
 from nanorocks_ros.nodes._tracks import TracksPicture
 from nanorocks_ros.records import Tracks, TrayImage
@@ -51,6 +52,7 @@ class PipelineNode(NanorocksNode):
         shown = self.declare(st.LivePageSettings()).dashboard
         workers = self.declare(st.WorkSettings()).workers
         self.refuse_unknown_parameters()
+        _sources.refuse_unused(self._source, self._bag, self._pacing)
         self._page = LivePage(self, page, self._settings.trays_file) if shown else None
         self._epoch = Epoch(self, may_set=True, follow=self._source == 'topic')
         self._recorded = None
@@ -143,12 +145,13 @@ class PipelineNode(NanorocksNode):
 
     def _play_recorded(self):
         bag = _sources.opened_bag(self._bag)
+        part = Part(self, bag.reader, self._bag, self._pacing.duration)
+        part.require([bag.topic], 'frame')
         self._name_source(bag.where, bag.view())
         self._recorded = bag
         self._epoch.set(bag.epoch_ns())
-        moments = _sources.recorded_moments(bag, self._bag, self._pacing.duration)
         self._pacing = replace(self._pacing, duration=0.0)
-        self._play(moments, tuple)
+        self._play(_sources.recorded_moments(bag, part), tuple)
 
     def _play(self, moments, dated):
         def emit(_, moment):
@@ -208,9 +211,6 @@ class PipelineNode(NanorocksNode):
 
     def _finish(self):
         self._background.drain()
-        if self._recorded is not None:
-            for notice in self._recorded.reader.notices:
-                self.get_logger().warning(notice)
         for record in self._pipeline.flush():
             self.publish_result(record, self._epoch.ns)
         if self.recorder is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,8 @@ from sensor_msgs.msg import Image
 from nanorocks_ros.nodes._shell import image_message, qos_of
 from nanorocks_ros.wire import topics
 
+SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
+
 
 def lines_with(output, text):
     return [line for line in output.splitlines() if text in line]
@@ -29,6 +33,7 @@ def lines_with(output, text):
         ('speed_estimator', 'trays:=[9]', 'trays: 9 is outside [1, 8]'),
         ('pipeline', 'speed.method:=guess', "'guess' is none of auto"),
         ('pipeline', 'simulation.tray:=3', 'parameter simulation.tray: 3 is not among trays'),
+        ('pipeline', 'bag:=x', 'parameter bag: given, but source is simulator; set source:=bag'),
         ('preprocessor', 'trays_file:=/nowhere.yaml', '/nowhere.yaml: No such file'),
         ('simulator', 'noise:=-1.0', 'parameter noise'),
         ('bag_player', 'rate:=1.0', 'parameter bag: is empty; give the path of a bag'),
@@ -46,6 +51,18 @@ def test_a_bag_that_does_not_exist_ends_the_player_with_one_line(graph):
     finished = graph.wait(graph.start('bag_player', 'bag:=/no/such/bag'))
     assert finished.code == 1
     assert '/no/such/bag' in finished.output
+    assert len(finished.output.splitlines()) == 1, finished.output
+
+
+@pytest.mark.parametrize(
+    ('name', 'source', 'kind'),
+    [('bag_player', (), 'message'), ('pipeline', ('source:=bag',), 'frame')],
+)
+def test_a_loop_over_nothing_ends_with_one_line(graph, name, source, kind):
+    part = (f'bag:={SAMPLE}', 'start:=0.005', 'duration:=0.001', 'loop:=true')
+    finished = graph.wait(graph.start(name, *source, *part))
+    assert finished.code == 2
+    assert f'parameters start and duration: {SAMPLE} holds no {kind} from' in finished.output
     assert len(finished.output.splitlines()) == 1, finished.output
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -110,7 +111,11 @@ def test_a_player_pauses_steps_seeks_and_goes_on_and_its_clock_says_so(graph):
     graph.until(lambda: len(remote.frames) > 20)
     assert remote.frames[4:] == stamps[61 : 61 + len(remote.frames) - 4]
     assert sorted(remote.ticks()) == remote.clock[:5]
-    assert remote.order('toggle_paused').success
+    answer = remote.order('toggle_paused')
+    assert answer.success
+    remote.ticks()
+    (held_ns,) = set(remote.ticks())
+    assert answer.message == f'paused at {(held_ns - start_ns) / NS:.3f} s'
     assert remote.set('position', 15.5).successful
     assert set(remote.ticks()) == {start_ns + 15 * NS + NS // 2}
     assert remote.order('resume').success
@@ -212,3 +217,34 @@ def test_of_a_raw_recording_jpegs_are_made_for_who_asks_for_them(graph, tmp_path
     for one in frames:
         assert one.image.shape == picture.shape
         assert np.abs(one.image.astype(int) - picture[:, :, ::-1]).max() <= 3
+
+
+def test_messages_that_are_none_and_names_that_ros_does_not_know_cost_themselves_alone(
+    graph, tmp_path
+):
+    name = topics.RAW_COMPRESSED.absolute()
+    frames = list(itertools.islice(open_bag(SAMPLE).messages([name]), 6))
+    contents = [one.cdr for one in frames]
+    contents[2:5] = contents[2][:6], b'', contents[4][: len(contents[4]) // 2]
+    table = {
+        name: OfferedTopic(msgtype=topics.COMPRESSED, qos=OfferedQos()),
+        '/1st name': OfferedTopic(msgtype='std_msgs/msg/String', qos=OfferedQos()),
+    }
+    path = tmp_path / 'bag'
+    with BagWriter(path, table, metadata={}) as bag:
+        bag.write_raw('/1st name', frames[0].log_time_ns, b'')
+        for one, cdr in zip(frames, contents, strict=True):
+            bag.write_raw(name, one.log_time_ns, cdr)
+    found = []
+    graph.node.create_subscription(Image, topics.RAW.name, found.append, qos_of(topics.RAW))
+    ended = graph.wait(graph.start('bag_player', f'bag:={path}', 'listeners:=1'))
+    assert ended.code == 0
+    stamps = [frames[k].log_time_ns - frames[0].log_time_ns for k in (0, 1, 5)]
+    played = [stamp_of(one.header.stamp) for one in found]
+    assert [one - played[0] for one in played] == stamps
+    said = ended.output.splitlines()
+    assert len(said) == 4
+    assert '/1st name: not a name that ROS allows; it is not played' in said[0]
+    assert f'{name}: a message of 6 bytes is no {topics.COMPRESSED}; record it' in said[1]
+    assert f'{name}: a message of 0 bytes is no {topics.COMPRESSED}; record it' in said[2]
+    assert f'is no {topics.COMPRESSED} (' in said[3]

@@ -1,0 +1,106 @@
+"""The part of a bag that is played, once or again and again, and what is missing of it."""
+
+from __future__ import annotations
+
+from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.nodes._pace import NS
+from nanorocks_ros.recordings.replay import played_part
+
+
+class Part:
+    """The part of a bag that is played.
+
+    Parameters
+    ----------
+    node : NanorocksNode
+        That tells what is missing.
+    reader : BagReader
+    settings : BagSettings
+    duration : float, [s]
+        0: to the end of the bag.
+
+    Attributes
+    ----------
+    first_ns, last_ns : int, [ns]
+        Log times between which it lies.
+
+    Raises
+    ------
+    ConfigurationError
+        When the recording is over before it begins.
+    """
+
+    def __init__(self, node, reader, settings, duration):
+        self._node, self._reader = node, reader
+        self._loop = settings.loop
+        self._told = set()
+        self._whole = settings.start == 0.0 and duration == 0.0
+        self.first_ns, self.last_ns = played_part(reader, settings.start, duration)
+
+    def require(self, names, kind):
+        """Refuse a part in which there is nothing to play.
+
+        Parameters
+        ----------
+        names : collection of str
+            The topics that are played.
+        kind : str
+            What their messages are called.
+
+        Raises
+        ------
+        RecordingError
+            When nothing that is there can be read, or there are no topics.
+        ConfigurationError
+            When nothing is there.
+        """
+        if next(self._reader.messages(names, self.first_ns, self.last_ns), None) is not None:
+            return
+        if not names:
+            raise RecordingError(
+                str(self._reader.path), 'none of its topics can be played', 'pass another bag'
+            )
+        first, last = (self.seconds(stamp_ns) for stamp_ns in (self.first_ns, self.last_ns))
+        where = f'{first:.3f} to {last:.3f} s'
+        lost = self._reader.messages_lost
+        if lost or self._whole:
+            damage = f' (at least {lost} messages are lost)' if lost else ''
+            raise RecordingError(
+                str(self._reader.path),
+                f'no {kind} can be read from {where}{damage}',
+                'play another part or another bag',
+            )
+        raise ConfigurationError(
+            'parameters start and duration',
+            f'{self._reader.path} holds no {kind} from {where}',
+            'give another start or a longer duration',
+        )
+
+    def turns(self, first_ns=None):
+        """Where each turn begins; what is missing is told after each.
+
+        Parameters
+        ----------
+        first_ns : int, optional, [ns]
+            Where the first one does, when not at the beginning of the part.
+
+        Yields
+        ------
+        int, [ns]
+        """
+        yield self.first_ns if first_ns is None else first_ns
+        self.tell_missing()
+        while self._loop:
+            yield self.first_ns
+            self.tell_missing()
+
+    def tell_missing(self):
+        """Say what the reader says of the bag, each sentence once."""
+        for notice in self._reader.notices:
+            if notice not in self._told:
+                self._told.add(notice)
+                self._node.get_logger().warning(notice)
+
+    def seconds(self, stamp_ns):
+        """A log time in seconds since the first message of the bag."""
+        return (stamp_ns - self._reader.start_ns) / NS

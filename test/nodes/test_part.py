@@ -1,0 +1,109 @@
+"""The part of a bag that is played: turn after turn, never empty, and what is missing is told."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+from mcap.reader import make_reader
+
+pytest.importorskip('rclpy')
+
+from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.experiment.settings import BagSettings
+from nanorocks_ros.nodes._part import Part
+from nanorocks_ros.recordings.reader import open_bag
+from nanorocks_ros.recordings.writer import BagWriter, OfferedQos, OfferedTopic
+
+NS = 10**9
+NAMES = ['/often']
+SHORT = (0.0, 0.2, 0.4)
+
+
+class Told:
+    """What a node says."""
+
+    def __init__(self):
+        self.lines = []
+
+    def get_logger(self):
+        return self
+
+    def warning(self, line):
+        self.lines.append(line)
+
+
+def bag_with(path, seconds):
+    """Strings at some times after the first."""
+    table = {'/often': OfferedTopic(msgtype='std_msgs/msg/String', qos=OfferedQos())}
+
+    class Text:
+        data = 'some text'
+
+    with BagWriter(path, table, metadata={}) as bag:
+        for one in seconds:
+            bag.write('/often', 100 * NS + round(one * NS), Text())
+    return path
+
+
+def damaged(path):
+    """The same bag with a bit changed in every place where messages are."""
+    (file,) = path.glob('*.mcap')
+    with file.open('rb') as stream:
+        chunks = make_reader(stream).get_summary().chunk_indexes
+    content = bytearray(file.read_bytes())
+    for one in chunks:
+        content[one.chunk_start_offset + one.chunk_length // 2] ^= 0x10
+    file.write_bytes(content)
+    return path
+
+
+def part_of(path, duration=0.0, **settings):
+    told = Told()
+    reader = open_bag(path)
+    return Part(told, reader, BagSettings(bag=str(path), **settings), duration), reader, told
+
+
+@pytest.mark.parametrize('loop', [False, True])
+def test_a_part_without_a_message_is_refused_with_start_and_duration(tmp_path, loop):
+    path = bag_with(tmp_path / 'bag', range(0, 20, 5))
+    part, *_ = part_of(path, start=6.0, duration=2.0, loop=loop)
+    expected = 'parameters start and duration: .*bag holds no message from 6.000 to 8.000 s; give'
+    with pytest.raises(ConfigurationError, match=expected):
+        part.require(NAMES, 'message')
+    part, *_ = part_of(path, start=6.0, duration=5.0)
+    part.require(NAMES, 'message')
+
+
+def test_a_bag_of_which_nothing_can_be_read_is_an_error_of_the_bag(tmp_path):
+    part, *_ = part_of(damaged(bag_with(tmp_path / 'bag', SHORT)), start=0.1)
+    expected = (
+        r'bag: no frame can be read from 0.100 to 0.400 s \(at least 3 messages are lost\); play'
+    )
+    with pytest.raises(RecordingError, match=expected):
+        part.require(NAMES, 'frame')
+
+
+def test_a_bag_without_a_topic_that_can_be_played_is_an_error_of_the_bag(tmp_path):
+    part, *_ = part_of(bag_with(tmp_path / 'bag', SHORT), start=0.1)
+    with pytest.raises(RecordingError, match='none of its topics can be played'):
+        part.require([], 'message')
+
+
+def test_what_is_missing_is_told_after_the_turn_in_which_it_was_found_and_once(tmp_path):
+    path = damaged(bag_with(tmp_path / 'bag', SHORT))
+    part, reader, told = part_of(path, loop=True)
+    lines = []
+    for begin_ns in itertools.islice(part.turns(100 * NS + 1), 4):
+        lines.append((begin_ns - 100 * NS, len(told.lines)))
+        assert not list(reader.messages(NAMES, begin_ns, part.last_ns))
+    assert lines == [(1, 0), (0, 1), (0, 1), (0, 1)]
+    assert 'at least 3 messages are lost' in told.lines[0]
+
+
+def test_without_a_loop_there_is_one_turn_and_what_is_missing_is_told_after_it(tmp_path):
+    part, reader, told = part_of(damaged(bag_with(tmp_path / 'bag', SHORT)))
+    for _ in part.turns():
+        assert not list(reader.messages(NAMES, part.first_ns, part.last_ns))
+        assert not told.lines
+    assert len(told.lines) == 1
