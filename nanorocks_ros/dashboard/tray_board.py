@@ -19,7 +19,8 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.wire.layouts import NS
 
-Shown = SpeedEstimate | CorEstimate | ClusterEstimate | GroundTruth
+Measured = SpeedEstimate | CorEstimate | ClusterEstimate
+Shown = Measured | GroundTruth
 Row = list[float | None]
 
 # Points of a curve; at ten a second the longest cycle of the flight has 600.
@@ -68,6 +69,11 @@ class Series:
             self.rows = kept
             self.generation += 1
 
+    def drop_before(self, time: float) -> None:
+        """Forget what is earlier."""
+        self.rows = [row for row in self.rows if row[0] is not None and row[0] >= time]
+        self.generation += 1
+
     def since(self, told: tuple[int, int]) -> tuple[int, list[Row]]:
         """Where new points begin, and the points."""
         generation, count = told
@@ -104,6 +110,8 @@ class TrayBoard:
         A new one for each cycle that is shown, also when a source starts again.
     version : int
         Rises with every record.
+    heard_s : float, [s]
+        When something measured came last; the truth is none.
     """
 
     description: str
@@ -119,40 +127,77 @@ class TrayBoard:
     _finals_version: int = 1
 
     def __post_init__(self) -> None:
-        self._begin(-1)
+        self._clear()
 
     def take(self, record: Shown, now_s: float) -> None:
         """Note a record."""
-        name, columns = _COLUMNS[type(record)]
+        self.version += 1
+        if isinstance(record, GroundTruth):
+            self._take_truth(record)
+            return
+        name, _ = _COLUMNS[type(record)]
         # A merge that became known later ends the window where beads began to stick.
         ended = (
             isinstance(record, CorEstimate)
             and record.status is not CorStatus.COOLING
             and record.cycle == self.cycle
         )
+        last_ns = self._stamps.get(name, record.stamp_ns)
         if ended:
             self.series[name].cut(record.stamp_ns / NS)
-        elif record.stamp_ns < self._stamps.get(name, record.stamp_ns) - _BACK_NS:
-            self.finals.clear()
-            self._finals_version += 1
-            self._begin(record.cycle)
+        elif record.stamp_ns < last_ns - _BACK_NS:
+            self._start_again(record, last_ns)
         if isinstance(record, CorEstimate) and record.status is CorStatus.FINAL:
             self._finish(record)
-        self.version += 1
         self.heard_s = now_s
         if record.cycle > self.cycle:
-            self._begin(record.cycle)
+            self._begin(record)
         if record.cycle < self.cycle:
             # Known seconds later, of the cycle before: only the number that is final counts.
             return
-        self._stamps[name] = record.stamp_ns
         self._learn_start(record)
+        self._note(record)
+
+    def _take_truth(self, truth: GroundTruth) -> None:
+        """Put the truth beside what is measured at that time, whatever its cycle.
+
+        It counts cycles from the start of the simulator, a node that measures from when it joined.
+        """
+        if truth.stamp_ns < self._stamps.get('truth', truth.stamp_ns) - _BACK_NS:
+            self.series['truth'].cut(-math.inf)
+        self._note(truth)
+
+    def _note(self, record: Shown) -> None:
+        name, columns = _COLUMNS[type(record)]
+        self._stamps[name] = record.stamp_ns
         self.latest[name] = as_fields(record)
         values = (_number(getattr(record, one)) for one in columns)
         self.series[name].append([_number(record.stamp_ns / NS), *values])
 
-    def _begin(self, cycle: int) -> None:
-        self.cycle, self.start_ns = cycle, None
+    def _start_again(self, record: Measured, last_ns: int) -> None:
+        """Forget what the source told before its clock went back from `last_ns`."""
+        self.finals.clear()
+        self._finals_version += 1
+        # The truth may have gone back first, and then belongs to what begins here.
+        if self._stamps.get('truth', last_ns) > (record.stamp_ns + last_ns) // 2:
+            self._clear()
+        self._begin(record)
+
+    def _begin(self, record: Measured) -> None:
+        """Show the cycle of a record, with the truth since it began or, not known, since then."""
+        truth, latest = self.series['truth'], self.latest.get('truth')
+        stamp_ns = self._stamps.get('truth')
+        self._clear()
+        self.cycle = record.cycle
+        self._learn_start(record)
+        since_ns = record.stamp_ns if self.start_ns is None else self.start_ns
+        truth.drop_before(since_ns / NS)
+        if latest is not None and stamp_ns is not None and truth.rows:
+            self.series['truth'], self.latest['truth'] = truth, latest
+            self._stamps['truth'] = stamp_ns
+
+    def _clear(self) -> None:
+        self.start_ns = None
         self.serial += 1
         self.series = {name: Series() for name, _ in _COLUMNS.values()}
         self.latest = {}
@@ -169,7 +214,7 @@ class TrayBoard:
         while len(self.finals) > _MOST_CYCLES:
             del self.finals[min(self.finals)]
 
-    def _learn_start(self, record: Shown) -> None:
+    def _learn_start(self, record: Measured) -> None:
         if isinstance(record, SpeedEstimate) and record.cycle_start_ns is not None:
             self.start_ns = record.cycle_start_ns
         if self.start_ns is not None or not isinstance(record, CorEstimate):
