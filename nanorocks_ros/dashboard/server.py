@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from concurrent.futures import Future
 
-    from nanorocks_ros.dashboard.board import Board, Shown
+    from nanorocks_ros.dashboard.board import Board
+    from nanorocks_ros.dashboard.tray_board import Shown
     from nanorocks_ros.experiment.settings import DashboardSettings
 
 _MOST_CLIENTS = 64

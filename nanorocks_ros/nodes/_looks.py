@@ -9,8 +9,8 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
 from nanorocks_ros.dashboard.pictures import encoded
+from nanorocks_ros.nodes._crops import gray_frame, picture_frame
 from nanorocks_ros.nodes._shell import message_class
-from nanorocks_ros.recordings.images import frame_from_image
 from nanorocks_ros.wire import topics
 
 _TOPICS = {'tray': topics.RECTIFIED, 'tracks': topics.TRACKS, 'motion': topics.MOTION}
@@ -58,7 +58,8 @@ class Looks:
 
     def _take(self, look, where, message):
         self._seen[look] = time.monotonic()
-        frame = frame_from_image(message, where)
+        # What moves is a mask, and a mask has no colours.
+        frame = (gray_frame if look[1] == 'motion' else picture_frame)(message, where)
         self._show(look, encoded(look[1], frame.image))
         age_s = 1e-9 * (self._node.get_clock().now().nanoseconds - frame.stamp_ns)
         # Of a recording of some other day it means nothing.

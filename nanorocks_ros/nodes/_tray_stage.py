@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
+from nanorocks_ros.errors import FrameError
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.experiment.settings import PipelineSettings
+from nanorocks_ros.nodes._crops import OneSize, color_frame, gray_frame
 from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._join import TrayJoiner
 from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.nodes._tracks import TracksPicture
-from nanorocks_ros.recordings.images import frame_from_image
 from nanorocks_ros.records import Tracks, TrayImage, TrayState
 from nanorocks_ros.stages.pipeline import trays_of
 from nanorocks_ros.stages.warm_up import warm_up_counting, warm_up_speed
@@ -66,9 +67,13 @@ class TrayStageNode(NanorocksNode):
     def _adopt(self, settings, stages):
         self._settings, self._stages = settings, stages
         self._picture = TracksPicture(self, calibrated(settings).preprocess.pixels_per_metre)
+        # Stages that are new know of no size yet.
+        self._sizes = {
+            tray: OneSize(self.resolve_topic_name(topics.GRAY.of(tray))) for tray in stages
+        }
 
     def _take_gray(self, tray, message):
-        frame = frame_from_image(message, self.resolve_topic_name(topics.GRAY.of(tray)))
+        frame = gray_frame(message, self.resolve_topic_name(topics.GRAY.of(tray)))
         if self.count_publishers(topics.STATE.of(tray)) == 0:
             # Somebody's own crops, of which nothing more is known.
             image = TrayImage(stamp_ns=frame.stamp_ns, tray=tray, gray=frame.image)
@@ -77,7 +82,7 @@ class TrayStageNode(NanorocksNode):
         self._push_all(frame.stamp_ns, self._joiners[tray].gray(frame))
 
     def _take_color(self, tray, message):
-        frame = frame_from_image(message, self.resolve_topic_name(topics.RECTIFIED.of(tray)))
+        frame = color_frame(message, self.resolve_topic_name(topics.RECTIFIED.of(tray)))
         self._push_all(frame.stamp_ns, self._joiners[tray].color(frame))
 
     def _take_state(self, tray, message):
@@ -101,6 +106,12 @@ class TrayStageNode(NanorocksNode):
                 self.taken(image.stamp_ns)
 
     def _push(self, image):
+        try:
+            self._sizes[image.tray].check(image)
+        except FrameError as error:
+            # Here, so that what waits behind it for the epoch is not lost with it.
+            self.refuse(error)
+            return
         stage = self._stages[image.tray]
         self.prepare(stage, image.tray)
         for record in stage.push(image):

@@ -7,13 +7,15 @@ from dataclasses import replace
 
 import pytest
 
-from nanorocks_ros.dashboard.board import MOST_POINTS, Board, Cursor, clean
+from nanorocks_ros.dashboard.board import Board, clean
+from nanorocks_ros.dashboard.tray_board import MOST_POINTS, Cursor
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import (
     ClusterEstimate,
     CorEstimate,
     CorRelation,
     CorStatus,
+    GroundTruth,
     Quality,
     SpeedEstimate,
     SpeedMethod,
@@ -48,6 +50,24 @@ def cor(seconds, cycle=1, status=CorStatus.COOLING, value=0.9):
         restitution_upper=value + 0.02,
         window_end=seconds - 1.0,
     )
+
+
+def truth(seconds, cycle=1):
+    return GroundTruth(
+        stamp_ns=round(seconds * NS),
+        tray=1,
+        cycle=cycle,
+        mean_projected_speed=0.005,
+        mean_speed=0.006,
+        bodies=15,
+        restitution=0.9,
+        wall_restitution=0.8,
+        sticking_speed=0.0,
+    )
+
+
+def times(told, name):
+    return [row[0] for row in told[name]['rows']]
 
 
 @pytest.fixture
@@ -128,6 +148,73 @@ def test_a_source_that_starts_again_starts_the_page_again(board):
     told = board.news(Cursor(), 0.0)['trays']['1']
     assert [row[0] for row in told['speed']['rows']] == [2.0]
     assert told['finals'] == []
+
+
+def test_whoever_joins_in_the_middle_sees_results_beside_the_truth(board):
+    # The truth counts cycles from the start of the simulator, the pipeline from when it joined.
+    for k in range(5):
+        board.take(truth(5.0 + k, cycle=3), 0.0)
+        board.take(speed(5.5 + k, cycle=0, start=4.0), 0.0)
+    told = board.news(Cursor(), 0.0)['trays']['1']
+    assert (told['cycle'], told['start']) == (0, 4.0)
+    assert times(told, 'speed') == [5.5, 6.5, 7.5, 8.5, 9.5]
+    assert times(told, 'truth') == [5.0, 6.0, 7.0, 8.0, 9.0]
+    assert set(told['latest']) == {'speed', 'truth'}
+
+
+def test_the_truth_goes_over_to_the_cycle_in_whose_time_it_is(board):
+    cursor = Cursor()
+    for k in range(4):
+        board.take(speed(57.0 + k), 0.0)
+    for k in range(7):
+        board.take(truth(57.0 + k, cycle=1 + (k > 3)), 0.0)
+    board.news(cursor, 0.0)
+    board.take(speed(61.5, cycle=2, start=61.0), 0.0)
+    told = board.news(cursor, 0.0)['trays']['1']
+    assert (told['truth']['from'], times(told, 'truth')) == (0, [61.0, 62.0, 63.0])
+    assert 'truth' in told['latest']
+
+
+def test_the_truth_before_a_node_joined_is_not_shown(board):
+    for k in range(60):
+        board.take(truth(k), 0.0)
+    first = replace(speed(57.5, cycle=0), cycle_start_ns=None)
+    board.take(first, 0.0)
+    assert times(board.news(Cursor(), 0.0)['trays']['1'], 'truth') == [58.0, 59.0]
+
+
+@pytest.mark.parametrize('truth_first', [True, False])
+def test_a_source_that_starts_again_has_its_new_truth_alone(board, truth_first):
+    cursor = Cursor()
+    for k in range(5):
+        board.take(speed(50.0 + k), 0.0)
+        board.take(truth(50.0 + k), 0.0)
+    board.news(cursor, 0.0)
+    again = [speed(2.0), truth(2.1)]
+    for record in reversed(again) if truth_first else again:
+        board.take(record, 0.0)
+    told = board.news(cursor, 0.0)['trays']['1']
+    assert (told['truth']['from'], times(told, 'truth')) == (0, [2.1])
+    assert (told['speed']['from'], times(told, 'speed')) == (0, [2.0])
+
+
+def test_a_clock_of_the_truth_that_goes_back_alone_takes_no_result_away(board):
+    cursor = Cursor()
+    for k in range(3):
+        board.take(speed(50.0 + k), 0.0)
+        board.take(truth(50.0 + k), 0.0)
+    board.news(cursor, 0.0)
+    board.take(truth(2.0), 0.0)
+    told = board.news(cursor, 0.0)['trays']['1']
+    assert (told['truth']['from'], times(told, 'truth')) == (0, [2.0])
+    assert 'speed' not in told
+    assert len(times(board.news(Cursor(), 0.0)['trays']['1'], 'speed')) == 3
+
+
+def test_the_truth_does_not_hide_that_nothing_is_measured_any_more(board):
+    board.take(speed(2.0), 10.0)
+    board.take(truth(3.0), 20.0)
+    assert board.news(Cursor(), 20.0)['trays']['1']['age'] == 10.0
 
 
 def test_a_merge_that_became_known_later_ends_the_curve_and_nothing_else(board):

@@ -64,7 +64,9 @@ export function sticking(cluster) {
 /** What a tray does at present: a state for its colour, words, and fewer words. */
 export function trayState(tray, silentFor) {
   const shaken = tray.start !== null && tray.start !== undefined;
-  if (Object.keys(tray.latest).length === 0) return ['waiting', 'nothing measured yet', 'waiting'];
+  // The truth is told whether anybody measures or not.
+  const { truth: _, ...measured } = tray.latest;
+  if (Object.keys(measured).length === 0) return ['waiting', 'nothing measured yet', 'waiting'];
   if (silentFor > 4) {
     const text = `silent for ${duration(silentFor)}`;
     return ['warning', text, text];

@@ -1,0 +1,269 @@
+"""One tray on the page: the curves of the present cycle, what was found last, and past cycles.
+
+Each client keeps a `Cursor` of what it was told.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+from enum import IntEnum, IntFlag
+from typing import Any
+
+from nanorocks_ros.records import (
+    ClusterEstimate,
+    CorEstimate,
+    CorStatus,
+    GroundTruth,
+    SpeedEstimate,
+)
+from nanorocks_ros.wire.layouts import NS
+
+Measured = SpeedEstimate | CorEstimate | ClusterEstimate
+Shown = Measured | GroundTruth
+Row = list[float | None]
+
+# Points of a curve; at ten a second the longest cycle of the flight has 600.
+MOST_POINTS = 4096
+# Cycles that are remembered: a page needs no more.
+_MOST_CYCLES = 200
+# The clock of a source that starts again; windows of one kind overlap by less.
+_BACK_NS = NS // 2
+_COLUMNS: dict[type, tuple[str, tuple[str, ...]]] = {
+    SpeedEstimate: ('speed', ('mean_projected_speed', 'mean_projected_speed_error')),
+    CorEstimate: (
+        'cor',
+        (
+            'restitution',
+            'restitution_lower',
+            'restitution_upper',
+            'wall_restitution',
+            'wall_restitution_lower',
+            'wall_restitution_upper',
+        ),
+    ),
+    ClusterEstimate: ('cluster', ('combined_size', 'combined_size_error')),
+    GroundTruth: ('truth', ('mean_projected_speed',)),
+}
+_NOT_SHOWN = {'stamp_ns', 'tray', 'cycle_start_ns'}
+
+
+class Series:
+    """Points of a curve in order of time, of which old ones are thinned when there are many."""
+
+    def __init__(self) -> None:
+        self.rows: list[Row] = []
+        self.generation = 0
+
+    def append(self, row: Row) -> None:
+        """Add a point."""
+        self.rows.append(row)
+        if len(self.rows) > MOST_POINTS:
+            self.rows = self.rows[:-1:2] + self.rows[-1:]
+            self.generation += 1
+
+    def cut(self, time: float) -> None:
+        """Take back what is later."""
+        kept = [row for row in self.rows if row[0] is None or row[0] <= time]
+        if len(kept) < len(self.rows):
+            self.rows = kept
+            self.generation += 1
+
+    def drop_before(self, time: float) -> None:
+        """Forget what is earlier."""
+        self.rows = [row for row in self.rows if row[0] is not None and row[0] >= time]
+        self.generation += 1
+
+    def since(self, told: tuple[int, int]) -> tuple[int, list[Row]]:
+        """Where new points begin, and the points."""
+        generation, count = told
+        first = count if generation == self.generation else 0
+        return first, self.rows[first:]
+
+    @property
+    def end(self) -> tuple[int, int]:
+        """What somebody knows who was told everything."""
+        return self.generation, len(self.rows)
+
+
+@dataclass
+class Cursor:
+    """What a client was told."""
+
+    trays: dict[int, tuple[int, int]] = field(default_factory=dict)
+    series: dict[tuple[int, str], tuple[int, int]] = field(default_factory=dict)
+    finals: dict[int, int] = field(default_factory=dict)
+    nodes: int = 0
+
+
+@dataclass
+class TrayBoard:
+    """One tray.
+
+    Parameters
+    ----------
+    description : str
+    cycle : int
+    start_ns : int or None
+        The shaking event that opened the cycle.
+    serial : int
+        A new one for each cycle that is shown, also when a source starts again.
+    version : int
+        Rises with every record.
+    heard_s : float, [s]
+        When something measured came last; the truth is none.
+    """
+
+    description: str
+    cycle: int = -1
+    start_ns: int | None = None
+    serial: int = 0
+    version: int = 0
+    heard_s: float = 0.0
+    series: dict[str, Series] = field(default_factory=dict)
+    latest: dict[str, dict[str, Any]] = field(default_factory=dict)
+    finals: dict[int, list[float | None]] = field(default_factory=dict)
+    _stamps: dict[str, int] = field(default_factory=dict)
+    _finals_version: int = 1
+
+    def __post_init__(self) -> None:
+        self._clear()
+
+    def take(self, record: Shown, now_s: float) -> None:
+        """Note a record."""
+        self.version += 1
+        if isinstance(record, GroundTruth):
+            self._take_truth(record)
+            return
+        name, _ = _COLUMNS[type(record)]
+        # A merge that became known later ends the window where beads began to stick.
+        ended = (
+            isinstance(record, CorEstimate)
+            and record.status is not CorStatus.COOLING
+            and record.cycle == self.cycle
+        )
+        last_ns = self._stamps.get(name, record.stamp_ns)
+        if ended:
+            self.series[name].cut(record.stamp_ns / NS)
+        elif record.stamp_ns < last_ns - _BACK_NS:
+            self._start_again(record, last_ns)
+        if isinstance(record, CorEstimate) and record.status is CorStatus.FINAL:
+            self._finish(record)
+        self.heard_s = now_s
+        if record.cycle > self.cycle:
+            self._begin(record)
+        if record.cycle < self.cycle:
+            # Known seconds later, of the cycle before: only the number that is final counts.
+            return
+        self._learn_start(record)
+        self._note(record)
+
+    def _take_truth(self, truth: GroundTruth) -> None:
+        """Put the truth beside what is measured at that time, whatever its cycle.
+
+        It counts cycles from the start of the simulator, a node that measures from when it joined.
+        """
+        if truth.stamp_ns < self._stamps.get('truth', truth.stamp_ns) - _BACK_NS:
+            self.series['truth'].cut(-math.inf)
+        self._note(truth)
+
+    def _note(self, record: Shown) -> None:
+        name, columns = _COLUMNS[type(record)]
+        self._stamps[name] = record.stamp_ns
+        self.latest[name] = as_fields(record)
+        values = (_number(getattr(record, one)) for one in columns)
+        self.series[name].append([_number(record.stamp_ns / NS), *values])
+
+    def _start_again(self, record: Measured, last_ns: int) -> None:
+        """Forget what the source told before its clock went back from `last_ns`."""
+        self.finals.clear()
+        self._finals_version += 1
+        # The truth may have gone back first, and then belongs to what begins here.
+        if self._stamps.get('truth', last_ns) > (record.stamp_ns + last_ns) // 2:
+            self._clear()
+        self._begin(record)
+
+    def _begin(self, record: Measured) -> None:
+        """Show the cycle of a record, with the truth since it began or, not known, since then."""
+        truth, latest = self.series['truth'], self.latest.get('truth')
+        stamp_ns = self._stamps.get('truth')
+        self._clear()
+        self.cycle = record.cycle
+        self._learn_start(record)
+        since_ns = record.stamp_ns if self.start_ns is None else self.start_ns
+        truth.drop_before(since_ns / NS)
+        if latest is not None and stamp_ns is not None and truth.rows:
+            self.series['truth'], self.latest['truth'] = truth, latest
+            self._stamps['truth'] = stamp_ns
+
+    def _clear(self) -> None:
+        self.start_ns = None
+        self.serial += 1
+        self.series = {name: Series() for name, _ in _COLUMNS.values()}
+        self.latest = {}
+        self._stamps = {}
+
+    def _finish(self, record: CorEstimate) -> None:
+        self.finals[record.cycle] = [
+            record.cycle,
+            _number(record.restitution),
+            _number(record.restitution_lower),
+            _number(record.restitution_upper),
+        ]
+        self._finals_version += 1
+        while len(self.finals) > _MOST_CYCLES:
+            del self.finals[min(self.finals)]
+
+    def _learn_start(self, record: Measured) -> None:
+        if isinstance(record, SpeedEstimate) and record.cycle_start_ns is not None:
+            self.start_ns = record.cycle_start_ns
+        if self.start_ns is not None or not isinstance(record, CorEstimate):
+            return
+        if math.isfinite(record.window_end):
+            # Whoever comes late has the latched estimates before the first speed.
+            self.start_ns = record.stamp_ns - round(record.window_end * NS)
+
+    def news(self, number: int, cursor: Cursor, now_s: float) -> dict[str, Any]:
+        """What the cursor does not know yet; the cursor knows it afterwards."""
+        known_serial = cursor.trays.get(number, (0, 0))[0]
+        cursor.trays[number] = (self.serial, self.version)
+        told: dict[str, Any] = {
+            'description': self.description,
+            'cycle': self.cycle,
+            'serial': self.serial,
+            'start': None if self.start_ns is None else _number(self.start_ns / NS),
+            'age': round(now_s - self.heard_s, 1),
+            'latest': self.latest,
+        }
+        if cursor.finals.get(number) != self._finals_version:
+            cursor.finals[number] = self._finals_version
+            told['finals'] = list(self.finals.values())
+        for name, series in self.series.items():
+            known = cursor.series.get((number, name), (0, 0))
+            first, rows = series.since(known if known_serial == self.serial else (-1, 0))
+            cursor.series[number, name] = series.end
+            if rows or known_serial != self.serial:
+                told[name] = {'from': first, 'rows': rows}
+        return told
+
+
+def as_fields(record: Shown) -> dict[str, Any]:
+    """The numbers of a record by name, None where one is not known; states as words."""
+    found: dict[str, Any] = {}
+    for one in fields(record):
+        value = getattr(record, one.name)
+        if one.name in _NOT_SHOWN:
+            continue
+        if isinstance(value, IntFlag):
+            value = value.names() if hasattr(value, 'names') else int(value)
+        elif isinstance(value, IntEnum):
+            value = value.name.lower()
+        elif isinstance(value, float):
+            value = _number(value)
+        found[one.name] = value
+    return found
+
+
+def _number(value: float) -> float | None:
+    # Stamps in seconds need the milliseconds, up to a day.
+    return float(f'{value:.9g}') if math.isfinite(value) else None
