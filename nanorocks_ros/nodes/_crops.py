@@ -67,8 +67,14 @@ def picture_frame(message, where):
     return replace(frame, encoding='bgr8', image=image)
 
 
+# So many pictures of a new size in a row, and it is the size.
+_LASTING = 10
+
+
 class OneSize:
-    """Refuses pictures of a tray of another size than the first: stages compare them by pixels.
+    """Refuses pictures of a tray of another size than before: stages compare them by pixels.
+
+    A size that stays is the new one: who sends the pictures was given other parameters.
 
     Parameters
     ----------
@@ -79,9 +85,11 @@ class OneSize:
     def __init__(self, where):
         self._where = where
         self._shape = None
+        self._other = None
+        self._others = 0
 
-    def check(self, image):
-        """Let a TrayImage pass.
+    def changed(self, image):
+        """Let a TrayImage pass; whether it is of a new size that has come to stay.
 
         Raises
         ------
@@ -97,12 +105,19 @@ class OneSize:
             )
         if self._shape is None:
             self._shape = shape
-        if shape != self._shape:
+        if shape == self._shape:
+            self._others = 0
+            return False
+        self._others = self._others + 1 if shape == self._other else 1
+        self._other = shape
+        if self._others < _LASTING:
             raise FrameError(
                 self._where,
                 f'the size changed from {_size(self._shape)} to {_size(shape)}',
-                'publish one size, or restart this node after changing it',
+                'publish one size',
             )
+        self._shape = shape
+        return True
 
 
 def _size(shape):

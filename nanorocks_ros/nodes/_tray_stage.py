@@ -107,7 +107,8 @@ class TrayStageNode(NanorocksNode):
 
     def _push(self, image):
         try:
-            self._sizes[image.tray].check(image)
+            if self._sizes[image.tray].changed(image):
+                self._start_afresh(image.tray)
         except FrameError as error:
             # Here, so that what waits behind it for the epoch is not lost with it.
             self.refuse(error)
@@ -119,6 +120,11 @@ class TrayStageNode(NanorocksNode):
                 self._picture.send(image, record)
             else:
                 self.publish_result(record, self._epoch.ns)
+
+    def _start_afresh(self, tray):
+        where = self.resolve_topic_name(topics.GRAY.of(tray))
+        self.get_logger().warning(f'{where}: pictures of another size; starting afresh')
+        self._stages[tray] = self._build(self._settings)[tray]
 
     def prepare(self, stage, tray):
         """Tell the stage which pictures somebody wants to see."""

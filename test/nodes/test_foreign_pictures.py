@@ -59,11 +59,30 @@ def test_one_size_is_kept_to():
     gray = np.zeros((20, 30), np.uint8)
     color = np.zeros((20, 31, 3), np.uint8)
     with pytest.raises(FrameError, match='30x20 px in gray, 31x20 px in colour'):
-        sizes.check(TrayImage(stamp_ns=1, tray=1, gray=gray, color=color))
-    sizes.check(TrayImage(stamp_ns=1, tray=1, gray=gray))
+        sizes.changed(TrayImage(stamp_ns=1, tray=1, gray=gray, color=color))
+    assert not sizes.changed(TrayImage(stamp_ns=1, tray=1, gray=gray))
+    other = TrayImage(stamp_ns=2, tray=1, gray=gray.T)
     with pytest.raises(FrameError, match='/gray: the size changed from 30x20 px to 20x30 px'):
-        sizes.check(TrayImage(stamp_ns=2, tray=1, gray=gray.T))
-    sizes.check(TrayImage(stamp_ns=3, tray=1, gray=gray, color=color[:, :30]))
+        sizes.changed(other)
+    assert not sizes.changed(TrayImage(stamp_ns=3, tray=1, gray=gray, color=color[:, :30]))
+
+
+def test_a_size_that_stays_is_the_new_one():
+    sizes = OneSize('/gray')
+    gray = np.zeros((20, 30), np.uint8)
+    sizes.changed(TrayImage(stamp_ns=1, tray=1, gray=gray))
+    other = TrayImage(stamp_ns=2, tray=1, gray=gray.T)
+    refused = 0
+    for _ in range(20):
+        try:
+            if sizes.changed(other):
+                break
+        except FrameError:
+            refused += 1
+    assert 2 < refused < 15
+    assert not sizes.changed(other)
+    with pytest.raises(FrameError, match='from 20x30 px to 30x20 px'):
+        sizes.changed(TrayImage(stamp_ns=1, tray=1, gray=gray))
 
 
 @pytest.mark.parametrize('name', ['speed_estimator', 'cluster_autocorrelator'])
@@ -84,15 +103,18 @@ def test_a_stage_refuses_crops_that_it_cannot_use_and_goes_on(graph, name):
     graph.until(lambda: crops.get_subscription_count() == 1)
     random = np.random.default_rng(1)
     shapes = [(200, 200)] * 4 + [(200, 200, 3), (206, 200)] * 3 + [(200, 200)] * 4
+    # Somebody gave the node that sends them another scale.
+    shapes += [(206, 200)] * 12
     for k, shape in enumerate(shapes):
         pixels = random.integers(0, 255, shape).astype(np.uint8)
         crops.publish(image_message(NS + k * NS // 30, 'x', pixels))
     graph.until(lambda: counts.get('received') and int(counts['received']) >= len(shapes))
-    graph.until(lambda: counts.get('refused') == '6')
+    graph.until(lambda: counts.get('refused') == '15')
     finished = graph.interrupt(process)
     assert finished.code == 0
     assert "image_gray: encoding 'bgr8' where gray is expected" in finished.output
     assert 'the size changed from 200x200 px to 200x206 px' in finished.output
+    assert 'image_gray: pictures of another size; starting afresh' in finished.output
     assert 'Traceback' not in finished.output
 
 
