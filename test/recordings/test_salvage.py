@@ -119,6 +119,50 @@ def test_a_damaged_chunk_costs_its_own_messages_alone(tmp_path, record, ended, n
     assert found.recovered + found.lost == len(everything)
 
 
+def changed(path, start, content, cut=0):
+    """With other bytes at one place, and without its end."""
+    whole = bytearray(path.read_bytes())
+    whole[start : start + len(content)] = content
+    path.write_bytes(whole[: len(whole) - cut])
+
+
+@pytest.mark.parametrize('cut', [0, 40])
+@pytest.mark.parametrize('content', [b'\x00', b'\x89LCAP0\r\n', bytes(8)])
+def test_an_mcap_file_that_is_damaged_in_its_first_bytes_is_read(tmp_path, record, content, cut):
+    path = record(tmp_path / 'run', frames=100, size=9000)
+    everything = list(open_bag(path).messages())
+    changed(path / 'run.mcap', 0, content, cut)
+    found, messages = salvaged(path, tmp_path / 'new')
+    assert messages == everything
+    assert found.lost == 0
+    said = f'{path}/run.mcap: is damaged at its beginning; the rest is read'
+    assert said in found.notices
+    assert said in [one.what for one in bag_info(path, lambda *_: None).health]
+
+
+@pytest.mark.parametrize('cut', [0, 8])
+def test_a_first_sector_that_is_lost_costs_its_chunk_alone(tmp_path, record, cut):
+    """Topics and types, which stood in it, come again at the end."""
+    path = record(tmp_path / 'run', frames=100, size=9000)
+    everything = list(open_bag(path).messages())
+    first, second, *_ = chunks(path / 'run.mcap')
+    changed(path / 'run.mcap', 0, bytes(512), cut)
+    found, messages = salvaged(path, tmp_path / 'new')
+    assert first.chunk_start_offset < 512
+    assert messages == everything[-len(messages) :]
+    assert messages[0].log_time_ns == second.message_start_time
+    assert found.recovered + found.lost == 201
+    assert set(open_bag(tmp_path / 'new').topics) == {CAMERA, SPEED}
+
+
+@pytest.mark.parametrize('size', [3, 600, 3_000_000])
+def test_what_is_no_mcap_at_all_is_said(tmp_path, size):
+    noise = np.random.default_rng(2).bytes(size)
+    (tmp_path / 'x.mcap').write_bytes(noise)
+    with pytest.raises(RecordingError, match=r'is not an MCAP file \(begins with .*\); pass a'):
+        open_bag(tmp_path / 'x.mcap')
+
+
 def write_unknown(path, encoding, text):
     writer = McapWriter(str(path))
     writer.start()
