@@ -54,23 +54,27 @@ class McapFile:
         self.path = path
         with path.open('rb') as stream:
             size = stream.seek(0, 2)
-            self._check_magic(stream)
             index = read_index(stream, size)
             self._index: McapIndex = index or scan(stream, size)
+            self._begins_well = self._check_magic(stream)
             self.recorder_notes = recorder_notes(stream, self._index)
         self.topics = _topics(self._index)
         self.start_ns = self._index.start_ns or 0
         self.end_ns = self._index.end_ns or 0
 
-    def _check_magic(self, stream: BinaryIO) -> None:
+    def _check_magic(self, stream: BinaryIO) -> bool:
+        """Whether the file begins as it should; one that does not may be damaged there."""
         stream.seek(0)
         start = stream.read(len(MAGIC))
-        if not MAGIC.startswith(start):
-            raise RecordingError(
-                str(self.path),
-                f'is not an MCAP file (begins with {start!r})',
-                'pass a rosbag2 folder or an .mcap file',
-            )
+        if MAGIC.startswith(start):
+            return True
+        if self._index.ended or self._index.blocks:
+            return False
+        raise RecordingError(
+            str(self.path),
+            f'is not an MCAP file (begins with {start!r})',
+            'pass a rosbag2 folder or an .mcap file',
+        )
 
     @property
     def complete(self) -> bool:
@@ -86,6 +90,8 @@ class McapFile:
     def notices(self) -> tuple[str, ...]:
         """What was salvaged and what is lost, so far."""
         notices = []
+        if not self._begins_well:
+            notices.append(f'{self.path}: is damaged at its beginning; the rest is read')
         if not self._index.ended:
             notices.append(f'{self.path}: {self._salvaged()}')
         if self._index.lost:

@@ -17,6 +17,7 @@ from nanorocks_ros.recordings.mcap_blocks import (
     gather_names,
     indexed_messages,
     load,
+    walk,
 )
 from nanorocks_ros.recordings.mcap_index import McapIndex
 
@@ -32,6 +33,8 @@ _FIRST_PRIVATE_OPCODE = 0x80
 _CHUNK_START = re.compile(rb'[\x06\x07][\s\S]{4}\x00{4}')
 _MESSAGE_START = re.compile(rb'[\x05\x06\x07][\s\S]{4}\x00{4}')
 _IN_A_ROW = 3
+# No more is read of what follows the data.
+_SUMMARY_BYTES = 1 << 26
 # Times, size and checksum in the head of a chunk, and the length of the name of its compression.
 _CHUNK_HEAD = struct.Struct('<QQQII')
 _LONGEST_NAME = 16
@@ -72,6 +75,7 @@ class _Scan:
             if opcode in _END_OF_DATA:
                 self._end_run()
                 self.index.ended = self._has_footer()
+                self._note_summary(end)
                 return
             self._record(opcode, position, end)
             position = end
@@ -120,6 +124,15 @@ class _Scan:
     def _has_footer(self) -> bool:
         self._stream.seek(self._size - len(MAGIC))
         return self._stream.read() == MAGIC
+
+    def _note_summary(self, position: int) -> None:
+        """Names come again at the end: where they stood at first may be damaged."""
+        self._stream.seek(position)
+        try:
+            for opcode, content in walk(memoryview(self._stream.read(_SUMMARY_BYTES)), cut=True):
+                self.index.catalogue.note(opcode, content)
+        except UNREADABLE:
+            return
 
     def _record(self, opcode: int, position: int, end: int) -> None:
         if opcode == Opcode.MESSAGE_INDEX:

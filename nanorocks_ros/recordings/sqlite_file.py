@@ -12,8 +12,9 @@ import numpy as np
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.qos import recorded_qos
-from nanorocks_ros.recordings.sqlite_rows import readable_rows
-from nanorocks_ros.recordings.storage import BagMessage, TopicInfo
+from nanorocks_ros.recordings.sqlite_open import ReadOnly
+from nanorocks_ros.recordings.sqlite_rows import FIT, readable_rows
+from nanorocks_ros.recordings.storage import LAST_NS, BagMessage, TopicInfo
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -22,12 +23,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MAGIC = b'SQLite format 3\x00'
-# SQLite's integers have 64 bits, one of them for the sign.
-_FOREVER = 2**63 - 1
 _IN_ORDER = (
     'SELECT id, topic_id, timestamp, data FROM messages '
-    'WHERE topic_id IN ({}) AND timestamp BETWEEN ? AND ? ORDER BY timestamp, id'
+    f'WHERE topic_id IN ({{}}) AND timestamp BETWEEN ? AND ? AND {FIT} ORDER BY timestamp, id'
 )
+_BY_TOPIC = (
+    f'SELECT topic_id, count(*), sum({FIT}), min(timestamp) FILTER (WHERE {FIT}), '
+    f'max(timestamp) FILTER (WHERE {FIT}) FROM messages GROUP BY topic_id'
+)
+_ODD = f'SELECT id FROM messages WHERE NOT ({FIT})'
 _ONE = 'SELECT data FROM messages WHERE id = ?'
 
 
@@ -58,11 +62,14 @@ class SqliteFile:
         self.path = path
         self._damage = ''
         self._rows: NDArray[np.int64] | None = None
-        # Rows that were counted and are not found any more, and numbers of those found in vain.
-        self._missing = 0
+        # Rows that cannot have been written so, rows that were counted and are not found any
+        # more, and numbers of those found in vain.
+        self._odd = self._missing = 0
+        self._odd_rows: frozenset[int] = frozenset()
         self._unreadable: set[int] = set()
+        self._file = ReadOnly(path)
         try:
-            with closing(self._connect()) as database:
+            with closing(self._file.connect()) as database:
                 try:
                     self._read(database)
                 except sqlite3.Error as error:
@@ -77,50 +84,53 @@ class SqliteFile:
             ) from error
 
     def _read(self, database: sqlite3.Connection) -> None:
-        counts = dict(
-            database.execute('SELECT topic_id, count(*) FROM messages GROUP BY topic_id')
-        )
+        found = database.execute(_BY_TOPIC).fetchall()
+        counts = {topic: fit for topic, _, fit, *_ in found}
         self._numbers, self.topics = _topics(database, counts)
-        first, last = database.execute(
-            'SELECT min(timestamp), max(timestamp) FROM messages'
-        ).fetchone()
-        self.start_ns: int = first or 0
-        self.end_ns: int = last or 0
+        known = [row for row in found if row[0] in self._numbers and row[2]]
+        self.start_ns: int = min((first for *_, first, _ in known), default=0)
+        self.end_ns: int = max((last for *_, last in known), default=0)
+        self._odd = sum(row[1] for row in found) - sum(row[2] for row in known)
+        if self._odd:
+            self._odd_rows = frozenset(number for (number,) in database.execute(_ODD))
+
+    def _known(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Those on a topic that has a name."""
+        return rows[np.isin(rows[:, 2], np.array([*self._numbers], dtype=np.int64))]
 
     def _read_damaged(self, database: sqlite3.Connection, error: sqlite3.Error) -> None:
         """Note which rows can still be read, in order of time."""
-        rows = readable_rows(database, self.path.stat().st_size, whole=True)
+        rows = readable_rows(database, self._file.size, whole=True)
+        self._numbers, _ = _topics(database, {})
+        self._rows = rows = self._known(rows)
         if not rows.size:
             raise error
-        self._rows = rows
-        self._numbers, self.topics = _topics(database, Counter(rows[:, 2].tolist()))
+        _, self.topics = _topics(database, Counter(rows[:, 2].tolist()))
         self.start_ns, self.end_ns = int(rows[0, 0]), int(rows[-1, 0])
         # Rows are counted from 1.
         self._missing = int(rows[:, 1].max()) - len(rows)
         self._damage = f'damaged, {len(rows)} messages can still be read ({error})'
 
-    def _connect(self) -> sqlite3.Connection:
-        return sqlite3.connect(f'{self.path.resolve().as_uri()}?mode=ro', uri=True)
-
     @property
     def complete(self) -> bool:
         """Nothing is known to be missing, so far."""
-        return not self._damage
+        return not self._damage and not self._odd
 
     @property
     def notices(self) -> tuple[str, ...]:
         """What is lost, so far."""
-        if not self._damage:
-            return ()
-        said = [f'{self.path}: {self._damage}']
-        if self._unreadable:
-            said.append(f'{self.path}: {len(self._unreadable)} messages could not be read')
-        return tuple(said)
+        odd = 'messages have a time, topic or content that cannot be and were left out'
+        said = (
+            (self._damage, self._damage),
+            (self._odd, f'{self._odd} {odd}'),
+            (self._unreadable, f'{len(self._unreadable)} messages could not be read'),
+        )
+        return tuple(f'{self.path}: {text}' for there, text in said if there)
 
     @property
     def messages_lost(self) -> int:
         """Messages between others that are lost; how many lie behind the damage is not known."""
-        return self._missing + len(self._unreadable)
+        return self._odd + self._missing + len(self._unreadable)
 
     def messages(
         self,
@@ -146,8 +156,8 @@ class SqliteFile:
             if topics is None or name in topics
         }
         span = (
-            -_FOREVER if start_ns is None else max(start_ns, -_FOREVER),
-            _FOREVER if end_ns is None else min(end_ns, _FOREVER),
+            0 if start_ns is None else min(max(start_ns, 0), LAST_NS),
+            LAST_NS if end_ns is None else min(max(end_ns, -1), LAST_NS),
         )
         for number, log_time_ns, data in self._given(tuple(wanted), span):
             info = self.topics[wanted[number]]
@@ -157,14 +167,16 @@ class SqliteFile:
         self, wanted: tuple[int, ...], span: tuple[int, int]
     ) -> Iterator[tuple[int, int, bytes]]:
         """Topic, log time and content of each message."""
-        with closing(self._connect()) as database:
+        with closing(self._file.connect()) as database:
             given = array('q')
             if self._rows is None:
                 query = _IN_ORDER.format(','.join('?' * len(wanted)))
                 try:
                     for number, topic, stamp, content in database.execute(query, (*wanted, *span)):
                         given.append(number)
-                        yield topic, stamp, content
+                        # The index may hold a time as it was before the row was damaged.
+                        if number not in self._odd_rows:
+                            yield topic, stamp, content
                     return
                 except sqlite3.Error as error:
                     self._turn_to_rows(database, error)
@@ -173,7 +185,7 @@ class SqliteFile:
     def _turn_to_rows(self, database: sqlite3.Connection, error: sqlite3.Error) -> None:
         """From here on by single rows: SQLite goes no further than to the first damage."""
         database.execute('PRAGMA writable_schema=ON')
-        self._rows = readable_rows(database, self.path.stat().st_size, whole=False)
+        self._rows = self._known(readable_rows(database, self._file.size, whole=False))
         held = sum(info.count for info in self.topics.values())
         self._missing = max(0, held - len(self._rows))
         self._damage = f'damaged, what can be read is read row by row ({error})'
@@ -201,7 +213,7 @@ class SqliteFile:
                 found = database.execute(_ONE, (number,)).fetchone()
             except sqlite3.Error:
                 found = None
-            if found is None:
+            if found is None or not isinstance(found[0], bytes):
                 self._unreadable.add(number)
             else:
                 yield topic, stamp, found[0]
@@ -218,6 +230,7 @@ def _topics(
     for number, name, kind, encoding, qos in database.execute(
         f'SELECT id, name, type, serialization_format, {qos_column} FROM topics ORDER BY id'
     ):
+        name, kind, encoding, qos = (_text(one) for one in (name, kind, encoding, qos))
         numbers[number] = name
         before = topics.get(name)
         form, text = definitions.get(kind, ('ros2msg', ''))
@@ -228,7 +241,7 @@ def _topics(
             encoding=encoding,
             definition=text,
             definition_format=form,
-            qos=recorded_qos(qos or ''),
+            qos=recorded_qos(qos),
         )
     return numbers, topics
 
@@ -245,4 +258,9 @@ def _definitions(database: sqlite3.Connection) -> dict[str, tuple[str, str]]:
         ).fetchall()
     except sqlite3.Error:
         return {}
-    return {name: (encoding, text) for name, encoding, text in rows}
+    return {_text(name): (_text(encoding), _text(text)) for name, encoding, text in rows}
+
+
+def _text(value: object) -> str:
+    """What stands where a text was written."""
+    return value if isinstance(value, str) else ''

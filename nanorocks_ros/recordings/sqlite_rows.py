@@ -13,9 +13,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-_ROWS = 'SELECT timestamp, id, topic_id FROM messages WHERE id BETWEEN ? AND ?'
+# Of a row in which types are not those that were written, nothing tells what it was.
+FIT = (
+    "typeof(timestamp) = 'integer' AND timestamp >= 0 "
+    "AND typeof(topic_id) = 'integer' AND typeof(data) = 'blob'"
+)
+_ROWS = f'SELECT timestamp, id, topic_id FROM messages WHERE id BETWEEN ? AND ? AND {FIT}'
 # All of a row, so that one that lost its end is not taken for whole.
-_WHOLE = f"{_ROWS} AND length(CAST(data AS BLOB) || x'') >= 0"
+_WHOLE = f"{_ROWS} AND length(data || x'') >= 0"
 _NEXT = 'SELECT id FROM messages WHERE id > ? ORDER BY id LIMIT 1'
 _LAST = 'SELECT max(id) FROM messages'
 # Rows that are asked for together, and how often there may be none where nobody knows the last.
@@ -42,8 +47,7 @@ def readable_rows(database: sqlite3.Connection, size: int, *, whole: bool) -> ND
     """
     found = array('q')
     for row in _found(database, size, _WHOLE if whole else _ROWS):
-        if all(isinstance(value, int) for value in row):
-            found.extend(row)
+        found.extend(row)
     rows = np.array(found, dtype=np.int64).reshape(-1, 3)
     return rows[np.lexsort((rows[:, 1], rows[:, 0]))]
 

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
+import os
+import re
+import shutil
 import sqlite3
+import tempfile
 from contextlib import closing
 
 import numpy as np
@@ -17,6 +22,7 @@ from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.messages import compressed_image_message
 from nanorocks_ros.recordings.reader import open_bag
 from nanorocks_ros.recordings.salvage import salvage
+from nanorocks_ros.study.bag_info import bag_info
 
 SPEED = '/nanorocks/tray_3/speed'
 CAMERA = '/nanorocks/camera/image_raw/compressed'
@@ -111,6 +117,50 @@ def test_a_damaged_chunk_costs_its_own_messages_alone(tmp_path, record, ended, n
     ]
     assert [one for one in messages if one in outside] == outside
     assert found.recovered + found.lost == len(everything)
+
+
+def changed(path, start, content, cut=0):
+    """With other bytes at one place, and without its end."""
+    whole = bytearray(path.read_bytes())
+    whole[start : start + len(content)] = content
+    path.write_bytes(whole[: len(whole) - cut])
+
+
+@pytest.mark.parametrize('cut', [0, 40])
+@pytest.mark.parametrize('content', [b'\x00', b'\x89LCAP0\r\n', bytes(8)])
+def test_an_mcap_file_that_is_damaged_in_its_first_bytes_is_read(tmp_path, record, content, cut):
+    path = record(tmp_path / 'run', frames=100, size=9000)
+    everything = list(open_bag(path).messages())
+    changed(path / 'run.mcap', 0, content, cut)
+    found, messages = salvaged(path, tmp_path / 'new')
+    assert messages == everything
+    assert found.lost == 0
+    said = f'{path}/run.mcap: is damaged at its beginning; the rest is read'
+    assert said in found.notices
+    assert said in [one.what for one in bag_info(path, lambda *_: None).health]
+
+
+@pytest.mark.parametrize('cut', [0, 8])
+def test_a_first_sector_that_is_lost_costs_its_chunk_alone(tmp_path, record, cut):
+    """Topics and types, which stood in it, come again at the end."""
+    path = record(tmp_path / 'run', frames=100, size=9000)
+    everything = list(open_bag(path).messages())
+    first, second, *_ = chunks(path / 'run.mcap')
+    changed(path / 'run.mcap', 0, bytes(512), cut)
+    found, messages = salvaged(path, tmp_path / 'new')
+    assert first.chunk_start_offset < 512
+    assert messages == everything[-len(messages) :]
+    assert messages[0].log_time_ns == second.message_start_time
+    assert found.recovered + found.lost == 201
+    assert set(open_bag(tmp_path / 'new').topics) == {CAMERA, SPEED}
+
+
+@pytest.mark.parametrize('size', [3, 600, 3_000_000])
+def test_what_is_no_mcap_at_all_is_said(tmp_path, size):
+    noise = np.random.default_rng(2).bytes(size)
+    (tmp_path / 'x.mcap').write_bytes(noise)
+    with pytest.raises(RecordingError, match=r'is not an MCAP file \(begins with .*\); pass a'):
+        open_bag(tmp_path / 'x.mcap')
 
 
 def write_unknown(path, encoding, text):
@@ -211,6 +261,82 @@ def test_of_a_sqlite_file_whose_index_is_damaged_nothing_is_lost(tmp_path):
     assert messages == everything
     assert found.lost == 0
     assert 'damaged' in found.notices[0]
+
+
+@pytest.mark.parametrize('change', [
+    'timestamp = -timestamp', "timestamp = 'soon'", 'timestamp = timestamp + 0.5',
+    "data = 'hello'", "data = CAST(x'ff00' AS TEXT)", 'topic_id = 77', "topic_id = 'x'",
+])  # fmt: skip
+@pytest.mark.parametrize('damaged', [False, True])
+def test_a_row_that_cannot_have_been_written_so_is_left_out(tmp_path, change, damaged):
+    path = write_sqlite(tmp_path / 'run', 60, size=20_000)
+    everything = list(open_bag(path).messages())
+    file = next(path.glob('*.db3'))
+    with closing(sqlite3.connect(file)) as database, database:
+        database.execute(f'UPDATE messages SET {change} WHERE id = 10')
+    if damaged:
+        content = bytearray(file.read_bytes())
+        # A page in the middle of a row, which says where the next one is: without it that is seen.
+        starts = range(len(content) // 8192 * 4096, len(content), 4096)
+        start = next(k for k in starts if content[k : k + 4] == (k // 4096 + 2).to_bytes(4, 'big'))
+        content[start : start + 4096] = bytes(4096)
+        file.write_bytes(content)
+    found, messages = salvaged(path, tmp_path / 'new')
+    assert everything[9] not in messages
+    assert [one for one in everything if one in messages] == messages
+    assert found.recovered + found.lost == 60
+    assert found.recovered >= (55 if damaged else 59)
+    left_out = 'run.db3: 1 messages have a time, topic or content that cannot be and were left out'
+    assert damaged or found.notices == (f'{path}/{left_out}',)
+    report = bag_info(path, lambda *_: None)
+    assert not report.complete
+    assert report.messages_lost == found.lost
+
+
+def test_an_index_that_knows_better_than_a_damaged_row_is_not_asked(tmp_path):
+    path = write_sqlite(tmp_path / 'run', 60)
+    file = next(path.glob('*.db3'))
+    with closing(sqlite3.connect(file)) as database, database:
+        database.execute('UPDATE messages SET timestamp = timestamp + (1 << 50)')
+    content = bytearray(file.read_bytes())
+    # The types in the head of a row: one bit makes a floating-point number of its time.
+    heads = re.finditer(rb'\x06\x00[\x01\x09]\x06[\x80-\xff][\x00-\x7f]', bytes(content))
+    content[next(heads).start() + 3] ^= 1
+    file.write_bytes(content)
+    found, messages = salvaged(path, tmp_path / 'new')
+    assert (found.recovered, found.lost, len(messages)) == (59, 1, 59)
+
+
+@pytest.mark.parametrize('unmerged', [False, True])
+def test_a_sqlite_file_with_a_log_beside_it_is_read_and_not_touched(
+    tmp_path, monkeypatch, unmerged
+):
+    scratch = tmp_path / 'scratch'
+    scratch.mkdir()
+    monkeypatch.setattr(tempfile, 'tempdir', str(scratch))
+    path = write_sqlite(tmp_path / 'run', 60)
+    file = next(path.glob('*.db3'))
+    left = tmp_path / 'left'
+    with closing(sqlite3.connect(file)) as database:
+        database.execute('PRAGMA journal_mode=WAL')
+        with database:
+            database.execute('DELETE FROM messages WHERE id = 60')
+        # As a recorder leaves it that was killed.
+        shutil.copytree(path, left)
+    if not unmerged:
+        shutil.rmtree(left)
+        shutil.copytree(path, left)
+    before = sorted(os.listdir(left))
+    assert ('run.db3-wal' in before) == unmerged
+    for bag in (left, left / 'run.db3'):
+        reader = open_bag(bag)
+        assert len(list(reader.messages())) == 59
+        assert reader.complete
+        del reader
+    salvaged(left, tmp_path / 'new')
+    assert sorted(os.listdir(left)) == before
+    gc.collect()
+    assert not list(scratch.iterdir())
 
 
 def test_definitions_that_are_lost_cost_no_messages(tmp_path):
