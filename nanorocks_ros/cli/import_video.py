@@ -117,6 +117,7 @@ def _run_each(
             )
         except KeyboardInterrupt as interruption:
             raise KeyboardInterrupt('the same command goes on with what is left') from interruption
+    found.failed = searched.failed | found.failed
     for imported in found.imported:
         _tell(imported)
     if options.json:
@@ -125,14 +126,7 @@ def _run_each(
         for imported in found.imported:
             print(_text(imported))
         print(f'{len(found.imported)} imported, {len(found.skipped)} were there already')
-    if searched.left_out:
-        names = ', '.join(one.name for one in searched.left_out[:_NAMED])
-        more = ', ...' if len(searched.left_out) > _NAMED else ''
-        print(
-            f'nanorocks: left out {len(searched.left_out)} files that may be films or pictures '
-            f'of one, but not by their names ({names}{more}); pass those that are films by name',
-            file=sys.stderr,
-        )
+    _tell_left_out(searched.left_out)
     return _tell_failures(found)
 
 
@@ -141,6 +135,20 @@ def _tell(imported: Imported) -> None:
 
     for notice in imported.notices:
         print(f'nanorocks: {shown(notice)}', file=sys.stderr)
+
+
+def _tell_left_out(files: list[Path]) -> None:
+    if not files:
+        return
+    from nanorocks_ros.study.shown import shown
+
+    named = [*(shown(one.name) for one in files[:_NAMED]), *['...'] * (len(files) > _NAMED)]
+    names = ', '.join(named)
+    print(
+        f'nanorocks: left out {len(files)} files that may be films or pictures of one, but not by '
+        f'their names ({names}); pass those that are films by name',
+        file=sys.stderr,
+    )
 
 
 def _tell_failures(found: ImportedEach) -> int:

@@ -90,7 +90,10 @@ class Steady(Generic[Item]):
         place = self._place(waiting)
         time_ns, item = waiting[place]
         del waiting[place]
-        stamp_ns = self._stamp(time_ns, self._later(waiting))
+        if self.last_ns is None:
+            stamp_ns = self._first_stamp(time_ns, waiting)
+        else:
+            stamp_ns = self._stamp(time_ns, self._later(waiting))
         if self.last_ns is not None:
             self._steps.append(stamp_ns - self.last_ns)
         self.last_ns = stamp_ns
@@ -108,8 +111,10 @@ class Steady(Generic[Item]):
     def _place(self, waiting: deque[tuple[int | None, Item]]) -> int:
         """Which of those that wait is next: the first, unless others belong before it."""
         first = waiting[0][0]
-        if first is None or self.last_ns is None or len(waiting) < 2:
+        if first is None or len(waiting) < 2:
             return 0
+        if self.last_ns is None:
+            return self._place_of_first(first, waiting)
         lower, upper = self.last_ns - self._shift_ns, first
         before = [
             place
@@ -122,14 +127,35 @@ class Steady(Generic[Item]):
         self.repairs.reordered += 1
         return min(before, key=lambda place: waiting[place][0] or 0)
 
+    def _place_of_first(self, first: int, waiting: deque[tuple[int | None, Item]]) -> int:
+        """Which is the first of all, where nothing before them tells whose time is wrong."""
+        times = [time for time, _ in waiting if time is not None]
+        # A clock that was set back shows times once more, or lies far behind.
+        again = len(set(times)) < len(times)
+        if again or not 0 < first - min(times) <= _JUMP * self.usual_ns():
+            return 0
+        self.repairs.reordered += 1
+        return min(range(len(waiting)), key=lambda place: _or_later(waiting[place][0], first))
+
     def _is_far(self, time_ns: int, waiting: deque[tuple[int | None, Item]], before: int) -> bool:
         assert self.last_ns is not None
         jump = time_ns - self.last_ns > _JUMP * self.usual_ns()
         return jump and 2 * before >= len(waiting) - 1
 
+    def _first_stamp(self, time_ns: int | None, waiting: deque[tuple[int | None, Item]]) -> int:
+        """Without a time of its own, so many steps before those that have one."""
+        if time_ns is not None:
+            return time_ns
+        self.repairs.missing += 1
+        known = [(time, place) for place, (time, _) in enumerate(waiting) if time is not None]
+        if not known:
+            return 0
+        first, place = known[0]
+        near = (time for time, _ in known if time >= first - _JUMP * self.usual_ns())
+        return min(near) - (place + 1) * self.usual_ns()
+
     def _stamp(self, time_ns: int | None, later: list[int]) -> int:
-        if self.last_ns is None:
-            return time_ns or 0
+        assert self.last_ns is not None
         usual = self.usual_ns()
         if time_ns is None:
             self.repairs.missing += 1
@@ -154,3 +180,7 @@ class Steady(Generic[Item]):
         if following is None:
             return self.last_ns + usual
         return self.last_ns + max(1, min(usual, (following - self.last_ns) // 2))
+
+
+def _or_later(time_ns: int | None, other_ns: int) -> int:
+    return other_ns if time_ns is None else time_ns

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -52,3 +53,31 @@ def test_the_same_time_twice_is_parted():
     stamps, _, repairs = steadied([0, 40, 40, 80, 120])
     assert stamps == [0, 40, 60, 80, 120]
     assert repairs == Repairs(replaced=1)
+
+
+@pytest.mark.parametrize('first', [[80, 0, 40], [40, 0, 80], [120, 0, 80, 40]])
+def test_the_first_pictures_are_sorted_by_their_times_too(first):
+    times = [*first, *range(40 * len(first), 800, 40)]
+    stamps, places, repairs = steadied(times)
+    assert stamps == sorted(times)
+    assert [times[place] for place in places] == stamps
+    assert repairs == Repairs(reordered=repairs.reordered)
+    assert repairs.reordered > 0
+
+
+@pytest.mark.parametrize('first', [
+    [500, 540, 580], [280, 320, 360], [*range(1000, 1320, 40)], [9000],
+])  # fmt: skip
+def test_a_clock_that_was_set_back_at_once_moves_no_picture(first):
+    times = [*first, *range(0, 800, 40)]
+    stamps, places, repairs = steadied(times)
+    assert places == list(range(len(times)))
+    assert stamps == [first[0] + 40 * place for place in places]
+    assert repairs == Repairs(set_back=1)
+
+
+@pytest.mark.parametrize('first', [[None], [None, None]])
+def test_a_film_whose_first_pictures_have_no_time_begins_a_step_earlier(first):
+    stamps, _, repairs = steadied([*first, 1000, 1080, 1040, *range(1120, 1800, 40)])
+    assert stamps == [*range(1000 - 40 * len(first), 1800, 40)]
+    assert repairs == Repairs(missing=len(first), reordered=1)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 from videos import (
@@ -161,3 +163,49 @@ def test_films_of_all_formats_are_found_and_what_may_be_one_is_named(tmp_path, c
     assert f'left out 3 files that may be films or pictures of one, but not by their names ' \
         f'({", ".join(others)})' in err  # fmt: skip
     assert 'notes' not in err
+
+
+def close(monkeypatch, folder):
+    """Let nobody look into a folder, as it is for all but root where they have no permission."""
+    really = Path.iterdir
+
+    def iterdir(path):
+        if path == folder:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        return really(path)
+
+    monkeypatch.setattr(Path, 'iterdir', iterdir)
+
+
+@pytest.mark.parametrize('passed', ['the folder', 'what is in it'])
+def test_a_folder_that_cannot_be_read_costs_no_other(tmp_path, capsys, monkeypatch, passed):
+    folder = tmp_path / 'films'
+    closed = folder / 'lost'
+    closed.mkdir(parents=True)
+    for name in ('a.avi', 'z.avi'):
+        write_video(folder / name, range(3))
+    paths = [folder] if passed == 'the folder' else sorted(folder.iterdir())
+    close(monkeypatch, closed)
+    code = main(['import', *map(str, paths), '--each', '-o', str(tmp_path / 'bags'), '--json'])
+    out, err = capsys.readouterr()
+    printed = json.loads(out)
+    assert code == 1
+    assert [os.path.basename(one['bag']) for one in printed['imported']] == ['a', 'z']
+    (failed,) = printed['failed']
+    assert failed['video'] == str(closed)
+    assert (
+        failed['reason'] == f'{closed}: cannot be read (Permission denied); check its permissions'
+    )
+    assert '1 of 3 videos could not be imported' in err
+
+
+def test_a_folder_of_which_nothing_can_be_read_is_said_in_one_line(tmp_path, capsys, monkeypatch):
+    closed = tmp_path / 'films'
+    closed.mkdir()
+    close(monkeypatch, closed)
+    assert main(['import', str(closed), '--each', '-o', str(tmp_path / 'bags')]) == 1
+    said = capsys.readouterr().err.strip()
+    assert (
+        said == f'nanorocks: {closed}: cannot be read (Permission denied); check its permissions'
+    )
+    assert not (tmp_path / 'bags').exists()

@@ -106,12 +106,16 @@ def test_a_variable_rate_is_kept(tmp_path):
     assert stamps == times
 
 
-def test_pictures_out_of_order_are_sorted_by_their_times(tmp_path):
-    write_video(tmp_path / 'a.mkv', range(6), times=[0, 80, 40, 120, 160, 200])
+@pytest.mark.parametrize(('times', 'order', 'moved'), [
+    ([0, 80, 40, 120, 160, 200], [0, 2, 1, 3, 4, 5], 1),
+    ([80, 0, 40, 120, 160, 200], [1, 2, 0, 3, 4, 5], 2),
+])  # fmt: skip
+def test_pictures_out_of_order_are_sorted_by_their_times(tmp_path, times, order, moved):
+    write_video(tmp_path / 'a.mkv', range(6), times=times)
     found, numbers, stamps = imported(tmp_path / 'a.mkv', tmp_path / 'bag')
-    assert numbers == [0, 2, 1, 3, 4, 5]
+    assert numbers == order
     assert stamps == [0, 40, 80, 120, 160, 200]
-    assert any('1 frames came out of order' in one for one in found.notices)
+    assert any(f'{moved} frames came out of order' in one for one in found.notices)
 
 
 def test_a_time_that_cannot_be_is_replaced(tmp_path):

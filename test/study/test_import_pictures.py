@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from fractions import Fraction
 
 import av
@@ -103,7 +104,9 @@ def write_streams(path, *streams):
             stream.width, stream.height = WIDTH, HEIGHT
             stream.pix_fmt = 'yuvj420p' if codec == 'mjpeg' else 'yuv420p'
             if cover:
-                stream.disposition = av.stream.Disposition.attached_pic
+                # Old versions of the library cannot say it; then it is told by its one picture.
+                with suppress(AttributeError):
+                    stream.disposition = av.stream.Disposition.attached_pic
             added.append((stream, numbers))
         for stream, numbers in added:
             for number in numbers:
