@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
@@ -97,13 +98,22 @@ def _open_file(path: Path) -> StorageFile:
         raise RecordingError(
             str(path),
             'is a ROS 1 bag',
-            f'convert it first: rosbags-convert --src {path} --dst {path.with_suffix("")}',
+            f'convert it first: {shlex.join(_conversion(path))}',
         )
     if start == sqlite_file.MAGIC:
         return SqliteFile(path)
     if path.suffix == '.mcap' or start.startswith(mcap_blocks.MAGIC):
         return McapFile(path)
     raise RecordingError(str(path), 'is not a bag', f'pass {_KINDS}')
+
+
+def _conversion(path: Path) -> list[str]:
+    """The command that makes a ROS 2 recording of a ROS 1 bag, beside it."""
+    target = path.with_suffix('')
+    # The converter goes by the ending of what it is to make, and overwrites nothing.
+    if target.suffix == '.bag' or target.exists():
+        target = path.with_name(f'{path.stem.removesuffix(".bag")}_ros2')
+    return ['rosbags-convert', '--src', str(path), '--dst', str(target)]
 
 
 def _folder(path: Path) -> Contents:

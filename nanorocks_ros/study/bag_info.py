@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -192,7 +193,7 @@ def _look(found: BagInfo, reader: BagReader, message: BagMessage) -> None:
 
 
 def _health(found: BagInfo, reader: BagReader) -> list[Ailment]:
-    again = f'nanorocks salvage {found.path} -o NEW copies what can be read'
+    again = f'nanorocks salvage {shlex.quote(str(found.path))} -o NEW copies what can be read'
     ailments = [Ailment(notice, again) for notice in reader.damage]
     if found.messages_lost and not reader.damage:
         ailments.append(Ailment(f'{found.messages_lost} messages are missing', again))

@@ -89,8 +89,8 @@ def test_info_says_what_a_bag_holds(tmp_path, capsys):
 
 
 def test_info_says_what_is_wrong_and_what_to_do(tmp_path, capsys):
-    path = write_bag(tmp_path / 'bag', range(100))
-    file = path / 'bag.mcap'
+    path = write_bag(tmp_path / 'my bag', range(100))
+    file = path / 'my bag.mcap'
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
     code, out, _ = called(capsys, 'info', path, '--json')
     found = json.loads(out)
@@ -98,7 +98,7 @@ def test_info_says_what_is_wrong_and_what_to_do(tmp_path, capsys):
     assert found['complete'] is False
     assert found['messages_lost'] == 200 - sum(one['count'] for one in found['topics']) > 0
     (cut,) = [one for one in found['health'] if 'cut short' in one['what']]
-    assert cut['remedy'] == f'nanorocks salvage {path} -o NEW copies what can be read'
+    assert cut['remedy'] == f"nanorocks salvage '{path}' -o NEW copies what can be read"
 
 
 def test_info_and_salvage_leave_out_messages_of_a_time_that_cannot_be(tmp_path, capsys):

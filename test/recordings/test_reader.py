@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import shlex
 
 import numpy as np
 import pytest
@@ -446,6 +447,24 @@ def test_a_ros_1_bag_is_named_with_its_converter(tmp_path):
     (tmp_path / 'old.bag').write_bytes(b'#ROSBAG V2.0\n' + bytes(100))
     with pytest.raises(RecordingError, match=r'old\.bag: is a ROS 1 bag; .*rosbags-convert --src'):
         open_bag(tmp_path / 'old.bag')
+
+
+@pytest.mark.parametrize(('name', 'target'), [
+    ('old.bag', 'old'), ('my run 1.bag', 'my run 1'), ("it's; $(one).bag", "it's; $(one)"),
+    ('noext', 'noext_ros2'), ('run.v1.bag', 'run.v1'), ('x.bag.bag', 'x_ros2'),
+    ('there.bag', 'there_ros2'),
+])  # fmt: skip
+def test_the_command_that_converts_a_ros_1_bag_can_be_pasted(tmp_path, name, target):
+    folder = tmp_path / 'my flight'
+    (folder / 'there').mkdir(parents=True)
+    path = folder / name
+    path.write_bytes(b'#ROSBAG V2.0\n')
+    with pytest.raises(RecordingError) as refusal:
+        open_bag(path)
+    _, _, command = one_line(refusal.value).partition('; convert it first: ')
+    assert shlex.split(command) == [
+        'rosbags-convert', '--src', str(path), '--dst', str(folder / target)
+    ]  # fmt: skip
 
 
 def test_every_refusal_is_one_line(tmp_path):
