@@ -13,6 +13,7 @@ from PIL import Image
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.recordings.film import NS, FilmInfo, Shot, StoredPicture, form_of
+from nanorocks_ros.recordings.image_file import FULL, bits_used, opened
 from nanorocks_ros.recordings.instants import instant
 from nanorocks_ros.recordings.jpeg import is_whole_jpeg, jpeg_head, with_huffman_tables
 from nanorocks_ros.recordings.names import natural, numbers_of
@@ -83,7 +84,7 @@ class ImageFolder:
         files = images_in(path)
         if not files:
             raise RecordingError(str(path), 'holds no image', 'pass a video or a folder of images')
-        first = next((one for one in map(_opened, files) if one is not None), None)
+        first = next((one for one in map(opened, files) if one is not None), None)
         if first is None:
             raise RecordingError(
                 str(path),
@@ -91,6 +92,10 @@ class ImageFolder:
                 'check that they were copied whole',
             )
         self._times, remarks = _times(path, files, rate)
+        self._bits = bits_used(files)
+        if self._bits < FULL:
+            said = f'its images use {self._bits} of their {FULL} bits; they are made 8 of those'
+            remarks += (f'{path}: {said}',)
         steps = np.diff(np.array(self._times, dtype=np.int64))
         self.info = FilmInfo(
             path=path,
@@ -100,7 +105,7 @@ class ImageFolder:
             height=first.shape[0],
             step_ns=int(np.median(steps)) if steps.size else 0,
             start_ns=None if rate else self._times[0],
-            as_stored=all(_is_stored(one) for one in files),
+            as_stored=self._bits == FULL and all(_is_stored(one) for one in files),
             expected=len(files),
             remarks=remarks,
         )
@@ -113,7 +118,7 @@ class ImageFolder:
         Shot
         """
         for number, (file, time_ns) in enumerate(zip(self.info.files, self._times, strict=True)):
-            picture = _picture(file, (self.info.width, self.info.height))
+            picture = _picture(file, (self.info.width, self.info.height), self._bits)
             if picture is None:
                 self.broken += 1
                 continue
@@ -135,16 +140,6 @@ class _Drawn:
         return self._image
 
 
-def _opened(file: Path) -> NDArray[np.uint8] | None:
-    """Its pixels, upright, gray or bgr; None when it cannot be decoded."""
-    try:
-        content = np.fromfile(file, np.uint8)
-        image = cv2.imdecode(content, cv2.IMREAD_ANYCOLOR) if content.size else None
-    except (OSError, cv2.error):
-        return None
-    return None if image is None else np.asarray(image, dtype=np.uint8)
-
-
 def _is_stored(file: Path) -> bool:
     """Whether it goes into a bag as it is, as far as its name and orientation say."""
     if file.suffix.lower() not in {'.jpg', '.jpeg', '.png'}:
@@ -156,7 +151,7 @@ def _is_stored(file: Path) -> bool:
         return True
 
 
-def _picture(file: Path, size: tuple[int, int]) -> StoredPicture | _Drawn | None:
+def _picture(file: Path, size: tuple[int, int], bits: int) -> StoredPicture | _Drawn | None:
     """The picture in a file; None where it is damaged, or of another size: (width, height)."""
     image = None
     if _is_stored(file):
@@ -170,10 +165,11 @@ def _picture(file: Path, size: tuple[int, int]) -> StoredPicture | _Drawn | None
                 return None
             content = with_huffman_tables(content, head)
             return StoredPicture(form_of('jpeg', head.channels), content)
-        image = _opened(file)
-        if image is not None and content.startswith(b'\x89PNG') and _size(image) == size:
+        image = opened(file, bits)
+        as_it_is = bits == FULL and content.startswith(b'\x89PNG')
+        if image is not None and as_it_is and _size(image) == size:
             return StoredPicture(form_of('png', image.ndim), content)
-    image = _opened(file) if image is None else image
+    image = opened(file, bits) if image is None else image
     return _Drawn(image) if image is not None and _size(image) == size else None
 
 

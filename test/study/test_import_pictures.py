@@ -43,6 +43,33 @@ def test_images_of_another_size_are_left_out_and_counted(tmp_path, ending, size)
     assert any('1 frames are damaged or of another size' in one for one in found.notices)
 
 
+def ramp(number, bits):
+    """An image of 16 bits with all levels that so many have, and its number."""
+    gray = picture(number)[..., 1].astype(np.uint16) << (bits - 8)
+    gray[HEIGHT // 2 :] = np.linspace(0, (1 << bits) - 1, WIDTH).astype(np.uint16)
+    return gray
+
+
+@pytest.mark.parametrize('ending', ['png', 'tif'])
+@pytest.mark.parametrize('bits', [8, 10, 12, 14, 16])
+def test_images_of_16_bits_keep_the_levels_that_the_camera_had(tmp_path, bits, ending):
+    folder = tmp_path / 'images'
+    folder.mkdir()
+    for number in range(4):
+        # The darker ones are not made brighter than the others.
+        cv2.imwrite(str(folder / f'{number}.{ending}'), ramp(number, bits) >> (number == 0))
+    found, numbers, _ = imported(folder, tmp_path / 'bag', TIMED)
+    assert numbers[1:] == [1, 2, 3]
+    levels = [one.image[-1].astype(int) for one in BagFrames(tmp_path / 'bag').frames()]
+    expected = np.linspace(0, 255, WIDTH)
+    np.testing.assert_allclose(levels[0], expected / 2, atol=4)
+    np.testing.assert_allclose(levels[1], expected, atol=4)
+    said = f'its images use {bits} of their 16 bits'
+    assert any(said in one for one in found.notices) == (bits < 16)
+    as_stored = bits == 16 and ending == 'png'
+    assert (found.provenance['pictures'] == 'as stored') == as_stored
+
+
 # --- pixels that are not square -------------------------------------------------------------
 
 
