@@ -8,8 +8,8 @@ import itertools
 import sys
 
 from nanorocks_ros.experiment import settings
+from nanorocks_ros.nodes._overrides import PREFIX as OVERRIDES
 
-_OVERRIDES = 'qos_overrides.'
 _PREFIXES = ('', 'simulation.', 'scene.', 'dashboard_')
 _FLAGS = ('-p', '--param')
 
@@ -28,14 +28,14 @@ def unknown_parameters(given, declared):
     -------
     list of str
         A sentence for each name that is not known; a name in a file is known if any node has it,
-        one on the command line if this node has it.
+        one on the command line if this node has it. Overrides of a quality of service are known.
     """
     anywhere = _of_all_nodes()
     direct = on_the_command_line()
     wrong = [
         name
         for name in sorted(given)
-        if not name.startswith(_OVERRIDES) and (name in direct or name not in anywhere)
+        if not name.startswith(OVERRIDES) and (name in direct or name not in anywhere)
     ]
     return [_sentence(name, declared) for name in wrong]
 

@@ -19,6 +19,7 @@ from nanorocks_ros.nodes._shell import image_message, qos_of
 from nanorocks_ros.wire import topics
 
 SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
+SPEED = 'qos_overrides./nanorocks/tray_1/speed.subscription'
 
 
 def lines_with(output, text):
@@ -37,6 +38,12 @@ def lines_with(output, text):
         ('preprocessor', 'trays_file:=/nowhere.yaml', '/nowhere.yaml: No such file'),
         ('simulator', 'noise:=-1.0', 'parameter noise'),
         ('bag_player', 'rate:=1.0', 'parameter bag: is empty; give the path of a bag'),
+        ('haff_fitter', f'{SPEED}.reliability:=best_efort', "'best_efort' is none of system_defa"),
+        (
+            'haff_fitter',
+            f'{SPEED.replace("speed", "sped")}.depth:=3',
+            "(did you mean '/nanorocks/tray_1/speed'?)",
+        ),
         ('simulator', 'nois:=1.0', "no parameter 'nois' (did you mean 'noise'?)"),
     ],
 )
