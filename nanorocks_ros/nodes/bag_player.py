@@ -28,6 +28,10 @@ from nanorocks_ros.wire import topics
 _CLOCK_S = 0.025
 _JPEG_QUALITY = 95
 _CAMERA = (topics.RAW.absolute(), topics.RAW_COMPRESSED.absolute())
+_ONE_CLOCK = (
+    'end all but one, or give each a clock of its own (-r /clock:=/NAME/clock, also for the nodes '
+    'that follow it)'
+)
 _WORK_IT_OUT_AGAIN = 'set results:=false for bag_player, or end the other'
 
 
@@ -68,6 +72,7 @@ class BagPlayerNode(NanorocksNode):
         return name in self._playback.names and self._reader.topics[name].count > 0
 
     def _expect_to_be_alone(self):
+        self.watch.alone_on('/clock', _ONE_CLOCK)
         for topic in (topics.RAW, topics.RAW_COMPRESSED):
             self.offer((topic,))
             self.watch.alone_on(topic.name)
