@@ -73,6 +73,15 @@ def test_a_loop_over_nothing_ends_with_one_line(graph, name, source, kind):
     assert len(finished.output.splitlines()) == 1, finished.output
 
 
+def test_a_position_outside_the_part_ends_the_player_with_one_line(graph):
+    position = ('start:=2.0', 'position:=1.0')
+    finished = graph.wait(graph.start('bag_player', f'bag:={SAMPLE}', *position))
+    assert finished.code == 2
+    said = 'parameter position: 1 s is not in the part that is played, 2.000 to 22.467 s'
+    assert said in finished.output
+    assert len(finished.output.splitlines()) == 1, finished.output
+
+
 def test_unknown_ros_arguments_end_the_node_with_one_line(graph):
     finished = graph.wait(graph.start('haff_fitter', arguments=('--nonsense',)))
     assert finished.code == 2

@@ -83,13 +83,13 @@ def test_a_player_pauses_steps_seeks_and_goes_on_and_its_clock_says_so(graph):
     stamps = [stamp_of(bag.deserialize(one).header.stamp) for one in played]
     start_ns = bag.start_ns
     remote = Remote(graph)
-    parameters = (f'bag:={SAMPLE}', 'paused:=true', 'start:=1.0', 'duration:=15.0', 'listeners:=1')
-    player = graph.start('bag_player', *parameters)
-    assert remote.ticks() == 5 * [start_ns + NS]
+    part = ('start:=1.0', 'duration:=15.0', 'position:=2.0')
+    player = graph.start('bag_player', f'bag:={SAMPLE}', 'paused:=true', *part, 'listeners:=1')
+    assert remote.ticks() == 5 * [start_ns + 2 * NS]
     assert remote.order('is_paused').success
     graph.until(lambda: remote.epochs)
-    assert remote.next_frame() == stamps[30]
-    assert remote.next_frame() == stamps[31]
+    assert remote.next_frame() == stamps[60]
+    assert remote.next_frame() == stamps[61]
 
     known = len(remote.epochs)
     assert remote.set('position', 10.0).successful
@@ -101,7 +101,7 @@ def test_a_player_pauses_steps_seeks_and_goes_on_and_its_clock_says_so(graph):
 
     beyond = remote.set('position', 18.0)
     assert not beyond.successful
-    assert '18 s is not in the part that is played, 1 to 16 s' in beyond.reason
+    assert '18 s is not in the part that is played, 1.000 to 16.000 s' in beyond.reason
     assert not remote.set('rate', -1.0).successful
     assert not remote.set('start', 3.0).successful
 
