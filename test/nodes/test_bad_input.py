@@ -38,6 +38,7 @@ def lines_with(output, text):
         ('preprocessor', 'trays_file:=/nowhere.yaml', '/nowhere.yaml: No such file'),
         ('simulator', 'noise:=-1.0', 'parameter noise'),
         ('bag_player', 'rate:=1.0', 'parameter bag: is empty; give the path of a bag'),
+        ('bag_player', 'bag:=2015', """2015 is not a text; quote it twice: -p "bag:='2015'\""""),
         ('haff_fitter', f'{SPEED}.reliability:=best_efort', "'best_efort' is none of system_defa"),
         (
             'haff_fitter',
