@@ -640,7 +640,11 @@ class PlayerSettings:
     )
     paused: bool = _setting(False, 'wait at the start until told to go on')
     position: float = _setting(
-        0.0, 'set it to jump to so long after the first message', 's', low=0.0, high=1e7
+        0.0,
+        'begin, or when set later jump to, so long after the first message',
+        's',
+        low=0.0,
+        high=1e7,
     )
 
 

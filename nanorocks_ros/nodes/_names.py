@@ -7,9 +7,10 @@ import inspect
 import itertools
 import sys
 
+from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment import settings
+from nanorocks_ros.nodes._overrides import PREFIX as OVERRIDES
 
-_OVERRIDES = 'qos_overrides.'
 _PREFIXES = ('', 'simulation.', 'scene.', 'dashboard_')
 _FLAGS = ('-p', '--param')
 
@@ -28,14 +29,14 @@ def unknown_parameters(given, declared):
     -------
     list of str
         A sentence for each name that is not known; a name in a file is known if any node has it,
-        one on the command line if this node has it.
+        one on the command line if this node has it. Overrides of a quality of service are known.
     """
     anywhere = _of_all_nodes()
     direct = on_the_command_line()
     wrong = [
         name
         for name in sorted(given)
-        if not name.startswith(_OVERRIDES) and (name in direct or name not in anywhere)
+        if not name.startswith(OVERRIDES) and (name in direct or name not in anywhere)
     ]
     return [_sentence(name, declared) for name in wrong]
 
@@ -58,7 +59,32 @@ def _of_all_nodes():
 
 
 def on_the_command_line():
-    """Names set by ``-p NAME:=VALUE`` or ``-p NODE:NAME:=VALUE``."""
+    """Texts of parameters set by ``-p NAME:=TEXT`` or ``-p NODE:NAME:=TEXT``, by name."""
     after = itertools.pairwise(sys.argv)
-    rules = (rule.split(':=', 1)[0] for flag, rule in after if flag in _FLAGS)
-    return {name.rsplit(':', 1)[-1] for name in rules}
+    rules = (rule.partition(':=') for flag, rule in after if flag in _FLAGS)
+    return {name.rsplit(':', 1)[-1]: text for name, _, text in rules}
+
+
+def require_text(name, value):
+    """Refuse what YAML, in which parameters are written, took for something other than a text.
+
+    Parameters
+    ----------
+    name : str
+        Of the parameter.
+    value : object
+        What it was taken for.
+
+    Raises
+    ------
+    ConfigurationError
+        With how to quote it.
+    """
+    if isinstance(value, str):
+        return
+    texts = on_the_command_line()
+    if name in texts:
+        remedy = f'quote it twice: -p "{name}:=\'{texts[name]}\'"'
+    else:
+        remedy = f"quote it: {name}: '{value}'"
+    raise ConfigurationError(f'parameter {name}', f'{value!r} is not a text', remedy)

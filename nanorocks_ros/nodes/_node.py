@@ -23,8 +23,9 @@ from std_msgs.msg import Header
 
 from nanorocks_ros.errors import ConfigurationError, FrameError, NanorocksError
 from nanorocks_ros.experiment.settings import rows, with_values
-from nanorocks_ros.nodes._names import unknown_parameters
+from nanorocks_ros.nodes._names import on_the_command_line, require_text, unknown_parameters
 from nanorocks_ros.nodes._now_and_then import NowAndThen
+from nanorocks_ros.nodes._overrides import refuse_unheard_overrides, refuse_wrong_overrides
 from nanorocks_ros.nodes._shell import (
     array_message,
     image_message,
@@ -99,6 +100,7 @@ class NanorocksNode(Node):
 
     def __init__(self, name):
         super().__init__(name, namespace=topics.NAMESPACE.strip('/'))
+        refuse_wrong_overrides(self._parameter_overrides)
         self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._outputs = {}
         self._events = NowAndThen()
@@ -139,6 +141,8 @@ class NanorocksNode(Node):
                     str(error).split('Reason: ')[-1],
                     'see docs/parameters.md',
                 ) from error
+            if isinstance(row.default, str) and not row.bounds.choices:
+                require_text(name, values[row.name])
         checked = with_values(settings, values, f'node {self.get_name()}')
         self._declared.update({prefix + row.name: row for row in rows(settings)})
         return checked
@@ -159,6 +163,21 @@ class NanorocksNode(Node):
             raise ConfigurationError(
                 f'node {self.get_name()}', '; '.join(problems), 'see docs/parameters.md'
             )
+
+    def refuse_unheard_overrides(self):
+        """Refuse, of the command line, what overrides a topic that this node does not have.
+
+        To be called when all topics are there but those that come later.
+
+        Raises
+        ------
+        ConfigurationError
+            With the topic that comes nearest.
+        """
+        known = topics.TOPICS if self.hears_much else (topics.EPOCH, topics.TAKEN)
+        late = {self.resolve_topic_name(one.of(k)) for one in known for k in range(1, 9)}
+        given = on_the_command_line().keys() & self._parameter_overrides.keys()
+        refuse_unheard_overrides(given, self._parameters, {*late, '/clock'})
 
     def _declare_one(self, name, row, read_only):
         # Typed by the default, but 13500 in a YAML file has to do for 13500.0.

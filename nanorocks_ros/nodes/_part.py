@@ -6,6 +6,8 @@ from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.nodes._pace import NS
 from nanorocks_ros.recordings.replay import played_part
 
+_TOLD_NS = NS // 1000
+
 
 class Part:
     """The part of a bag that is played.
@@ -60,8 +62,7 @@ class Part:
             raise RecordingError(
                 str(self._reader.path), 'none of its topics can be played', 'pass another bag'
             )
-        first, last = (self.seconds(stamp_ns) for stamp_ns in (self.first_ns, self.last_ns))
-        where = f'{first:.3f} to {last:.3f} s'
+        where = self.where
         lost = self._reader.messages_lost
         if lost or self._whole:
             damage = f' (at least {lost} messages are lost)' if lost else ''
@@ -100,6 +101,20 @@ class Part:
             if notice not in self._told:
                 self._told.add(notice)
                 self._node.get_logger().warning(notice)
+
+    @property
+    def where(self):
+        """From when to when it goes, in seconds since the first message of the bag."""
+        return f'{self.seconds(self.first_ns):.3f} to {self.seconds(self.last_ns):.3f} s'
+
+    def stamp_at(self, seconds):
+        """The log time [ns] so long after the first message of the bag; None beyond the part.
+
+        Times are told to the millisecond: who asks for one a bit beyond an end means the end.
+        """
+        stamp_ns = self._reader.start_ns + round(seconds * NS)
+        placed_ns = min(max(stamp_ns, self.first_ns), self.last_ns)
+        return placed_ns if abs(placed_ns - stamp_ns) < _TOLD_NS else None
 
     def seconds(self, stamp_ns):
         """A log time in seconds since the first message of the bag."""

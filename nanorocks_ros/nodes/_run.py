@@ -122,11 +122,12 @@ def _spin(name, interrupts):
         return 0
     interrupts.at_once = True
     node = getattr(module, f'{name.title().replace("_", "")}Node')()
-    node.refuse_unknown_parameters()
-    interrupts.at_once = False
     executor = _executor(node)
     executor.add_node(node)
     try:
+        node.refuse_unknown_parameters()
+        node.refuse_unheard_overrides()
+        interrupts.at_once = False
         while not node.done and not interrupts.asked:
             executor.spin_once(timeout_sec=0.2)
         return node.exit_code

@@ -83,7 +83,7 @@ def refuse_unused(source, bag, pacing):
     given = [name for name, value in asdict(bag).items() if value != getattr(BagSettings(), name)]
     if source == 'topic' and pacing.duration > 0.0:
         given.append('duration')
-    meant = on_the_command_line() | ({'bag'} if source == 'simulator' else set())
+    meant = {*on_the_command_line(), *(('bag',) if source == 'simulator' else ())}
     for name in given:
         if name in meant:
             raise ConfigurationError(

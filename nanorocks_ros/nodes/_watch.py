@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from nanorocks_ros.nodes._quality import mismatches
 
 _PATIENCE_S = 5.0
 _ONE_CAMERA = 'end all but one, or give each a namespace of its own (-r __ns:=/NAME)'
+# A publisher is seen before the node that it belongs to; so often that is waited for.
+_NOT_YET, _LOOKS = '_NODE_NAME_UNKNOWN_', 5
 
 
 class Watch:
@@ -24,6 +28,7 @@ class Watch:
     def __init__(self, node):
         self._node = node
         self._alone = {}
+        self._unnamed = Counter()
         self.expected = []
         self._once(self._check_clock)
 
@@ -55,15 +60,18 @@ class Watch:
     def look(self):
         """Check who publishes what only one should."""
         for name, remedy in list(self._alone.items()):
-            if self._node.count_publishers(name) > 1:
-                del self._alone[name]
-                full = self._node.resolve_topic_name(name)
-                infos = self._node.get_publishers_info_by_topic(full)
-                nodes = sorted(f'{one.node_namespace}/{one.node_name}' for one in infos)
-                self._say(
-                    f'{full}: {" and ".join(nodes)} publish it, and what they send is mixed; '
-                    f'{remedy}'
-                )
+            full = self._node.resolve_topic_name(name)
+            if self._node.count_publishers(full) < 2:
+                continue
+            infos = self._node.get_publishers_info_by_topic(full)
+            if any(one.node_name == _NOT_YET for one in infos) and self._unnamed[name] < _LOOKS:
+                self._unnamed[name] += 1
+                continue
+            del self._alone[name]
+            nodes = sorted(f'{one.node_namespace.rstrip("/")}/{one.node_name}' for one in infos)
+            self._say(
+                f'{full}: {" and ".join(nodes)} publish it, and what they send is mixed; {remedy}'
+            )
 
     def mismatch(self, name, _):
         """Say what a publisher offers and this node asks for."""

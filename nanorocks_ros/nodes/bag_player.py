@@ -9,11 +9,10 @@ from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from nanorocks_ros.errors import FrameError, RecordingError
+from nanorocks_ros.errors import ConfigurationError, FrameError, RecordingError
 from nanorocks_ros.experiment.settings import BagSettings, PacingSettings, PlayerSettings, rows
 from nanorocks_ros.experiment.settings import problem as wrong_with
 from nanorocks_ros.nodes._node import NanorocksNode
-from nanorocks_ros.nodes._pace import NS
 from nanorocks_ros.nodes._pacing import Pacer
 from nanorocks_ros.nodes._part import Part
 from nanorocks_ros.nodes._playback import Playback, stamp_in
@@ -28,6 +27,10 @@ from nanorocks_ros.wire import topics
 _CLOCK_S = 0.025
 _JPEG_QUALITY = 95
 _CAMERA = (topics.RAW.absolute(), topics.RAW_COMPRESSED.absolute())
+_ONE_CLOCK = (
+    'end all but one, or give each a clock of its own (-r /clock:=/NAME/clock, also for the nodes '
+    'that follow it)'
+)
 _WORK_IT_OUT_AGAIN = 'set results:=false for bag_player, or end the other'
 
 
@@ -52,10 +55,11 @@ class BagPlayerNode(NanorocksNode):
         self._camera = [name for name in _CAMERA if self._has_messages(name)]
         self._epoch_ns = BagFrames(self._reader.path).epoch_ns() if self._camera else None
         self._expect_to_be_alone()
-        self._tell_latched(self._part.first_ns)
+        begin_ns = self._begin_ns(player.position)
+        self._tell_latched(begin_ns)
         self._pacer = Pacer(
             self,
-            self._moments(self._part.first_ns),
+            self._moments(begin_ns),
             self._emit,
             replace(pacing, duration=0.0),
             self.finish,
@@ -64,10 +68,21 @@ class BagPlayerNode(NanorocksNode):
         self.create_timer(_CLOCK_S, self._tell_time, clock=self.steady_clock)
         self._take_orders()
 
+    def _begin_ns(self, position):
+        # Its default is no order: the part may begin later.
+        if position == 0.0:
+            return self._part.first_ns
+        if self._part.stamp_at(position) is None:
+            raise ConfigurationError(
+                'parameter position', self._wrong_with_position(position), 'give another'
+            )
+        return self._part.stamp_at(position)
+
     def _has_messages(self, name):
         return name in self._playback.names and self._reader.topics[name].count > 0
 
     def _expect_to_be_alone(self):
+        self.watch.alone_on('/clock', _ONE_CLOCK)
         for topic in (topics.RAW, topics.RAW_COMPRESSED):
             self.offer((topic,))
             self.watch.alone_on(topic.name)
@@ -201,10 +216,8 @@ class BagPlayerNode(NanorocksNode):
         return SetParametersResult(successful=True)
 
     def _wrong_with_position(self, seconds):
-        part = self._part
-        first, last = (part.seconds(stamp_ns) for stamp_ns in (part.first_ns, part.last_ns))
-        if not first <= seconds <= last:
-            return f'{seconds:g} s is not in the part that is played, {first:g} to {last:g} s'
+        if self._part.stamp_at(seconds) is None:
+            return f'{seconds:g} s is not in the part that is played, {self._part.where}'
         return None
 
     def _changed(self, parameters):
@@ -212,7 +225,7 @@ class BagPlayerNode(NanorocksNode):
             if one.name == 'rate':
                 self._pacer.set_rate(float(one.value))
             if one.name == 'position':
-                self._seek(self._reader.start_ns + round(one.value * NS))
+                self._seek(self._part.stamp_at(one.value))
 
     def _seek(self, stamp_ns):
         self._pacer.restart(self._moments(stamp_ns), stamp_ns)

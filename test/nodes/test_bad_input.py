@@ -19,6 +19,7 @@ from nanorocks_ros.nodes._shell import image_message, qos_of
 from nanorocks_ros.wire import topics
 
 SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
+SPEED = 'qos_overrides./nanorocks/tray_1/speed.subscription'
 
 
 def lines_with(output, text):
@@ -37,6 +38,13 @@ def lines_with(output, text):
         ('preprocessor', 'trays_file:=/nowhere.yaml', '/nowhere.yaml: No such file'),
         ('simulator', 'noise:=-1.0', 'parameter noise'),
         ('bag_player', 'rate:=1.0', 'parameter bag: is empty; give the path of a bag'),
+        ('bag_player', 'bag:=2015', """2015 is not a text; quote it twice: -p "bag:='2015'\""""),
+        ('haff_fitter', f'{SPEED}.reliability:=best_efort', "'best_efort' is none of system_defa"),
+        (
+            'haff_fitter',
+            f'{SPEED.replace("speed", "sped")}.depth:=3',
+            "(did you mean '/nanorocks/tray_1/speed'?)",
+        ),
         ('simulator', 'nois:=1.0', "no parameter 'nois' (did you mean 'noise'?)"),
     ],
 )
@@ -63,6 +71,15 @@ def test_a_loop_over_nothing_ends_with_one_line(graph, name, source, kind):
     finished = graph.wait(graph.start(name, *source, *part))
     assert finished.code == 2
     assert f'parameters start and duration: {SAMPLE} holds no {kind} from' in finished.output
+    assert len(finished.output.splitlines()) == 1, finished.output
+
+
+def test_a_position_outside_the_part_ends_the_player_with_one_line(graph):
+    position = ('start:=2.0', 'position:=1.0')
+    finished = graph.wait(graph.start('bag_player', f'bag:={SAMPLE}', *position))
+    assert finished.code == 2
+    said = 'parameter position: 1 s is not in the part that is played, 2.000 to 22.467 s'
+    assert said in finished.output
     assert len(finished.output.splitlines()) == 1, finished.output
 
 

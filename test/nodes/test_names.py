@@ -10,7 +10,8 @@ pytest.importorskip('rclpy')
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from nanorocks_ros.nodes._names import unknown_parameters
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.nodes._names import require_text, unknown_parameters
 from nanorocks_ros.nodes._quality import mismatches
 
 OURS = ('rate', 'bag', 'loop')
@@ -37,6 +38,18 @@ def test_a_file_may_hold_what_other_nodes_read_but_no_name_that_none_has(monkeyp
 def test_on_the_command_line_only_parameters_of_the_node_itself_are_known(monkeypatch, rule):
     monkeypatch.setattr(sys, 'argv', ['bag_player', '--ros-args', '-p', 'rate:=1.0', '-p', rule])
     assert unknown_parameters(('trays',), OURS) == ["no parameter 'trays'"]
+
+
+def test_a_text_that_looks_like_a_number_is_quoted_as_it_was_typed(monkeypatch):
+    typed = ['bag_player', '--ros-args', '-p', 'pipeline:bag:=007', '--params-file', 'all.yaml']
+    monkeypatch.setattr(sys, 'argv', typed)
+    require_text('bag', '2015')
+    with pytest.raises(ConfigurationError) as error:
+        require_text('bag', 7)
+    said = """parameter bag: 7 is not a text; quote it twice: -p "bag:='007'\""""
+    assert str(error.value) == said
+    with pytest.raises(ConfigurationError, match="2015 is not a text; quote it: record: '2015'"):
+        require_text('record', 2015)
 
 
 def test_every_policy_that_does_not_match_is_named():

@@ -107,3 +107,13 @@ def test_without_a_loop_there_is_one_turn_and_what_is_missing_is_told_after_it(t
         assert not list(reader.messages(NAMES, part.first_ns, part.last_ns))
         assert not told.lines
     assert len(told.lines) == 1
+
+
+def test_an_end_as_it_is_told_is_in_the_part(tmp_path):
+    part, *_ = part_of(bag_with(tmp_path / 'bag', (0.0, 0.1234567, 22.4666667)), start=0.1234567)
+    assert part.where == '0.123 to 22.467 s'
+    assert part.stamp_at(0.123) == part.first_ns
+    assert part.stamp_at(22.467) == part.stamp_at(22.4667) == part.last_ns
+    assert part.stamp_at(5) == 105 * NS
+    assert part.stamp_at(0.12) is None
+    assert part.stamp_at(22.47) is None
