@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 import socket
 import threading
@@ -91,13 +92,19 @@ class PageServer:
         Raises
         ------
         DashboardError
-            When the port cannot be used.
+            When the address or the port cannot be used.
         """
         self._thread.start()
         try:
             asyncio.run_coroutine_threadsafe(self._open(), self._loop).result()
         except OSError as error:
             self.stop()
+            if error.errno == errno.EADDRNOTAVAIL:
+                raise DashboardError(
+                    f'host {self._settings.host!r}',
+                    'is no address of this machine',
+                    'name one of its own, 0.0.0.0 for all of them, or 127.0.0.1',
+                ) from error
             raise DashboardError(
                 f'port {self._port} of {self._settings.host}',
                 # What asyncio says begins with the address again.
@@ -151,7 +158,10 @@ class PageServer:
     async def _open(self) -> None:
         application = make_site(self._access, self._port, self._live)
         self._runner = web.AppRunner(
-            application, access_log=None, shutdown_timeout=_FAREWELL_S, handle_signals=False
+            application,
+            access_log=None,
+            shutdown_timeout=_FAREWELL_S,
+            handle_signals=False,
         )
         await self._runner.setup()
         site = web.TCPSite(self._runner, self._settings.host, self._port)

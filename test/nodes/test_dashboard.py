@@ -128,6 +128,13 @@ def command(graph, *arguments):
     )
 
 
+def test_the_command_says_in_one_line_that_an_address_is_not_of_this_machine(graph):
+    ended = command(graph, '--host', '192.0.2.1')
+    assert ended.returncode == 1
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith("dashboard: host '192.0.2.1': is no address of this machine; name one")
+
+
 def test_the_command_says_in_one_line_that_the_port_is_in_use(graph):
     with socket.socket() as taken:
         taken.bind(('127.0.0.1', 0))
