@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import logging
 import os
 import socket
 import threading
@@ -18,6 +19,7 @@ from nanorocks_ros.errors import DashboardError
 
 try:
     from aiohttp import WSMsgType, web
+    from aiohttp.http_exceptions import HttpProcessingError
 
     from nanorocks_ros.dashboard.site import make_site
 except ImportError as error:
@@ -38,6 +40,16 @@ _MOST_SAID_BYTES = 4096
 # A browser that does not answer within half of that is gone.
 _HEARTBEAT_S = 20.0
 _FAREWELL_S = 1.0
+
+
+def _is_our_fault(record: logging.LogRecord) -> bool:
+    """Whether what is logged is more than a request that is none, which has its answer, 400."""
+    error = record.exc_info[1] if record.exc_info else None
+    return not isinstance(error, HttpProcessingError | web.RequestPayloadError)
+
+
+_requests = logging.getLogger(__name__)
+_requests.addFilter(_is_our_fault)
 
 
 class PageServer:
@@ -160,6 +172,7 @@ class PageServer:
         self._runner = web.AppRunner(
             application,
             access_log=None,
+            logger=_requests,
             shutdown_timeout=_FAREWELL_S,
             handle_signals=False,
         )
