@@ -13,6 +13,7 @@ from nanorocks_ros.records import CorStatus, GroundTruth, Quality
 
 WIDE = {'width': 1440, 'height': 900}
 PHONE = {'width': 390, 'height': 844}
+NARROW = {'width': 320, 'height': 568}
 TOKEN = 'correct-horse-battery'
 
 # Every text that is seen, with its colour and what lies behind it, as a contrast (WCAG 2).
@@ -42,6 +43,14 @@ CONTRASTS = """
   }
   return found;
 }
+"""
+
+
+# Cards whose text goes beyond their border.
+OVERFLOWING = """
+() => [...document.querySelectorAll('.card')]
+  .filter((card) => card.scrollWidth > card.clientWidth)
+  .map((card) => card.textContent)
 """
 
 
@@ -222,7 +231,7 @@ def test_changes_are_said_to_those_who_listen(look, full, results):
     assert page.locator('#link').get_attribute('role') == 'status'
 
 
-@pytest.mark.parametrize('size', [WIDE, PHONE], ids=['wide', 'phone'])
+@pytest.mark.parametrize('size', [WIDE, PHONE, NARROW], ids=['wide', 'phone', 'narrow'])
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 def test_text_is_readable_and_nothing_sticks_out(look, full, scheme, size):
     full.diagnose(
@@ -237,6 +246,7 @@ def test_text_is_readable_and_nothing_sticks_out(look, full, scheme, size):
     assert {text: ratio for text, ratio in contrasts.items() if ratio < 4.5} == {}
     wider = page.evaluate('document.documentElement.scrollWidth - innerWidth')
     assert wider <= 0
+    assert page.evaluate(OVERFLOWING) == []
 
 
 def test_texts_from_outside_stay_texts(look, serve, results):
