@@ -90,7 +90,8 @@ def test_numbers_are_those_of_the_estimate_with_units(look, full, results):
     text_is(page, '#walls', wall_interval)
     text_is(page, '#speed', f'{1e3 * speed.mean_projected_speed:.2f} mm/s')
     text_is(page, '#haff', f'{cor.haff_time:.2f} s')
-    text_is(page, '#cluster', f'{cluster.combined_size:.1f}')
+    text_is(page, '#cluster', f'{cluster.combined_size:.2f}')
+    text_is(page, '#cluster', f'±\u00a0{cluster.combined_size_error:.2f}')
     text_is(page, '#about', '15 acrylic 2 mm')
     text_is(page, '#health', '1 node, well')
     for chart in ('speed', 'cor', 'cluster'):
