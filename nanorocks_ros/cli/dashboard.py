@@ -18,7 +18,9 @@ def add_parser(commands: Any) -> None:
     from nanorocks_ros.cli.flags import add_flags
 
     parser = commands.add_parser('dashboard', help='serve the live page of a graph that runs')
-    parser.add_argument('--namespace', default='', help='of the graph; default /nanorocks')
+    parser.add_argument(
+        '--namespace', default='', help='of the graph, such as /lab; default /nanorocks'
+    )
     parser.add_argument('--trays-file', default='', help='YAML file of trays, as the graph has it')
     add_flags(parser, DashboardSettings(), skip=set())
     parser.set_defaults(run=run)
@@ -27,16 +29,16 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Become the node; does not come back."""
     from nanorocks_ros.cli.flags import settings_from
-    from nanorocks_ros.dashboard.process import node_command, with_token
+    from nanorocks_ros.dashboard.process import full_namespace, node_command, with_token
 
     settings = settings_from(options, DashboardSettings())
+    namespace = full_namespace(options.namespace)
     if find_spec('rclpy') is None:
         raise ConfigurationError(
             'nanorocks dashboard',
             'listens to a ROS graph, and there is no ROS 2 here',
             'source a ROS 2 Jazzy, or install nanorocks_ros[ros]',
         )
-    command = node_command(
-        settings, DashboardGraphSettings(trays_file=options.trays_file), options.namespace
-    )
+    graph = DashboardGraphSettings(trays_file=options.trays_file)
+    command = node_command(settings, graph, namespace)
     os.execve(command[0], command, with_token(os.environ, settings.token))

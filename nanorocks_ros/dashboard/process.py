@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from typing import TYPE_CHECKING
 
+from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.settings import rows
 
 if TYPE_CHECKING:
@@ -15,6 +17,37 @@ if TYPE_CHECKING:
 
 TOKEN_VARIABLE = 'NANOROCKS_DASHBOARD_TOKEN'
 """Environment variable that holds the token, where it is not to be seen in a command line."""
+
+
+# Twice _ is no part of a name where rcl reads one in a command line.
+_NAMESPACE = re.compile(r'(?!.*__)(/[A-Za-z_][A-Za-z0-9_]*)+')
+# What ROS allows (RMW_NAMESPACE_MAX_NAME_LENGTH).
+_LONGEST_NAMESPACE = 245
+
+
+def full_namespace(text: str) -> str:
+    """A namespace as ROS has it, which begins with a slash and does not end with one.
+
+    Parameters
+    ----------
+    text : str
+        As somebody wrote it; empty: the usual one.
+
+    Raises
+    ------
+    ConfigurationError
+        When no namespace can be called that.
+    """
+    if not text or text == '/':
+        return text
+    full = '/' + text.strip('/')
+    if not _NAMESPACE.fullmatch(full) or len(full) > _LONGEST_NAMESPACE:
+        raise ConfigurationError(
+            '--namespace',
+            f'{text!r} is no namespace of ROS',
+            'give names of letters, digits and single _, with slashes between them, such as /lab',
+        )
+    return full
 
 
 def node_command(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import logging
 import os
 import socket
 import threading
@@ -17,6 +19,7 @@ from nanorocks_ros.errors import DashboardError
 
 try:
     from aiohttp import WSMsgType, web
+    from aiohttp.http_exceptions import HttpProcessingError
 
     from nanorocks_ros.dashboard.site import make_site
 except ImportError as error:
@@ -37,6 +40,16 @@ _MOST_SAID_BYTES = 4096
 # A browser that does not answer within half of that is gone.
 _HEARTBEAT_S = 20.0
 _FAREWELL_S = 1.0
+
+
+def _is_our_fault(record: logging.LogRecord) -> bool:
+    """Whether what is logged is more than a request that is none, which has its answer, 400."""
+    error = record.exc_info[1] if record.exc_info else None
+    return not isinstance(error, HttpProcessingError | web.RequestPayloadError)
+
+
+_requests = logging.getLogger(__name__)
+_requests.addFilter(_is_our_fault)
 
 
 class PageServer:
@@ -91,13 +104,19 @@ class PageServer:
         Raises
         ------
         DashboardError
-            When the port cannot be used.
+            When the address or the port cannot be used.
         """
         self._thread.start()
         try:
             asyncio.run_coroutine_threadsafe(self._open(), self._loop).result()
         except OSError as error:
             self.stop()
+            if error.errno == errno.EADDRNOTAVAIL:
+                raise DashboardError(
+                    f'host {self._settings.host!r}',
+                    'is no address of this machine',
+                    'name one of its own, 0.0.0.0 for all of them, or 127.0.0.1',
+                ) from error
             raise DashboardError(
                 f'port {self._port} of {self._settings.host}',
                 # What asyncio says begins with the address again.
@@ -151,7 +170,11 @@ class PageServer:
     async def _open(self) -> None:
         application = make_site(self._access, self._port, self._live)
         self._runner = web.AppRunner(
-            application, access_log=None, shutdown_timeout=_FAREWELL_S, handle_signals=False
+            application,
+            access_log=None,
+            logger=_requests,
+            shutdown_timeout=_FAREWELL_S,
+            handle_signals=False,
         )
         await self._runner.setup()
         site = web.TCPSite(self._runner, self._settings.host, self._port)

@@ -134,7 +134,10 @@ class _Entrance:
 
     async def log_in(self, request: web.Request) -> web.StreamResponse:
         """Take the token from the form."""
-        given = (await request.post()).get('token', '')
+        try:
+            given = (await request.post()).get('token', '')
+        except (ValueError, LookupError, web.RequestPayloadError):
+            return _refused(400, 'not what the form says')
         return await self._answer(given.strip() if isinstance(given, str) else '')
 
     async def _answer(self, given: str) -> web.StreamResponse:

@@ -13,6 +13,7 @@ from nanorocks_ros.records import CorStatus, GroundTruth, Quality
 
 WIDE = {'width': 1440, 'height': 900}
 PHONE = {'width': 390, 'height': 844}
+NARROW = {'width': 320, 'height': 568}
 TOKEN = 'correct-horse-battery'
 
 # Every text that is seen, with its colour and what lies behind it, as a contrast (WCAG 2).
@@ -42,6 +43,14 @@ CONTRASTS = """
   }
   return found;
 }
+"""
+
+
+# Cards whose text goes beyond their border.
+OVERFLOWING = """
+() => [...document.querySelectorAll('.card')]
+  .filter((card) => card.scrollWidth > card.clientWidth)
+  .map((card) => card.textContent)
 """
 
 
@@ -81,7 +90,8 @@ def test_numbers_are_those_of_the_estimate_with_units(look, full, results):
     text_is(page, '#walls', wall_interval)
     text_is(page, '#speed', f'{1e3 * speed.mean_projected_speed:.2f} mm/s')
     text_is(page, '#haff', f'{cor.haff_time:.2f} s')
-    text_is(page, '#cluster', f'{cluster.combined_size:.1f}')
+    text_is(page, '#cluster', f'{cluster.combined_size:.2f}')
+    text_is(page, '#cluster', f'±\u00a0{cluster.combined_size_error:.2f}')
     text_is(page, '#about', '15 acrylic 2 mm')
     text_is(page, '#health', '1 node, well')
     for chart in ('speed', 'cor', 'cluster'):
@@ -222,7 +232,7 @@ def test_changes_are_said_to_those_who_listen(look, full, results):
     assert page.locator('#link').get_attribute('role') == 'status'
 
 
-@pytest.mark.parametrize('size', [WIDE, PHONE], ids=['wide', 'phone'])
+@pytest.mark.parametrize('size', [WIDE, PHONE, NARROW], ids=['wide', 'phone', 'narrow'])
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 def test_text_is_readable_and_nothing_sticks_out(look, full, scheme, size):
     full.diagnose(
@@ -237,6 +247,7 @@ def test_text_is_readable_and_nothing_sticks_out(look, full, scheme, size):
     assert {text: ratio for text, ratio in contrasts.items() if ratio < 4.5} == {}
     wider = page.evaluate('document.documentElement.scrollWidth - innerWidth')
     assert wider <= 0
+    assert page.evaluate(OVERFLOWING) == []
 
 
 def test_texts_from_outside_stay_texts(look, serve, results):

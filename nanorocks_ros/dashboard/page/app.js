@@ -130,8 +130,8 @@ function drawNumbers(tray) {
   const size = cluster && words.known(cluster.combined_size);
   number(
     'cluster',
-    size && cluster.combined_size.toFixed(1),
-    size ? `beads per body ${words.give(cluster.combined_size_error, (one) => one.toFixed(1))}` : 'not known yet',
+    size && cluster.combined_size.toFixed(2),
+    size ? `beads per body ${words.give(cluster.combined_size_error, (one) => one.toFixed(2))}` : 'not known yet',
   );
   number('sticking', ...(cluster ? words.sticking(cluster) : ['', 'not known yet']));
 }

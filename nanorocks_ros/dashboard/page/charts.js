@@ -284,7 +284,7 @@ export class ClusterChart extends Chart {
             column(rows, 2, (error, row) => row[1] + error),
           ]
         : null,
-      `Cluster size, ${rows.length ? rows[rows.length - 1][1].toFixed(1) : 'not known'} beads per body now`,
+      `Cluster size, ${rows.length ? rows[rows.length - 1][1].toFixed(2) : 'not known'} beads per body now`,
     );
   }
 

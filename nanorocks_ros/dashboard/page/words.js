@@ -9,8 +9,8 @@ export const restitution = (value) => fixed(value, 3);
 export const interval = (lower, upper, show) =>
   known(lower) && known(upper) ? `[${show(lower)}, ${show(upper)}]` : '';
 
-/** One standard error, where it is known. */
-export const give = (value, show, more = '') => (known(value) ? `± ${show(value)}${more}` : '');
+/** One standard error, where it is known; the sign stays with its number. */
+export const give = (value, show, more = '') => (known(value) ? `±\u00a0${show(value)}${more}` : '');
 
 /** Millimetres a second with the digits that mean something. */
 export function speed(value) {
