@@ -207,8 +207,9 @@ def test_of_a_raw_recording_jpegs_are_made_for_who_asks_for_them(graph, tmp_path
     table = {name: OfferedTopic(msgtype=topics.RAW.type, qos=OfferedQos())}
     picture = np.full((48, 64, 3), (200, 120, 40), dtype=np.uint8)
     with BagWriter(tmp_path / 'raw', table, metadata={}) as bag:
-        for k in range(5):
-            bag.write(name, k * NS // 10, image_message(k * NS // 10, 'camera', 'rgb8', picture))
+        stamps = [NS + k * NS // 10 for k in range(5)]
+        for stamp_ns in stamps:
+            bag.write(name, stamp_ns, image_message(stamp_ns, 'camera', 'rgb8', picture))
     found = []
     graph.node.create_subscription(
         CompressedImage, topics.RAW_COMPRESSED.name, found.append, qos_of(topics.RAW_COMPRESSED)
@@ -216,7 +217,7 @@ def test_of_a_raw_recording_jpegs_are_made_for_who_asks_for_them(graph, tmp_path
     player = graph.start('bag_player', f'bag:={tmp_path / "raw"}', 'listeners:=1')
     assert graph.wait(player).code == 0
     frames = [frame_from_compressed(one, 'jpeg') for one in found]
-    assert [one.stamp_ns for one in frames] == [k * NS // 10 for k in range(5)]
+    assert [one.stamp_ns for one in frames] == stamps
     for one in frames:
         assert one.image.shape == picture.shape
         assert np.abs(one.image.astype(int) - picture[:, :, ::-1]).max() <= 3
