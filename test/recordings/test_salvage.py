@@ -135,9 +135,12 @@ def test_an_mcap_file_that_is_damaged_in_its_first_bytes_is_read(tmp_path, recor
     found, messages = salvaged(path, tmp_path / 'new')
     assert messages == everything
     assert found.lost == 0
-    said = f'{path}/run.mcap: is damaged at its beginning; the rest is read'
-    assert said in found.notices
-    assert said in [one.what for one in bag_info(path, lambda *_: None).health]
+    assert f'{path}/run.mcap: is damaged at its beginning; the rest is read' in found.notices
+    # Nothing else takes it for whole.
+    with pytest.raises(RecordingError, match='is not an MCAP file') as refusal:
+        open_bag(path)
+    remedy = 'pass a rosbag2 folder' if cut else 'ends as one; nanorocks salvage recovers what'
+    assert remedy in str(refusal.value)
 
 
 @pytest.mark.parametrize('cut', [0, 8])
@@ -160,7 +163,7 @@ def test_what_is_no_mcap_at_all_is_said(tmp_path, size):
     noise = np.random.default_rng(2).bytes(size)
     (tmp_path / 'x.mcap').write_bytes(noise)
     with pytest.raises(RecordingError, match=r'is not an MCAP file \(begins with .*\); pass a'):
-        open_bag(tmp_path / 'x.mcap')
+        salvage(tmp_path / 'x.mcap', tmp_path / 'new', lambda *_: None)
 
 
 def write_unknown(path, encoding, text):
