@@ -127,6 +127,18 @@ def changed(path, start, content, cut=0):
 
 
 @pytest.mark.parametrize('cut', [0, 40])
+def test_a_length_inside_a_chunk_that_no_memory_holds_costs_that_chunk(tmp_path, record, cut):
+    path = record(tmp_path / 'run', frames=100, size=9000)
+    everything = list(open_bag(path).messages())
+    # The highest byte of the length of the records, behind times, size, checksum and 'zstd'.
+    changed(path / 'run.mcap', chunks(path / 'run.mcap')[1].chunk_start_offset + 52, b'\xff', cut)
+    found, messages = salvaged(path, tmp_path / 'new')
+    assert [one for one in everything if one in messages] == messages
+    assert found.lost > 0
+    assert found.recovered + found.lost == 201
+
+
+@pytest.mark.parametrize('cut', [0, 40])
 @pytest.mark.parametrize('content', [b'\x00', b'\x89LCAP0\r\n', bytes(8)])
 def test_an_mcap_file_that_is_damaged_in_its_first_bytes_is_read(tmp_path, record, content, cut):
     path = record(tmp_path / 'run', frames=100, size=9000)
