@@ -51,12 +51,14 @@ class Contents:
     expected: int | None = None
 
 
-def contents(path: Path) -> Contents:
+def contents(path: Path, *, salvaging: bool = False) -> Contents:
     """Open what a path holds.
 
     Parameters
     ----------
     path : Path
+    salvaging : bool
+        Files whose first bytes are damaged, too.
 
     Returns
     -------
@@ -71,8 +73,8 @@ def contents(path: Path) -> Contents:
         if not path.exists():
             raise RecordingError(str(path), 'does not exist', f'pass {_KINDS}')
         if path.is_dir():
-            return _folder(path)
-        file = _open_file(path)
+            return _folder(path, salvaging)
+        file = _open_file(path, salvaging)
         information = _recorder_notes([file])
         return Contents(
             files=(file,),
@@ -87,7 +89,7 @@ def contents(path: Path) -> Contents:
         ) from error
 
 
-def _open_file(path: Path) -> StorageFile:
+def _open_file(path: Path, salvaging: bool) -> StorageFile:
     with path.open('rb') as stream:
         start = stream.read(16)
     if not start:
@@ -103,7 +105,7 @@ def _open_file(path: Path) -> StorageFile:
     if start == sqlite_file.MAGIC:
         return SqliteFile(path)
     if path.suffix == '.mcap' or start.startswith(mcap_blocks.MAGIC):
-        return McapFile(path)
+        return McapFile(path, salvaging=salvaging)
     raise RecordingError(str(path), 'is not a bag', f'pass {_KINDS}')
 
 
@@ -116,7 +118,7 @@ def _conversion(path: Path) -> list[str]:
     return ['rosbags-convert', '--src', str(path), '--dst', str(target)]
 
 
-def _folder(path: Path) -> Contents:
+def _folder(path: Path, salvaging: bool) -> Contents:
     notices: list[str] = []
     information = _information(path, notices)
     names = _names(path, information)
@@ -125,7 +127,7 @@ def _folder(path: Path) -> Contents:
             str(path), 'is a folder without any .mcap or .db3 file', f'pass {_KINDS}'
         )
     _refuse_compressed_files(path, information)
-    files = _open_files(path, names, notices)
+    files = _open_files(path, names, notices, salvaging)
     count = information.get('message_count')
     information = information or _recorder_notes(files)
     return Contents(
@@ -191,7 +193,9 @@ def _refuse_compressed_files(path: Path, information: dict[str, Any]) -> None:
         )
 
 
-def _open_files(path: Path, names: list[str], notices: list[str]) -> list[StorageFile]:
+def _open_files(
+    path: Path, names: list[str], notices: list[str], salvaging: bool
+) -> list[StorageFile]:
     files: list[StorageFile] = []
     errors: list[RecordingError] = []
     for name in names:
@@ -199,7 +203,7 @@ def _open_files(path: Path, names: list[str], notices: list[str]) -> list[Storag
             notices.append(f'{path / name}: is missing')
             continue
         try:
-            files.append(_open_file(path / name))
+            files.append(_open_file(path / name, salvaging))
         except RecordingError as error:
             errors.append(error)
     if not files:

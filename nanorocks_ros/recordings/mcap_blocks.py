@@ -35,7 +35,15 @@ _NAMES_BYTES, _PIECE_BYTES, _CHECKSUM_BYTES = 1 << 21, 1 << 12, 4
 # A flipped bit in a length must not ask for all memory; common writers stay below 16 MB.
 _CHUNK_LIMIT = 2**31
 
-UNREADABLE = (McapError, struct.error, ValueError, RuntimeError, zstandard.ZstdError, MemoryError)
+UNREADABLE = (
+    McapError,
+    struct.error,
+    ValueError,
+    OverflowError,
+    RuntimeError,
+    zstandard.ZstdError,
+    MemoryError,
+)
 """What the `mcap` library and the decompressors raise over bytes that make no sense."""
 
 

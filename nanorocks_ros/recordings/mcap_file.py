@@ -35,6 +35,8 @@ class McapFile:
     Parameters
     ----------
     path : Path
+    salvaging : bool
+        Read one whose first bytes are damaged, too.
 
     Attributes
     ----------
@@ -50,30 +52,35 @@ class McapFile:
         When it is no MCAP file.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, salvaging: bool = False) -> None:
         self.path = path
         with path.open('rb') as stream:
             size = stream.seek(0, 2)
+            start, self._begins_well = self._beginning(stream, size, salvaging)
             index = read_index(stream, size)
             self._index: McapIndex = index or scan(stream, size)
-            self._begins_well = self._check_magic(stream)
+            if not (self._begins_well or self._index.ended or self._index.blocks):
+                raise self._is_none(start)
             self.recorder_notes = recorder_notes(stream, self._index)
         self.topics = _topics(self._index)
         self.start_ns = self._index.start_ns or 0
         self.end_ns = self._index.end_ns or 0
 
-    def _check_magic(self, stream: BinaryIO) -> bool:
-        """Whether the file begins as it should; one that does not may be damaged there."""
+    def _beginning(self, stream: BinaryIO, size: int, salvaging: bool) -> tuple[bytes, bool]:
+        """The first bytes, and whether they are what they should be."""
         stream.seek(0)
         start = stream.read(len(MAGIC))
-        if MAGIC.startswith(start):
-            return True
-        if self._index.ended or self._index.blocks:
-            return False
-        raise RecordingError(
-            str(self.path),
-            f'is not an MCAP file (begins with {start!r})',
-            'pass a rosbag2 folder or an .mcap file',
+        if MAGIC.startswith(start) or salvaging:
+            return start, MAGIC.startswith(start)
+        stream.seek(max(0, size - len(MAGIC)))
+        raise self._is_none(start, ends_well=stream.read() == MAGIC)
+
+    def _is_none(self, start: bytes, *, ends_well: bool = False) -> RecordingError:
+        what, remedy = '', 'pass a rosbag2 folder or an .mcap file'
+        if ends_well:
+            what, remedy = ', but ends as one', 'nanorocks salvage recovers what can be read'
+        return RecordingError(
+            str(self.path), f'is not an MCAP file (begins with {start!r}){what}', remedy
         )
 
     @property

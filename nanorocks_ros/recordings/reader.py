@@ -29,13 +29,15 @@ _NOT_CDR = (SerdeError, struct.error, ValueError, LookupError, AssertionError, M
 _MESSAGE_LIMIT = 2**30
 
 
-def open_bag(path: str | Path) -> BagReader:
+def open_bag(path: str | Path, *, salvaging: bool = False) -> BagReader:
     """Open a recording.
 
     Parameters
     ----------
     path : str or Path
         A rosbag2 folder (MCAP or SQLite storage) or a storage file.
+    salvaging : bool
+        Read MCAP files whose first bytes are damaged, too, which otherwise are none.
 
     Returns
     -------
@@ -46,7 +48,7 @@ def open_bag(path: str | Path) -> BagReader:
     RecordingError
         When there is nothing at the path, or no recording.
     """
-    return BagReader(Path(path))
+    return BagReader(Path(path), salvaging=salvaging)
 
 
 class BagReader:
@@ -59,6 +61,8 @@ class BagReader:
     Parameters
     ----------
     path : Path
+    salvaging : bool
+        Read files whose first bytes are damaged, too.
 
     Attributes
     ----------
@@ -72,9 +76,9 @@ class BagReader:
         Messages that the recorder counted in all; None where it does not say.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, salvaging: bool = False) -> None:
         self.path = path
-        self._contents: Contents = contents(path)
+        self._contents: Contents = contents(path, salvaging=salvaging)
         self.metadata = self._contents.metadata
         self.expected = self._contents.expected
         self.topics = _merged_topics(self._contents.files)

@@ -66,7 +66,7 @@ def salvage(source: Path, target: Path, progress: Callable[[int, int], None]) ->
         raise RecordingError(
             str(target), 'exists already and is not overwritten', 'pass another path'
         )
-    reader = open_bag(source)
+    reader = open_bag(source, salvaging=True)
     held = sum(info.count for info in reader.topics.values())
     if not held:
         raise RecordingError(

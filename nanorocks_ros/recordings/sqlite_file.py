@@ -25,11 +25,12 @@ if TYPE_CHECKING:
 MAGIC = b'SQLite format 3\x00'
 _IN_ORDER = (
     'SELECT id, topic_id, timestamp, data FROM messages '
-    f'WHERE topic_id IN ({{}}) AND timestamp BETWEEN ? AND ? AND {FIT} ORDER BY timestamp, id'
+    'WHERE topic_id IN ({}) AND timestamp BETWEEN ? AND ? ORDER BY timestamp, id'
 )
+# In front of the grouping, which would copy the content to sort it.
 _BY_TOPIC = (
-    f'SELECT topic_id, count(*), sum({FIT}), min(timestamp) FILTER (WHERE {FIT}), '
-    f'max(timestamp) FILTER (WHERE {FIT}) FROM messages GROUP BY topic_id'
+    'SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages '
+    f'WHERE {FIT} GROUP BY topic_id'
 )
 _ODD = f'SELECT id FROM messages WHERE NOT ({FIT})'
 _ONE = 'SELECT data FROM messages WHERE id = ?'
@@ -85,14 +86,13 @@ class SqliteFile:
 
     def _read(self, database: sqlite3.Connection) -> None:
         found = database.execute(_BY_TOPIC).fetchall()
-        counts = {topic: fit for topic, _, fit, *_ in found}
-        self._numbers, self.topics = _topics(database, counts)
-        known = [row for row in found if row[0] in self._numbers and row[2]]
-        self.start_ns: int = min((first for *_, first, _ in known), default=0)
+        self._numbers, self.topics = _topics(database, {row[0]: row[1] for row in found})
+        known = [row for row in found if row[0] in self._numbers]
+        self.start_ns: int = min((first for _, _, first, _ in known), default=0)
         self.end_ns: int = max((last for *_, last in known), default=0)
-        self._odd = sum(row[1] for row in found) - sum(row[2] for row in known)
-        if self._odd:
-            self._odd_rows = frozenset(number for (number,) in database.execute(_ODD))
+        self._odd_rows = frozenset(number for (number,) in database.execute(_ODD))
+        nameless = sum(row[1] for row in found) - sum(row[1] for row in known)
+        self._odd = len(self._odd_rows) + nameless
 
     def _known(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
         """Those on a topic that has a name."""

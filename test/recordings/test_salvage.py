@@ -127,6 +127,18 @@ def changed(path, start, content, cut=0):
 
 
 @pytest.mark.parametrize('cut', [0, 40])
+def test_a_length_inside_a_chunk_that_no_memory_holds_costs_that_chunk(tmp_path, record, cut):
+    path = record(tmp_path / 'run', frames=100, size=9000)
+    everything = list(open_bag(path).messages())
+    # The highest byte of the length of the records, behind times, size, checksum and 'zstd'.
+    changed(path / 'run.mcap', chunks(path / 'run.mcap')[1].chunk_start_offset + 52, b'\xff', cut)
+    found, messages = salvaged(path, tmp_path / 'new')
+    assert [one for one in everything if one in messages] == messages
+    assert found.lost > 0
+    assert found.recovered + found.lost == 201
+
+
+@pytest.mark.parametrize('cut', [0, 40])
 @pytest.mark.parametrize('content', [b'\x00', b'\x89LCAP0\r\n', bytes(8)])
 def test_an_mcap_file_that_is_damaged_in_its_first_bytes_is_read(tmp_path, record, content, cut):
     path = record(tmp_path / 'run', frames=100, size=9000)
@@ -135,9 +147,12 @@ def test_an_mcap_file_that_is_damaged_in_its_first_bytes_is_read(tmp_path, recor
     found, messages = salvaged(path, tmp_path / 'new')
     assert messages == everything
     assert found.lost == 0
-    said = f'{path}/run.mcap: is damaged at its beginning; the rest is read'
-    assert said in found.notices
-    assert said in [one.what for one in bag_info(path, lambda *_: None).health]
+    assert f'{path}/run.mcap: is damaged at its beginning; the rest is read' in found.notices
+    # Nothing else takes it for whole.
+    with pytest.raises(RecordingError, match='is not an MCAP file') as refusal:
+        open_bag(path)
+    remedy = 'pass a rosbag2 folder' if cut else 'ends as one; nanorocks salvage recovers what'
+    assert remedy in str(refusal.value)
 
 
 @pytest.mark.parametrize('cut', [0, 8])
@@ -160,7 +175,7 @@ def test_what_is_no_mcap_at_all_is_said(tmp_path, size):
     noise = np.random.default_rng(2).bytes(size)
     (tmp_path / 'x.mcap').write_bytes(noise)
     with pytest.raises(RecordingError, match=r'is not an MCAP file \(begins with .*\); pass a'):
-        open_bag(tmp_path / 'x.mcap')
+        salvage(tmp_path / 'x.mcap', tmp_path / 'new', lambda *_: None)
 
 
 def write_unknown(path, encoding, text):
