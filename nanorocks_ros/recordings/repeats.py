@@ -5,6 +5,7 @@ Drawn pictures are compared by their brightness alone.
 
 from __future__ import annotations
 
+from collections import deque
 from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
@@ -31,6 +32,9 @@ _SHARE, _PRODUCT, _MOST = 0.5, 0.15, 6.0
 # JPEGs are compared by more than their bytes in the beginning, and on if there were repeats.
 _DECODED = 64
 _BLOCK_PX = 8
+# Where something swings, pictures at its turning points repeat each other as well. Those around
+# them do, too: they differ by less than this share of what they differ from these by.
+_TURNED = 0.8
 
 
 class _Change(NamedTuple):
@@ -67,7 +71,11 @@ class Repeats:
         self._before: _Change | None = None
         self._any_run = False
         self._compared = 0
-        self._gray: NDArray[np.uint8] | None = None
+        # Runs between pictures that are alike, and between others.
+        self._turned = self._straight = 0
+        # Of the last pictures, and of that before the one that a run repeats.
+        self._grays: deque[NDArray[np.uint8]] = deque(maxlen=3)
+        self._gray_ahead: NDArray[np.uint8] | None = None
 
     def without(self, shots: Iterable[Stamped[Shot]]) -> Iterator[Stamped[Shot]]:
         """The pictures that are held once, as soon as those behind them are known.
@@ -95,6 +103,7 @@ class Repeats:
                 yield from self._release()
                 yield one
             elif change is None:
+                yield from self._release()
                 yield one
             else:
                 since_ns = one.stamp_ns
@@ -113,18 +122,22 @@ class Repeats:
             if before == now:
                 return _NONE
             if self._compared >= _DECODED and not self._any_run:
-                self._gray = None
+                self._grays.clear()
                 return None
         self._compared += 1
-        one = before.gray() if self._gray is None else self._gray
-        self._gray = other = now.gray()
-        return _difference(one, other)
+        if not self._grays:
+            self._grays.append(before.gray())
+        self._grays.append(now.gray())
+        return _difference(self._grays[-2], self._grays[-1])
 
     def _judged(self, shot: Stamped[Shot], change: _Change) -> Iterator[Stamped[Shot]]:
         """Pictures that differ little wait for one that differs more, as the one before did."""
         if self._run:
             if all(own.is_small_beside(change) for _, own in self._run):
-                self._drop()
+                if self._may_have_turned(change):
+                    yield from self._release()
+                else:
+                    self._drop()
                 self._before = change
                 yield shot
                 return
@@ -134,6 +147,7 @@ class Repeats:
             yield from self._release()
         if self._before is None or self._is_candidate(change):
             self._run.append((shot, change))
+            self._gray_ahead = self._grays[0] if len(self._grays) == 3 else None
             return
         self._before = change
         yield shot
@@ -141,9 +155,21 @@ class Repeats:
     def _is_candidate(self, change: _Change) -> bool:
         return self._before is not None and change.is_small_beside(self._before)
 
+    def _may_have_turned(self, after: _Change) -> bool:
+        """Whether the pictures around a run are alike, as around most runs so far."""
+        if self._gray_ahead is None or self._before is None:
+            return False
+        around = _difference(self._gray_ahead, self._grays[-1])
+        least = min(self._before.mean, after.mean)
+        turned = around is not None and around.mean < _TURNED * least
+        self._turned += turned
+        self._straight += not turned
+        return turned and self._turned > 2 * self._straight
+
     def _drop(self) -> None:
         self.dropped += len(self._run)
-        self._any_run = True
+        # Of the first pictures nothing tells whether they turned.
+        self._any_run = self._any_run or self._before is not None
         self._run.clear()
 
     def _release(self) -> Iterator[Stamped[Shot]]:
