@@ -167,6 +167,12 @@ def test_what_is_wrong_or_not_told_is_said_in_words(look, serve, results):
     server.diagnose([('/n', 0, 'working', [('frames waiting for the trays', '29')])])
     text_is(page, '#health', '1 behind')
     text_is(page, '.node', '29 frames waiting')
+    server.diagnose([('/n', 0, 'working', [('frames waiting for the trays', '1')])])
+    text_is(page, '.node', '1 frame waiting')
+    # Nothing of a node that is not heard any more is told as if it were so now.
+    text_is(page, '.node', 'silent for 4 s')
+    text_is(page, '.node', 'before: 1 frame waiting')
+    assert 'working' not in page.locator('.node summary').inner_text()
 
 
 def test_whoever_opens_the_page_late_sees_the_same(look, full):
