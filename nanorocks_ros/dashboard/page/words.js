@@ -68,8 +68,8 @@ export function trayState(tray, silentFor) {
   const { truth: _, ...measured } = tray.latest;
   if (Object.keys(measured).length === 0) return ['waiting', 'nothing measured yet', 'waiting'];
   if (silentFor > 4) {
-    const text = `silent for ${duration(silentFor)}`;
-    return ['warning', text, text];
+    const since = duration(silentFor);
+    return ['warning', `silent for ${since}`, `silent ${since}`];
   }
   if (!shaken && !tray.latest.cor) return ['waiting', 'no shaking event yet', 'not shaken yet'];
   const status = tray.latest.cor?.status;
