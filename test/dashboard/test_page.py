@@ -9,7 +9,7 @@ import pytest
 
 from nanorocks_ros.dashboard.pictures import encoded
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.records import CorStatus, GroundTruth, Quality
+from nanorocks_ros.records import CorStatus, Quality
 
 WIDE = {'width': 1440, 'height': 900}
 PHONE = {'width': 390, 'height': 844}
@@ -122,36 +122,6 @@ def test_the_estimate_tightens_while_one_looks(look, serve, results):
     assert shown(results.cors[-1])[0] in page.locator('#finals').inner_text()
 
 
-def test_what_is_measured_from_the_middle_of_a_run_is_shown_beside_its_truth(look, serve, results):
-    server = serve()
-    page = look(server.url)
-    for speed in results.speeds[::10]:
-        server.take(truth_at(speed.stamp_ns))
-    text_is(page, '#state', 'nothing measured yet')
-    joined = [replace(one, cycle=0, cycle_start_ns=None) for one in results.speeds[20:60]]
-    for speed in joined:
-        server.take(truth_at(speed.stamp_ns))
-        server.take(speed)
-    text_is(page, '#state', 'no shaking event yet')
-    text_is(page, '#speed', f'{1e3 * joined[-1].mean_projected_speed:.2f} mm/s')
-    page.wait_for_selector('#speed-chart canvas')
-    assert page.locator('#speed-chart .only-truth').is_visible()
-
-
-def truth_at(stamp_ns):
-    return GroundTruth(
-        stamp_ns=stamp_ns,
-        tray=1,
-        cycle=1,
-        mean_projected_speed=0.003,
-        mean_speed=0.004,
-        bodies=15,
-        restitution=0.9,
-        wall_restitution=0.8,
-        sticking_speed=0.0,
-    )
-
-
 def test_what_is_wrong_or_not_told_is_said_in_words(look, serve, results):
     server = serve()
     for number in (1, 2):
@@ -167,6 +137,12 @@ def test_what_is_wrong_or_not_told_is_said_in_words(look, serve, results):
     server.diagnose([('/n', 0, 'working', [('frames waiting for the trays', '29')])])
     text_is(page, '#health', '1 behind')
     text_is(page, '.node', '29 frames waiting')
+    server.diagnose([('/n', 0, 'working', [('frames waiting for the trays', '1')])])
+    text_is(page, '.node', '1 frame waiting')
+    # Nothing of a node that is not heard any more is told as if it were so now.
+    text_is(page, '.node', 'silent for 4 s')
+    text_is(page, '.node', 'before: 1 frame waiting')
+    assert 'working' not in page.locator('.node summary').inner_text()
 
 
 def test_whoever_opens_the_page_late_sees_the_same(look, full):

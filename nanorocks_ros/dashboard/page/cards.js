@@ -51,14 +51,14 @@ export class Cards {
     const now = tray.latest.speed?.mean_projected_speed;
     const last = tray.finals[tray.finals.length - 1];
     if (saysSomething(cor)) {
-      one.value.firstChild.textContent = restitution(cor.restitution);
-      one.small.textContent = ` ${interval(cor.restitution_lower, cor.restitution_upper, restitution)}`;
+      one.value.firstChild.textContent = `${restitution(cor.restitution)} `;
+      one.small.textContent = `${interval(cor.restitution_lower, cor.restitution_upper, restitution)}`;
     } else if (last && known(last[1])) {
-      one.value.firstChild.textContent = restitution(last[1]);
-      one.small.textContent = ` in cycle ${last[0]}`;
+      one.value.firstChild.textContent = `${restitution(last[1])} `;
+      one.small.textContent = `in cycle ${last[0]}`;
     } else {
-      one.value.firstChild.textContent = known(now) ? speed(now) : '–';
-      one.small.textContent = known(now) ? ' mm/s' : ' no COR yet';
+      one.value.firstChild.textContent = known(now) ? `${speed(now)} ` : '– ';
+      one.small.textContent = known(now) ? 'mm/s' : 'no COR yet';
     }
     one.line.setAttribute('points', spark(tray.rows.speed));
     one.card.setAttribute('aria-label', `Tray ${number}, ${words}, ${one.value.textContent}`);

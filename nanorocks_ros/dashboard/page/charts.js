@@ -1,6 +1,6 @@
 // The three curves of a tray, drawn by uPlot.
 
-import { known, restitution, speed } from './words.js';
+import { known, restitution, roundNumbers, speed } from './words.js';
 
 const MM = 1e3;
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -194,8 +194,16 @@ export class SpeedChart extends Chart {
       const value = data[1][at] ?? data[4][at];
       return known(value) ? `${data[0][at].toFixed(1)} s: ${speed(value / MM)} mm/s` : '';
     };
+    const common = this.common({ distr: this.log ? 3 : 1, range }, read);
+    if (this.log) {
+      Object.assign(common.axes[1], {
+        splits: (_, __, low, high) => roundNumbers(low, high),
+        values: (_, splits) => splits.map(String),
+        filter: (_, splits) => splits,
+      });
+    }
     return {
-      ...this.common({ distr: this.log ? 3 : 1, range }, read),
+      ...common,
       series: [
         {},
         line('--measured', { width: 0, points: { show: true, size: 4, width: 0, fill: () => colour('--measured') } }),

@@ -11,7 +11,7 @@ const RATES = [
   ['processing, mean [ms]', (value) => `${value} ms each`],
   ['refused', (value) => (value === '0' ? '' : `${value} refused`)],
   ['picture, since the camera took it [ms]', (value) => `pictures ${value} ms old`],
-  [WAITING, (value) => `${value} frames waiting`],
+  [WAITING, (value) => `${value} ${value === '1' ? 'frame' : 'frames'} waiting`],
 ];
 
 const colour = (state) => (['silent', 'behind'].includes(state) ? 'warning' : state);
@@ -76,12 +76,13 @@ export class Nodes {
     one.level.dataset.state = colour(state);
     const words = { ok: 'well', behind: 'falls behind', silent: `silent for ${duration(age)}` };
     one.level.textContent = words[state] ?? state;
-    one.text.textContent = ['ok', 'behind'].includes(state) && node.text === 'working' ? '' : node.text;
+    one.text.textContent = ['ok', 'behind', 'silent'].includes(state) && node.text === 'working' ? '' : node.text;
     const values = new Map(node.values);
-    one.rates.textContent = RATES.filter(([key]) => values.get(key))
+    const rates = RATES.filter(([key]) => values.get(key))
       .map(([key, show]) => show(values.get(key)))
       .filter(Boolean)
       .join(' · ');
+    one.rates.textContent = state === 'silent' && rates ? `before: ${rates}` : rates;
     if (one.details.open || one.values.childElementCount === 0) {
       one.values.replaceChildren(
         ...node.values.flatMap(([key, value]) => {

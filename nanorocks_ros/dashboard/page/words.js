@@ -19,6 +19,21 @@ export function speed(value) {
   return mm >= 10 ? mm.toFixed(1) : mm >= 1 ? mm.toFixed(2) : mm.toFixed(3);
 }
 
+const HALVES = Array.from({ length: 18 }, (_, k) => 1 + k / 2);
+
+/** Round numbers between two others on a logarithmic axis, closer where these are near. */
+export function roundNumbers(low, high) {
+  const [first, last] = [Math.floor(Math.log10(low)), Math.ceil(Math.log10(high))];
+  const found = [[1], [1, 2, 5], [1, 1.5, 2, 3, 4, 5, 7], HALVES].map((digits) => {
+    const all = [];
+    for (let power = first; power <= last; power += 1) {
+      for (const digit of digits) all.push(Number(`${digit}e${power}`));
+    }
+    return all.filter((one) => one >= low && one <= high);
+  });
+  return found.find((some) => some.length >= 3) ?? found[3];
+}
+
 export function duration(seconds) {
   if (seconds < 90) return `${Math.round(seconds)} s`;
   return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${Math.round(seconds / 3600)} h`;
@@ -68,8 +83,8 @@ export function trayState(tray, silentFor) {
   const { truth: _, ...measured } = tray.latest;
   if (Object.keys(measured).length === 0) return ['waiting', 'nothing measured yet', 'waiting'];
   if (silentFor > 4) {
-    const text = `silent for ${duration(silentFor)}`;
-    return ['warning', text, text];
+    const since = duration(silentFor);
+    return ['warning', `silent for ${since}`, `silent ${since}`];
   }
   if (!shaken && !tray.latest.cor) return ['waiting', 'no shaking event yet', 'not shaken yet'];
   const status = tray.latest.cor?.status;
