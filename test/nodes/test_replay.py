@@ -197,7 +197,7 @@ def test_topics_of_others_are_played_as_they_were_offered(graph, tmp_path):
     assert '/odd: type odd_msgs/msg/Odd is not installed here; it is not played' in ended.output
     for name in ('/nanorocks/camera/image_raw', '/clock'):
         said = f'{name}: /nanorocks/bag_player and /nanorocks/listener publish it, and what'
-        assert said in ended.output
+        assert said in ended.output, ended.output
     assert 'a clock of its own (-r /clock:=/NAME/clock' in ended.output
     assert 'Traceback' not in ended.output
 
