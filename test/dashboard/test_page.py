@@ -137,6 +137,9 @@ def test_what_is_wrong_or_not_told_is_said_in_words(look, serve, results):
     server.diagnose([('/n', 0, 'working', [('frames waiting for the trays', '29')])])
     text_is(page, '#health', '1 behind')
     text_is(page, '.node', '29 frames waiting')
+    published = [('received', '0'), ('published', '31'), ('rate [1/s]', '0.00')]
+    server.diagnose([('/n', 0, 'working', published)])
+    text_is(page, '.node', '31 published')
     server.diagnose([('/n', 0, 'working', [('frames waiting for the trays', '1')])])
     text_is(page, '.node', '1 frame waiting')
     # Nothing of a node that is not heard any more is told as if it were so now.

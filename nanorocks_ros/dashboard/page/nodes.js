@@ -6,8 +6,10 @@ const SILENT_S = 3.5;
 const WAITING = 'frames waiting for the trays';
 // Of the thirty that may wait before frames are lost.
 const MANY_WAITING = 15;
+// What a node receives, and how fast, says nothing of one that only publishes.
+const isSource = (all) => all.get('received') === '0' && Number(all.get('published')) > 0;
 const RATES = [
-  ['rate [1/s]', (value) => `${value} messages/s`],
+  ['rate [1/s]', (value, all) => (isSource(all) ? `${all.get('published')} published` : `${value} messages/s`)],
   ['processing, mean [ms]', (value) => `${value} ms each`],
   ['refused', (value) => (value === '0' ? '' : `${value} refused`)],
   ['picture, since the camera took it [ms]', (value) => `pictures ${value} ms old`],
@@ -79,7 +81,7 @@ export class Nodes {
     one.text.textContent = ['ok', 'behind', 'silent'].includes(state) && node.text === 'working' ? '' : node.text;
     const values = new Map(node.values);
     const rates = RATES.filter(([key]) => values.get(key))
-      .map(([key, show]) => show(values.get(key)))
+      .map(([key, show]) => show(values.get(key), values))
       .filter(Boolean)
       .join(' · ');
     one.rates.textContent = state === 'silent' && rates ? `before: ${rates}` : rates;
