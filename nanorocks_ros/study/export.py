@@ -20,6 +20,7 @@ from nanorocks_ros.experiment.settings import rows
 from nanorocks_ros.recordings.messages import float_array_message, time_message
 from nanorocks_ros.recordings.results import RESULTS_MARK, write_csv
 from nanorocks_ros.recordings.writer import BagWriter
+from nanorocks_ros.study.offline import TrayResults
 from nanorocks_ros.study.parquet import Column, write_parquet
 from nanorocks_ros.study.results_bag import offered
 from nanorocks_ros.wire import topics
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from nanorocks_ros.experiment.settings import PipelineSettings
-    from nanorocks_ros.study.offline import Analysis, TrayResults
+    from nanorocks_ros.study.offline import Analysis
 
 BAG_NAME = 'results_bag'
 # Beside the tables in a batch.
@@ -37,13 +38,6 @@ SUMMARY, EVIDENCE = 'bag.json', 'evidence.npz'
 
 FORMATS = ('csv', 'parquet')
 """Forms of the tables of results; the first unless another is asked for."""
-
-_TABLES = 'speed', 'cluster', 'cor', 'rebound', 'collision', 'bodies', 'merge'
-# What an earlier analysis wrote, also that of a batch: it would not belong to the new one.
-_OURS = re.compile(
-    rf'{re.escape(RESULTS_MARK)}|{BAG_NAME}|{re.escape(SUMMARY)}|{re.escape(EVIDENCE)}'
-    rf'|tray_\d+_({"|".join(_TABLES)})\.({"|".join(FORMATS)})'
-)
 
 # Rows of a table that are put together in memory.
 _PIECE = 1000
@@ -130,8 +124,12 @@ def write_results(
 
 def _keep_others(folder: Path, fresh: Path) -> None:
     """Take over what somebody put beside earlier results: a figure, notes."""
+    # What an earlier analysis wrote, also that of a batch, would not belong to the new one.
+    tables = rf'tray_\d+_({"|".join(_tables(TrayResults()))})\.({"|".join(FORMATS)})'
+    names = map(re.escape, (RESULTS_MARK, BAG_NAME, SUMMARY, EVIDENCE))
+    ours = re.compile('|'.join([tables, *names]))
     for one in folder.iterdir():
-        if _OURS.fullmatch(one.name) or (fresh / one.name).exists():
+        if ours.fullmatch(one.name) or (fresh / one.name).exists():
             continue
         if one.is_dir() and not one.is_symlink():
             shutil.copytree(one, fresh / one.name, symlinks=True, copy_function=_linked)
@@ -148,16 +146,15 @@ def _linked(source: str | Path, target: str | Path) -> None:
 
 
 def _tables(results: TrayResults) -> dict[str, Sequence[ArrayRecord]]:
-    records = (
-        results.speeds,
-        results.clusters,
-        results.cors,
-        results.rebounds,
-        results.collisions,
-        results.bodies,
-        results.merges,
-    )
-    return dict(zip(_TABLES, records, strict=True))
+    return {
+        'speed': results.speeds,
+        'cluster': results.clusters,
+        'cor': results.cors,
+        'rebound': results.rebounds,
+        'collision': results.collisions,
+        'bodies': results.bodies,
+        'merge': results.merges,
+    }
 
 
 def _write_table(
