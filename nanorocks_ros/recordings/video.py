@@ -81,7 +81,9 @@ class Video:
             # Notes of old cameras need not be UTF-8.
             container = self._av.open(
                 f'file:{path.resolve()}',
-                options=dict(_ONLY_FILES),
+                # Not `options`: those are for streams, too, and where streams show up only after
+                # the head of a file, as in FLV, PyAV writes beyond what it has room for.
+                container_options=dict(_ONLY_FILES),
                 metadata_errors='backslashreplace',
             )
         except (self._av.FFmpegError, OSError) as error:
