@@ -104,6 +104,9 @@ class _Entrance:
     @web.middleware
     async def check(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Refuse who came by another name, from another page, or without the token."""
+        if 'Host' not in request.headers:
+            # Old versions of aiohttp make one up.
+            return _refused(400, 'asked for without a host')
         if not self._access.host_is_ours(request.host):
             return _refused(421, 'not served under this name; open it as http://127.0.0.1')
         origin = request.headers.get('Origin')

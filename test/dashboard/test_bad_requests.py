@@ -22,7 +22,6 @@ def answer(server, request):
         b'GET / HTTP/1.1\r\n\r\n',
         b'nonsense\r\n\r\n',
         b'\x16\x03\x01\x02\x00\x01\x00\x01\xfc',
-        b'GET http://[/ HTTP/1.1\r\nHost: localhost\r\n\r\n',
         b'GET / HTTP/1.1\r\nHost: localhost\r\nCookie: \x00\r\n\r\n',
         b'POST /login HTTP/1.1\r\nHost: localhost\r\nContent-Length: abc\r\n\r\n',
         _FORM + b'multipart/form-data\r\n\r\nabcde',
