@@ -103,8 +103,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.close()
         return 0
     except OSError as error:
-        where = '' if error.filename is None else f'{os.fsdecode(error.filename)}: '
-        text = f'{where}{error.strerror or error}; make room, or write elsewhere'
-        print(f'nanorocks: {text.encode(errors="backslashreplace").decode()}', file=sys.stderr)
+        from nanorocks_ros.study.shown import shown
+
+        where = '' if error.filename is None else f'{shown(str(error.filename))}: '
+        what = f'{where}{error.strerror or error}'
+        print(f'nanorocks: {what}; make room, or write elsewhere', file=sys.stderr)
         return EXIT_INPUT
     return code

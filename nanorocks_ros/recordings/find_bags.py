@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.bag_folder import ROS1_MAGIC, STORAGE_SUFFIXES
 from nanorocks_ros.recordings.mcap_blocks import MAGIC
-from nanorocks_ros.recordings.names import natural
+from nanorocks_ros.recordings.names import OF_THE_DISK, natural
 from nanorocks_ros.recordings.results import RESULTS_MARK
 from nanorocks_ros.recordings.sqlite_file import MAGIC as SQLITE_MAGIC
 
@@ -23,8 +23,6 @@ _MAGIC = MAGIC, ROS1_MAGIC, SQLITE_MAGIC
 _METADATA = 'metadata.yaml'
 # Of ROS 1 as well: whoever reads one says what to do with it.
 _RECORDINGS = {*STORAGE_SUFFIXES, '.bag'}
-# What a system keeps on a disk for itself.
-_OF_THE_DISK = {'lost+found', 'System Volume Information', '$RECYCLE.BIN'}
 _SPLIT = re.compile(r'_\d+$')
 
 
@@ -108,7 +106,7 @@ def _inside(folder: Path, found: FoundBags) -> list[Path]:
     """Recordings in a folder and in its folders; what else there is, is nobody's concern."""
     bags = []
     for path in sorted(folder.iterdir(), key=_in_order):
-        if path.name.startswith('.') or path.name in _OF_THE_DISK:
+        if path.name.startswith('.') or path.name in OF_THE_DISK:
             continue
         try:
             bags += _recordings_at(path, found)

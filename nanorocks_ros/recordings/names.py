@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+OF_THE_DISK = frozenset({'lost+found', 'System Volume Information', '$RECYCLE.BIN'})
+"""Folders that a system keeps on a disk for itself."""
+
 
 def natural(name: str) -> list[tuple[int, str]]:
     """A key that sorts `run_10.mcap` behind `run_9.mcap`."""

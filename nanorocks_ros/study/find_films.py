@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.image_folder import IMAGES, images_in
-from nanorocks_ros.recordings.names import natural
+from nanorocks_ros.recordings.names import OF_THE_DISK, natural
 from nanorocks_ros.recordings.streams import VIDEOS, looks_like_film
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def look_into(folder: Path) -> FoundFilms:
     """
     found = FoundFilms()
     for one in sorted(folder.iterdir(), key=lambda one: natural(one.name)):
-        if one.name.startswith('.'):
+        if one.name.startswith('.') or one.name in OF_THE_DISK:
             continue
         try:
             if bool(images_in(one)) if one.is_dir() else one.suffix.lower() in VIDEOS:

@@ -177,6 +177,15 @@ def close(monkeypatch, folder):
     monkeypatch.setattr(Path, 'iterdir', iterdir)
 
 
+def test_what_a_system_keeps_on_a_disk_for_itself_is_nobodys_concern(tmp_path, monkeypatch):
+    folder = tmp_path / 'films'
+    (folder / 'lost+found').mkdir(parents=True)
+    film = write_video(folder / 'a.avi', range(3))
+    close(monkeypatch, folder / 'lost+found')
+    found = films_of([folder])
+    assert (found.films, found.failed) == ([film], {})
+
+
 @pytest.mark.parametrize('passed', ['the folder', 'what is in it'])
 def test_a_folder_that_cannot_be_read_costs_no_other(tmp_path, capsys, monkeypatch, passed):
     folder = tmp_path / 'films'

@@ -1,0 +1,34 @@
+"""What the command says of faults that no part of it expected."""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import os
+
+import pytest
+
+from nanorocks_ros.cli import main as command
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'said'),
+    [
+        ((errno.EACCES, 'Permission denied', 'a\udcff b'), 'a\\udcff b: Permission denied; '),
+        ((errno.ENOSPC, 'No space left on device'), 'No space left on device; '),
+    ],
+)
+def test_a_fault_of_the_system_is_one_line_that_names_the_file(
+    monkeypatch, capsys, arguments, said
+):
+    def run(_):
+        raise OSError(*arguments)
+
+    parser = argparse.ArgumentParser()
+    parser.set_defaults(run=run)
+    monkeypatch.setattr(command, 'build_parser', lambda: parser)
+    assert command.main([]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == f'nanorocks: {said}make room, or write elsewhere'
+    # So that any terminal takes it.
+    assert os.fsencode(line) == line.encode('utf-8')
