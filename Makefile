@@ -48,10 +48,10 @@ test: venv ## Run all tests, then those of the core with the oldest dependencies
 # whole bags go through all stages and the inference. The simulation is the same, bit by bit, with
 # all dependencies, and one command of it is enough.
 ONCE := test/validation test/simulation test/inference test/stages test/dashboard/test_page.py \
-        test/physics/test_confined.py test/study/test_reproduce.py test/study/test_batch.py \
-        test/study/test_plate_fit.py test/study/test_cluster_curve.py test/study/test_sweep.py \
-        test/study/test_area_calibration.py test/study/test_calibrate.py test/cli/test_sweep.py \
-        test/cli/test_figure_cor.py test/cli/test_simulate_scene.py test/test_contributing.py
+        test/physics/test_confined_theory.py test/studies/reproduction test/studies/batch \
+        test/pipeline test/studies/calibration test/studies/libraries test/studies/sweeps \
+        test/cli/simulation/test_sweep.py \
+        test/cli/figures/test_figure_cor.py test/cli/simulation/test_simulate_scene.py test/test_contributing.py
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba" \
@@ -68,7 +68,7 @@ bench: venv ## Measure against the limits and against peers
 	@$(RUN) python -m benchmarks
 
 docs: venv ## Renew the pages of docs/ that are made from the code
-	@$(RUN) python -m nanorocks_ros.study.reference
+	@$(RUN) python -m nanorocks_ros.tools.docs_pages.wire_pages
 	@$(RUN) python -m nanorocks_ros.nodes.reference
 
 venv: ## Set up the environment that all of these use

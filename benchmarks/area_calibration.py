@@ -17,16 +17,16 @@ from benchmarks.scene_bag import SCALE, film_scene, settings
 from nanorocks_ros.experiment.plate import regions_on_plate
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import SpeedEstimate
-from nanorocks_ros.stages.speed import SpeedEstimator
-from nanorocks_ros.study.area_calibration import calibrate_area
-from nanorocks_ros.study.bag_frames import BagFrames
-from nanorocks_ros.study.bag_images import BagImages
-from nanorocks_ros.study.manual_tracks import ManualTracks
-from nanorocks_ros.study.speeds import ComparedSpeeds
-from nanorocks_ros.wire.beads import beads_from_array
+from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
+from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+from nanorocks_ros.studies.analysis.bag_images import BagImages
+from nanorocks_ros.studies.calibration.area_calibration import calibrate_area
+from nanorocks_ros.studies.calibration.manual_tracks import ManualTracks
+from nanorocks_ros.studies.inspection.speed_comparison import ComparedSpeeds
+from nanorocks_ros.wire.bead_truth import beads_from_array
 
 if TYPE_CHECKING:
-    from nanorocks_ros.study.area_fit import AreaFit
+    from nanorocks_ros.studies.calibration.area_fit import AreaFit
 
 # A tray, and a reading of the recipe.
 _Case = tuple[int, str]

@@ -14,14 +14,15 @@ from scipy.signal import fftconvolve
 
 from benchmarks.films import filmed
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.cluster_curve import curve_of
-from nanorocks_ros.inference.cluster_size import INNER_LEVEL, Width
+from nanorocks_ros.inference.cluster_size.cluster_curve import curve_of
+from nanorocks_ros.inference.cluster_size.size_from_width import INNER_LEVEL, Width
+from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.physics.autocorrelation import autocorrelation, level_region
 from nanorocks_ros.physics.paper_clusters import paper_calibration, paper_onset
 from nanorocks_ros.records import SizeStatus
-from nanorocks_ros.stages.clusters import correlated
-from nanorocks_ros.stages.tray_contrast import tray_contrast
-from nanorocks_ros.study.cluster_films import (
+from nanorocks_ros.stages.clusters.background_removal import tray_contrast
+from nanorocks_ros.stages.clusters.correlation_width import correlated
+from nanorocks_ros.studies.libraries.cluster_films import (
     EFFECTS,
     TIMES,
     ClusterPlan,
@@ -29,7 +30,6 @@ from nanorocks_ros.study.cluster_films import (
     drawn_run,
     filmed_run,
 )
-from nanorocks_ros.study.tasks import Workers, run_tasks
 
 _ALL = (1, 2, 3, 4, 5, 6, 7, 8)
 _TRAYS = (1, 3, 5)

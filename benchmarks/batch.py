@@ -18,26 +18,29 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from nanorocks_ros.experiment.settings import (
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.jobs.tasks import Workers
+from nanorocks_ros.recordings.bag.find_bags import find_bags
+from nanorocks_ros.recordings.bag.fingerprint import content_hash, file_states, total_size
+from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.reader import open_bag
+from nanorocks_ros.recordings.bag.writer import BagWriter
+from nanorocks_ros.recordings.messages.message_builders import (
+    compressed_image_message,
+    time_message,
+)
+from nanorocks_ros.settings import (
     CompressionSettings,
     PipelineSettings,
     SceneSettings,
     SimulationSettings,
 )
-from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.recordings.content import content_hash, file_states, total_size
-from nanorocks_ros.recordings.find_bags import find_bags
-from nanorocks_ros.recordings.messages import compressed_image_message, time_message
-from nanorocks_ros.recordings.reader import open_bag
-from nanorocks_ros.recordings.writer import BagWriter
-from nanorocks_ros.study.batch import BatchPlan, run_batch
-from nanorocks_ros.study.batch_files import write_batch
-from nanorocks_ros.study.campaign import plate_settings
-from nanorocks_ros.study.combined import combined
-from nanorocks_ros.study.film_bag import START_NS, film_into_bag
-from nanorocks_ros.study.film_scene import SceneRecorder
-from nanorocks_ros.study.results_bag import offered
-from nanorocks_ros.study.tasks import Workers
+from nanorocks_ros.studies.batch.batch_analysis import BatchPlan, run_batch
+from nanorocks_ros.studies.batch.batch_files import write_batch
+from nanorocks_ros.studies.batch.campaign_means import combined
+from nanorocks_ros.studies.reproduction.simulated_campaign import plate_settings
+from nanorocks_ros.studies.synthetic.film_bag import START_NS, film_into_bag
+from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
 from nanorocks_ros.wire import topics
 
 _SECONDS = 20.0

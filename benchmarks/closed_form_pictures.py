@@ -13,11 +13,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from nanorocks_ros.cli.main import main as nanorocks
-from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.recordings.results import write_csv
+from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
-from nanorocks_ros.simulation.shaking import ShakenTray
+from nanorocks_ros.simulation.shaken_tray import ShakenTray
 
 TIMES = np.arange(0.1, 30.0, 0.1)
 PERIOD = 60.0

@@ -14,16 +14,20 @@ import numpy as np
 from scipy import optimize
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.physics.confined import confined_gas
-from nanorocks_ros.physics.confined_decay import windowed_restitution
-from nanorocks_ros.physics.kinetic import contact_value, kinetic_decay_rate, kinetic_restitution
-from nanorocks_ros.physics.paper import RELATIVE_TO_MEAN_SPEED, paper_restitution_of_decay
+from nanorocks_ros.inference.decay.confined_decay import windowed_restitution
+from nanorocks_ros.physics.confined_theory import confined_gas
+from nanorocks_ros.physics.kinetic_theory import (
+    contact_value,
+    kinetic_decay_rate,
+    kinetic_restitution,
+)
+from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED, paper_restitution_of_decay
+from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.ensemble import cooling_runs
-from nanorocks_ros.simulation.initial import resting_beads, rules_of
-from nanorocks_ros.simulation.shaking import after_shaking
+from nanorocks_ros.simulation.initial_state import resting_beads, rules_of
+from nanorocks_ros.simulation.shaken_tray import after_shaking
 
 RUNS = {1: 400, 3: 120, 5: 64, 6: 8, 7: 24, 8: 8}
 TEMPERATURES = {1: 100, 3: 40, 5: 20, 7: 6}

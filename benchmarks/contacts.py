@@ -13,21 +13,24 @@ from collections.abc import Iterator, Sequence
 import cv2
 import numpy as np
 
-from nanorocks_ros.experiment.settings import (
+from nanorocks_ros.experiment.trays import Tray, load_trays
+from nanorocks_ros.experiment.view import View
+from nanorocks_ros.inference.contacts.contact_estimate import contact_estimate
+from nanorocks_ros.inference.contacts.contact_likelihood import (
+    pair_log_likelihood,
+    rebound_log_likelihood,
+)
+from nanorocks_ros.records import BeadsTruth, Frame, PairCollision, Rebound, Tracks, TrayImage
+from nanorocks_ros.settings import (
     PipelineSettings,
     SceneSettings,
     SimulationSettings,
     with_values,
 )
-from nanorocks_ros.experiment.trays import Tray, load_trays
-from nanorocks_ros.experiment.view import View
-from nanorocks_ros.inference.contact_estimate import contact_estimate
-from nanorocks_ros.inference.contacts import pair_log_likelihood, rebound_log_likelihood
-from nanorocks_ros.records import BeadsTruth, Frame, PairCollision, Rebound, Tracks, TrayImage
-from nanorocks_ros.simulation.scene.film import SceneFilm
-from nanorocks_ros.simulation.shaking import ShakenTray
-from nanorocks_ros.stages.contacts.find import ContactFinder
-from nanorocks_ros.stages.preprocess import Preprocessor
+from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
+from nanorocks_ros.simulation.shaken_tray import ShakenTray
+from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
+from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 _RATE = 30.0

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.contact_terms import ContactTerms
-from nanorocks_ros.physics.haff_fit import fit_haff
+from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+from nanorocks_ros.inference.decay.haff_fit import fit_haff
+from nanorocks_ros.jobs.tasks import Workers
+from nanorocks_ros.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
-from nanorocks_ros.stages.readings import Decay, LibraryReading
-from nanorocks_ros.study.build_library import LibraryPlan, cool_node
-from nanorocks_ros.study.sweep import sweep
-from nanorocks_ros.study.sweep_plan import sweep_plan
-from nanorocks_ros.study.tasks import Workers
+from nanorocks_ros.stages.restitution.restitution_methods import Decay, LibraryReading
+from nanorocks_ros.studies.libraries.decay_simulations import LibraryPlan, cool_node
+from nanorocks_ros.studies.sweeps.sweep_plan import sweep_plan
+from nanorocks_ros.studies.sweeps.sweep_runs import sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -23,17 +23,17 @@ from operator import add
 import numpy as np
 
 from benchmarks.filmed_cycles import Cycle, Film, load, make
-from nanorocks_ros.experiment.settings import PipelineSettings, PriorSettings, with_values
 from nanorocks_ros.experiment.trays import Tray, load_trays
-from nanorocks_ros.inference.contact_terms import ContactTerms
-from nanorocks_ros.inference.decay_library import library_of
-from nanorocks_ros.inference.decay_likelihood import decay_likelihood
-from nanorocks_ros.inference.restitution import Posterior, posterior_of, tables_of
+from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.posterior import Posterior, posterior_of, tables_of
+from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.records import CorEstimate, CorStatus
-from nanorocks_ros.stages.contacts.find import LATEST_NS
-from nanorocks_ros.stages.cooling import HaffFitter
-from nanorocks_ros.stages.readings import Decay
-from nanorocks_ros.study.tasks import Workers
+from nanorocks_ros.settings import PipelineSettings, PriorSettings, with_values
+from nanorocks_ros.stages.contacts.contact_finder import LATEST_NS
+from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.restitution.restitution_methods import Decay
 
 # Films of each: the first truth is what the goals are about.
 _FILMS = {

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.scene_bag import SCALE, settings
-from nanorocks_ros.experiment.settings import SceneSettings, SimulationSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import View
 from nanorocks_ros.records import BeadsTruth, Frame, Tracks, TrayImage
-from nanorocks_ros.simulation.scene.film import SceneFilm, without_effects
-from nanorocks_ros.stages.preprocess import Preprocessor
+from nanorocks_ros.settings import SceneSettings, SimulationSettings, with_values
+from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm, without_effects
+from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 if TYPE_CHECKING:

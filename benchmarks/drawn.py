@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import numpy as np
 
-    from nanorocks_ros.experiment.settings import PriorSettings
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.settings import PriorSettings
 
 
 def varied(

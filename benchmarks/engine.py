@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.engine_peers import report_peers
-from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
-from nanorocks_ros.simulation.engine import tuning
+from nanorocks_ros.settings import SimulationSettings
+from nanorocks_ros.simulation.engine.collision_rules import UniformRestitution
 from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas, Kernel
-from nanorocks_ros.simulation.engine.rules import UniformRestitution
+from nanorocks_ros.simulation.engine.neighbours import list_tuning
 from nanorocks_ros.simulation.ensemble import cooling_runs
 
 # Collisions per bead before the clock starts, so that the crystal has melted, and after.
@@ -199,15 +199,15 @@ def report_search() -> None:
 def report_shell() -> None:
     """Print what a reference ahead of the bead saves."""
     print('centre of a new shell ahead of its bead, in radii of the shell; N = 1000\n')
-    kept = tuning.AHEAD_OF_BEAD
+    kept = list_tuning.AHEAD_OF_BEAD
     for density in (DILUTE, DENSE):
         found = []
         for ahead in (0.0, 0.4, kept):
-            tuning.AHEAD_OF_BEAD = ahead
+            list_tuning.AHEAD_OF_BEAD = ahead
             gas = gas_of(1000, density, periodic=True)
             rate = measured(gas, density, SHORT * 3).collisions
             found.append((ahead, rate, gas.counts.renewed / gas.counts.pair))
-        tuning.AHEAD_OF_BEAD = kept
+        list_tuning.AHEAD_OF_BEAD = kept
         text = ', '.join(
             f'{ahead:.1f}: {renewed:.2f} renewals a collision, rate x {rate / found[0][1]:.2f}'
             for ahead, rate, renewed in found

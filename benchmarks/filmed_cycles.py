@@ -17,15 +17,9 @@ import cv2
 import numpy as np
 
 from benchmarks.drawn import varied
-from nanorocks_ros.experiment.settings import (
-    PipelineSettings,
-    PriorSettings,
-    SceneSettings,
-    SimulationSettings,
-    with_values,
-)
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.experiment.view import View
+from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.records import (
     Frame,
     PairCollision,
@@ -34,11 +28,17 @@ from nanorocks_ros.records import (
     Tracks,
     TrayImage,
 )
-from nanorocks_ros.simulation.scene.film import SceneFilm
-from nanorocks_ros.stages.contacts.find import ContactFinder
-from nanorocks_ros.stages.preprocess import Preprocessor
-from nanorocks_ros.stages.speed import SpeedEstimator
-from nanorocks_ros.study.tasks import Workers, run_tasks
+from nanorocks_ros.settings import (
+    PipelineSettings,
+    PriorSettings,
+    SceneSettings,
+    SimulationSettings,
+    with_values,
+)
+from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
+from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
+from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 
 FOLDER = 'NANOROCKS_FILMS'
 """Environment variable: where films are kept; without it, below the temporary directory."""

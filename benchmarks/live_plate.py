@@ -29,8 +29,8 @@ from pathlib import Path
 import numpy as np
 
 from nanorocks_ros.records import GroundTruth, TrayState
-from nanorocks_ros.study.bag_frames import BagFrames
-from nanorocks_ros.wire.layouts import layout
+from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+from nanorocks_ros.wire.array_layouts import layout
 
 _SECONDS = float(os.environ.get('LIVE_PLATE_SECONDS', '60'))
 _RUNS = os.environ.get('LIVE_PLATE_RUNS', 'compressed raw everything').split()

@@ -20,16 +20,16 @@ from pathlib import Path
 import cv2
 
 from benchmarks.live_plate import PLATE, filmed_plate
-from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings, with_values
-from nanorocks_ros.stages.warm_up import (
+from nanorocks_ros.pipeline.warm_up import (
     warm_up,
     warm_up_clusters,
     warm_up_cooling,
     warm_up_speed,
 )
-from nanorocks_ros.study.bag_frames import BagFrames
-from nanorocks_ros.study.film_bag import film_into_bag
-from nanorocks_ros.study.offline import analyse
+from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
+from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+from nanorocks_ros.studies.analysis.offline_analysis import analyse
+from nanorocks_ros.studies.synthetic.film_bag import film_into_bag
 
 _SECONDS = 10.0
 _PLATE_SECONDS = 60.0

@@ -12,14 +12,14 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.contacts import true_tracks
-from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.physics.packing import HEXAGONAL_LAYER, PAPER_COMPACTION
+from nanorocks_ros.physics.filling_factor import HEXAGONAL_LAYER, PAPER_COMPACTION
 from nanorocks_ros.records import Merge
-from nanorocks_ros.simulation.shaking import ShakenTray
-from nanorocks_ros.stages.bodies.count import BodyCounter
-from nanorocks_ros.stages.packing import bodies_of_pairs, packing_of_clusters
-from nanorocks_ros.study.packing import compaction, simulated_packing
+from nanorocks_ros.settings import PipelineSettings, SimulationSettings
+from nanorocks_ros.simulation.shaken_tray import ShakenTray
+from nanorocks_ros.stages.bodies.body_counter import BodyCounter
+from nanorocks_ros.stages.clusters.packing_density import bodies_of_pairs, packing_of_clusters
+from nanorocks_ros.studies.analysis.cluster_packing import compaction, simulated_packing
 
 _SPEEDS = (0.0, 0.001, 0.003, 0.0104)
 _CYCLES = 18

@@ -12,13 +12,13 @@ from collections import defaultdict
 import cv2
 
 from benchmarks.films import SCALE, filmed
-from nanorocks_ros.experiment.settings import PipelineSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import View
+from nanorocks_ros.pipeline.composition import Pipeline
 from nanorocks_ros.records import Frame, SpeedEstimate, TrayImage
-from nanorocks_ros.stages.bodies.count import BodyCounter
-from nanorocks_ros.stages.contacts.find import ContactFinder
-from nanorocks_ros.stages.pipeline import Pipeline
+from nanorocks_ros.settings import PipelineSettings, with_values
+from nanorocks_ros.stages.bodies.body_counter import BodyCounter
+from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 _TRAYS = (1, 2, 3, 4, 5, 6, 7, 8)

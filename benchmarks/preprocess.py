@@ -14,25 +14,25 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.experiment.plate import regions_on_plate
-from nanorocks_ros.experiment.settings import (
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.experiment.view import View
+from nanorocks_ros.pipeline.composition import trays_of
+from nanorocks_ros.records import Frame, TrayImage
+from nanorocks_ros.settings import (
     PipelineSettings,
     SceneSettings,
     SimulationSettings,
     with_values,
 )
-from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.experiment.view import View
-from nanorocks_ros.records import Frame, TrayImage
-from nanorocks_ros.simulation.scene.film import SceneFilm
-from nanorocks_ros.stages.find_trays import guess_plate
-from nanorocks_ros.stages.frame_checks import FrameChecks
-from nanorocks_ros.stages.picture_checks import picture_quality
-from nanorocks_ros.stages.pipeline import trays_of
-from nanorocks_ros.stages.preprocess import Preprocessor
-from nanorocks_ros.stages.rectify import mix_weights, nodes_of, resample_color
-from nanorocks_ros.stages.shaking import MotionMeter
-from nanorocks_ros.stages.stabilise import TrayFollower
-from nanorocks_ros.study.plate_fit import fit_plate
+from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
+from nanorocks_ros.stages.preprocess.frame_checks import FrameChecks
+from nanorocks_ros.stages.preprocess.gray_image_checks import picture_quality
+from nanorocks_ros.stages.preprocess.plate_search import guess_plate
+from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.rectify import mix_weights, nodes_of, resample_color
+from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter
+from nanorocks_ros.stages.preprocess.stabilise import TrayFollower
+from nanorocks_ros.studies.calibration.plate_fit import fit_plate
 
 _FRAMES = 75
 _ROUNDS = 3

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from nanorocks_ros.recordings.images import encode_jpeg
-from nanorocks_ros.recordings.messages import compressed_image_message
-from nanorocks_ros.recordings.recorder import Recorder
-from nanorocks_ros.study.results_bag import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.recorder import Recorder
+from nanorocks_ros.recordings.messages.image_messages import encode_jpeg
+from nanorocks_ros.recordings.messages.message_builders import compressed_image_message
 from nanorocks_ros.wire import topics
 
 _FRAMES = 300

@@ -18,13 +18,13 @@ import cv2
 import numpy as np
 from rosbags.rosbag2 import Reader
 
-from nanorocks_ros.recordings.messages import compressed_image_message
-from nanorocks_ros.recordings.reader import open_bag
-from nanorocks_ros.recordings.salvage import salvage
-from nanorocks_ros.recordings.writer import BagWriter
-from nanorocks_ros.study.films import ImportSettings
-from nanorocks_ros.study.import_film import import_films
-from nanorocks_ros.study.results_bag import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.reader import open_bag
+from nanorocks_ros.recordings.bag.salvage import salvage
+from nanorocks_ros.recordings.bag.writer import BagWriter
+from nanorocks_ros.recordings.messages.message_builders import compressed_image_message
+from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
+from nanorocks_ros.studies.film_import.import_film import import_films
 from nanorocks_ros.wire import topics
 
 _WIDTH, _HEIGHT, _FRAMES = 1920, 1080, 300

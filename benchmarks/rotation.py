@@ -15,8 +15,8 @@ from benchmarks import rough_gas as gas
 from benchmarks import rough_sharing as energy
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.physics.confined import confined_gas
-from nanorocks_ros.physics.rotation import (
+from nanorocks_ros.physics.confined_theory import confined_gas
+from nanorocks_ros.physics.rough_spheres import (
     SOLID_SPHERE,
     rough_temperature_ratio,
     smooth_equivalent,

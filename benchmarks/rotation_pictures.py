@@ -12,8 +12,8 @@ from benchmarks import rough_gas as gas
 from benchmarks import rough_sharing as energy
 from benchmarks.rotation import NOISE, RUNS, SEEDS, STEP, TIMES, TOGETHER, curves
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.physics.paper import RELATIVE_TO_MEAN_SPEED
-from nanorocks_ros.physics.rotation import temperature_ratio_course
+from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED
+from nanorocks_ros.physics.rough_spheres import temperature_ratio_course
 
 mpl.use('Agg')
 from matplotlib.figure import Figure

@@ -10,10 +10,10 @@ import numpy as np
 from benchmarks.hard_sphere_runs import DIAMETER, MASS, TIME, bulk
 from benchmarks.rough_gas import settings_of
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.physics.rotation import SOLID_SPHERE
+from nanorocks_ros.physics.rough_spheres import SOLID_SPHERE
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
-from nanorocks_ros.simulation.initial import resting_beads, rules_of
-from nanorocks_ros.simulation.shaking import after_shaking
+from nanorocks_ros.simulation.initial_state import resting_beads, rules_of
+from nanorocks_ros.simulation.shaken_tray import after_shaking
 
 BULK_DENSITY = 0.1
 

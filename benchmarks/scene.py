@@ -15,13 +15,14 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from nanorocks_ros.experiment.settings import (
+from nanorocks_ros.settings import (
     CompressionSettings,
     SceneSettings,
     SimulationSettings,
 )
-from nanorocks_ros.simulation.scene import camera, film, moving_plate, painter
-from nanorocks_ros.study.compression import H264Stream, compressed
+from nanorocks_ros.simulation.plate_scene import moving_plate, plate_camera, plate_film
+from nanorocks_ros.simulation.plate_scene.drawing import painter
+from nanorocks_ros.studies.synthetic.film_compression import H264Stream, compressed
 
 _FRAMES = 60
 _KEPT = 3
@@ -31,12 +32,12 @@ _FLIGHT = 96e6 / 1800.0
 
 # What is timed: label, where it is looked up, its name.
 _PARTS = (
-    ('gas in eight trays', film.ShakenTray, 'at'),
+    ('gas in eight trays', plate_film.ShakenTray, 'at'),
     ('plate, shifted while it swings', moving_plate.MovingPlate, 'moved_to'),
     ('shadows', painter, 'draw_shadows'),
     ('beads and grains', painter, 'draw_bodies'),
-    ('glare', camera, 'add_light'),
-    ('light, noise, gray levels', camera, 'expose'),
+    ('glare', plate_camera, 'add_light'),
+    ('light, noise, gray levels', plate_camera, 'expose'),
 )
 
 
@@ -62,7 +63,7 @@ def report() -> None:
 
 def _run(scene: SceneSettings, spent=None):
     shaken = SimulationSettings(first_shake=0.0)
-    filmed = film.SceneFilm(shaken, scene)
+    filmed = plate_film.SceneFilm(shaken, scene)
     images, times = [], []
     filmed.at(0, 0)
     for times_of_part in (spent or {}).values():
@@ -112,7 +113,7 @@ def _print_single(jpeg: float) -> None:
         'all effects, plate at rest': replace(everything, swing=0.0),
         'all effects but shadows': replace(everything, shadows=0.0),
         'all effects, trays 1 to 5': replace(everything, trays=(1, 2, 3, 4, 5)),
-        'no effects': film.without_effects(everything),
+        'no effects': plate_film.without_effects(everything),
     }
     for name, scene in cases.items():
         _, cost = _run(scene)
@@ -127,7 +128,7 @@ def _print_compression(images, jpeg: float, decode: float) -> None:
     print(f'| decoding that | {decode:.1f} | |')
     flight = CompressionSettings(codec='jpeg_rate')
     shaken = SimulationSettings(first_shake=0.0)
-    moments = film.SceneFilm(shaken, SceneSettings()).moments(_FRAMES)
+    moments = plate_film.SceneFilm(shaken, SceneSettings()).moments(_FRAMES)
     sizes = [len(content) for _, content in compressed(moments, flight, quality=1, frame_rate=30)]
     print(f'| JPEG of the rate of the flight | | {1800 * np.mean(sizes) / _MEGA:.0f} |')
     try:
@@ -145,9 +146,10 @@ def _print_places() -> None:
     print('\n| red beads of tray 1 | found | mean column, row [px] | rms [px] |')
     print('| --- | --- | --- | --- |')
     everything = SceneSettings()
-    cases = {'all effects': everything, 'no effects': film.without_effects(everything)}
+    cases = {'all effects': everything, 'no effects': plate_film.without_effects(everything)}
     for name, scene in cases.items():
-        filmed = film.SceneFilm(SimulationSettings(first_shake=0.0), replace(scene, trays=(1,)))
+        simulation = SimulationSettings(first_shake=0.0)
+        filmed = plate_film.SceneFilm(simulation, replace(scene, trays=(1,)))
         errors = np.concatenate([_places(filmed, number) for number in range(0, 60, 3)])
         mean = ', '.join(f'{value:.3f}' for value in errors.mean(axis=0))
         rms = ', '.join(f'{value:.3f}' for value in np.sqrt((errors**2).mean(axis=0)))

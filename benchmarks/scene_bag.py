@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.experiment.settings import (
+from nanorocks_ros.settings import (
     CompressionSettings,
     PipelineSettings,
     SceneSettings,
     SimulationSettings,
     with_values,
 )
-from nanorocks_ros.study.film_scene import SceneRecorder
+from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import Tray, load_trays
-from nanorocks_ros.physics.haff_fit import HaffFit, fit_haff
-from nanorocks_ros.simulation.shaking import ShakenTray
+from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
+from nanorocks_ros.settings import SimulationSettings
+from nanorocks_ros.simulation.shaken_tray import ShakenTray
 
 _CYCLES = 120
 _TIMES = 0.2 * np.arange(1, 101)

@@ -14,13 +14,13 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.records import Frame, SpeedEstimate, TrayImage
-from nanorocks_ros.simulation.film import film
-from nanorocks_ros.stages.pipeline import trays_of
-from nanorocks_ros.stages.preprocess import Preprocessor
-from nanorocks_ros.stages.speed import SpeedEstimator
+from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
+from nanorocks_ros.simulation.tray_camera.tray_film import film
+from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 
 _NS = 1e9
 _SEEDS = range(1, 5)

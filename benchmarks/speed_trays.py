@@ -16,19 +16,19 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from nanorocks_ros.experiment.settings import (
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.experiment.view import View
+from nanorocks_ros.jobs.worker_processes import finished_in_processes
+from nanorocks_ros.records import Frame, Quality, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.settings import (
     PipelineSettings,
     SceneSettings,
     SimulationSettings,
     with_values,
 )
-from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.experiment.view import View
-from nanorocks_ros.records import Frame, Quality, SpeedEstimate, SpeedMethod, TrayImage
-from nanorocks_ros.simulation.scene.film import SceneFilm, without_effects
-from nanorocks_ros.stages.preprocess import Preprocessor
-from nanorocks_ros.stages.speed import SpeedEstimator
-from nanorocks_ros.study.processes import finished_in_processes
+from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm, without_effects
+from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

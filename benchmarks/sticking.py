@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.contacts import tracks_of
-from nanorocks_ros.experiment.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import Tray, load_trays
-from nanorocks_ros.inference.sticking import sticking_estimate
-from nanorocks_ros.inference.sticking_cycle import StickingCycle, sticking_cycle
-from nanorocks_ros.physics.sticking import slow_contacts
+from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
+from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
+from nanorocks_ros.jobs.tasks import Workers, run_tasks
+from nanorocks_ros.physics.sticking_rates import slow_contacts
 from nanorocks_ros.records import BodyEstimate, Merge, Tracks
-from nanorocks_ros.simulation.shaking import ShakenTray
-from nanorocks_ros.stages.bodies.count import BodyCounter
-from nanorocks_ros.study.tasks import Workers, run_tasks
+from nanorocks_ros.settings import PipelineSettings, SimulationSettings
+from nanorocks_ros.simulation.shaken_tray import ShakenTray
+from nanorocks_ros.stages.bodies.body_counter import BodyCounter
 
 _RATE = 30.0
 _SECONDS = 58.0

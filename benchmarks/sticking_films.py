@@ -18,18 +18,14 @@ import numpy as np
 
 from benchmarks.filmed_cycles import PLACES, folder
 from benchmarks.sticking import true_merges
-from nanorocks_ros.experiment.settings import (
-    PipelineSettings,
-    SceneSettings,
-    SimulationSettings,
-    with_values,
-)
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.experiment.view import View
-from nanorocks_ros.inference.sticking import sticking_estimate
-from nanorocks_ros.inference.sticking_cycle import StickingCycle, sticking_cycle
+from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
+from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
+from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.physics.paper_clusters import paper_onset
-from nanorocks_ros.physics.sticking import slow_contacts
+from nanorocks_ros.physics.sticking_rates import slow_contacts
+from nanorocks_ros.pipeline.composition import TrayStages
 from nanorocks_ros.records import (
     BodyEstimate,
     ClusterEstimate,
@@ -39,11 +35,15 @@ from nanorocks_ros.records import (
     Tracks,
     TrayImage,
 )
-from nanorocks_ros.simulation.scene.film import SceneFilm
-from nanorocks_ros.stages.bodies.count import BodyCounter
-from nanorocks_ros.stages.pipeline import TrayStages
-from nanorocks_ros.stages.preprocess import Preprocessor
-from nanorocks_ros.study.tasks import Workers, run_tasks
+from nanorocks_ros.settings import (
+    PipelineSettings,
+    SceneSettings,
+    SimulationSettings,
+    with_values,
+)
+from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
+from nanorocks_ros.stages.bodies.body_counter import BodyCounter
+from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 
 _STICKING = (1e-3, 3e-3, 5e-3, 10.4e-3)
 _FILMS, _CONTROLS = 12, 7

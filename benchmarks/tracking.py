@@ -16,11 +16,11 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from benchmarks.films import RATE, SCALE, Shot, filmed
-from nanorocks_ros.experiment.settings import PipelineSettings, TrackingSettings, with_values
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import BeadsTruth, Tracks
-from nanorocks_ros.stages.tracking.detect import BeadDetector, Detections
-from nanorocks_ros.stages.tracking.link import Linker
+from nanorocks_ros.settings import PipelineSettings, TrackingSettings, with_values
+from nanorocks_ros.stages.tracking.detection.bead_detector import BeadDetector, Detections
+from nanorocks_ros.stages.tracking.linking.track_linker import Linker
 from nanorocks_ros.stages.tracking.mean_speed import mean_speed
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.scene.film import SceneFilm
+    from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
 
 _TRAYS = (1, 2, 3, 4, 5, 6, 7)
 _WARM_UP = 45

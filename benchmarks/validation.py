@@ -20,15 +20,15 @@ from scipy.spatial.distance import cdist
 from benchmarks import area_calibration
 from benchmarks.scene_bag import QUALITY, SCALE, SECONDS, SHAKE, film_scene, scenes, settings
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.simulation.scene.film import SceneFilm
-from nanorocks_ros.study.bag_frames import BagFrames
-from nanorocks_ros.study.speeds import AUTO, METHODS, compare_speeds
-from nanorocks_ros.study.tracking import track_bag
-from nanorocks_ros.wire.beads import beads_from_array
+from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
+from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+from nanorocks_ros.studies.analysis.bag_tracks import track_bag
+from nanorocks_ros.studies.inspection.speed_comparison import AUTO, METHODS, compare_speeds
+from nanorocks_ros.wire.bead_truth import beads_from_array
 
 if TYPE_CHECKING:
     from nanorocks_ros.records import BeadsTruth, Tracks
-    from nanorocks_ros.study.speeds import ComparedSpeeds
+    from nanorocks_ros.studies.inspection.speed_comparison import ComparedSpeeds
 
 _ROOT = Path(__file__).parents[1]
 _PAGE = _ROOT / 'docs' / 'validation.md'

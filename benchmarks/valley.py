@@ -14,14 +14,14 @@ from operator import add
 import numpy as np
 
 from benchmarks.contacts import contacts_of, true_tracks
-from nanorocks_ros.experiment.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.contact_terms import ContactTerms
-from nanorocks_ros.inference.decay_library import library_of
-from nanorocks_ros.inference.decay_likelihood import DecayLikelihood, decay_likelihood
-from nanorocks_ros.inference.restitution import Posterior, posterior_of, tables_of
+from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood, decay_likelihood
+from nanorocks_ros.inference.posterior import Posterior, posterior_of, tables_of
+from nanorocks_ros.jobs.tasks import Workers, run_tasks
+from nanorocks_ros.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
-from nanorocks_ros.study.tasks import Workers, run_tasks
 
 _TRAYS = (1, 3)
 _CYCLES = 18

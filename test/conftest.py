@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+pytest_plugins = ['dask_fixtures']
+
 ROOT = Path(__file__).resolve().parent.parent
 NOT_PACKAGED = ('.*', '__pycache__', '*.egg-info', 'build', 'install', 'log', 'dist')
 

@@ -21,7 +21,7 @@ from ament_index_python.packages import get_package_prefix
 import nanorocks_ros
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import CorEstimate
-from nanorocks_ros.wire.layouts import layout
+from nanorocks_ros.wire.array_layouts import layout
 
 assert len(load_trays()) == 8
 assert layout(CorEstimate).fields[0].name == 'time'

@@ -22,7 +22,7 @@ from importlib import resources
 import nanorocks_ros
 from nanorocks_ros.records import CorEstimate
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.wire.layouts import layout
+from nanorocks_ros.wire.array_layouts import layout
 
 print(nanorocks_ros.__file__)
 print(len(load_trays()), layout(CorEstimate).fields[0].name)

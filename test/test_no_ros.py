@@ -39,7 +39,7 @@ def test_every_module_but_the_nodes_imports_without_ros():
     )
     assert result.returncode == 0, result.stderr
     imported = set(result.stdout.split())
-    assert {'nanorocks_ros.cli.main', 'nanorocks_ros.stages.pipeline'} <= imported
+    assert {'nanorocks_ros.cli.main', 'nanorocks_ros.pipeline.composition'} <= imported
     assert not any(name.startswith('nanorocks_ros.nodes') for name in imported)
 
 

@@ -10,14 +10,14 @@ from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import NanorocksError
-from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.records import CorRelation, CorStatus, Quality
+from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
 
     from nanorocks_ros.records import CorEstimate
-    from nanorocks_ros.study.offline import Analysis, TrayResults
+    from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
 
 _EPILOG = """\
 Several bags, a pattern, or a folder of bags make a batch: one worker for each core, resumed by the
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
     """Analyse one bag or many, print, write; the exit code."""
     from nanorocks_ros.cli.analyse_batch import is_batch, run_many
     from nanorocks_ros.cli.flags import settings_from
-    from nanorocks_ros.study.parquet import check_parquet
+    from nanorocks_ros.outputs.parquet import check_parquet
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
     # Before hours of work.
@@ -76,9 +76,9 @@ def run(options: argparse.Namespace) -> int:
 
 def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.study.export import check_results_folder, write_results
-    from nanorocks_ros.study.offline import analyse
-    from nanorocks_ros.study.results_json import as_json
+    from nanorocks_ros.studies.analysis.offline_analysis import analyse
+    from nanorocks_ros.studies.analysis.results_folder import check_results_folder, write_results
+    from nanorocks_ros.studies.analysis.results_json import as_json
 
     source = Path(options.bags[0])
     # `.` has no name of its own.
@@ -132,7 +132,7 @@ def _print(analysis: Analysis) -> None:
 
 
 def _print_cycles(results: TrayResults) -> None:
-    from nanorocks_ros.study.results_json import last_of_each_cycle
+    from nanorocks_ros.studies.analysis.results_json import last_of_each_cycle
 
     cycles = last_of_each_cycle(results.cors)
     if not cycles:

@@ -11,16 +11,16 @@ from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.study.shown import counted, shown
+from nanorocks_ros.outputs.safe_text import counted, shown
 
 if TYPE_CHECKING:
     import argparse
 
-    from nanorocks_ros.experiment.settings import PipelineSettings
-    from nanorocks_ros.study.batch import Batch
-    from nanorocks_ros.study.batch_store import BatchStore
-    from nanorocks_ros.study.batch_task import BagOutcome
-    from nanorocks_ros.study.combined import Combined, TrayMeans
+    from nanorocks_ros.settings import PipelineSettings
+    from nanorocks_ros.studies.batch.batch_analysis import Batch
+    from nanorocks_ros.studies.batch.batch_store import BatchStore
+    from nanorocks_ros.studies.batch.batch_task import BagOutcome
+    from nanorocks_ros.studies.batch.campaign_means import Combined, TrayMeans
 
 _LOOK = 1.0
 # Where nobody watches a bar, a line is written so often, [s].
@@ -36,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def is_batch(options: argparse.Namespace) -> bool:
     """Whether many recordings are meant."""
-    from nanorocks_ros.recordings.find_bags import is_collection, is_pattern
+    from nanorocks_ros.recordings.bag.find_bags import is_collection, is_pattern
 
     asked = options.workers, options.scheduler
     if len(options.bags) > 1 or any(one is not None for one in asked):
@@ -46,11 +46,11 @@ def is_batch(options: argparse.Namespace) -> bool:
 
 def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
     """Analyse all, put them together, report; the exit code."""
-    from nanorocks_ros.recordings.find_bags import find_bags
-    from nanorocks_ros.study.batch import BatchPlan, run_batch
-    from nanorocks_ros.study.batch_files import write_batch
-    from nanorocks_ros.study.combined import combined
-    from nanorocks_ros.study.tasks import Workers
+    from nanorocks_ros.jobs.tasks import Workers
+    from nanorocks_ros.recordings.bag.find_bags import find_bags
+    from nanorocks_ros.studies.batch.batch_analysis import BatchPlan, run_batch
+    from nanorocks_ros.studies.batch.batch_files import write_batch
+    from nanorocks_ros.studies.batch.campaign_means import combined
 
     if options.no_output or not options.output:
         raise ConfigurationError(
@@ -101,7 +101,7 @@ def _end(batch: Batch) -> int:
 
 
 def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> dict[str, Any]:
-    from nanorocks_ros.study.combined import means_as_json
+    from nanorocks_ros.studies.batch.campaign_means import means_as_json
 
     shown_keys = 'state', 'frames', 'frames_lost', 'seconds', 'complete', 'notices'
     return {
@@ -129,7 +129,7 @@ def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> di
 
 
 def _print(batch: Batch, together: Combined) -> None:
-    from nanorocks_ros.study.batch import told
+    from nanorocks_ros.studies.batch.batch_analysis import told
 
     frames = sum(one.summary['frames'] for one in batch.results)
     seconds = sum(one.summary['seconds'] for one in batch.results)
@@ -144,7 +144,7 @@ def _print(batch: Batch, together: Combined) -> None:
 
 
 def _tray_lines(tray: TrayMeans) -> list[str]:
-    from nanorocks_ros.study.combined import means_as_json
+    from nanorocks_ros.studies.batch.campaign_means import means_as_json
 
     values = means_as_json(tray)
 
@@ -219,7 +219,7 @@ class _Watch:
         """A recording is done, or failed."""
         from tqdm import tqdm
 
-        from nanorocks_ros.study.batch_task import DONE
+        from nanorocks_ros.studies.batch.batch_task import DONE
 
         self._left.pop(name, None)
         self._frames += outcome.frames

@@ -8,12 +8,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.experiment.settings import PipelineSettings
+from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
 
-    from nanorocks_ros.study.autocorrelations import BagClusters, CycleClusters
+    from nanorocks_ros.studies.inspection.autocorrelations import BagClusters, CycleClusters
 
 
 def add_parser(commands: Any) -> None:
@@ -35,8 +35,8 @@ def run(options: argparse.Namespace) -> int:
     """Measure, print, write; the exit code."""
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.study.autocorrelations import cycle_clusters, write_clusters
-    from nanorocks_ros.study.output_files import check_outputs
+    from nanorocks_ros.outputs.atomic_files import check_outputs
+    from nanorocks_ros.studies.inspection.autocorrelations import cycle_clusters, write_clusters
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
     named = {'--output': options.output, '--table': options.table}
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
     if '--table' in files:
         write_clusters(files['--table'], found)
     if '--output' in files:
-        from nanorocks_ros.study.autocorrelation_figure import autocorrelation_figure
+        from nanorocks_ros.studies.inspection.autocorrelation_figure import autocorrelation_figure
 
         autocorrelation_figure(files['--output'], found, settings.preprocess.pixels_per_metre)
     for flag, path in files.items():

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.settings import DashboardGraphSettings, DashboardSettings
+from nanorocks_ros.settings import DashboardGraphSettings, DashboardSettings
 
 if TYPE_CHECKING:
     import argparse
@@ -29,7 +29,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Become the node; does not come back."""
     from nanorocks_ros.cli.flags import settings_from
-    from nanorocks_ros.dashboard.process import full_namespace, node_command, with_token
+    from nanorocks_ros.dashboard.page_process import full_namespace, node_command, with_token
 
     settings = settings_from(options, DashboardSettings())
     namespace = full_namespace(options.namespace)

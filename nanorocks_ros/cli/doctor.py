@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import argparse
 
-    from nanorocks_ros.study.doctor.findings import Finding
+    from nanorocks_ros.tools.doctor.findings import Finding
 
 _CODE_OF_A_PROBLEM = 1
 
@@ -33,7 +33,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Examine and print; 1 where the graph cannot be used."""
-    from nanorocks_ros.study.doctor.findings import Status, worst
+    from nanorocks_ros.tools.doctor.findings import Status, worst
 
     findings = _of_graph(options) if options.graph else _of_machine(options)
     verdict = worst(findings)
@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _of_machine(options: argparse.Namespace) -> list[Finding]:
-    from nanorocks_ros.study.doctor.examine import examine
+    from nanorocks_ros.tools.doctor.examination import examine
 
     findings = []
     for one in examine(_announce):
@@ -67,8 +67,8 @@ def _of_machine(options: argparse.Namespace) -> list[Finding]:
 
 def _of_graph(options: argparse.Namespace) -> list[Finding]:
     from nanorocks_ros.errors import ConfigurationError
-    from nanorocks_ros.study.doctor.children import graph
-    from nanorocks_ros.study.doctor.examine import examine_graph
+    from nanorocks_ros.tools.doctor.examination import examine_graph
+    from nanorocks_ros.tools.doctor.ros_probe_client import graph
 
     if not 0.0 < options.seconds <= 10.0:
         raise ConfigurationError('--seconds', f'{options.seconds:g}', 'give 0.1 to 10')

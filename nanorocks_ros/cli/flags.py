@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import yaml
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.settings import PipelineSettings, SettingRow, rows, with_values
+from nanorocks_ros.settings import PipelineSettings, SettingRow, rows, with_values
 
 SettingsType = TypeVar('SettingsType')
 

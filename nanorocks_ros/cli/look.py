@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.settings import PipelineSettings
+from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
 
-    from nanorocks_ros.study.steps import FrameSteps, TraySteps
+    from nanorocks_ros.studies.inspection.preprocessing_steps import FrameSteps, TraySteps
 
 _MM, _MM2 = 1e3, 1e6
 
@@ -43,8 +43,8 @@ def run(options: argparse.Namespace) -> int:
     """Follow the bag to the frame, print, draw; the exit code."""
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.study.output_files import check_outputs
-    from nanorocks_ros.study.steps import steps_of_bag
+    from nanorocks_ros.outputs.atomic_files import check_outputs
+    from nanorocks_ros.studies.inspection.preprocessing_steps import steps_of_bag
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
     _check_moment(options)
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     else:
         _print(steps)
     if options.output:
-        from nanorocks_ros.study.steps_figure import steps_figure
+        from nanorocks_ros.studies.inspection.steps_figure import steps_figure
 
         steps_figure(Path(options.output), steps, settings.speed)
         print(f'nanorocks: picture in {options.output}', file=sys.stderr)

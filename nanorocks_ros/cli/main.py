@@ -24,23 +24,17 @@ def build_parser() -> argparse.ArgumentParser:
     from nanorocks_ros.cli import (
         analyse,
         autocorrelation,
-        calibrate,
-        calibrate_area,
-        cluster_curve,
         dashboard,
         doctor,
-        figure,
-        import_video,
-        info,
-        library,
         look,
         reproduce,
-        salvage,
-        simulate,
         speeds,
-        sweep,
         track,
     )
+    from nanorocks_ros.cli.calibration import calibrate, calibrate_area, cluster_curve, library
+    from nanorocks_ros.cli.figures import figure
+    from nanorocks_ros.cli.recordings import import_video, info, salvage
+    from nanorocks_ros.cli.simulation import simulate, sweep
 
     parser = argparse.ArgumentParser(
         prog='nanorocks',
@@ -103,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.close()
         return 0
     except OSError as error:
-        from nanorocks_ros.study.shown import shown
+        from nanorocks_ros.outputs.safe_text import shown
 
         where = '' if error.filename is None else f'{shown(str(error.filename))}: '
         what = f'{where}{error.strerror or error}'

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.study.campaign import CampaignPlan
+    from nanorocks_ros.studies.reproduction.simulated_campaign import CampaignPlan
 
 _TEXT = 'simulate the campaign, analyse its films, and report every figure and table of the paper'
 _EPILOG = """\
@@ -55,9 +55,9 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Simulate, analyse, report; the exit code."""
-    from nanorocks_ros.study.campaign import parts_done
-    from nanorocks_ros.study.reproduce import minutes, reproduce
-    from nanorocks_ros.study.tasks import Workers
+    from nanorocks_ros.jobs.tasks import Workers
+    from nanorocks_ros.studies.reproduction.reproduce_paper import minutes, reproduce
+    from nanorocks_ros.studies.reproduction.simulated_campaign import parts_done
 
     plan, runs = _plan(options)
     workers = Workers(processes=options.workers)
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _plan(options: argparse.Namespace) -> tuple[CampaignPlan, int]:
     from nanorocks_ros.errors import ConfigurationError
-    from nanorocks_ros.study.campaign import CampaignPlan
+    from nanorocks_ros.studies.reproduction.simulated_campaign import CampaignPlan
 
     cycles, runs = (
         usual[options.quick] if given is None else given

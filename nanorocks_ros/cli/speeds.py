@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.settings import PipelineSettings
+from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Iterable
 
-    from nanorocks_ros.study.speeds import BagSpeeds, ComparedSpeeds
+    from nanorocks_ros.studies.inspection.speed_comparison import BagSpeeds, ComparedSpeeds
 
 
 def add_parser(commands: Any) -> None:
@@ -37,8 +37,8 @@ def run(options: argparse.Namespace) -> int:
     """Measure, print, write; the exit code."""
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.study.output_files import check_outputs
-    from nanorocks_ros.study.speeds import compare_speeds
+    from nanorocks_ros.outputs.atomic_files import check_outputs
+    from nanorocks_ros.studies.inspection.speed_comparison import compare_speeds
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
     named = {'--output': options.output, '--table': options.table}
@@ -79,12 +79,12 @@ def _cycle(found: BagSpeeds, wanted: int | None) -> int:
 
 def _write(files: dict[str, Path], found: BagSpeeds, cycle: int) -> None:
     if '--table' in files:
-        from nanorocks_ros.study.speeds import write_speeds
+        from nanorocks_ros.studies.inspection.speed_comparison import write_speeds
 
         write_speeds(files['--table'], found)
         print(f'nanorocks: speeds in {files["--table"]}', file=sys.stderr)
     if '--output' in files:
-        from nanorocks_ros.study.speeds_figure import speeds_figure
+        from nanorocks_ros.studies.inspection.speeds_figure import speeds_figure
 
         speeds_figure(files['--output'], found, cycle)
         print(f'nanorocks: picture in {files["--output"]}', file=sys.stderr)

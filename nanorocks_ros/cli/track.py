@@ -8,13 +8,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.experiment.settings import PipelineSettings
+from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
 
-    from nanorocks_ros.study.track_comparison import TrackComparison
-    from nanorocks_ros.study.tracking import TrackedBag
+    from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag
+    from nanorocks_ros.studies.calibration.track_comparison import TrackComparison
 
 _MM = 1e3
 _PERCENT = 100.0
@@ -44,8 +44,8 @@ def run(options: argparse.Namespace) -> int:
     """Track, print, write; the exit code."""
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.study.manual_tracks import read_manual_tracks
-    from nanorocks_ros.study.tracking import track_bag
+    from nanorocks_ros.studies.analysis.bag_tracks import track_bag
+    from nanorocks_ros.studies.calibration.manual_tracks import read_manual_tracks
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
     _check_outputs(options)
@@ -66,9 +66,9 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
-    from nanorocks_ros.study.output_files import check_outputs
-    from nanorocks_ros.study.parquet import check_parquet
-    from nanorocks_ros.study.tracks_files import TABLES
+    from nanorocks_ros.outputs.atomic_files import check_outputs
+    from nanorocks_ros.outputs.parquet import check_parquet
+    from nanorocks_ros.studies.analysis.tracks_files import TABLES
 
     named = {'--output': options.output, '--picture': options.picture}
     files = {flag: Path(name) for flag, name in named.items() if name}
@@ -78,8 +78,8 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _write(options: argparse.Namespace, found: TrackedBag) -> None:
-    from nanorocks_ros.study.overlay import overlay, write_overlay
-    from nanorocks_ros.study.tracks_files import write_tracks
+    from nanorocks_ros.studies.analysis.tracks_files import write_tracks
+    from nanorocks_ros.studies.inspection.track_overlay import overlay, write_overlay
 
     if options.output:
         write_tracks(Path(options.output), found)
@@ -96,7 +96,7 @@ def _write(options: argparse.Namespace, found: TrackedBag) -> None:
 def _compared(found: TrackedBag, manual: Any, first_frame: int) -> dict[int, TrackComparison]:
     """The comparison for each tray in which the file has places."""
     from nanorocks_ros.errors import RecordingError
-    from nanorocks_ros.study.track_comparison import compare_tracks, manual_reference
+    from nanorocks_ros.studies.calibration.track_comparison import compare_tracks, manual_reference
 
     results = {}
     for number, tray in found.trays.items():

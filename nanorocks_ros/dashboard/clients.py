@@ -7,8 +7,8 @@ import json
 import time
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.dashboard.pictures import LAYERS
 from nanorocks_ros.dashboard.tray_board import Cursor
+from nanorocks_ros.dashboard.tray_pictures import LAYERS
 
 if TYPE_CHECKING:
     from aiohttp.web import WebSocketResponse

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros import __version__
 from nanorocks_ros.dashboard.access import Access
 from nanorocks_ros.dashboard.clients import Client, Look, Pictures
-from nanorocks_ros.dashboard.process import TOKEN_VARIABLE
+from nanorocks_ros.dashboard.page_process import TOKEN_VARIABLE
 from nanorocks_ros.errors import DashboardError
 
 try:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.dashboard.board import Board
     from nanorocks_ros.dashboard.tray_board import Shown
-    from nanorocks_ros.experiment.settings import DashboardSettings
+    from nanorocks_ros.settings import DashboardSettings
 
 _MOST_CLIENTS = 64
 _MOST_SAID_BYTES = 4096

@@ -17,7 +17,7 @@ from nanorocks_ros.records import (
     GroundTruth,
     SpeedEstimate,
 )
-from nanorocks_ros.wire.layouts import NS
+from nanorocks_ros.wire.array_layouts import NS
 
 Measured = SpeedEstimate | CorEstimate | ClusterEstimate
 Shown = Measured | GroundTruth

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.camera import Camera, PlumbBob
+from nanorocks_ros.experiment.lens import Camera, PlumbBob
 from nanorocks_ros.experiment.view import IDENTITY, View, view_from_matrices
 
 if TYPE_CHECKING:

@@ -32,7 +32,7 @@ from nanorocks_ros.experiment.view import IDENTITY
 from nanorocks_ros.experiment.yaml_lines import YamlLines, composed, read_text
 
 if TYPE_CHECKING:
-    from nanorocks_ros.experiment.settings import PipelineSettings
+    from nanorocks_ros.settings import PipelineSettings
 
 
 def load_calibration(path: str | Path) -> Calibration:

@@ -10,8 +10,12 @@ from sensor_msgs.msg import CameraInfo
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.nodes._gaps import Gaps
 from nanorocks_ros.nodes._shell import qos_of
-from nanorocks_ros.recordings.images import frame_from_compressed, frame_from_image, stamp_ns_of
-from nanorocks_ros.recordings.lens import info_from_message, view_from_message
+from nanorocks_ros.recordings.messages.camera_info import info_from_message, view_from_message
+from nanorocks_ros.recordings.messages.image_messages import (
+    frame_from_compressed,
+    frame_from_image,
+    stamp_ns_of,
+)
 from nanorocks_ros.wire import topics
 
 # Frames that are held back for a camera_info that somebody offers, but has not sent yet.

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.errors import FrameError
-from nanorocks_ros.recordings.images import frame_from_image
+from nanorocks_ros.recordings.messages.image_messages import frame_from_image
 
 
 def gray_frame(message, where):

@@ -6,8 +6,8 @@ import os
 import signal
 import subprocess
 
-from nanorocks_ros.dashboard.process import node_command, with_token
-from nanorocks_ros.experiment.settings import DashboardGraphSettings
+from nanorocks_ros.dashboard.page_process import node_command, with_token
+from nanorocks_ros.settings import DashboardGraphSettings
 
 _ENDS_WITHIN_S = 5.0
 

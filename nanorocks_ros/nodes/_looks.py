@@ -8,7 +8,7 @@ from functools import partial
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
-from nanorocks_ros.dashboard.pictures import encoded
+from nanorocks_ros.dashboard.tray_pictures import encoded
 from nanorocks_ros.nodes._crops import gray_frame, picture_frame
 from nanorocks_ros.nodes._shell import message_class
 from nanorocks_ros.wire import topics

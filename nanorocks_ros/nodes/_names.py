@@ -7,8 +7,8 @@ import inspect
 import itertools
 import sys
 
+from nanorocks_ros import settings
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment import settings
 from nanorocks_ros.nodes._overrides import PREFIX as OVERRIDES
 
 _PREFIXES = ('', 'simulation.', 'scene.', 'dashboard_')
@@ -52,7 +52,7 @@ def _of_all_nodes():
     names = {
         row.name
         for one in groups
-        if one.__module__ == settings.__name__ and one.__name__.endswith('Settings')
+        if one.__module__.startswith(settings.__name__) and one.__name__.endswith('Settings')
         for row in settings.rows(one())
     }
     return {prefix + name for prefix in _PREFIXES for name in names} | {'use_sim_time'}

@@ -22,7 +22,6 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_msgs.msg import Header
 
 from nanorocks_ros.errors import ConfigurationError, FrameError, NanorocksError
-from nanorocks_ros.experiment.settings import rows, with_values
 from nanorocks_ros.nodes._names import on_the_command_line, require_text, unknown_parameters
 from nanorocks_ros.nodes._now_and_then import NowAndThen
 from nanorocks_ros.nodes._overrides import refuse_unheard_overrides, refuse_wrong_overrides
@@ -48,6 +47,7 @@ from nanorocks_ros.records import (
     SpeedEstimate,
     TrayImage,
 )
+from nanorocks_ros.settings import rows, with_values
 from nanorocks_ros.wire import topics
 
 _ARRAYS = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.nodes._pace import NS
-from nanorocks_ros.recordings.replay import played_part
+from nanorocks_ros.recordings.bag.played_range import played_part
 
 _TOLD_NS = NS // 1000
 

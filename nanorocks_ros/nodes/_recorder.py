@@ -9,12 +9,15 @@ from sensor_msgs.msg import CompressedImage
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import NanorocksError
-from nanorocks_ros.experiment.settings import rows
-from nanorocks_ros.recordings.images import jpeg_of
-from nanorocks_ros.recordings.messages import compressed_image_message, time_message
-from nanorocks_ros.recordings.reader import BagMessage
-from nanorocks_ros.recordings.recorder import Recorder
-from nanorocks_ros.study.results_bag import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.reader import BagMessage
+from nanorocks_ros.recordings.bag.recorder import Recorder
+from nanorocks_ros.recordings.messages.image_messages import jpeg_of
+from nanorocks_ros.recordings.messages.message_builders import (
+    compressed_image_message,
+    time_message,
+)
+from nanorocks_ros.settings import rows
 from nanorocks_ros.wire import topics
 
 _LOOK_S = 1.0

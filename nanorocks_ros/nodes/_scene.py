@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from nanorocks_ros.nodes._shell import beads_message, image_message, lens_message
-from nanorocks_ros.simulation.scene.film import SceneFilm, without_effects
+from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm, without_effects
 from nanorocks_ros.wire import topics
 
 

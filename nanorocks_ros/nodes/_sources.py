@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.settings import BagSettings
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.nodes._names import on_the_command_line
 from nanorocks_ros.nodes._shell import image_message
-from nanorocks_ros.simulation.film import film
-from nanorocks_ros.study.bag_frames import BagFrames
+from nanorocks_ros.settings import BagSettings
+from nanorocks_ros.simulation.tray_camera.tray_film import film
+from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 from nanorocks_ros.wire import topics
 
 

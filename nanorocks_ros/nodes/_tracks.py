@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from nanorocks_ros.nodes._shell import image_message
-from nanorocks_ros.study.overlay import overlay
+from nanorocks_ros.studies.inspection.track_overlay import overlay
 from nanorocks_ros.wire import topics
 
 # Pictures over which ways are drawn.

@@ -7,17 +7,17 @@ from functools import partial
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.experiment.calibration_file import calibrated
-from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.nodes._crops import OneSize, color_frame, gray_frame
 from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._join import TrayJoiner
 from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.nodes._tracks import TracksPicture
+from nanorocks_ros.pipeline.composition import trays_of
+from nanorocks_ros.pipeline.warm_up import warm_up_counting, warm_up_speed
 from nanorocks_ros.records import Tracks, TrayImage, TrayState
-from nanorocks_ros.stages.pipeline import trays_of
-from nanorocks_ros.stages.warm_up import warm_up_counting, warm_up_speed
+from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.layouts import from_array
+from nanorocks_ros.wire.array_layouts import from_array
 
 
 class TrayStageNode(NanorocksNode):

@@ -10,18 +10,22 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from nanorocks_ros.errors import ConfigurationError, FrameError, RecordingError
-from nanorocks_ros.experiment.settings import BagSettings, PacingSettings, PlayerSettings, rows
-from nanorocks_ros.experiment.settings import problem as wrong_with
 from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.nodes._pacing import Pacer
 from nanorocks_ros.nodes._part import Part
 from nanorocks_ros.nodes._playback import Playback, stamp_in
 from nanorocks_ros.nodes._shell import compressed_message, image_message, time_message
 from nanorocks_ros.nodes._sources import path_of_bag
-from nanorocks_ros.recordings.images import frame_from_compressed, frame_from_image, jpeg_of
-from nanorocks_ros.recordings.reader import open_bag
-from nanorocks_ros.recordings.replay import latest
-from nanorocks_ros.study.bag_frames import BagFrames
+from nanorocks_ros.recordings.bag.played_range import latest
+from nanorocks_ros.recordings.bag.reader import open_bag
+from nanorocks_ros.recordings.messages.image_messages import (
+    frame_from_compressed,
+    frame_from_image,
+    jpeg_of,
+)
+from nanorocks_ros.settings import BagSettings, PacingSettings, PlayerSettings, rows
+from nanorocks_ros.settings import problem as wrong_with
+from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 from nanorocks_ros.wire import topics
 
 _CLOCK_S = 0.025

@@ -5,11 +5,11 @@ from __future__ import annotations
 from functools import partial
 
 from nanorocks_ros.nodes._tray_stage import TrayStageNode
+from nanorocks_ros.pipeline.warm_up import warm_up_clusters
 from nanorocks_ros.records import BodyEstimate, Merge, SpeedEstimate
-from nanorocks_ros.stages.cluster_estimator import ClusterEstimator
-from nanorocks_ros.stages.warm_up import warm_up_clusters
+from nanorocks_ros.stages.clusters.cluster_estimator import ClusterEstimator
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.layouts import from_array
+from nanorocks_ros.wire.array_layouts import from_array
 
 
 class ClusterAutocorrelatorNode(TrayStageNode):

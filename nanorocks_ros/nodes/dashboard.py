@@ -12,13 +12,13 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from nanorocks_ros.dashboard.board import Board
 from nanorocks_ros.dashboard.server import PageServer
-from nanorocks_ros.experiment.settings import DashboardGraphSettings, DashboardSettings
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.nodes._looks import Looks
 from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.records import ClusterEstimate, CorEstimate, GroundTruth, SpeedEstimate
+from nanorocks_ros.settings import DashboardGraphSettings, DashboardSettings
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.layouts import from_array
+from nanorocks_ros.wire.array_layouts import from_array
 
 _RESULTS = (
     (topics.SPEED, SpeedEstimate),

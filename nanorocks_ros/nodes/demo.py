@@ -13,9 +13,9 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.records import CorEstimate, CorStatus, GroundTruth, SpeedEstimate
-from nanorocks_ros.study.figures import cooling_figure
+from nanorocks_ros.studies.figures.demo_figure import cooling_figure
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.layouts import from_array
+from nanorocks_ros.wire.array_layouts import from_array
 
 _TRAY = 1
 _GRAPH = ('preprocessor', 'speed_estimator', 'cluster_autocorrelator', 'haff_fitter', 'simulator')

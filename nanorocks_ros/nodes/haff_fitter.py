@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from functools import partial
 
-from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.nodes._node import NanorocksNode
+from nanorocks_ros.pipeline.composition import trays_of
+from nanorocks_ros.pipeline.warm_up import warm_up_cooling
 from nanorocks_ros.records import Merge, PairCollision, Rebound, SpeedEstimate
-from nanorocks_ros.stages.cooling import HaffFitter
-from nanorocks_ros.stages.pipeline import trays_of
-from nanorocks_ros.stages.warm_up import warm_up_cooling
+from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.layouts import from_array
+from nanorocks_ros.wire.array_layouts import from_array
 
 
 class HaffFitterNode(NanorocksNode):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from nanorocks_ros import settings as st
 from nanorocks_ros.errors import ConfigurationError, FrameError
-from nanorocks_ros.experiment import settings as st
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.nodes import _sources
 from nanorocks_ros.nodes._background import Background
@@ -17,15 +17,15 @@ from nanorocks_ros.nodes._pacing import Pacer
 from nanorocks_ros.nodes._part import Part
 from nanorocks_ros.nodes._recorder import GraphRecorder, provenance
 from nanorocks_ros.nodes._tracks import TracksPicture
-from nanorocks_ros.records import Tracks, TrayImage
-from nanorocks_ros.stages.pipeline import Pipeline, Wanted
-from nanorocks_ros.stages.warm_up import (
+from nanorocks_ros.pipeline.composition import Pipeline, Wanted
+from nanorocks_ros.pipeline.parallel_pipeline import SharedPipeline, started, worker_count
+from nanorocks_ros.pipeline.warm_up import (
     warm_up,
     warm_up_clusters,
     warm_up_cooling,
     warm_up_speed,
 )
-from nanorocks_ros.study.shared_pipeline import SharedPipeline, started, worker_count
+from nanorocks_ros.records import Tracks, TrayImage
 from nanorocks_ros.wire import topics
 
 # With more frames behind than these, pictures are published of one frame in so many.

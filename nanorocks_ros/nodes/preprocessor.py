@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from nanorocks_ros.experiment.settings import CameraSettings, PipelineSettings
 from nanorocks_ros.nodes._camera import Camera
 from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._node import NanorocksNode
-from nanorocks_ros.stages.pipeline import trays_of
-from nanorocks_ros.stages.preprocess import Preprocessor
-from nanorocks_ros.stages.warm_up import warm_up
+from nanorocks_ros.pipeline.composition import trays_of
+from nanorocks_ros.pipeline.warm_up import warm_up
+from nanorocks_ros.settings import CameraSettings, PipelineSettings
+from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.wire import topics
 
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from nanorocks_ros.experiment.settings import (
-    FilmSettings,
-    PacingSettings,
-    SceneSettings,
-    SimulationSettings,
-)
 from nanorocks_ros.nodes._epoch import Epoch
 from nanorocks_ros.nodes._node import NanorocksNode
 from nanorocks_ros.nodes._pacing import Pacer
 from nanorocks_ros.nodes._scene import SimulatedScene
 from nanorocks_ros.nodes._sources import Simulated, publish_moment
+from nanorocks_ros.settings import (
+    FilmSettings,
+    PacingSettings,
+    SceneSettings,
+    SimulationSettings,
+)
 from nanorocks_ros.wire import topics
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from nanorocks_ros.nodes._tray_stage import TrayStageNode
-from nanorocks_ros.stages.speed import SpeedEstimator
+from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 from nanorocks_ros.wire import topics
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import fft
 
-from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.numerics.compiled import compiled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
     from pathlib import Path
 
-    from nanorocks_ros.recordings.qos import OfferedQos
+    from nanorocks_ros.recordings.offered_qos import OfferedQos
 
 # Recordings count signed nanoseconds since 1970; what is earlier or later was damaged.
 LAST_NS = 2**63 - 1

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.physics.compiled import compiled
+from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.counter_rng import Purpose, key_for
 from nanorocks_ros.simulation.engine import observables as columns
-from nanorocks_ros.simulation.engine.checks import check_room, check_times
+from nanorocks_ros.simulation.engine.collision_rules import for_species
+from nanorocks_ros.simulation.engine.event_loop import Output, run_until
 from nanorocks_ros.simulation.engine.gas import MOST_FOR_SCAN, HardSphereGas
-from nanorocks_ros.simulation.engine.kernel import Output, run_until
-from nanorocks_ros.simulation.engine.rules import for_species
-from nanorocks_ros.simulation.engine.state import COUNTS, DONE, PAIR, WALL, new_state
-from nanorocks_ros.simulation.initial import (
+from nanorocks_ros.simulation.engine.gas_state import COUNTS, DONE, PAIR, WALL, new_state
+from nanorocks_ros.simulation.engine.input_checks import check_room, check_times
+from nanorocks_ros.simulation.initial_state import (
     draw_diameters,
     drawn_velocities,
     resting_beads,
@@ -23,19 +24,18 @@ from nanorocks_ros.simulation.initial import (
     sphere_masses,
     stock,
 )
-from nanorocks_ros.simulation.placement import MOST_TRIES, place
-from nanorocks_ros.simulation.randomness import Purpose, key_for
-from nanorocks_ros.simulation.shaking import after_shaking, check_settings
+from nanorocks_ros.simulation.packing.random_placement import MOST_TRIES, place
+from nanorocks_ros.simulation.shaken_tray import after_shaking, check_settings
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.experiment.settings import SimulationSettings
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.simulation.engine.rules import Rules
-    from nanorocks_ros.simulation.initial import Stock
+    from nanorocks_ros.settings import SimulationSettings
+    from nanorocks_ros.simulation.engine.collision_rules import Rules
+    from nanorocks_ros.simulation.initial_state import Stock
 
 _NO_ROOM = -1
 _MOST_EVENTS = 10_000_000

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.physics.compiled import compiled
-from nanorocks_ros.simulation.randomness import direction, hashed, uniform
+from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.counter_rng import direction, hashed, uniform
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

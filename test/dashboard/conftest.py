@@ -9,9 +9,9 @@ import pytest
 
 from nanorocks_ros.dashboard.board import Board
 from nanorocks_ros.dashboard.server import PageServer
-from nanorocks_ros.experiment.settings import DashboardSettings, PipelineSettings
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.study.offline import analyse
+from nanorocks_ros.settings import DashboardSettings, PipelineSettings
+from nanorocks_ros.studies.analysis.offline_analysis import analyse
 
 SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
 

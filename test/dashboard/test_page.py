@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nanorocks_ros.dashboard.pictures import encoded
+from nanorocks_ros.dashboard.tray_pictures import encoded
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import CorStatus, Quality
 

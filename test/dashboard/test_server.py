@@ -167,7 +167,7 @@ def test_an_address_that_others_reach_is_served_with_a_token_that_is_made_up(ser
 def test_a_port_in_use_is_named():
     from nanorocks_ros.dashboard.board import Board
     from nanorocks_ros.dashboard.server import PageServer
-    from nanorocks_ros.experiment.settings import DashboardSettings
+    from nanorocks_ros.settings import DashboardSettings
 
     with socket.socket() as taken:
         taken.bind(('127.0.0.1', 0))

@@ -14,7 +14,7 @@ from nanorocks_ros.experiment.calibration_file import (
     write_calibration,
 )
 from nanorocks_ros.experiment.plate import Region
-from nanorocks_ros.experiment.settings import PipelineSettings, with_values
+from nanorocks_ros.settings import PipelineSettings, with_values
 
 INFO = CameraInfo(
     width=1920,

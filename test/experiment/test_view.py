@@ -8,7 +8,7 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.calibration import CameraInfo, view_of
-from nanorocks_ros.experiment.camera import Camera
+from nanorocks_ros.experiment.lens import Camera
 from nanorocks_ros.experiment.view import View
 
 K = (700.0, 0.0, 955.0, 0.0, 700.0, 541.0, 0.0, 0.0, 1.0)

@@ -20,10 +20,10 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.simulation.film import film
-from nanorocks_ros.stages.warm_up import warm_up, warm_up_counting, warm_up_speed
+from nanorocks_ros.pipeline.warm_up import warm_up, warm_up_counting, warm_up_speed
+from nanorocks_ros.settings import SimulationSettings
+from nanorocks_ros.simulation.tray_camera.tray_film import film
 
 _PATIENCE_S = 40.0
 # With more, ports are those that the system gives to anybody.

@@ -10,7 +10,7 @@ pytest.importorskip('rclpy')
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import CameraInfo, Image
 
-from nanorocks_ros.experiment.camera import Camera
+from nanorocks_ros.experiment.lens import Camera
 from nanorocks_ros.nodes._shell import image_message, lens_message, qos_of
 from nanorocks_ros.wire import topics
 

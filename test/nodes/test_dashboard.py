@@ -20,7 +20,7 @@ from std_msgs.msg import Float32MultiArray
 from nanorocks_ros.nodes._shell import qos_of
 from nanorocks_ros.records import CorEstimate, CorStatus
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.layouts import from_array
+from nanorocks_ros.wire.array_layouts import from_array
 
 SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
 TOKEN = 'correct-horse-battery'

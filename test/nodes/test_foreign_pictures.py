@@ -17,7 +17,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image
 
-from nanorocks_ros.dashboard.pictures import LAYERS
+from nanorocks_ros.dashboard.tray_pictures import LAYERS
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.nodes._crops import OneSize, color_frame, gray_frame, picture_frame
 from nanorocks_ros.nodes._shell import image_message, qos_of

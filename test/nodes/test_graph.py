@@ -20,9 +20,8 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Float32MultiArray
 
-from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.nodes._shell import compressed_message, qos_of, stamp_of
-from nanorocks_ros.recordings.images import encode_jpeg
+from nanorocks_ros.recordings.messages.image_messages import encode_jpeg
 from nanorocks_ros.records import (
     ClusterEstimate,
     CorEstimate,
@@ -32,10 +31,11 @@ from nanorocks_ros.records import (
     Rebound,
     SpeedEstimate,
 )
-from nanorocks_ros.study.bag_frames import BagFrames
-from nanorocks_ros.study.offline import analyse
+from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.layouts import from_array, layout, to_array
+from nanorocks_ros.wire.array_layouts import from_array, layout, to_array
 
 SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
 ARRAYS = {

@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from nanorocks_ros.recordings.reader import open_bag
+from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.wire import topics
 
 # Frames of the sample bag: it rests, is shaken after a second, and cools.

@@ -7,7 +7,7 @@ import pytest
 
 from nanorocks_ros.nodes._join import TrayJoiner
 from nanorocks_ros.records import Frame, Quality, TrayImage, TrayState
-from nanorocks_ros.wire.layouts import from_array, to_array
+from nanorocks_ros.wire.array_layouts import from_array, to_array
 
 EPOCH = 1_700_000_000_000_000_000
 STEP = 33_333_333

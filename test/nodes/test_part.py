@@ -10,10 +10,10 @@ from mcap.reader import make_reader
 pytest.importorskip('rclpy')
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
-from nanorocks_ros.experiment.settings import BagSettings
 from nanorocks_ros.nodes._part import Part
-from nanorocks_ros.recordings.reader import open_bag
-from nanorocks_ros.recordings.writer import BagWriter, OfferedQos, OfferedTopic
+from nanorocks_ros.recordings.bag.reader import open_bag
+from nanorocks_ros.recordings.bag.writer import BagWriter, OfferedQos, OfferedTopic
+from nanorocks_ros.settings import BagSettings
 
 NS = 10**9
 NAMES = ['/often']

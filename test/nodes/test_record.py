@@ -13,10 +13,10 @@ pytest.importorskip('rclpy')
 
 from std_msgs.msg import Float32MultiArray
 
-from nanorocks_ros.experiment.settings import PipelineSettings
 from nanorocks_ros.nodes._shell import qos_of
-from nanorocks_ros.recordings.reader import open_bag
-from nanorocks_ros.study.offline import analyse
+from nanorocks_ros.recordings.bag.reader import open_bag
+from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.wire import topics
 
 SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'

@@ -8,11 +8,11 @@ import numpy as np
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Float32MultiArray
 
-from nanorocks_ros.experiment.settings import SceneSettings, SimulationSettings
 from nanorocks_ros.nodes._shell import qos_of, stamp_of
-from nanorocks_ros.simulation.scene.geometry import scene_camera
+from nanorocks_ros.settings import SceneSettings, SimulationSettings
+from nanorocks_ros.simulation.plate_scene.scene_geometry import scene_camera
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.beads import beads_from_array
+from nanorocks_ros.wire.bead_truth import beads_from_array
 
 SMALL = ('width_px:=640', 'height_px:=480', 'scene.pixels_per_metre:=5600.0')
 SCENE = ('whole_scene:=true', 'scene.trays:=[1, 4]', 'first_shake:=0.1')

@@ -9,8 +9,8 @@ import pytest
 pytest.importorskip('rclpy')
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.settings import BagSettings, PacingSettings
 from nanorocks_ros.nodes._sources import refuse_unused
+from nanorocks_ros.settings import BagSettings, PacingSettings
 
 
 @pytest.fixture

@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.physics.haff import granular_energy
-from nanorocks_ros.physics.haff_fit import fit_haff
-from nanorocks_ros.physics.paper import (
+from nanorocks_ros.inference.decay.haff_fit import fit_haff
+from nanorocks_ros.physics.haff_law import granular_energy
+from nanorocks_ros.physics.paper_formulas import (
     RELATIVE_TO_MEAN_SPEED,
     paper_restitution,
     paper_wall_ellipse,
     paper_wall_ellipse_as_printed,
 )
+from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
 
 PAPER = json.loads((Path(__file__).parents[1] / 'paper_values.json').read_text())

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nanorocks_ros.recordings.messages import (
+from nanorocks_ros.recordings.bag.writer import BagWriter, OfferedQos, OfferedTopic
+from nanorocks_ros.recordings.messages.message_builders import (
     compressed_image_message,
     float_array_message,
     time_message,
 )
-from nanorocks_ros.recordings.writer import BagWriter, OfferedQos, OfferedTopic
 
 CAMERA = '/nanorocks/camera/image_raw/compressed'
 SPEED = '/nanorocks/tray_3/speed'

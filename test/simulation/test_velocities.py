@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from nanorocks_ros.simulation.randomness import Purpose, direction, hashed, key_for, uniform
+from nanorocks_ros.numerics.counter_rng import Purpose, direction, hashed, key_for, uniform
 from nanorocks_ros.simulation.velocities import (
     logarithm,
     maxwellian,

@@ -1,12 +1,6 @@
 """The plate that several tests look at."""
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from plates import Plate
 
 

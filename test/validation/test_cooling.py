@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.hard_sphere_runs import DIAMETER, cooling_coefficient, over_runs
 from benchmarks.hard_spheres import contact_value, haff_coefficient
-from nanorocks_ros.physics.kinetic import kinetic_restitution
+from nanorocks_ros.physics.kinetic_theory import kinetic_restitution
 
 # 2048 beads at 2.6 % filling in a cube of 34 diameters, eight mean free paths: too small for
 # vortices, which at these restitutions need a cube of more than 30 to outgrow the cooling.

@@ -9,24 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine import saved
-from nanorocks_ros.simulation.engine.checks import (
-    check_beads,
-    check_species,
-    check_spins,
-    check_times,
-    overlapping_pair,
-    refuse_overlap,
-)
-from nanorocks_ros.simulation.engine.course import Course, Recorder
-from nanorocks_ros.simulation.engine.kernel import TAKEN, run_until, snapshot
-from nanorocks_ros.simulation.engine.memory import in_large_pages
-from nanorocks_ros.simulation.engine.rules import (
+from nanorocks_ros.simulation.engine import checkpoint
+from nanorocks_ros.simulation.engine.collision_rules import (
     CONTACT_DURATION,
     CollisionRules,
     for_species,
 )
-from nanorocks_ros.simulation.engine.state import (
+from nanorocks_ros.simulation.engine.event_loop import TAKEN, run_until, snapshot
+from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
     COUNTER,
     DONE,
@@ -50,12 +40,22 @@ from nanorocks_ros.simulation.engine.state import (
     WALL,
     new_state,
 )
-from nanorocks_ros.simulation.engine.tuning import (
+from nanorocks_ros.simulation.engine.input_checks import (
+    check_beads,
+    check_species,
+    check_spins,
+    check_times,
+    overlapping_pair,
+    refuse_overlap,
+)
+from nanorocks_ros.simulation.engine.neighbours.huge_pages import in_large_pages
+from nanorocks_ros.simulation.engine.neighbours.list_tuning import (
     built,
     in_space_order,
     skin_for,
     with_lists,
 )
+from nanorocks_ros.simulation.engine.run_record import Course, Recorder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -63,8 +63,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.engine.rules import Rules
-    from nanorocks_ros.simulation.engine.state import State
+    from nanorocks_ros.simulation.engine.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.gas_state import State
 
 __all__ = ['CONTACT_DURATION', 'Beads', 'CollisionRules', 'EventCounts', 'HardSphereGas', 'Kernel']
 
@@ -189,7 +189,7 @@ class HardSphereGas:
             For a file that is damaged, or not a saved gas.
         """
         gas = cls.__new__(cls)
-        state, gas._rules, gas._n_species = saved.load(path)
+        state, gas._rules, gas._n_species = checkpoint.load(path)
         gas._state = in_large_pages(state)
         gas._known_species = gas._n_species
         return gas
@@ -202,7 +202,7 @@ class HardSphereGas:
         SimulationError
             When it cannot be written.
         """
-        saved.save(path, self._state, self._rules, self._n_species)
+        checkpoint.save(path, self._state, self._rules, self._n_species)
 
     @property
     def now(self) -> float:

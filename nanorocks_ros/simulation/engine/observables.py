@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.physics.compiled import compiled, inlined
-from nanorocks_ros.simulation.engine.integers import whole
-from nanorocks_ros.simulation.engine.state import (
+from nanorocks_ros.numerics.compiled import compiled, inlined
+from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
     BOOKS,
     COUNTS,
@@ -23,11 +22,12 @@ from nanorocks_ros.simulation.engine.state import (
     State,
     X,
 )
+from nanorocks_ros.simulation.engine.integer_width import whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.engine.rules import Rules
+    from nanorocks_ros.simulation.engine.collision_rules import Rules
 
 # Columns of a row of observations; then for each species how many beads it has and their mean
 # squares of velocity along x, y and z.

@@ -14,7 +14,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.stages.tracking.paths import ALL, Series, Wanted, far_enough, jitter_of, joined
+from nanorocks_ros.stages.tracking.displacements import (
+    ALL,
+    Series,
+    Wanted,
+    far_enough,
+    jitter_of,
+    joined,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

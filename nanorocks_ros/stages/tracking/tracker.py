@@ -9,15 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.records import Quality, Tracks, TrayImage
-from nanorocks_ros.stages.tracking.detect import BeadDetector
-from nanorocks_ros.stages.tracking.link import Linker
-from nanorocks_ros.stages.tracking.view import count_seen, in_metres, room_in_view
+from nanorocks_ros.stages.tracking.detection.bead_detector import BeadDetector
+from nanorocks_ros.stages.tracking.linking.track_linker import Linker
+from nanorocks_ros.stages.tracking.linking.track_snapshot import (
+    count_seen,
+    in_metres,
+    room_in_view,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.experiment.settings import PipelineSettings
     from nanorocks_ros.experiment.trays import Species, Tray
+    from nanorocks_ros.settings import PipelineSettings
 
 _NS = 1e9
 # Of the beads of a species, a share below which speeds and counts are not to be relied upon.

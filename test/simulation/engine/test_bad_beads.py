@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gases import ALWAYS, KERNELS, beads_of, gas_of
 
-from engine.gases import ALWAYS, KERNELS, beads_of, gas_of
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas
 

@@ -6,15 +6,15 @@ import math
 
 import numpy as np
 import pytest
+from gases import BOX
 
-from engine.gases import BOX
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine.gas import CollisionRules
-from nanorocks_ros.simulation.engine.rules import (
+from nanorocks_ros.simulation.engine.collision_rules import (
     UniformRestitution,
     ViscoelasticRestitution,
     WallMotion,
 )
+from nanorocks_ros.simulation.engine.gas import CollisionRules
 
 NAN, INF = math.nan, math.inf
 MOTION = WallMotion(amplitude=(1, 0, 0), angular_frequency=1.0)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from engine.gases import (
+from gases import (
     BOX,
     KERNELS,
     beads_of,
@@ -16,6 +15,7 @@ from engine.gases import (
     placed,
     smallest_gap,
 )
+
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from engine.gases import (
+from gases import (
     KERNELS,
     NEVER,
     RULES,
@@ -15,6 +14,7 @@ from engine.gases import (
     momentum,
     smallest_gap,
 )
+
 from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
 
 BOX = (12.0, 11.0, 10.0)

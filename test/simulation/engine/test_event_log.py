@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from gases import BOX, KERNELS, RULES, mixture, to_nearest
 
-from engine.gases import BOX, KERNELS, RULES, mixture, to_nearest
+from nanorocks_ros.simulation.engine.collision_rules import UniformRestitution
 from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
-from nanorocks_ros.simulation.engine.rules import UniformRestitution
 
 BEADS = 12
 EVENTS = 400

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gases import ALWAYS, BOX, KERNELS, RULES, energy, gas_of, mixture, near
 
-from engine.gases import ALWAYS, BOX, KERNELS, RULES, energy, gas_of, mixture, near
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
 

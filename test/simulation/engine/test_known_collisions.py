@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from engine.gases import ALWAYS, KERNELS, gas_of, near
+from gases import ALWAYS, KERNELS, gas_of, near
 
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 

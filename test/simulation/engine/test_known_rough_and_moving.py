@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from gases import KERNELS, angular_momentum, energy, gas_of, momentum, near
 
-from engine.gases import KERNELS, angular_momentum, energy, gas_of, momentum, near
-from nanorocks_ros.simulation.engine.rules import WallMotion
+from nanorocks_ros.simulation.engine.collision_rules import WallMotion
 
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 

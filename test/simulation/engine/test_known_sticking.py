@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from gases import KERNELS, energy, gas_of, mixture, momentum, near, to_nearest
 
-from engine.gases import KERNELS, energy, gas_of, mixture, momentum, near, to_nearest
 from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
 
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)

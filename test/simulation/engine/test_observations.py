@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from gases import BOX, KERNELS, RULES, energy, gas_of, mixture, near
 
-from engine.gases import BOX, KERNELS, RULES, energy, gas_of, mixture, near
 from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
 
 END = 12.0

@@ -6,16 +6,16 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from gases import BOX, KERNELS, energy, mixture, smallest_gap
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.gases import BOX, KERNELS, energy, mixture, smallest_gap
-from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas, Kernel
-from nanorocks_ros.simulation.engine.rules import (
+from nanorocks_ros.simulation.engine.collision_rules import (
     UniformRestitution,
     ViscoelasticRestitution,
     WallMotion,
 )
+from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas, Kernel
 
 END = 20.0
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from gases import BOX, KERNELS, RULES, mixture, to_nearest
 from reference.gas import ReferenceGas
 
-from engine.gases import BOX, KERNELS, RULES, mixture, to_nearest
 from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
 
 BEADS = 7

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gases import ALWAYS, BOX, KERNELS, RULES, Beads, placed
 
-from engine.gases import ALWAYS, BOX, KERNELS, RULES, Beads, placed
 from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
 
 # CRC-32 of places and velocities after 30 s. The rules are those that need no more than

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gases import ALWAYS, BOX, KERNELS, RULES, mixture, placed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.gases import ALWAYS, BOX, KERNELS, RULES, mixture, placed
+from nanorocks_ros.simulation.engine.collision_rules import ViscoelasticRestitution
 from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
-from nanorocks_ros.simulation.engine.rules import ViscoelasticRestitution
 
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from engine.gases import (
+from gases import (
     ALWAYS,
     BOX,
     KERNELS,
@@ -17,10 +16,11 @@ from engine.gases import (
     near,
     smallest_gap,
 )
+
 from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.simulation.engine.collision_rules import WallMotion
 from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
-from nanorocks_ros.simulation.engine.rules import WallMotion
-from nanorocks_ros.simulation.engine.state import EPOCH, QUANTUM
+from nanorocks_ros.simulation.engine.gas_state import EPOCH, QUANTUM
 
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 

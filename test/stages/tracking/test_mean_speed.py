@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tracking_films import RATE, SCALE, pipeline_settings, tray_film
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import Tracks
 from nanorocks_ros.stages.tracking.mean_speed import mean_speed
 from nanorocks_ros.stages.tracking.tracker import Tracker
-from tracking.films import RATE, SCALE, pipeline_settings, tray_film
 
 PIXEL = 1.0 / SCALE
 

@@ -6,20 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tracking_films import SCALE, paired, pipeline_settings, tray_film
 
-from nanorocks_ros.experiment.settings import (
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.experiment.view import View
+from nanorocks_ros.records import Quality, TrayImage
+from nanorocks_ros.settings import (
     PipelineSettings,
     SceneSettings,
     SimulationSettings,
     with_values,
 )
-from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.experiment.view import View
-from nanorocks_ros.records import Quality, TrayImage
-from nanorocks_ros.simulation.scene.film import SceneFilm
-from nanorocks_ros.stages.preprocess import Preprocessor
+from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
+from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.tracking.tracker import Tracker
-from tracking.films import SCALE, paired, pipeline_settings, tray_film
 
 
 def _follow(number, frames, **values):

@@ -1,0 +1,148 @@
+"""``nanorocks calibrate RECORDING``: lens and tray regions from the trays themselves."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    import argparse
+
+    from nanorocks_ros.experiment.calibration import Calibration
+    from nanorocks_ros.studies.calibration.plate_fit import PlateFit
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        'calibrate', help='estimate lens and tray regions from a recording of the trays'
+    )
+    parser.add_argument('recording', help='rosbag2 folder or .mcap file')
+    parser.add_argument('-o', '--output', help='calibration file to write, YAML')
+    parser.add_argument('--picture', help='write a picture that shows the calibration, PNG')
+    parser.add_argument('--show', metavar='YAML', help='show this calibration, estimate none')
+    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    parser.add_argument('--image-topic', default='', help="the camera topic, if it isn't ours")
+    parser.add_argument(
+        '--trays', type=int, nargs='+', metavar='K', help='trays on the plate; default: all'
+    )
+    parser.add_argument('--trays-file', default='', help='YAML file of trays; default: as flown')
+    parser.add_argument(
+        '--scale',
+        type=float,
+        nargs=2,
+        metavar=('LOW', 'HIGH'),
+        help='px per metre between which the scale lies; default: plate in the whole picture',
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Calibrate or show, print, write; the exit code."""
+    from nanorocks_ros.experiment.calibration_file import load_calibration, write_calibration
+    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+    from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+    from nanorocks_ros.studies.calibration.camera_calibration import (
+        calibrate,
+        shown,
+        still_picture,
+        write_picture,
+    )
+
+    _check(options)
+    flown = load_trays(options.trays_file)
+    numbers = options.trays or sorted(flown)
+    trays = [tray_by_number(flown, number) for number in dict.fromkeys(numbers)]
+    fit = None
+    if options.show:
+        calibration = load_calibration(options.show)
+        picture = still_picture(BagFrames(options.recording, options.image_topic))
+        _check_size(options.show, calibration, picture.shape)
+    else:
+        for tray in trays:
+            if tray.place is None:
+                raise ConfigurationError(
+                    f'tray {tray.number}', 'has no place on the plate', 'leave it out of --trays'
+                )
+        frames = BagFrames(options.recording, options.image_topic)
+        scale = tuple(options.scale) if options.scale else None
+        fit, picture = calibrate(frames, trays, scale)
+        calibration = fit.calibration
+    if options.output:
+        remark = f'nanorocks calibrate, from {Path(options.recording).name}'
+        write_calibration(calibration, Path(options.output), remark)
+    if options.picture:
+        write_picture(Path(options.picture), shown(picture, calibration, trays))
+    if options.json:
+        print(json.dumps(as_json(calibration, fit), allow_nan=False))
+    else:
+        _print(calibration, fit, options)
+    return 0
+
+
+def _check(options: argparse.Namespace) -> None:
+    if options.show and options.output:
+        raise ConfigurationError('--show', 'together with --output', 'give one of them')
+    low, high = options.scale or (1.0, 2.0)
+    if not (math.isfinite(high) and 0.0 < low < high):
+        raise ConfigurationError('--scale', f'{low:g} to {high:g}', 'give a lower and a higher')
+
+
+def _check_size(path: str, calibration: Calibration, shape: tuple[int, ...]) -> None:
+    info = calibration.info
+    if (info.height, info.width) != shape[:2]:
+        raise ConfigurationError(
+            path,
+            f'is for {info.width}x{info.height} px, the recording has {shape[1]}x{shape[0]} px',
+            'calibrate this recording',
+        )
+
+
+def as_json(calibration: Calibration, fit: PlateFit | None) -> dict[str, Any]:
+    """The calibration as plain values; null where unknown."""
+    from nanorocks_ros.studies.calibration.camera_calibration import largest_bend
+
+    residual = calibration.residual_px
+    info = calibration.info
+    found: dict[str, Any] = {
+        'width': info.width,
+        'height': info.height,
+        'distortion_model': info.distortion_model,
+        'd': list(info.d),
+        'k': list(info.k),
+        'r': list(info.r),
+        'p': list(info.p),
+        'pixels_per_metre': calibration.pixels_per_metre,
+        'residual_px': None if math.isnan(residual) else residual,
+        'largest_bend_px': largest_bend(calibration),
+        'trays': {str(number): list(one) for number, one in calibration.regions.items()},
+    }
+    if fit is not None:
+        found['edges'] = len(fit.residuals)
+        found['camera_pixels_per_metre'] = {str(k): one for k, one in fit.tray_scales.items()}
+    return found
+
+
+def _print(calibration: Calibration, fit: PlateFit | None, options: argparse.Namespace) -> None:
+    from nanorocks_ros.studies.calibration.camera_calibration import largest_bend
+
+    info = calibration.info
+    print(f'{info.width}x{info.height} px, {info.distortion_model}')
+    print(f'focal length {info.k[0]:.1f} px, axis at {info.k[2]:.1f}, {info.k[5]:.1f} px')
+    print(f'distortion {", ".join(f"{one:.4f}" for one in info.d)}')
+    print(f'the lens moves the corners of the trays by up to {largest_bend(calibration):.1f} px')
+    print(f'scale {calibration.pixels_per_metre:.0f} px/m in the rectified picture')
+    if not math.isnan(calibration.residual_px):
+        edges = '' if fit is None else f' ({len(fit.residuals)} places on edges)'
+        print(f'residual {calibration.residual_px:.3f} px rms{edges}')
+    for number, region in sorted(calibration.regions.items()):
+        seen = '' if fit is None else f', {fit.tray_scales[number] / 1e3:.2f} px/mm in the frame'
+        x, y, width, height = region
+        print(f'tray {number}: x={x} y={y}, {width}x{height} px{seen}')
+    for name in ('output', 'picture'):
+        if getattr(options, name):
+            print(f'written: {getattr(options, name)}')

@@ -1,0 +1,62 @@
+"""``nanorocks library``: simulated decays of a tray, which measured ones are held against."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import argparse
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        'library', help='simulate the decays of a tray that restitutions are read from'
+    )
+    parser.add_argument('--tray', type=int, required=True, help='number of the tray')
+    parser.add_argument('-o', '--output', required=True, help='file to write, .npz')
+    parser.add_argument('--trays-file', default='', help='YAML file of trays; default: as flown')
+    parser.add_argument('--nodes', type=int, default=800, help='places simulated; default 800')
+    parser.add_argument('--runs', type=int, default=12, help='runs at each; default 12')
+    parser.add_argument('--seed', type=int, default=1, help='of everything random; default 1')
+    parser.add_argument('--workers', type=int, help='processes; default: one for each core')
+    parser.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
+    parser.add_argument('--force', action='store_true', help='replace a file that exists')
+    parser.add_argument('--json', action='store_true', help='print one JSON object')
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Simulate, write, print; the exit code."""
+    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+    from nanorocks_ros.jobs.tasks import Workers
+    from nanorocks_ros.outputs.atomic_files import check_outputs
+    from nanorocks_ros.studies.libraries.decay_simulations import LibraryPlan, build_library
+
+    output = Path(options.output)
+    check_outputs({'--output': output}, {'--output': ('.npz',)}, force=options.force)
+    plan = LibraryPlan(
+        tray=tray_by_number(load_trays(options.trays_file or None), options.tray),
+        nodes=options.nodes,
+        runs=options.runs,
+        seed=options.seed,
+    )
+    workers = Workers(processes=options.workers, scheduler=options.scheduler)
+    with Progress(f'decays of tray {options.tray}') as progress:
+        found = build_library(
+            plan,
+            output,
+            workers,
+            progress.count,
+            lambda text: print(f'nanorocks: {text}', file=sys.stderr),
+        )
+    if options.json:
+        made = {'output': str(output), 'misfit': found.misfit, **json.loads(found.made_by)}
+        print(json.dumps(made))
+    else:
+        print(f'{output}: off by {100.0 * found.misfit:.1f} % beyond the noise of its runs')
+    return 0

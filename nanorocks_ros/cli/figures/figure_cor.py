@@ -1,0 +1,213 @@
+"""``nanorocks figure cor RESULTS``: the paper's figures behind a restitution, in one folder."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    import argparse
+
+    from nanorocks_ros.studies.figures.cor_figures import CorData, Search
+
+_TEXT = 'the decay, the search over simulated runs, and restitution against speed (7, 12, 13)'
+_EPILOG = """\
+Writes decay.png (figure 7, with the simulated decay that agrees best), walls.png and width.png
+(figure 12: which restitutions of beads and walls, or beads and width of a distribution, agree),
+and cor_against_speed.png (figure 13). Interrupted, the same command goes on where it was. As
+many runs at a point as the paper has: --runs 178. Example:
+
+  nanorocks analyse BAG && nanorocks figure cor BAG_results -o figures
+"""
+# What `analyse` uses by itself where its results do not say.
+_FIRST, _LAST = 1.75, 20.0
+
+
+def add_parser(kinds: Any) -> None:
+    """Add the kind to those of ``nanorocks figure``."""
+    import argparse
+
+    parser = kinds.add_parser(
+        'cor',
+        help=_TEXT,
+        description=_TEXT,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument('source', help='results of `nanorocks analyse`, or a bag')
+    parser.add_argument('-o', '--output', required=True, help='folder for the figures')
+    parser.add_argument('--tray', type=int, help='where there are several, or with a bag')
+    parser.add_argument('--runs', type=int, default=20, help='at every point; default 20')
+    parser.add_argument(
+        '--beads', default='0.5:1:26', help='restitutions searched; default 0.5:1:26'
+    )
+    parser.add_argument('--walls', default='0.8:1:11', help='the same of walls; default 0.8:1:11')
+    parser.add_argument(
+        '--widths', default='0:0.16:5', help='widths of a distribution; default 0:0.16:5'
+    )
+    parser.add_argument(
+        '--wall-restitution',
+        type=float,
+        default=0.99,
+        help='taken for known beside widths and against speed; default 0.99',
+    )
+    parser.add_argument(
+        '--first', type=float, help='[s] since the shaking event; default: as analysed'
+    )
+    parser.add_argument('--last', type=float, help='[s]; default: as analysed')
+    parser.add_argument('--parameters', help='of the analysis of a bag: a ROS parameter file')
+    parser.add_argument('--seed', type=int, default=1, help='of the runs; default 1')
+    parser.add_argument('--workers', type=int, help='processes; default: one for each core')
+    parser.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
+    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Read or analyse, search, draw, print; the exit code."""
+    from nanorocks_ros.cli.progress import RunProgress
+    from nanorocks_ros.jobs.tasks import Workers
+    from nanorocks_ros.studies.figures.cor_figures import Reports, cor_figures, prepare_folder
+
+    search = _search(options)
+    workers = Workers(processes=options.workers, scheduler=options.scheduler)
+    workers.check()
+    folder = Path(options.output)
+    source = Path(options.source)
+    if _is_bag(source):
+        if options.tray is None:
+            raise ConfigurationError('--tray', 'is needed with a bag', 'name the tray')
+        prepare_folder(folder)
+        source = _analysed(options, source, folder / 'results')
+    data = _data(options, source)
+    prepare_folder(folder)
+    bars: dict[str, RunProgress] = {}
+
+    def progress(name: str, done: int, total: int) -> None:
+        if name not in bars:
+            bars[name] = RunProgress(name).__enter__()
+        bars[name].update(done, total)
+
+    def notice(text: str) -> None:
+        print(f'nanorocks: {text}', file=sys.stderr)
+
+    try:
+        found = cor_figures(
+            folder, data, search, workers, Reports(progress=progress, notice=notice)
+        )
+    finally:
+        for bar in bars.values():
+            bar.__exit__()
+    if options.json:
+        print(json.dumps(_as_json(data, found), allow_nan=False))
+    _print(data, found, folder)
+    return 0
+
+
+def _search(options: argparse.Namespace) -> Search:
+    from nanorocks_ros.cli.simulation.sweep import values_of
+    from nanorocks_ros.studies.figures.cor_figures import Search
+
+    def values(text: str, flag: str) -> tuple[float, ...]:
+        return tuple(float(one) for one in values_of(text, flag))
+
+    return Search(
+        beads=values(options.beads, '--beads'),
+        walls=values(options.walls, '--walls'),
+        widths=values(options.widths, '--widths'),
+        runs=options.runs,
+        seed=options.seed,
+    )
+
+
+def _is_bag(path: Path) -> bool:
+    return path.suffix in ('.mcap', '.db3') or any(
+        True for pattern in ('metadata.yaml', '*.mcap', '*.db3') for _ in path.glob(pattern)
+    )
+
+
+def _analysed(options: argparse.Namespace, bag: Path, folder: Path) -> Path:
+    """The results of a bag, beside the figures."""
+    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.settings import PipelineSettings, with_values
+    from nanorocks_ros.studies.analysis.offline_analysis import analyse
+    from nanorocks_ros.studies.analysis.results_folder import check_results_folder, write_results
+
+    settings = settings_from(options, PipelineSettings(), options.parameters)
+    settings = with_values(settings, {'trays': [options.tray]}, '--tray')
+    scratch = check_results_folder(folder)
+    with Progress('analysing') as progress:
+        analysis = analyse(bag, settings, progress=progress.count, scratch=scratch)
+    for notice in analysis.notices:
+        print(f'nanorocks: {notice}', file=sys.stderr)
+    write_results(analysis, folder, bag, settings)
+    return folder
+
+
+def _data(options: argparse.Namespace, source: Path) -> CorData:
+    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+    from nanorocks_ros.studies.decays.cooling_curves import (
+        read_cycles,
+        species_cycles,
+        speed_table,
+    )
+    from nanorocks_ros.studies.decays.cooling_windows import cooling_window, span_of
+    from nanorocks_ros.studies.figures.cor_figures import CorData
+
+    table, number = speed_table(source, options.tray)
+    if number is None:
+        raise ConfigurationError('--tray', 'is not known from the name', 'name the tray')
+    tray = tray_by_number(load_trays(), number)
+    cycles = read_cycles(table)
+    window = cooling_window(table)
+    usual = (window.first, window.last) if window else (_FIRST, _LAST)
+    if not 0.0 <= options.wall_restitution <= 1.0:
+        raise ConfigurationError(
+            '--wall-restitution', f'{options.wall_restitution:g}', 'give a number from 0 to 1'
+        )
+    return CorData(
+        tray=tray,
+        cycles=cycles,
+        species=species_cycles(table, tray),
+        span=span_of(options.first, options.last, usual),
+        start=window.start if window else 0.0,
+        wall_restitution=options.wall_restitution,
+    )
+
+
+def _as_json(data: CorData, found: dict[str, Any]) -> dict[str, Any]:
+    from nanorocks_ros.studies.figures.instantaneous_figure import instantaneous_values
+
+    local = found['instantaneous']
+    return {
+        'tray': data.tray.number,
+        'cycles': len(data.cycles),
+        'first': data.span[0],
+        'last': data.span[1],
+        **found,
+        'instantaneous': None if local is None else instantaneous_values(local),
+    }
+
+
+def _print(data: CorData, found: dict[str, Any], folder: Path) -> None:
+    library = found['decay']['library']
+    if library is not None:
+        print(
+            f'nanorocks: simulated decays: beads {library["restitution"]:.3f} '
+            f'[{library["restitution_lower"]:.3f}, {library["restitution_upper"]:.3f}], '
+            f'walls {library["wall_restitution"]:.3f} [{library["wall_restitution_lower"]:.3f}, '
+            f'{library["wall_restitution_upper"]:.3f}]',
+            file=sys.stderr,
+        )
+    for name in ('walls', 'width'):
+        best = ', '.join(f'{key} {value:g}' for key, value in found[name]['best'].items())
+        print(
+            f'nanorocks: search, {name}: best at {best}; not alone, see the map', file=sys.stderr
+        )
+    many = f'{len(data.cycles)} cycles' if len(data.cycles) > 1 else 'a cycle'
+    print(f'nanorocks: {many} of tray {data.tray.number} in {folder}', file=sys.stderr)

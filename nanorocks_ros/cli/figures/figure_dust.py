@@ -1,0 +1,102 @@
+"""``nanorocks figure dust``: sticking thresholds beside dust collision models (figure 14)."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Mapping
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.physics.dust_models import MeasuredThreshold
+
+_PICTURES = ('.png', '.pdf', '.svg')
+_TEXT = 'sticking thresholds against mass, with published collision models (figure 14)'
+_FORM = 'give TRAY:SPEED or TRAY:SPEED:LOWER:UPPER in m/s, such as 1:0.0104:0.009:0.012'
+
+
+def add_parser(kinds: Any) -> None:
+    """Add the kind to those of ``nanorocks figure``."""
+    one = kinds.add_parser('dust', help=_TEXT, description=_TEXT)
+    one.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
+    one.add_argument(
+        '--measured',
+        action='append',
+        default=[],
+        metavar='TRAY:SPEED[:LOWER:UPPER]',
+        help='a threshold that was measured [m/s]; may be repeated',
+    )
+    one.add_argument('--no-paper', action='store_true', help="leave out the paper's points")
+    one.add_argument(
+        '--restitution',
+        type=float,
+        default=0.89,
+        help='for the factor by which a cloud collapses more slowly; default 0.89',
+    )
+    one.add_argument('--trays', default='', help='YAML file of trays; default: those flown')
+    one.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    one.add_argument('--force', action='store_true', help='replace a picture that exists')
+    one.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Draw, print; the exit code."""
+    from nanorocks_ros.experiment.trays import load_trays
+    from nanorocks_ros.outputs.atomic_files import check_outputs
+    from nanorocks_ros.physics.dust_models import collapse_time_factor
+
+    path = Path(options.output)
+    check_outputs({'--output': path}, {'--output': _PICTURES}, force=options.force)
+    factor = collapse_time_factor(options.restitution)
+    trays = load_trays(options.trays)
+    measured = [_threshold(text, trays) for text in options.measured]
+
+    from nanorocks_ros.studies.figures.dust_figure import dust_figure, paper_thresholds
+
+    paper = () if options.no_paper else paper_thresholds(trays)
+    found = dust_figure(path, [*paper, *measured])
+    found['collapse_time_factor'] = factor if factor < float('inf') else None
+    found['restitution'] = options.restitution
+    if options.json:
+        print(json.dumps(found, allow_nan=False))
+    else:
+        _print(found)
+    print(f'nanorocks: {len(found["points"])} thresholds in {path}', file=sys.stderr)
+    return 0
+
+
+def _threshold(text: str, trays: Mapping[int, Tray]) -> MeasuredThreshold:
+    from nanorocks_ros.experiment.trays import tray_by_number
+    from nanorocks_ros.studies.figures.dust_figure import threshold_of_tray
+
+    words = text.split(':')
+    try:
+        number, (speed, *interval) = int(words[0]), [float(one) for one in words[1:]]
+    except ValueError as error:
+        raise ConfigurationError('--measured', f'{text!r} cannot be read', _FORM) from error
+    if len(interval) not in (0, 2):
+        raise ConfigurationError('--measured', f'{text!r} has half an interval', _FORM)
+    ends = (interval[0], interval[1]) if interval else None
+    return threshold_of_tray(tray_by_number(trays, number), speed, ends)
+
+
+def _print(found: dict[str, Any]) -> None:
+    for one in found['points']:
+        mark = '' if one['all_bounce_above_verified'] else ' (unverified)'
+        print(
+            f'tray {one["tray"]}: {1e3 * one["sticking_speed"]:.1f} mm/s at '
+            f'{1e6 * one["mass"]:.2f} mg ({one["source"]}); published: all bounce above '
+            f'{1e3 * one["all_bounce_above"]:.1f} mm/s{mark}'
+        )
+    factor = found['collapse_time_factor']
+    cloud = f'a cloud of particles of restitution {found["restitution"]:g}'
+    if factor is None:
+        print(f'{cloud} never collapses')
+    else:
+        print(f'{cloud} takes {factor:.2f} times as long to collapse as one of 0')

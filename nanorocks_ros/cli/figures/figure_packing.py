@@ -1,0 +1,133 @@
+"""``nanorocks figure packing``: filling factors and compaction of clusters (figure 10)."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Sequence
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.studies.analysis.cluster_packing import PackingCurve
+
+PICTURES = ('.png', '.pdf', '.svg')
+_TEXT = 'how densely clusters are packed, measured or simulated with the truth (figure 10)'
+
+
+def add_parser(kinds: Any) -> None:
+    """Add the kind to those of ``nanorocks figure``."""
+    one = kinds.add_parser('packing', help=_TEXT, description=_TEXT)
+    one.add_argument('results', nargs='?', help='of `nanorocks analyse`; left out with --simulate')
+    one.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
+    one.add_argument('--trays', metavar='K,K,...', help='default: all there are; simulated 1,3,5')
+    one.add_argument(
+        '--simulate', action='store_true', help='shake and film trays whose beads stick'
+    )
+    one.add_argument('--cycles', type=int, default=6, help='simulated; default 6')
+    one.add_argument(
+        '--sticking-speed', type=float, default=0.003, help='simulated [m/s]; default 0.003'
+    )
+    one.add_argument(
+        '--mean-speed', type=float, default=0.010, help='after a shaking event [m/s]; 0.01'
+    )
+    one.add_argument('--restitution', type=float, default=0.89, help='simulated; default 0.89')
+    one.add_argument('--seed', type=int, default=1, help='simulated; default 1')
+    one.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    one.add_argument('--force', action='store_true', help='replace a picture that exists')
+    one.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Read or simulate, draw, print; the exit code."""
+    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+    from nanorocks_ros.outputs.atomic_files import check_outputs
+
+    path = Path(options.output)
+    check_outputs({'--output': path}, {'--output': PICTURES}, force=options.force)
+    if (options.results is None) != options.simulate:
+        raise ConfigurationError(
+            'results, --simulate',
+            'both are given' if options.simulate else 'neither is given',
+            'name results of `nanorocks analyse`, or pass --simulate',
+        )
+    numbers = _numbers(options.trays)
+    if options.simulate:
+        numbers = numbers or (1, 3, 5)
+    else:
+        from nanorocks_ros.studies.analysis.result_tables import trays_of
+
+        numbers = numbers or trays_of(Path(options.results), 'cluster')
+    every = load_trays()
+    trays = {number: tray_by_number(every, number) for number in numbers}
+    curves = (_simulated if options.simulate else _measured)(options, trays)
+
+    from nanorocks_ros.studies.figures.packing_figure import packing_figure
+
+    found = packing_figure(path, trays, curves)
+    if options.json:
+        print(json.dumps({'simulated': options.simulate, 'trays': found}, allow_nan=False))
+    else:
+        _print(found)
+    print(f'nanorocks: {len(trays)} tray{"s" * (len(trays) > 1)} in {path}', file=sys.stderr)
+    return 0
+
+
+def _numbers(text: str | None) -> tuple[int, ...]:
+    words = [one.strip() for one in (text or '').split(',') if one.strip()]
+    if not all(one.isdigit() for one in words):
+        raise ConfigurationError('--trays', f'{text!r}', 'give numbers such as 1,3,5')
+    return tuple(dict.fromkeys(int(one) for one in words))
+
+
+def _measured(
+    options: argparse.Namespace, trays: dict[int, Tray]
+) -> dict[int, Sequence[PackingCurve]]:
+    from nanorocks_ros.studies.analysis.cluster_packing import measured_packing
+
+    return {number: measured_packing(Path(options.results), number) for number in trays}
+
+
+def _simulated(
+    options: argparse.Namespace, trays: dict[int, Tray]
+) -> dict[int, Sequence[PackingCurve]]:
+    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.settings import SimulationSettings
+    from nanorocks_ros.studies.analysis.cluster_packing import simulated_packing
+
+    settings = SimulationSettings(
+        sticking_speed=options.sticking_speed,
+        mean_speed=options.mean_speed,
+        restitution=options.restitution,
+        seed=options.seed,
+    )
+    found: dict[int, Sequence[PackingCurve]] = {}
+    for number, tray in trays.items():
+        with Progress(f'filming tray {number}') as bar:
+            found[number] = simulated_packing(tray, settings, options.cycles, progress=bar.count)
+    return found
+
+
+def _print(found: dict[str, Any]) -> None:
+    for number, values in found.items():
+        text = f'tray {number}, {values["cycles"]} cycles: '
+        text += f"compaction by the paper's rule {_percent(values, 'apparent_compaction')}"
+        if values['true_compaction'] is not None:
+            text += f', true {_percent(values, "true_compaction")}'
+        if values['layer_filling'] is not None:
+            text += (
+                f'; filling {values["layer_filling"]:.3f} as a layer, '
+                f'{values["filling_in_space"]:.3f} in space, '
+                f"{values['paper_filling']:.3f} by the paper's formula"
+            )
+        print(text)
+
+
+def _percent(values: dict[str, Any], name: str) -> str:
+    error = values[f'{name}_error']
+    return f'{100 * values[name]:.1f}' + (f' ± {100 * error:.1f}' if error else '') + ' %'

@@ -1,0 +1,134 @@
+"""``nanorocks simulate --scene``: the whole plate, filmed."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.cli.flags import flag_of, settings_from
+from nanorocks_ros.cli.progress import Progress
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.settings import SceneFilmSettings, SimulationSettings, rows
+
+if TYPE_CHECKING:
+    import argparse
+
+    from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
+
+# What is of one tray alone, and what the scene has settings of its own for.
+_OF_A_TRAY = 'tray', 'trajectory', 'events', 'times', 'workers', 'noise', 'pixels_per_metre'
+_MOVED = {
+    'tray': '--scene-trays',
+    'noise': '--scene-noise',
+    'pixels_per_metre': '--scene-pixels-per-metre',
+}
+
+
+def check_alone(options: argparse.Namespace) -> None:
+    """Refuse flags of the scene where one tray alone is simulated.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the first of them.
+    """
+    for row in rows(SceneFilmSettings()):
+        if getattr(options, row.name) is not None:
+            raise ConfigurationError(
+                flag_of(row.name), 'is of the whole plate', 'add --scene, or leave it out'
+            )
+
+
+def film_the_scene(options: argparse.Namespace) -> int:
+    """Film, write, print; the exit code."""
+    files = _files(options)
+    recorder, filmed, settings = _recorder(options)
+    made: list[str] = []
+    try:
+        if 'picture' in files:
+            recorder.into_picture(files['picture'])
+            made.append(str(files['picture']))
+        if 'video' in files:
+            with Progress('filming the video') as bar:
+                recorder.into_video(files['video'], bar.count)
+            made.append(str(files['video']))
+        if 'bag' in files:
+            with Progress('filming the bag') as bar:
+                recorder.into_bag(files['bag'], filmed.compression, options.quality, bar.count)
+            made.append(str(files['bag']))
+    except KeyboardInterrupt as interruption:
+        left = f'complete: {", ".join(made)}' if made else 'nothing is complete'
+        raise KeyboardInterrupt(left) from interruption
+    _print(options, recorder, files, {**asdict(filmed), 'simulation': asdict(settings)})
+    return 0
+
+
+def _files(options: argparse.Namespace) -> dict[str, Path]:
+    from nanorocks_ros.outputs.atomic_files import check_outputs
+    from nanorocks_ros.studies.synthetic.film_video import VIDEOS, check_video
+
+    for name in _OF_A_TRAY:
+        if getattr(options, name) is not None:
+            remedy = f'use {_MOVED[name]}' if name in _MOVED else 'leave it, or --scene, out'
+            raise ConfigurationError(flag_of(name), 'is of one tray alone', remedy)
+    if options.runs != 1:
+        raise ConfigurationError('--runs', 'is of one tray alone', 'change --seed instead')
+    names = 'picture', 'video', 'bag'
+    files = {name: Path(getattr(options, name)) for name in names if getattr(options, name)}
+    if not files:
+        raise ConfigurationError(
+            '--scene', 'makes nothing but films', 'name a --bag, --video or --picture'
+        )
+    check_outputs(
+        {f'--{name}': path for name, path in files.items()},
+        {'--picture': ('.png',), '--video': VIDEOS},
+        force=options.force,
+    )
+    if 'video' in files:
+        check_video(files['video'])
+    return files
+
+
+def _recorder(
+    options: argparse.Namespace,
+) -> tuple[SceneRecorder, SceneFilmSettings, SimulationSettings]:
+    from dataclasses import replace
+
+    from nanorocks_ros.experiment.trays import load_trays
+    from nanorocks_ros.simulation.plate_scene.plate_film import check_scene, without_effects
+    from nanorocks_ros.simulation.shaken_tray import check_settings
+    from nanorocks_ros.studies.synthetic.film_bag import check_quality
+    from nanorocks_ros.studies.synthetic.film_compression import check_codec
+    from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
+
+    check_quality(options.quality)
+    base = SceneFilmSettings()
+    if options.effects == 'none':
+        base = replace(base, scene=without_effects(base.scene))
+    filmed = settings_from(options, base)
+    settings = settings_from(options, SimulationSettings())
+    check_settings(settings)
+    check_scene(filmed.scene)
+    check_codec(filmed.compression)
+    trays = load_trays(options.trays_file)
+    return SceneRecorder(settings, filmed.scene, options.duration, trays), filmed, settings
+
+
+def _print(
+    options: argparse.Namespace,
+    recorder: SceneRecorder,
+    files: dict[str, Path],
+    settings: dict[str, Any],
+) -> None:
+    summary = recorder.summary
+    if options.json:
+        bag = {'bag': options.bag} if options.bag else {}
+        named = {name: str(path) for name, path in files.items()}
+        print(json.dumps({**summary, **bag, 'settings': settings, 'files': named}))
+        return
+    print(f'{"trays":17}{", ".join(str(number) for number in summary["trays"])}')
+    print(f'{"film":17}{summary["frames"]} frames, {summary["duration"]:g} s')
+    print(f'{"seed":17}{summary["seed"]}')
+    print(f'{"written":17}{", ".join(str(path) for path in files.values())}')

@@ -1,0 +1,251 @@
+"""``nanorocks sweep``: many simulated runs at a point or over a grid of settings."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.settings import SimulationSettings, rows
+
+if TYPE_CHECKING:
+    import argparse
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.settings import Scalar, SettingRow
+    from nanorocks_ros.studies.decays.decay_curve import SpeedCurve
+    from nanorocks_ros.studies.sweeps.sweep_plan import SweepPlan
+    from nanorocks_ros.studies.sweeps.sweep_result import Sweep
+
+_MOST_VALUES = 10_000
+_DIGITS = 12
+# What the camera sees, and when the tray is shaken, is no part of a single decay.
+_CAMERA = {
+    'first_shake',
+    'shake_period',
+    'frame_rate',
+    'width_px',
+    'height_px',
+    'pixels_per_metre',
+    'noise',
+}
+_EPILOG = """\
+A setting given as low:high:count or a,b,c is an axis of the grid; without any, the sweep is a
+single point. Interrupted, the same command goes on where it was. Results are the same whatever
+the workers. Example:
+
+  nanorocks sweep --restitution 0.5:0.95:10 --wall-restitution 0.8,0.9,0.99 --runs 178 -o out.npz
+"""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    import argparse
+
+    from nanorocks_ros.cli.flags import add_flags
+
+    parser = commands.add_parser(
+        'sweep',
+        help='simulate many runs at a point or over a grid of settings',
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument('-o', '--output', required=True, help='.npz file to write')
+    parser.add_argument('--runs', type=int, default=178, help='at every point; default 178')
+    parser.add_argument('--times', default='0:30:31', help='[s]; default 0:30:31')
+    parser.add_argument('--workers', type=int, help='processes; default: one for each core')
+    parser.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
+    parser.add_argument(
+        '--task-seconds', type=float, default=1.0, help='work in one task, about; default 1'
+    )
+    parser.add_argument(
+        '--common-random-numbers', action='store_true', help='run k starts alike at every point'
+    )
+    parser.add_argument('--keep-runs', action='store_true', help='keep every run, not only means')
+    parser.add_argument('--csv', help='write the curves as a table, too')
+    parser.add_argument('--figure', help='draw the deviation from --reference over the grid')
+    parser.add_argument(
+        '--reference',
+        help='point of the grid (A,B), .csv or .npz file of a decay, or results of an analysis',
+    )
+    parser.add_argument(
+        '--free-speed',
+        action='store_true',
+        help='the reference may start faster or slower than the sweep, by up to 1.5 times',
+    )
+    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    add_flags(parser, SimulationSettings(), skip=_CAMERA)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Sweep, write, print; the exit code."""
+    from nanorocks_ros.cli.progress import RunProgress
+    from nanorocks_ros.jobs.tasks import Workers
+    from nanorocks_ros.studies.sweeps.sweep_runs import sweep
+
+    plan = _plan(options)
+    workers = Workers(
+        processes=options.workers,
+        scheduler=options.scheduler,
+        task_seconds=options.task_seconds,
+    )
+    # Before hours of work, not after.
+    reference = _reference(options, plan)
+    output = Path(options.output)
+    with RunProgress() as progress:
+        found = sweep(plan, output, workers, progress.update, progress.notice)
+    if options.csv:
+        units = {row.name: row.unit for row in rows(SimulationSettings())}
+        found.write_table(Path(options.csv), units)
+    if options.figure:
+        _draw(Path(options.figure), found, reference, options.free_speed)
+    _print(options, found)
+    return 0
+
+
+def _plan(options: argparse.Namespace) -> SweepPlan:
+    from nanorocks_ros.cli.flags import flag_of, settings_from
+    from nanorocks_ros.studies.sweeps.sweep_plan import sweep_plan
+
+    axes: dict[str, list[Scalar]] = {}
+    for row in rows(SimulationSettings()):
+        text = getattr(options, row.name, None)
+        if isinstance(text, str) and not isinstance(row.default, tuple) and set(text) & set(':,'):
+            axes[row.name] = values_of(text, flag_of(row.name), row)
+            setattr(options, row.name, None)
+    return sweep_plan(
+        settings_from(options, SimulationSettings()),
+        axes,
+        [float(one) for one in values_of(options.times, '--times')],
+        options.runs,
+        common_random_numbers=options.common_random_numbers,
+        keep_runs=options.keep_runs,
+    )
+
+
+def values_of(text: str, flag: str, row: SettingRow | None = None) -> list[Scalar]:
+    """The values that a text names.
+
+    Parameters
+    ----------
+    text : str
+        ``low:high:count``, both ends included, or ``a,b,c``.
+    flag : str
+        To name in the error.
+    row : SettingRow, optional
+        The setting, where the values are one's; without it they are numbers.
+
+    Raises
+    ------
+    ConfigurationError
+        For any other text.
+    """
+    form = 'give low:high:count or a,b,c'
+    try:
+        if ':' not in text:
+            if row is not None and isinstance(row.default, str):
+                return [one.strip() for one in text.split(',')]
+            return [_number(one) for one in text.split(',')]
+        low, high, count = text.split(':')
+        number, start, end = int(count), float(low), float(high)
+    except ValueError as error:
+        raise ConfigurationError(flag, f'{text!r} cannot be read', form) from error
+    if not (2 <= number <= _MOST_VALUES and start < end):
+        raise ConfigurationError(
+            flag, f'{text!r} has no values', f'{form} with low < high, 2 to {_MOST_VALUES} values'
+        )
+    step = (end - start) / (number - 1)
+    values = [*(start + k * step for k in range(number - 1)), end]
+    # 0.6, not 0.6000000000000001: people will ask for the point by its value.
+    return [_number(f'{value:.{_DIGITS}g}') for value in values]
+
+
+def _number(text: str) -> int | float:
+    try:
+        return int(text)
+    except ValueError:
+        return float(text)
+
+
+def _reference(options: argparse.Namespace, plan: SweepPlan) -> SpeedCurve | list[Scalar] | None:
+    """The decay to compare with, or the point of the grid where it will be."""
+    from nanorocks_ros.studies.decays.cooling_curves import read_decay
+    from nanorocks_ros.studies.decays.decay_curve import place_of
+
+    if (options.figure is None) != (options.reference is None):
+        raise ConfigurationError('--figure', 'goes with --reference', 'give both or neither')
+    if options.figure is None:
+        return None
+    from nanorocks_ros.studies.figures.sweep_figure import check_drawable
+
+    check_drawable(Path(options.figure), plan.axes)
+    path = Path(options.reference)
+    if path.suffix in ('.csv', '.npz') or path.exists():
+        return read_decay(path)
+    point = _point(options.reference)
+    place_of({axis.name: axis.values for axis in plan.axes}, point)
+    return point
+
+
+def _point(text: str) -> list[Scalar]:
+    try:
+        return [_number(one) for one in text.split(',')]
+    except ValueError as error:
+        raise ConfigurationError(
+            '--reference', f'{text!r} cannot be read', 'give a point A,B or a .csv or .npz file'
+        ) from error
+
+
+def _draw(
+    path: Path, found: Sweep, reference: SpeedCurve | list[Scalar] | None, scaled: bool
+) -> None:
+    from nanorocks_ros.studies.decays.decay_curve import curve_at
+    from nanorocks_ros.studies.figures.sweep_figure import chi_square_figure
+
+    if reference is not None:
+        curve = curve_at(found, reference) if isinstance(reference, list) else reference
+        chi_square_figure(path, found, curve, scaled=scaled)
+
+
+def _print(options: argparse.Namespace, found: Sweep) -> None:
+    points = found.mean_speed.size // found.times.size
+    events = int(found.pair_collisions.sum() + found.wall_collisions.sum())
+    if options.json:
+        print(json.dumps({'output': options.output, 'events': events, **_as_json(found)}))
+        return
+    print(
+        f'nanorocks: {found.runs} runs at each of {points} points, {events} events, in '
+        f'{options.output}',
+        file=sys.stderr,
+    )
+
+
+def _as_json(found: Sweep) -> dict[str, Any]:
+    from nanorocks_ros.studies.sweeps.sweep_parts import COUNTS
+    from nanorocks_ros.studies.sweeps.sweep_result import CURVES
+
+    asked = json.loads(found.question)
+    curves = {name: getattr(found, name) for name in CURVES}
+    return {
+        'axes': {axis.name: list(axis.values) for axis in found.axes},
+        'runs': found.runs,
+        'seed': asked['settings']['seed'],
+        'version': asked['version'],
+        'time': found.times.tolist(),
+        **{name: _known(curve) for name, curve in curves.items()},
+        **{name: getattr(found, name).tolist() for name in COUNTS},
+    }
+
+
+def _known(values: NDArray[np.float64]) -> list[Any]:
+    """Numbers as JSON has them: null for NaN."""
+    import numpy as np
+
+    plain = values.astype(object)
+    plain[~np.isfinite(values)] = None
+    return list(plain.tolist())

@@ -1,0 +1,148 @@
+"""Curves of cluster sizes: which tray they are for, and the files that hold them."""
+
+from __future__ import annotations
+
+import json
+import math
+import zipfile
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.inference.cluster_size.curve_fit import fit_curve
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.inference.cluster_size.size_from_width import ClusterCurve
+
+_FORMAT = 1
+PACKAGED = 'cluster_curves.npz'
+
+
+def curve_key(tray: Tray) -> str:
+    """What decides how the pictures of a tray look, as a JSON object."""
+    species = [
+        {'material': one.material, 'low': one.diameter_low, 'high': one.diameter_high}
+        | {'count': one.count}
+        for one in tray.species
+    ]
+    return json.dumps({'dimensions': tray.dimensions, 'species': species, 'chalk': tray.chalk})
+
+
+def build_command(tray: Tray) -> str:
+    """What to type to get the curve of a tray."""
+    return f'nanorocks cluster-curve --tray {tray.number} -o curve.npz'
+
+
+def curve_of(tray: Tray, path: str | Path = '') -> ClusterCurve:
+    """The curve of a tray: from a file, or the one that comes with the package.
+
+    Parameters
+    ----------
+    tray : Tray
+    path : str or Path
+        Empty: of the package.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file cannot be read, or has no curve of this tray.
+    """
+    name = str(path) or PACKAGED
+    curves = load_curves(name, packaged=not path)
+    found = curves.get(curve_key(tray))
+    if found is None:
+        raise ConfigurationError(
+            name,
+            f'there is no calibration of cluster sizes for the beads and sides of tray '
+            f'{tray.number}',
+            f'make one: {build_command(tray)}, and pass it as clusters.curve',
+        )
+    return found
+
+
+@lru_cache(maxsize=16)
+def load_curves(name: str, *, packaged: bool) -> Mapping[str, ClusterCurve]:
+    """The curves of a file, by what is seen of their trays (`curve_key`).
+
+    Parameters
+    ----------
+    name : str
+        Path, or name in the package.
+    packaged : bool
+
+    Raises
+    ------
+    ConfigurationError
+        When it cannot be read.
+    """
+    remedy = 'make it again with `nanorocks cluster-curve`'
+    source: Any = resources.files(__package__).joinpath(name) if packaged else Path(name)
+    try:
+        with source.open('rb') as stream, np.load(stream, allow_pickle=False) as arrays:
+            return _curves(arrays)
+    except FileNotFoundError as error:
+        raise ConfigurationError(
+            name, 'there is no such calibration of cluster sizes', remedy
+        ) from error
+    except OSError as error:
+        raise ConfigurationError(name, f'cannot be read ({error.strerror})', remedy) from error
+    except (ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
+        raise ConfigurationError(
+            name, 'is damaged, or no calibration of cluster sizes', remedy
+        ) from error
+
+
+def _curves(arrays: Mapping[str, NDArray[Any]]) -> dict[str, ClusterCurve]:
+    if int(arrays['format']) != _FORMAT:
+        raise ValueError('of another release')
+    samples, level = arrays['samples'], float(arrays['level'])
+    made_by = str(arrays['made_by'])
+    return {
+        str(key): fit_curve(
+            str(key), level, samples[samples[:, 0] == number, 1:], made_by, _discs(str(key))
+        )
+        for number, key in zip(arrays['trays'], arrays['keys'], strict=True)
+    }
+
+
+def _discs(key: str) -> float:
+    """Area of the discs of all beads over that of the floor, from a `curve_key`."""
+    tray = json.loads(key)
+    discs = sum(
+        one['count'] * 0.25 * math.pi * (0.5 * (one['low'] + one['high'])) ** 2
+        for one in tray['species']
+    )
+    return float(discs / (tray['dimensions'][0] * tray['dimensions'][1]))
+
+
+def as_arrays(
+    trays: Mapping[int, Tray], level: float, samples: NDArray[np.float32], made_by: str
+) -> dict[str, NDArray[Any]]:
+    """What a file of curves holds.
+
+    Parameters
+    ----------
+    trays : mapping of int to Tray
+    level : float
+    samples : ndarray (n_samples, 7)
+        The number of the tray, and the columns of `ClusterCurve.samples`.
+    made_by : str
+        JSON.
+    """
+    return {
+        'format': np.array(_FORMAT),
+        'level': np.array(level),
+        'made_by': np.array(made_by),
+        'trays': np.array(list(trays)),
+        'keys': np.array([curve_key(tray) for tray in trays.values()]),
+        'samples': samples.astype(np.float32),
+    }

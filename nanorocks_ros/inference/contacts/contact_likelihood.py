@@ -1,0 +1,194 @@
+"""What single contacts say of the restitution: rebounds of the walls, collisions of the beads.
+
+Both are functions of one restitution alone, on a grid of its values, to be added to the log
+likelihood of the decay. Constants that do not depend on the restitution are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import FitError
+from nanorocks_ros.inference.contacts.contact_estimate import checked_grid
+from nanorocks_ros.inference.contacts.projected_collisions import (
+    RANGE,
+    SeenCollisions,
+    pairs_given,
+)
+from nanorocks_ros.numerics.log_sums import log_sum
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from nanorocks_ros.records import PairCollision, Rebound
+
+OUTLIERS = 0.05
+"""Share of contacts that were something else: a wrong link, a third bead that nobody saw."""
+
+VERTICAL_RATIOS = (0.25, 0.4, 0.6, 0.9, 1.3)
+"""Mean square of the vertical over that of a horizontal velocity component; all alike likely."""
+
+RADIUS_ERRORS = (-0.02, 0.0, 0.02, 0.04, 0.06)
+"""Glass beads of 12 px came out 4 % too large in films with all effects."""
+
+# What errors of rebounds may be over what was stated. Not less: many slow rebounds, whose errors
+# are stated too large, would then lend too much weight to the few fast ones.
+_ERROR_SCALES = (1.0, 1.4, 2.0, 2.8)
+# The same of collisions, which tell errors from vertical speeds too badly to have it free:
+# simulated cycles scatter so much more.
+_PAIR_ERRORS = 1.25
+_AT_ONCE = 128
+_SQRT_2_PI = math.sqrt(2.0 * math.pi)
+
+
+def marginal(table: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Log likelihood, (n,), whichever row of a table is true; each as likely.
+
+    Parameters
+    ----------
+    table : ndarray (m, n)
+        One of those below, or a sum of some: what is not known is then the same in all of them.
+    """
+    return np.asarray(log_sum(table) - math.log(len(table)))
+
+
+def rebound_log_likelihood(
+    rebounds: Sequence[Rebound], wall_restitution: ArrayLike, *, outliers: float = OUTLIERS
+) -> NDArray[np.float64]:
+    """How likely some rebounds are for each of some restitutions of the side walls.
+
+    See `rebound_table`.
+    """
+    return marginal(rebound_table(rebounds, wall_restitution, outliers=outliers))
+
+
+def rebound_table(
+    rebounds: Sequence[Rebound], wall_restitution: ArrayLike, *, outliers: float = OUTLIERS
+) -> NDArray[np.float64]:
+    """How likely rebounds are for each restitution of the side walls and each scale of errors.
+
+    The speed before is as uncertain as that after, and any speed is as likely; given the speed
+    before, that a rebound was found says nothing of the speed after.
+
+    Parameters
+    ----------
+    rebounds : sequence of Rebound
+    wall_restitution : array_like (n,), 0 to 1
+    outliers : float, 0 to 1
+        Share of rebounds that were something else.
+
+    Returns
+    -------
+    ndarray (m, n)
+        Log likelihood but for a constant; 0 without rebounds. Those of more rebounds are to be
+        added.
+    """
+    grid = checked_grid('wall_restitution', wall_restitution)
+    _check_share(outliers)
+    if not rebounds:
+        return np.zeros((len(_ERROR_SCALES), grid.size))
+    columns = np.array(
+        [
+            (one.incoming, one.outgoing, one.incoming_error, one.outgoing_error,
+             one.wall_velocity_error)
+            for one in rebounds
+        ]
+    )  # fmt: skip
+    incoming, outgoing, before, after, wall = columns.T[:, :, None]
+    # The speed of the wall is in both speeds, with opposite signs.
+    variance = (grid * before) ** 2 + after**2 + ((1.0 + grid) * wall) ** 2
+    square = (outgoing - grid * incoming) ** 2 / variance
+    other = outliers / (RANGE * incoming)
+    by_scale = []
+    for scale in _ERROR_SCALES:
+        density = np.exp(-0.5 * square / scale**2) / (_SQRT_2_PI * scale * np.sqrt(variance))
+        by_scale.append(np.log((1.0 - outliers) * density + other).sum(axis=0))
+    return np.array(by_scale)
+
+
+def pair_log_likelihood(
+    collisions: Sequence[PairCollision],
+    restitution: ArrayLike,
+    *,
+    vertical_ratios: Sequence[float] = VERTICAL_RATIOS,
+    radius_errors: Sequence[float] = RADIUS_ERRORS,
+    sticking_speed: float = 0.0,
+    outliers: float = OUTLIERS,
+) -> NDArray[np.float64]:
+    """How likely some collisions are for each of some restitutions of the beads.
+
+    See `pair_table`.
+    """
+    return marginal(
+        pair_table(
+            collisions,
+            restitution,
+            vertical_ratios=vertical_ratios,
+            radius_errors=radius_errors,
+            sticking_speed=sticking_speed,
+            outliers=outliers,
+        )
+    )
+
+
+def pair_table(
+    collisions: Sequence[PairCollision],
+    restitution: ArrayLike,
+    *,
+    vertical_ratios: Sequence[float] = VERTICAL_RATIOS,
+    radius_errors: Sequence[float] = RADIUS_ERRORS,
+    sticking_speed: float = 0.0,
+    outliers: float = OUTLIERS,
+) -> NDArray[np.float64]:
+    """How likely collisions are for each restitution, and each pair of what is not known.
+
+    Parameters
+    ----------
+    collisions : sequence of PairCollision
+    restitution : array_like (n,), 0 to 1
+    vertical_ratios : sequence of float, > 0
+        Mean square of the vertical over that of a horizontal velocity component, one of them,
+        of all collisions; each as likely.
+    radius_errors : sequence of float
+        By what share all radii that were measured are wrong, one of them, each as likely.
+    sticking_speed : float, [m/s]
+        Beads that meet more slowly along the line of centres merge, and are not among these.
+    outliers : float, 0 to 1
+        Share of collisions that were something else.
+
+    Returns
+    -------
+    ndarray (m, n)
+        Log likelihood but for a constant; 0 without collisions. Those of more collisions are to
+        be added.
+    """
+    grid = checked_grid('restitution', restitution)
+    _check_share(outliers)
+    if not collisions:
+        return np.zeros((len(vertical_ratios) * len(radius_errors), grid.size))
+    seen = SeenCollisions.of(collisions).with_errors(_PAIR_ERRORS)
+    # In parts, so that memory does not grow with the number of collisions.
+    parts = [
+        SeenCollisions(*(one[k : k + _AT_ONCE] for one in seen))
+        for k in range(0, len(collisions), _AT_ONCE)
+    ]
+    limits = sticking_speed, outliers
+    # Where no radius was measured, it does not matter how wrong they are.
+    errors = radius_errors if seen.measured.any() else (0.0,)
+    ratios = np.array(vertical_ratios, dtype=np.float64)
+    by_error = [
+        np.sum([pairs_given(one, grid, ratios, error, limits) for one in parts], axis=0)
+        for error in errors
+    ]
+    table = np.stack(by_error, axis=1).reshape(-1, grid.size)
+    return np.repeat(table, len(radius_errors) // len(errors), axis=0)
+
+
+def _check_share(outliers: float) -> None:
+    if not 0.0 < outliers < 1.0:
+        raise FitError('outliers', f'a share of {outliers!r}', 'give one between 0 and 1')

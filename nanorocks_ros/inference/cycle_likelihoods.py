@@ -1,0 +1,147 @@
+"""What finished cycles say of both restitutions, kept so that those of others can be added."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.errors import FitError
+from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+_NOT_THERE = 'analyse the recording again'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evidence:
+    """Of some cycles of one tray, all of them read in the same way.
+
+    What is not known of tray, camera and start is the same in all of them, so it does not
+    average out: likelihoods are added up first, and integrated over it last.
+
+    Parameters
+    ----------
+    cycles : int
+    decay : DecayLikelihood or None
+        By a library; None for the closed form of the paper.
+    contacts : ContactTerms or None
+    by_form : tuple of (float, float)
+        By the closed form: restitution and error of each cycle.
+    """
+
+    cycles: int
+    decay: DecayLikelihood | None = None
+    contacts: ContactTerms | None = None
+    by_form: tuple[tuple[float, float], ...] = ()
+
+    def __add__(self, other: Evidence) -> Evidence:
+        return Evidence(
+            cycles=self.cycles + other.cycles,
+            decay=self.decay + other.decay if self.decay and other.decay else None,
+            contacts=self.contacts + other.contacts if self.contacts and other.contacts else None,
+            by_form=self.by_form + other.by_form,
+        )
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Everything as arrays, to be kept; derivatives to seven digits."""
+        found: dict[str, NDArray[Any]] = {
+            'cycles': np.array(self.cycles),
+            'by_form': np.array(self.by_form, dtype=np.float64).reshape(-1, 2),
+        }
+        if self.decay is None or self.contacts is None:
+            return found
+        upper = np.triu_indices(self.decay.gradient.shape[-1])
+        for prefix, part in (('decay', self.decay), ('contacts', self.contacts)):
+            for field in fields(part):
+                found[f'{prefix}.{field.name}'] = np.asarray(getattr(part, field.name))
+        # The largest by far, and symmetric.
+        found['decay.information'] = self.decay.information[..., upper[0], upper[1]].astype(
+            np.float32
+        )
+        found['decay.gradient'] = self.decay.gradient.astype(np.float32)
+        return found
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], where: str) -> Evidence:
+        """What `arrays` gave.
+
+        Parameters
+        ----------
+        arrays : mapping of str to ndarray
+        where : str
+            What to name in an error.
+
+        Raises
+        ------
+        FitError
+            When something is missing, or does not fit together.
+        """
+        try:
+            by_form = tuple((float(a), float(b)) for a, b in arrays['by_form'])
+            cycles = int(arrays['cycles'])
+            if 'decay.information' not in arrays:
+                return cls(cycles=cycles, by_form=by_form)
+            gradient = arrays['decay.gradient'].astype(np.float64)
+            upper = np.triu_indices(gradient.shape[-1])
+            information = np.empty((*gradient.shape, gradient.shape[-1]))
+            information[..., upper[0], upper[1]] = arrays['decay.information']
+            information[..., upper[1], upper[0]] = arrays['decay.information']
+            return cls(
+                cycles=cycles,
+                decay=DecayLikelihood(
+                    log_likelihood=arrays['decay.log_likelihood'],
+                    gradient=gradient,
+                    information=information,
+                    deviation=arrays['decay.deviation'],
+                    samples=int(arrays['decay.samples']),
+                ),
+                contacts=ContactTerms(
+                    rebounds=int(arrays['contacts.rebounds']),
+                    collisions=int(arrays['contacts.collisions']),
+                    walls=arrays['contacts.walls'],
+                    beads=arrays['contacts.beads'],
+                ),
+                by_form=by_form,
+            )
+        except (KeyError, ValueError, IndexError, TypeError) as error:
+            raise FitError(where, 'holds no evidence of cycles', _NOT_THERE) from error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeanRestitution:
+    """What many cycles say together; NaN where nothing is known.
+
+    Parameters
+    ----------
+    cycles : int
+    restitution, restitution_error : float
+        Of two beads: mean of what is probable, and standard deviation.
+    restitution_lower, restitution_upper : float
+        Interval.
+    wall_restitution, wall_restitution_error : float
+        Of beads and side walls.
+    wall_restitution_lower, wall_restitution_upper : float
+    tension : float
+        Standard deviations by which decays, rebounds and collisions disagree.
+    rebounds, collisions : int
+    """
+
+    cycles: int
+    restitution: float
+    restitution_error: float
+    restitution_lower: float
+    restitution_upper: float
+    wall_restitution: float = np.nan
+    wall_restitution_error: float = np.nan
+    wall_restitution_lower: float = np.nan
+    wall_restitution_upper: float = np.nan
+    tension: float = np.nan
+    rebounds: int = 0
+    collisions: int = 0

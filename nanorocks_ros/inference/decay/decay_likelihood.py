@@ -1,0 +1,234 @@
+"""How likely a measured decay is, for every pair of restitutions on a grid.
+
+A decay is a series of ln v with errors. Against the mean ln f of the library, the deviations of
+the gas from its mean have the library's covariance, and the errors of the speeds add to it. The
+amplitude is free: v(t) = a f(a t) holds exactly, and the best a is found for each place of the
+grid by Newton's method (a profile likelihood: integrating over ln a instead would favour low
+restitutions, of which a fast gas soon forgets how fast it was). What is not known exactly of
+the tray or the camera (`nuisances`) is left in: for every place the result holds how the
+likelihood depends on it, to second order, so that many decays of one tray can be added up before
+it is integrated over; unlike noise it does not average out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.inference.decay.likelihood_kernels import ROUNDING, evaluate
+from nanorocks_ros.numerics.log_sums import log_sum
+from nanorocks_ros.numerics.small_cholesky import integrate
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.inference.decay.decay_library import DecayLibrary
+
+# Nothing is measured better than that, relative.
+_LEAST_ERROR = 2e-3
+# One of so many places is looked at to find about the best.
+_EVERY = 4
+# A scale known no better than this is no linear nuisance: it is tried at so many of its standard
+# deviations, and linear by half of one between them.
+_WIDE = 0.1
+_SCALES = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
+# Nuisances of the camera, beside those of the library: scale of lengths, and a relative error of
+# the speeds that grows with their logarithm.
+CAMERA_NUISANCES = ('scale', 'speed_bias')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DecayTables:
+    """The library at the places of a grid of restitutions.
+
+    Parameters
+    ----------
+    decays : DecayLibrary
+    restitution : ndarray (n_c,)
+    wall_restitution : ndarray (n_w,)
+    mean : ndarray (n_c * n_w, n_x)
+        Of ln f.
+    slopes : ndarray (n_c * n_w, n_z, n_x)
+        Change of ln f for one standard deviation of each nuisance; without those of the camera.
+    corners : ndarray of int64, (n_c * n_w, 4)
+        Places around each, in the grid of the covariances.
+    shares : ndarray (n_c * n_w, 4)
+        Their weights.
+    """
+
+    decays: DecayLibrary
+    restitution: NDArray[np.float64]
+    wall_restitution: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+    corners: NDArray[np.int64]
+    shares: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DecayLikelihood:
+    """What decays say, at the places of the grid; those of several decays add up.
+
+    Where the scale is hardly known every array has one axis more before those named here: one
+    likelihood for each scale that is tried.
+
+    Parameters
+    ----------
+    log_likelihood : ndarray (n_places,)
+        For nuisances as they are expected.
+    gradient : ndarray (n_places, n_z)
+        Of it with the nuisances, in units of their standard deviations.
+    information : ndarray (n_places, n_z, n_z)
+        Minus its second derivative.
+    deviation : ndarray (n_places,)
+        Sum of the squares of the whitened residuals.
+    samples : int
+        Independent of how many speeds went into each: binned.
+    """
+
+    log_likelihood: NDArray[np.float64]
+    gradient: NDArray[np.float64]
+    information: NDArray[np.float64]
+    deviation: NDArray[np.float64]
+    samples: int
+
+    def __add__(self, other: DecayLikelihood) -> DecayLikelihood:
+        return DecayLikelihood(
+            log_likelihood=self.log_likelihood + other.log_likelihood,
+            gradient=self.gradient + other.gradient,
+            information=self.information + other.information,
+            deviation=self.deviation + other.deviation,
+            samples=self.samples + other.samples,
+        )
+
+    def integrated(self) -> NDArray[np.float64]:
+        """Log likelihood (n_places,) with the nuisances integrated over their Gaussian priors."""
+        each = np.empty(self.log_likelihood.shape)
+        n_z = self.gradient.shape[-1]
+        integrate(
+            np.ascontiguousarray(self.gradient).reshape(-1, n_z),
+            np.ascontiguousarray(self.information).reshape(-1, n_z, n_z),
+            each.reshape(-1),
+        )
+        each += self.log_likelihood
+        if each.ndim == 1:
+            return np.asarray(each)
+        weight = np.exp(-0.5 * _SCALES**2)
+        return np.asarray(log_sum(each, weight / weight.sum()))
+
+    def deviation_at(self, place: int) -> float:
+        """Sum of the squares of the whitened residuals at a place, for the likeliest scale."""
+        deviation = np.atleast_2d(self.deviation)[:, place]
+        return float(deviation[np.atleast_2d(self.log_likelihood)[:, place].argmax()])
+
+
+def decay_likelihood(
+    tables: DecayTables,
+    time: NDArray[np.float64],
+    speed: NDArray[np.float64],
+    error: NDArray[np.float64],
+    camera: tuple[float, float],
+) -> DecayLikelihood:
+    """The likelihood of one decay over the grid.
+
+    Parameters
+    ----------
+    tables : DecayTables
+    time : ndarray (n,), [s], > 0
+        Since the shaking event; rising. Of times further apart than the ends of the library are,
+        the first count.
+    speed, error : ndarray (n,), [m/s], > 0
+        Mean projected speeds and one standard error of each.
+    camera : tuple of 2 floats
+        Standard deviations of the `CAMERA_NUISANCES`, relative.
+    """
+    library = tables.decays
+    within = time < time[0] * math.exp((library.distances.size - 2) * library.step)
+    cells, log_time, log_speed, variance = _binned(
+        library.step, time[within], speed[within], error[within]
+    )
+    data = (log_time, log_speed, variance)
+    # First with the covariance of each place, then at all of them with that of the best one: how
+    # strongly the gas fluctuates is known too roughly to tell restitutions by.
+    some = slice(None, None, _EVERY)
+    corners, shares = tables.corners[some], tables.shares[some]
+    rough = _over(tables, data, cells, camera, (some, corners, shares), derivatives=False)
+    best = int(np.argmax(rough.log_likelihood)) * _EVERY
+    every = slice(None), tables.corners[best, np.newaxis], tables.shares[best, np.newaxis]
+    scale, bias = camera
+    if scale <= _WIDE:
+        return _over(tables, data, cells, camera, every)
+    each = [
+        _over(
+            tables,
+            (log_time, log_speed - step * scale, variance),
+            cells,
+            (0.5 * scale, bias),
+            every,
+        )
+        for step in _SCALES
+    ]
+    return DecayLikelihood(
+        **{
+            name: np.stack([getattr(one, name) for one in each])
+            for name in ('log_likelihood', 'gradient', 'information', 'deviation')
+        },
+        samples=cells.size,
+    )
+
+
+def _over(
+    tables: DecayTables,
+    data: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    cells: NDArray[np.int64],
+    camera: tuple[float, float],
+    places: tuple[slice, NDArray[np.int64], NDArray[np.float64]],
+    *,
+    derivatives: bool = True,
+) -> DecayLikelihood:
+    """The likelihood at some places, with covariances between given corners, in given shares."""
+    library = tables.decays
+    which, corners, shares = places
+    mean = tables.mean[which]
+    n_z = tables.slopes.shape[1] + len(CAMERA_NUISANCES)
+    numbers = np.empty((len(mean), 2))
+    gradient = np.empty((len(mean) if derivatives else 0, n_z))
+    information = np.empty((len(gradient), n_z, n_z))
+    evaluate(
+        data,
+        cells,
+        library.covariance.reshape(-1, *library.covariance.shape[2:]),
+        np.ascontiguousarray(corners),
+        np.ascontiguousarray(shares),
+        np.ascontiguousarray(mean),
+        np.ascontiguousarray(tables.slopes[which]),
+        np.array(camera),
+        math.log(library.distances[0]),
+        library.step,
+        (numbers, gradient, information),
+    )
+    return DecayLikelihood(
+        log_likelihood=numbers[:, 0],
+        gradient=gradient,
+        information=information,
+        deviation=numbers[:, 1],
+        samples=cells.size,
+    )
+
+
+def _binned(
+    step: float, time: NDArray[np.float64], speed: NDArray[np.float64], error: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Number, ln t, ln v and its variance of each bin as wide as the step of the library."""
+    bins = np.floor(np.log(time / time[0]) / step + ROUNDING).astype(np.int64)
+    starts = np.flatnonzero(np.diff(bins, prepend=-1))
+    counts = np.diff(np.append(starts, time.size))
+    relative = np.maximum(error / speed, _LEAST_ERROR)
+    log_time = np.add.reduceat(np.log(time), starts) / counts
+    log_speed = np.add.reduceat(np.log(speed), starts) / counts
+    variance = np.add.reduceat(relative**2, starts) / counts**2
+    # No two of them at one place: their covariance would be that of one and the same.
+    return bins[starts], log_time, log_speed, variance

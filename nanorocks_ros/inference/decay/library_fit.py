@@ -1,0 +1,192 @@
+"""Smooth functions through simulated decays: how a decay library is made of runs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import FitError
+from nanorocks_ros.inference.decay.decay_library import (
+    LOWEST_WALL,
+    NUISANCES,
+    DecayLibrary,
+    design_of,
+    term_count,
+    tray_key,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+
+FIRST_DISTANCE, LAST_DISTANCE, N_DISTANCES = 0.003, 1.0, 60
+# Where the covariance is worked out, and over what part of the ranges it is averaged.
+_COVARIANCE_RESTITUTION = np.array([1.0, 0.94, 0.84, 0.65, 0.4, 0.0])
+_COVARIANCE_WALL = np.array([0.80, 0.87, 0.94, 0.99])
+_REACH = 0.12
+# The weight of a node whose runs happen to be alike.
+_LEAST_ERROR = 1.0 / 3.0
+_ZERO = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decays:
+    """Runs at many nodes in the space of restitutions and nuisances.
+
+    Parameters
+    ----------
+    restitution, wall_restitution, floor_lid_restitution : ndarray (n,)
+    nuisances : ndarray (n, 5)
+    log_speed : ndarray (n, n_runs, n_x)
+        ln f at `distances()`.
+    """
+
+    restitution: NDArray[np.float64]
+    wall_restitution: NDArray[np.float64]
+    floor_lid_restitution: NDArray[np.float64]
+    nuisances: NDArray[np.float64]
+    log_speed: NDArray[np.float64]
+
+
+def distances() -> NDArray[np.float64]:
+    """The distances of a library, (60,), [m]."""
+    return np.geomspace(FIRST_DISTANCE, LAST_DISTANCE, N_DISTANCES)
+
+
+def fit_library(tray: Tray, decays: Decays, made_by: str) -> DecayLibrary:
+    """A library through decays.
+
+    Parameters
+    ----------
+    tray : Tray
+    decays : Decays
+    made_by : str
+        JSON, kept with it.
+
+    Returns
+    -------
+    DecayLibrary
+
+    Raises
+    ------
+    FitError
+        With fewer than two runs a node, or fewer nodes than `fewest_nodes`.
+    """
+    nodes, runs, _ = decays.log_speed.shape
+    design = design_of(
+        decays.restitution,
+        decays.wall_restitution,
+        decays.floor_lid_restitution,
+        decays.nuisances,
+    )
+    terms = design.plain.shape[1] + design.weighted.shape[1]
+    if runs < 2 or nodes < fewest_nodes():
+        raise FitError(
+            'decay library',
+            f'{nodes} nodes of {runs} runs',
+            f'give {fewest_nodes()} nodes and 2 runs at least',
+        )
+    base = rough_rates(tray)
+    rate = design.losses @ base
+    mean = decays.log_speed.mean(axis=1)
+    error = decays.log_speed.std(axis=1, ddof=1) / math.sqrt(runs)
+    x = distances()
+    coefficients = np.empty((terms, x.size))
+    excess = 0.0
+    for k in range(x.size):
+        decay = rate * x[k]
+        sd = np.maximum(error[:, k], _LEAST_ERROR * np.median(error[:, k]))
+        target = mean[:, k] + np.log1p(decay)
+        matrix = design.terms(decay)
+        coefficients[:, k] = np.linalg.lstsq(matrix / sd[:, np.newaxis], target / sd, rcond=_ZERO)[
+            0
+        ]
+        residual = target - matrix @ coefficients[:, k]
+        excess += float(np.mean(residual**2) - np.mean(error[:, k] ** 2) * (1.0 - terms / nodes))
+    return DecayLibrary(
+        tray=tray_key(tray),
+        made_by=made_by,
+        misfit=math.sqrt(max(excess / x.size, 0.0)),
+        base=base,
+        distances=x,
+        coefficients=coefficients,
+        covariance_restitution=_COVARIANCE_RESTITUTION,
+        covariance_wall=_COVARIANCE_WALL,
+        covariance=_covariances(decays),
+    )
+
+
+def fewest_nodes() -> int:
+    """Nodes that a library needs: with fewer, functions go through the noise of the runs."""
+    return 2 * term_count()
+
+
+def rough_rates(tray: Tray) -> NDArray[np.float64]:
+    """About what a full loss adds to the rate of decay, (3,), [1/m].
+
+    Kinetic theory of a dilute isotropic gas, in pairs, at side walls, at floor and lid; the
+    polynomials of the library make up for what is missing.
+    """
+    free = [max(side - tray.diameter, 0.1 * tray.diameter) for side in tray.dimensions]
+    pair = math.sqrt(2.0) / 6.0 * tray.count * math.pi * tray.diameter**2 / math.prod(free)
+    wall = 2.0 / (3.0 * math.pi)
+    return np.array([pair, wall * (1.0 / free[0] + 1.0 / free[1]), wall / free[2]])
+
+
+def _covariances(decays: Decays) -> NDArray[np.float64]:
+    """Covariance between runs, averaged over the nodes around each of a grid of places."""
+    _, runs, n_x = decays.log_speed.shape
+    deviation = decays.log_speed - decays.log_speed.mean(axis=1, keepdims=True)
+    of_node = np.einsum('nrx,nry->nxy', deviation, deviation) / (runs - 1)
+    across = _even(decays.restitution)
+    up = (1.0 - decays.wall_restitution) / (1.0 - LOWEST_WALL)
+    found = np.empty((_COVARIANCE_RESTITUTION.size, _COVARIANCE_WALL.size, n_x, n_x))
+    for i, restitution in enumerate(_even(_COVARIANCE_RESTITUTION)):
+        for j, wall in enumerate((1.0 - _COVARIANCE_WALL) / (1.0 - LOWEST_WALL)):
+            square = ((across - restitution) ** 2 + (up - wall) ** 2) / _REACH**2
+            weight = np.exp(-0.5 * square)
+            found[i, j] = np.tensordot(weight / weight.sum(), of_node, axes=1)
+    return found
+
+
+def _even(restitution: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The measure in which covariances are averaged, 0 for a restitution of 1."""
+    return np.asarray((1.0 - restitution) ** (1.0 / 1.5))
+
+
+def node_of(number: int) -> dict[str, float]:
+    """Restitutions and nuisances of a node of the library: evenly spread for any number of them.
+
+    An additive recurrence with the powers of the generalised golden ratio (Roberts 2018, "The
+    unreasonable effectiveness of quasirandom sequences"), so more nodes leave those there were.
+
+    Parameters
+    ----------
+    number : int, from 0
+
+    Returns
+    -------
+    dict of str to float
+        ``restitution``, ``wall_restitution``, ``floor_lid_restitution``, and the nuisances,
+        ``count`` in units of -1, 0, 1.
+    """
+    dimensions = 2 + 1 + len(NUISANCES)
+    golden = 1.5
+    for _ in range(64):
+        golden = (1.0 + golden) ** (1.0 / (dimensions + 1))
+    u = [(0.5 + (number + 1) * golden**-k) % 1.0 for k in range(1, dimensions + 1)]
+    wall = 1.0 - (1.0 - LOWEST_WALL) * u[1] ** 1.5
+    return {
+        'restitution': 1.0 - u[0] ** 2,
+        'wall_restitution': wall,
+        'floor_lid_restitution': 1.0 - (1.0 - wall) * math.exp(1.6 * (u[2] - 0.5)),
+        'height': 0.5e-3 * (u[3] - 0.5),
+        'diameter': 0.04 * (u[4] - 0.5),
+        'anisotropy': 1.4 * (u[5] - 0.5),
+        'count': math.floor(3.0 * u[6]) - 1.0,
+        'start': 1.0 if u[7] < 0.5 else -1.0,
+    }

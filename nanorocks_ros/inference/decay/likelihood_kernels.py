@@ -1,0 +1,300 @@
+"""The loops of `decay_likelihood`, compiled: place by place of the grid of restitutions."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.numerics.compiled import compiled, kernel
+from nanorocks_ros.numerics.small_cholesky import factorise, whiten
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+ROUNDING = 1e-9
+_NEWTON_STEPS = 15
+_LONGEST_STEP, _SMALL = 0.5, 3e-3
+# Before anything is measured the gas is taken to have been faster at the shaking event than at the
+# first speed used by a factor of 1.6, give or take a factor of e, where that is within four
+# seconds of the event. What it did before a first speed that comes later is known the less the
+# later that is: both rise with the logarithm of that time.
+_AMPLITUDE_LEAD, _AMPLITUDE_SPREAD = 0.5, 1.0
+_EARLY, _LEAD_PER_LOG_TIME = math.log(4.0), 1.0
+# The search begins where the first speeds are matched, however fast the gas was.
+_MOST_LEAD = 8.0
+# Speeds from which the amplitude is guessed.
+_FIRST_SPEEDS = 3
+
+
+@compiled
+def evaluate(
+    data: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    cells: NDArray[np.int64],
+    covariances: NDArray[np.float64],
+    corners: NDArray[np.int64],
+    shares: NDArray[np.float64],
+    means: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+    camera: NDArray[np.float64],
+    first: float,
+    step: float,
+    found: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+) -> None:
+    """Fill in the likelihood at every place, for its best amplitude.
+
+    Parameters
+    ----------
+    data : tuple of 3 ndarrays (n,)
+        ln t, ln v and its variance.
+    cells : ndarray of int64, (n,)
+        Bins of the data, counted from the first.
+    covariances : ndarray (n_corners, n_x, n_x)
+    corners, shares : ndarray (n_places or 1, 4)
+        One for all places, or one of each.
+    means, slopes : ndarray (n_places, n_x), (n_places, n_z, n_x)
+    camera : ndarray (2,)
+    first, step : float
+        Logarithm of the first distance of the library, and from each to the next.
+    found : tuple of 3 ndarrays
+        Log likelihood and deviation, (n_places, 2); gradient, (n_places, n_z + 2), and
+        information, (n_places, n_z + 2, n_z + 2): without entries where nobody asks for them.
+    """
+    log_time, log_speed, variance = data
+    numbers, gradients, informations = found
+    n = log_time.size
+    n_z = slopes.shape[1] + camera.size
+    mixed = np.empty(covariances.shape[1:])
+    factor = np.empty((n, n))
+    # Columns: residual, derivative with ln a, then the nuisances; whitened in place.
+    columns = np.empty((2 + n_z, n))
+    middle = log_speed.mean()
+    late = _LEAD_PER_LOG_TIME * max(log_time[0] - _EARLY, 0.0)
+    expected = log_speed[0] + _AMPLITUDE_LEAD + late
+    spread = _AMPLITUDE_SPREAD + late
+    for place in range(means.shape[0]):
+        amplitude = _matching(log_time, log_speed, means[place], first, step)
+        # Beyond the ends of the library the covariance is that of its ends.
+        offset = max((amplitude + log_time[0] - first) / step, 0.0)
+        offset = min(offset, len(mixed) - 1 - cells[n - 1] - ROUNDING)
+        if corners.shape[0] > 1:
+            part = max(int(offset), 0), min(int(offset) + cells[n - 1] + 2, len(mixed))
+            _mix(covariances, corners[place], shares[place], part, mixed)
+        elif place == 0:
+            _mix(covariances, corners[0], shares[0], (0, len(mixed)), mixed)
+        _covariance(mixed, cells, offset, factor)
+        for i in range(n):
+            factor[i, i] += variance[i]
+        log_determinant = factorise(factor)
+        best, cost = _best_amplitude(
+            data, means[place], (first, step), factor, (amplitude, expected, spread), columns
+        )
+        off = (best - expected) / spread
+        if gradients.shape[0] == 0:
+            numbers[place, 1] = cost - off * off
+            numbers[place, 0] = -0.5 * (cost + log_determinant)
+            continue
+        _compare(log_time, log_speed, means[place], first, step, best, columns)
+        offset = (best - first) / step
+        _look_up(slopes[place], log_time / step + offset, columns[2:])
+        columns[n_z] = camera[0] * (columns[1] - 1.0)
+        columns[n_z + 1] = camera[1] * (log_speed - middle)
+        whiten(factor, columns, 2 + n_z)
+        _sum_up(columns, (off, spread), numbers[place], gradients[place], informations[place])
+        numbers[place, 0] -= 0.5 * (log_determinant + off * off)
+
+
+@kernel
+def _best_amplitude(
+    data: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    mean: NDArray[np.float64],
+    axis: tuple[float, float],
+    factor: NDArray[np.float64],
+    amplitudes: tuple[float, float, float],
+    columns: NDArray[np.float64],
+) -> tuple[float, float]:
+    """The likeliest ln a and what it costs, by Newton's method.
+
+    The amplitudes are that to begin with, the expected one and the spread of what is expected.
+    """
+    log_time, log_speed, _ = data
+    first, step = axis
+    amplitude, expected, spread = amplitudes
+    residual, slope = columns[0], columns[1]
+    change = _LONGEST_STEP
+    cost = np.inf
+    best = amplitude
+    for _ in range(_NEWTON_STEPS):
+        _compare(log_time, log_speed, mean, first, step, amplitude, columns)
+        whiten(factor, columns, 2)
+        off = (amplitude - expected) / spread
+        now = off * off
+        pull = -off / spread
+        stiffness = 1.0 / spread**2
+        for i in range(log_time.size):
+            now += residual[i] ** 2
+            pull += residual[i] * slope[i]
+            stiffness += slope[i] ** 2
+        if now > cost:
+            # Too far: the mean is curved.
+            change *= 0.3
+        else:
+            cost, best = now, amplitude
+            change = min(max(pull / stiffness, -_LONGEST_STEP), _LONGEST_STEP)
+        amplitude = best + change
+        if abs(change) < _SMALL:
+            break
+    return best, cost
+
+
+@kernel
+def _matching(
+    log_time: NDArray[np.float64],
+    log_speed: NDArray[np.float64],
+    mean: NDArray[np.float64],
+    first: float,
+    step: float,
+) -> float:
+    """The amplitude with which the first speeds are the expected ones, if there is one."""
+    n = min(_FIRST_SPEEDS, log_time.size)
+    low, high = log_speed[0], log_speed[0] + _MOST_LEAD
+    while high - low > _SMALL:
+        amplitude = 0.5 * (low + high)
+        rest = 0.0
+        for i in range(n):
+            value, _ = _between(mean, (amplitude + log_time[i] - first) / step)
+            rest += log_speed[i] - amplitude - value
+        if rest > 0.0:
+            low = amplitude
+        else:
+            high = amplitude
+    return float(low)
+
+
+@kernel
+def _mix(
+    covariances: NDArray[np.float64],
+    corners: NDArray[np.int64],
+    shares: NDArray[np.float64],
+    part: tuple[int, int],
+    found: NDArray[np.float64],
+) -> None:
+    """The covariance of the library between four corners, from one distance to another."""
+    one, two = covariances[corners[0]], covariances[corners[1]]
+    three, four = covariances[corners[2]], covariances[corners[3]]
+    for i in range(part[0], part[1]):
+        for j in range(part[0], part[1]):
+            found[i, j] = (
+                shares[0] * one[i, j]
+                + shares[1] * two[i, j]
+                + shares[2] * three[i, j]
+                + shares[3] * four[i, j]
+            )
+
+
+@kernel
+def _covariance(
+    table: NDArray[np.float64],
+    cells: NDArray[np.int64],
+    offset: float,
+    found: NDArray[np.float64],
+) -> None:
+    """Lower half of the covariance of data at some cells after an offset."""
+    whole = math.floor(offset)
+    high = offset - whole
+    low = 1.0 - high
+    for i in range(cells.size):
+        row = max(whole + cells[i], 0)
+        here, next_one, into = table[row], table[row + 1], found[i]
+        for j in range(i + 1):
+            column = max(whole + cells[j], 0)
+            into[j] = low * here[column] + high * next_one[column + 1]
+
+
+@kernel
+def _compare(
+    log_time: NDArray[np.float64],
+    log_speed: NDArray[np.float64],
+    mean: NDArray[np.float64],
+    first: float,
+    step: float,
+    amplitude: float,
+    columns: NDArray[np.float64],
+) -> None:
+    """Residuals at an amplitude, and the derivative of the expected ln v with it."""
+    for i in range(log_time.size):
+        value, slope = _between(mean, (amplitude + log_time[i] - first) / step)
+        columns[0, i] = log_speed[i] - amplitude - value
+        columns[1, i] = 1.0 + slope / step
+
+
+@kernel
+def _between(values: NDArray[np.float64], at: float) -> tuple[float, float]:
+    """Value and slope between two entries, straight on beyond the ends."""
+    cell = min(max(math.floor(at), 0), values.size - 2)
+    slope = values[cell + 1] - values[cell]
+    return values[cell] + (at - cell) * slope, slope
+
+
+@kernel
+def _look_up(
+    slopes: NDArray[np.float64], places: NDArray[np.float64], found: NDArray[np.float64]
+) -> None:
+    """Changes of ln f with nuisances, (n_z, n_x), between distances; (n_z, n)."""
+    for i in range(places.size):
+        # Beyond its ends the library's slopes stay as they are there.
+        at = min(max(places[i], 0.0), slopes.shape[1] - 1.0)
+        cell = min(int(at), slopes.shape[1] - 2)
+        share = at - cell
+        for z in range(slopes.shape[0]):
+            value = slopes[z, cell]
+            found[z, i] = value + share * (slopes[z, cell + 1] - value)
+
+
+@kernel
+def _sum_up(
+    columns: NDArray[np.float64],
+    amplitude: tuple[float, float],
+    numbers: NDArray[np.float64],
+    gradient: NDArray[np.float64],
+    information: NDArray[np.float64],
+) -> None:
+    """Log likelihood and its derivatives, with the amplitude projected out."""
+    n = columns.shape[1]
+    off, spread = amplitude
+    deviation = 0.0
+    # At the best amplitude there is no pull left, but where the mean has a kink or an end.
+    pull = -off / spread
+    stiffness = 1.0 / spread**2
+    for i in range(n):
+        deviation += columns[0, i] ** 2
+        pull += columns[0, i] * columns[1, i]
+        stiffness += columns[1, i] ** 2
+    residual, with_amplitude = columns[0], columns[1]
+    for z in range(gradient.size):
+        own = columns[2 + z]
+        shared = 0.0
+        for i in range(n):
+            shared += with_amplitude[i] * own[i]
+        # Kept here until all of them are needed no more.
+        gradient[z] = shared
+        for first in range(0, z + 1, 2):
+            # Two side by side; an odd one at the end goes with itself.
+            second = min(first + 1, z)
+            one, two = columns[2 + first], columns[2 + second]
+            a, b = -shared * gradient[first] / stiffness, -shared * gradient[second] / stiffness
+            for i in range(n):
+                a += own[i] * one[i]
+                b += own[i] * two[i]
+            information[z, first] = information[first, z] = a
+            information[z, second] = information[second, z] = b
+    for z in range(gradient.size):
+        own = columns[2 + z]
+        slope = 0.0
+        for i in range(n):
+            slope += residual[i] * own[i]
+        # What the amplitude would take over is no gain of a nuisance.
+        gradient[z] = slope - gradient[z] * pull / stiffness
+    numbers[0] = -0.5 * deviation
+    numbers[1] = deviation

@@ -1,0 +1,155 @@
+"""The speed below which beads stick, from when bodies merged: a Poisson likelihood.
+
+Derived in docs/clusters.md, where its bias is measured.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import reduce
+from operator import add
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.inference.sticking.merge_likelihood import MergeRates, MergeTerms
+from nanorocks_ros.numerics.log_sums import log_sum
+from nanorocks_ros.records import StickingStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
+    from nanorocks_ros.physics.sticking_rates import SlowContacts
+
+# Log of a factor of all rates, in standard deviations: nodes and weights of its normal law.
+_NORMAL_NODES, _NORMAL_WEIGHTS = np.polynomial.hermite_e.hermegauss(9)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StickingEstimate:
+    """The sticking speed of some beads.
+
+    Parameters
+    ----------
+    status : StickingStatus
+    sticking_speed : float, [m/s]
+        Median of what is probable; NaN unless measured.
+    lower, upper : float, [m/s]
+        Interval; from 0 to an upper limit without a merge, from a lower limit to the highest
+        speed considered where all that met stuck.
+    merges : int
+    probability : float, 0 to 1
+        Of the interval.
+    """
+
+    status: StickingStatus
+    sticking_speed: float
+    lower: float
+    upper: float
+    merges: int
+    probability: float
+
+
+def sticking_estimate(
+    cycles: Sequence[StickingCycle],
+    contacts: SlowContacts,
+    beads: int,
+    *,
+    measure: str = 'normal',
+    highest: float = 0.03,
+    least_share: float = 0.3,
+    rate_error: float = 0.1,
+    probability: float = 0.95,
+) -> StickingEstimate:
+    """The sticking speed that merges of bodies prefer; any up to the highest is as likely before.
+
+    Parameters
+    ----------
+    cycles : sequence of StickingCycle
+        One or many; each independent of the others.
+    contacts, beads, measure, highest, least_share
+        See `MergeRates`.
+    rate_error, probability : float
+        See `estimate_by`.
+
+    Raises
+    ------
+    ConfigurationError
+        For an unknown measure.
+    FitError
+        For speeds or times that cannot be used.
+    """
+    rates = MergeRates(contacts, beads, measure, highest=highest, least_share=least_share)
+    terms = reduce(add, [rates.terms(one) for one in cycles], rates.nothing)
+    return estimate_by(terms, rate_error=rate_error, probability=probability)
+
+
+def estimate_by(terms: MergeTerms, *, rate_error: float, probability: float) -> StickingEstimate:
+    """The same by what cycles say.
+
+    Parameters
+    ----------
+    terms : MergeTerms
+        Of all of them together.
+    rate_error : float
+        Standard deviation of the logarithm of all rates, by which the theory may be wrong.
+    probability : float, 0 to 1
+        Of the interval; one-sided limits have it, too.
+    """
+    grid, merges = terms.speeds, terms.merges
+    if not terms.exposed:
+        return _nothing(StickingStatus.STUCK_FROM_THE_START, float(grid[-1]), merges, probability)
+    factors = rate_error * _NORMAL_NODES[:, np.newaxis]
+    likelihood = log_sum(
+        merges * factors + terms.logs - np.exp(factors) * terms.expected,
+        _NORMAL_WEIGHTS / _NORMAL_WEIGHTS.sum(),
+    )
+    return _posterior(grid, likelihood, merges, probability)
+
+
+def _posterior(
+    grid: NDArray[np.float64], likelihood: NDArray[np.float64], merges: int, probability: float
+) -> StickingEstimate:
+    weights = np.exp(likelihood - likelihood.max()) * np.gradient(grid)
+    total = np.cumsum(weights)
+    total /= total[-1]
+    tail = 0.5 * (1.0 - probability)
+    quantiles = (tail, 0.5, 1.0 - tail, probability, 1.0 - probability)
+    low, median, high, limit, least = (float(one) for one in np.interp(quantiles, total, grid))
+    if merges == 0:
+        status, low, median, high = StickingStatus.NO_MERGE, 0.0, math.nan, limit
+    elif likelihood[-1] > likelihood.max() - _UNLIMITED:
+        # All that met stuck: any higher speed explains it as well.
+        status, low, median = StickingStatus.NO_UPPER_LIMIT, least, math.nan
+        high = float(grid[-1])
+    else:
+        status = StickingStatus.MEASURED
+    return StickingEstimate(
+        status=status,
+        sticking_speed=median,
+        lower=low,
+        upper=high,
+        merges=merges,
+        probability=probability,
+    )
+
+
+# A log likelihood at the highest speed within this of the largest limits nothing.
+_UNLIMITED = 2.0
+
+
+def _nothing(
+    status: StickingStatus, highest: float, merges: int, probability: float
+) -> StickingEstimate:
+    return StickingEstimate(
+        status=status,
+        sticking_speed=math.nan,
+        lower=0.0,
+        upper=highest,
+        merges=merges,
+        probability=probability,
+    )

@@ -1,0 +1,112 @@
+"""Loops over small symmetric matrices, by their triangular factors; compiled.
+
+For a few rows a call of LAPACK takes longer than the work.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.numerics.compiled import compiled, kernel
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# Beyond these a product could be too much for a double.
+_LEAST, _MOST = 1e-150, 1e150
+# Standard deviations up to which a nuisance may be off.
+_FARTHEST = 4.0
+
+
+@kernel
+def factorise(matrix: NDArray[np.float64]) -> float:
+    """Cholesky factor in place, in the lower half, but 1 over its diagonal; ln of the determinant.
+
+    Two of a row are worked out side by side: one alone would wait for itself at each term.
+    """
+    log_determinant, product = 0.0, 1.0
+    for i in range(matrix.shape[0]):
+        row = matrix[i]
+        for j in range(0, i - 1, 2):
+            one, two = matrix[j], matrix[j + 1]
+            a, b = row[j], row[j + 1]
+            for k in range(j):
+                a -= row[k] * one[k]
+                b -= row[k] * two[k]
+            a *= one[j]
+            row[j], row[j + 1] = a, (b - a * two[j]) * two[j + 1]
+        if i % 2 == 1:
+            one, a = matrix[i - 1], row[i - 1]
+            for k in range(i - 1):
+                a -= row[k] * one[k]
+            row[i - 1] = a * one[i - 1]
+        rest = row[i]
+        for k in range(i):
+            rest -= row[k] * row[k]
+        product *= rest
+        if not _LEAST < product < _MOST:
+            log_determinant, product = log_determinant + math.log(product), 1.0
+        row[i] = 1.0 / math.sqrt(rest)
+    return log_determinant + math.log(product)
+
+
+@kernel
+def whiten(factor: NDArray[np.float64], columns: NDArray[np.float64], count: int) -> None:
+    """The first columns divided by a factor of `factorise`, in place; two side by side."""
+    for first in range(0, count, 2):
+        # An odd one at the end goes with itself.
+        one, two = columns[first], columns[min(first + 1, count - 1)]
+        for i in range(factor.shape[0]):
+            row = factor[i]
+            a, b = one[i], two[i]
+            for k in range(i):
+                a -= row[k] * one[k]
+                b -= row[k] * two[k]
+            one[i], two[i] = a * row[i], b * row[i]
+
+
+@compiled
+def integrate(
+    gradients: NDArray[np.float64],
+    informations: NDArray[np.float64],
+    found: NDArray[np.float64],
+) -> None:
+    """What the log likelihood gains by nuisances that may be off by one of their deviations each.
+
+    Parameters
+    ----------
+    gradients, informations : ndarray (n_places, n_z), (n_places, n_z, n_z)
+    found : ndarray (n_places,)
+        Filled in.
+    """
+    n = gradients.shape[1]
+    # The information and the prior, as L D L^T: pivots, and L below the diagonal.
+    lower, pivots = np.empty((n, n)), np.empty(n)
+    shift = np.empty(n)
+    for place in range(gradients.shape[0]):
+        log_determinant = 0.0
+        for i in range(n):
+            shift[i] = gradients[place, i]
+            for j in range(i + 1):
+                total = informations[place, i, j]
+                for k in range(j):
+                    total -= lower[i, k] * lower[j, k] * pivots[k]
+                if i == j:
+                    pivots[i] = 1.0 + total
+                    log_determinant += math.log(abs(pivots[i]))
+                else:
+                    lower[i, j] = total / pivots[j]
+                    shift[i] -= lower[i, j] * shift[j]
+        farthest, product = 0.0, 0.0
+        for i in range(n - 1, -1, -1):
+            shift[i] /= pivots[i]
+            for k in range(i + 1, n):
+                shift[i] -= lower[k, i] * shift[k]
+            farthest = max(farthest, abs(shift[i]))
+            product += gradients[place, i] * shift[i]
+        # Far out the dependence is not linear, and could explain anything.
+        share = min(1.0, _FARTHEST / max(farthest, _FARTHEST))
+        found[place] = (share - 0.5 * share**2) * product - 0.5 * log_determinant

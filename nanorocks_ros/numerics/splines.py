@@ -1,0 +1,97 @@
+"""Cubic splines that are needed for a few points at once, and soon others: compiled."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.numerics.compiled import compiled
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_ORDER = 4
+
+
+@compiled
+def spline_slopes(nodes: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Derivatives at the nodes of the cubic spline without a knot at the last but one node.
+
+    Parameters
+    ----------
+    nodes : ndarray (n,)
+        Rising, 4 or more.
+    values : ndarray (n,)
+    """
+    n = nodes.size
+    width = np.diff(nodes)
+    slope = np.diff(values) / width
+    # Tridiagonal equations, solved from the first row down and up again.
+    diagonal, above, found = np.empty(n), np.empty(n), np.empty(n)
+    both = width[0] + width[1]
+    diagonal[0], above[0] = width[1], both
+    found[0] = ((width[0] + 2.0 * both) * width[1] * slope[0] + width[0] ** 2 * slope[1]) / both
+    for i in range(1, n):
+        if i < n - 1:
+            below, own, above[i] = width[i], 2.0 * (width[i - 1] + width[i]), width[i - 1]
+            found[i] = 3.0 * (width[i] * slope[i - 1] + width[i - 1] * slope[i])
+        else:
+            both = width[n - 2] + width[n - 3]
+            below, own = both, width[n - 3]
+            found[i] = (
+                width[n - 2] ** 2 * slope[n - 3]
+                + (2.0 * both + width[n - 2]) * width[n - 3] * slope[n - 2]
+            ) / both
+        share = below / diagonal[i - 1]
+        diagonal[i] = own - share * above[i - 1]
+        found[i] -= share * found[i - 1]
+    found[n - 1] /= diagonal[n - 1]
+    for i in range(n - 2, -1, -1):
+        found[i] = (found[i] - above[i] * found[i + 1]) / diagonal[i]
+    return found
+
+
+@compiled
+def spline_at(
+    nodes: NDArray[np.float64],
+    values: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+    at: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The spline at some rising places, (m,); beyond the ends as next to them."""
+    found = np.empty(at.size)
+    cell = 0
+    for k in range(at.size):
+        while cell < nodes.size - 2 and at[k] >= nodes[cell + 1]:
+            cell += 1
+        width = nodes[cell + 1] - nodes[cell]
+        slope = (values[cell + 1] - values[cell]) / width
+        bend = (slopes[cell] + slopes[cell + 1] - 2.0 * slope) / width
+        way = at[k] - nodes[cell]
+        second = (slope - slopes[cell]) / width - bend
+        found[k] = values[cell] + way * (slopes[cell] + way * (second + way * bend / width))
+    return found
+
+
+@compiled
+def spline_basis(knots: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The cubic B-splines of some knots at some places within them, (m, n_knots - 4)."""
+    n = knots.size - _ORDER
+    found = np.zeros((at.size, n))
+    part = np.empty(_ORDER)
+    for k in range(at.size):
+        cell = min(max(np.searchsorted(knots, at[k], side='right') - 1, _ORDER - 1), n - 1)
+        # The recursion of de Boor and Cox.
+        part[0] = 1.0
+        for degree in range(1, _ORDER):
+            saved = 0.0
+            for r in range(degree):
+                right, left = knots[cell + r + 1], knots[cell + 1 - degree + r]
+                term = part[r] / (right - left)
+                part[r] = saved + (right - at[k]) * term
+                saved = (at[k] - left) * term
+            part[degree] = saved
+        for r in range(_ORDER):
+            found[k, cell - _ORDER + 1 + r] = part[r]
+    return found

@@ -1,0 +1,69 @@
+"""Tables of results as CSV files."""
+
+from __future__ import annotations
+
+import csv
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nanorocks_ros.errors import RecordingError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+
+def write_csv(
+    path: str | Path,
+    fields: Sequence[str],
+    units: Sequence[str],
+    rows: Iterable[Sequence[object]],
+) -> None:
+    """Write a table, complete or not at all.
+
+    The header reads ``time [s],mean_projected_speed [m/s]``. Numbers are written so that
+    reading gives the same number back; NaN, not known, is written ``nan``.
+
+    Parameters
+    ----------
+    path : str or Path
+        An earlier table there is replaced.
+    fields, units : sequence of str, (n_fields,)
+    rows : iterable of sequences, (n_fields,)
+
+    Raises
+    ------
+    RecordingError
+        When the file cannot be written, or a row has another length.
+    """
+    path = Path(path)
+    part = path.with_name(f'.{path.name}.part')
+    header = [f'{field} [{unit}]' for field, unit in zip(fields, units, strict=True)]
+    try:
+        try:
+            with part.open('w', encoding='utf-8', newline='') as stream:
+                table = csv.writer(stream, lineterminator='\n')
+                table.writerow(header)
+                table.writerows(_checked(path, rows, len(fields)))
+            os.replace(part, path)
+        finally:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
+    except OSError as error:
+        raise RecordingError(
+            str(path), f'cannot be written ({error.strerror})', 'pass a writable folder'
+        ) from error
+
+
+def _checked(
+    path: Path, rows: Iterable[Sequence[object]], expected: int
+) -> Iterator[Sequence[object]]:
+    for number, row in enumerate(rows, start=1):
+        if len(row) != expected:
+            raise RecordingError(
+                str(path),
+                f'row {number} has {len(row)} values for {expected} fields',
+                'give one value for each field',
+            )
+        yield row

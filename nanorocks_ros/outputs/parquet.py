@@ -1,0 +1,128 @@
+"""Tables as Parquet files, where pyarrow is installed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.outputs.atomic_files import whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+# Rows written together, at least, unless there are no more.
+_GROUP_ROWS = 1 << 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """A column of a table.
+
+    Parameters
+    ----------
+    name : str
+    kind : str
+        ``i4``, ``f8`` or ``text``.
+    unit : str
+    """
+
+    name: str
+    kind: str
+    unit: str = ''
+
+
+def check_parquet(path: Path) -> None:
+    """Refuse a Parquet file where nothing can write it.
+
+    Raises
+    ------
+    ConfigurationError
+        When pyarrow is not installed.
+    """
+    if path.suffix == '.parquet':
+        _pyarrow('pyarrow', path)
+
+
+def write_parquet(
+    path: Path,
+    columns: Sequence[Column],
+    pieces: Iterable[Mapping[str, NDArray[Any]]],
+    provenance: str,
+) -> None:
+    """Write a table, piece by piece.
+
+    Parameters
+    ----------
+    path : Path
+        A file there is replaced, once the new one is complete.
+    columns : sequence of Column
+    pieces : iterable of mappings
+        Columns by name; rows of one piece after those of the other.
+    provenance : str
+        Kept in the metadata of the file.
+
+    Raises
+    ------
+    ConfigurationError
+        When pyarrow is not installed.
+    RecordingError
+        When the file cannot be written.
+    """
+    arrow = _pyarrow('pyarrow', path)
+    writer_of = _pyarrow('pyarrow.parquet', path).ParquetWriter
+    text = arrow.dictionary(arrow.int32(), arrow.string())
+    kinds = {'i4': arrow.int32(), 'f8': arrow.float64(), 'text': text}
+    schema = arrow.schema(
+        [arrow.field(one.name, kinds[one.kind], metadata={'unit': one.unit}) for one in columns],
+        metadata={'provenance': provenance},
+    )
+    with whole_file(path) as part, writer_of(part, schema, compression='zstd') as writer:
+        for piece in _groups(columns, pieces):
+            arrays = [_array(arrow, piece[one.name], kinds[one.kind]) for one in columns]
+            writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
+
+
+def _groups(
+    columns: Sequence[Column], pieces: Iterable[Mapping[str, NDArray[Any]]]
+) -> Iterator[dict[str, NDArray[Any]]]:
+    """The pieces, joined until they are worth a group of rows: each group costs a kilobyte."""
+    waiting: list[Mapping[str, NDArray[Any]]] = []
+    rows = 0
+    for piece in pieces:
+        waiting.append(piece)
+        rows += piece[columns[0].name].size
+        if rows >= _GROUP_ROWS:
+            yield _joined(columns, waiting)
+            waiting, rows = [], 0
+    if waiting:
+        yield _joined(columns, waiting)
+
+
+def _joined(
+    columns: Sequence[Column], pieces: Sequence[Mapping[str, NDArray[Any]]]
+) -> dict[str, NDArray[Any]]:
+    return {one.name: np.concatenate([piece[one.name] for piece in pieces]) for one in columns}
+
+
+def _array(arrow: Any, values: NDArray[Any], kind: Any) -> Any:
+    if values.dtype.kind == 'U':
+        return arrow.array(values).dictionary_encode()
+    return arrow.array(values, type=kind)
+
+
+def _pyarrow(name: str, path: Path) -> Any:
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise ConfigurationError(
+            str(path),
+            'needs pyarrow, which is not installed',
+            "choose another ending, or run: pip install 'nanorocks_ros[parquet]'",
+        ) from error

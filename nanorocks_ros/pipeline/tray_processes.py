@@ -1,0 +1,268 @@
+"""Processes beside this one that follow the trays: what each gets, does and hands back."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import signal
+import threading
+import traceback
+from contextlib import suppress
+from dataclasses import replace
+from multiprocessing import get_context, parent_process, resource_tracker
+from multiprocessing.shared_memory import SharedMemory
+from typing import TYPE_CHECKING, NamedTuple
+
+import cv2
+import numpy as np
+
+from nanorocks_ros.errors import NanorocksError
+from nanorocks_ros.experiment.trays import Tray
+from nanorocks_ros.pipeline.composition import Result, TrayStages, Wanted
+from nanorocks_ros.pipeline.warm_up import warm_up_clusters, warm_up_cooling, warm_up_speed
+from nanorocks_ros.records import TrayImage
+from nanorocks_ros.settings import PipelineSettings
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from multiprocessing.connection import Connection
+
+    from numpy.typing import NDArray
+
+Found = dict[int, tuple[Result, ...]]
+"""What followed from the images of each tray, by number."""
+
+Begin = tuple[PipelineSettings, tuple[Tray, ...]]
+"""What stages are made of."""
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_NO_PIXELS = np.empty((0, 0), dtype=np.uint8)
+
+
+class _Place(NamedTuple):
+    """Where a picture is in the shared memory."""
+
+    offset: int
+    shape: tuple[int, ...]
+
+
+class _Sent(NamedTuple):
+    """A tray image without its pixels, and where those are."""
+
+    image: TrayImage
+    gray: _Place
+    color: _Place | None
+
+
+class _Job(NamedTuple):
+    """What one process is to do; see `TrayProcess.send`."""
+
+    begin: Begin | None
+    images: tuple[_Sent, ...]
+    wanted: Mapping[int, Wanted]
+    flush: bool
+
+
+class TrayProcess:
+    """One process, which starts at once and ends with this one, whatever happens to it.
+
+    Images are handed over in shared memory: a tenth of the time that a pipe takes. It is
+    nameless as soon as both have it, so that nothing stays behind.
+    """
+
+    def __init__(self) -> None:
+        context = get_context('spawn')
+        self._connection, its = context.Pipe()
+        self._process = context.Process(target=_serve, args=(its,), daemon=True)
+        self._memory: SharedMemory | None = None
+        # It would unblock the signals when it is started.
+        resource_tracker.ensure_running()
+        # Ctrl-C reaches all processes of a terminal: only this one is to heed it.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+        try:
+            self._process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        its.close()
+        atexit.register(self.close)
+
+    @property
+    def pid(self) -> int | None:
+        """Its number."""
+        return self._process.pid
+
+    def ready(self) -> None:
+        """Wait until all is compiled.
+
+        Raises
+        ------
+        NanorocksError
+            When the process ended.
+        """
+        self._answer()
+
+    def send(
+        self,
+        images: Sequence[TrayImage] = (),
+        wanted: Mapping[int, Wanted] | None = None,
+        *,
+        begin: Begin | None = None,
+        flush: bool = False,
+    ) -> None:
+        """Leave a job to it; `answer` must be called before the next one.
+
+        Parameters
+        ----------
+        images : sequence of TrayImage
+            To be followed.
+        wanted : mapping of int to Wanted
+            By number of the tray.
+        begin : (PipelineSettings, tuple of Tray), optional
+            Make new stages first.
+        flush : bool
+            Answer what is held back.
+
+        Raises
+        ------
+        NanorocksError
+            When the process ended.
+        """
+        job = _Job(begin, tuple(self._packed(images)), wanted or {}, flush)
+        try:
+            self._connection.send(job)
+        except OSError as error:
+            raise self._ended() from error
+
+    def answer(self) -> Found:
+        """What followed from the job; an error that it met is raised here."""
+        found, error = self._answer()
+        if error is not None:
+            raise error
+        return found
+
+    def close(self) -> None:
+        """End it; what it is doing is not done."""
+        atexit.unregister(self.close)
+        self._process.kill()
+        self._process.join()
+        if self._memory is not None:
+            # Another thread may be about to write.
+            with suppress(BufferError):
+                self._memory.close()
+
+    def _answer(self) -> tuple[Found, Exception | None]:
+        try:
+            found: tuple[Found, Exception | None] = self._connection.recv()
+        except (EOFError, OSError) as error:
+            raise self._ended() from error
+        return found
+
+    def _ended(self) -> NanorocksError:
+        self._process.join(1.0)
+        return NanorocksError(
+            'pipeline',
+            f'a process that follows trays ended (exit code {self._process.exitcode})',
+            'see what was said before; set workers: 0 to do without',
+        )
+
+    def _packed(self, images: Sequence[TrayImage]) -> list[_Sent]:
+        pictures = [
+            one for image in images for one in (image.gray, image.color) if one is not None
+        ]
+        self._make_room(sum(one.nbytes for one in pictures))
+        offset, packed = 0, []
+        for image in images:
+            gray, offset = self._written(image.gray, offset)
+            color = None
+            if image.color is not None:
+                color, offset = self._written(image.color, offset)
+            packed.append(_Sent(replace(image, gray=_NO_PIXELS, color=None), gray, color))
+        return packed
+
+    def _written(self, pixels: NDArray[np.uint8], offset: int) -> tuple[_Place, int]:
+        assert self._memory is not None
+        np.ndarray(pixels.shape, np.uint8, self._memory.buf, offset)[...] = pixels
+        return _Place(offset, pixels.shape), offset + pixels.nbytes
+
+    def _make_room(self, size: int) -> None:
+        if size == 0 or (self._memory is not None and self._memory.size >= size):
+            return
+        if self._memory is not None:
+            self._memory.close()
+        self._memory = SharedMemory(create=True, size=size)
+        try:
+            self._connection.send(self._memory.name)
+            self._answer()
+        except OSError as error:
+            raise self._ended() from error
+        finally:
+            self._memory.unlink()
+
+
+def _serve(connection: Connection) -> None:
+    """What the process does: jobs, one after the other, until nobody is there."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    # There are more processes than this one for the cores.
+    cv2.setNumThreads(1)
+    warm_up_speed()
+    warm_up_clusters()
+    warm_up_cooling()
+    connection.send(({}, None))
+    worker = _Worker()
+    while True:
+        try:
+            job = connection.recv()
+        except EOFError:
+            return
+        answer: tuple[Found, Exception | None]
+        try:
+            answer = worker.take(job), None
+        except NanorocksError as error:
+            answer = {}, error
+        # Raised again where somebody sees it, who has no use for the traceback of another process.
+        except Exception:
+            answer = {}, RuntimeError(traceback.format_exc())
+        connection.send(answer)
+
+
+def _end_with_parent() -> None:
+    """Also while a job takes its time, or a kernel is being compiled."""
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
+
+
+class _Worker:
+    """The stages of some trays."""
+
+    def __init__(self) -> None:
+        self._trays: dict[int, TrayStages] = {}
+        self._memory: SharedMemory | None = None
+
+    def take(self, job: str | _Job) -> Found:
+        """Do a job, or use the shared memory of some name from now on."""
+        if isinstance(job, str):
+            self._memory = SharedMemory(job)
+            return {}
+        if job.begin is not None:
+            settings, trays = job.begin
+            self._trays = {one.number: TrayStages(settings, one) for one in trays}
+        for number, wanted in job.wanted.items():
+            self._trays[number].emit(wanted)
+        found: Found = {}
+        for image, gray, color in job.images:
+            whole = replace(
+                image,
+                gray=self._pixels(gray),
+                color=None if color is None else self._pixels(color),
+            )
+            found[image.tray] = self._trays[image.tray].push(whole)
+        if job.flush:
+            found = {number: tray.flush() for number, tray in self._trays.items()}
+        return found
+
+    def _pixels(self, place: _Place) -> NDArray[np.uint8]:
+        """A copy: stages keep images, and the next ones will be written to the same place."""
+        assert self._memory is not None
+        return np.ndarray(place.shape, np.uint8, self._memory.buf, place.offset).copy()

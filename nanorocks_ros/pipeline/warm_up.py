@@ -1,0 +1,158 @@
+"""Compiles what a first frame would have to wait for, while no frame is waiting."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.experiment.view import Straight, View
+from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
+from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
+from nanorocks_ros.physics.sticking_rates import slow_contacts
+from nanorocks_ros.records import Frame, Rebound, SpeedEstimate, SpeedMethod, Tracks, TrayImage
+from nanorocks_ros.settings import PipelineSettings, with_values
+from nanorocks_ros.stages.bodies.body_counter import BodyCounter
+from nanorocks_ros.stages.clusters.correlation_width import ClusterAutocorrelator
+from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
+from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.shake_detection import CycleFollower
+from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
+
+_SIDE = 160
+_REGION = (40, 40, 80, 80)
+
+
+def warm_up_counting() -> None:
+    """Push two images through what counts shaking events in images that nobody has counted."""
+    follower = CycleFollower(2.0, 1.0)
+    for stamp_ns in (0, 1):
+        gray = np.full((16, 16), 100, dtype=np.uint8)
+        follower.push(TrayImage(stamp_ns=stamp_ns, tray=1, gray=gray))
+
+
+def warm_up_clusters() -> None:
+    """Correlate a picture with a disc on it, and hold a merge against the theory."""
+    stage = ClusterAutocorrelator(PipelineSettings(), load_trays()[1])
+    gray = np.full((64, 64), 150, dtype=np.uint8)
+    cv2.circle(gray, (32, 32), 12, 60, -1)
+    gray[:8, :8] = 255
+    stage.push(TrayImage(stamp_ns=0, tray=1, gray=gray))
+    tray = load_trays()[1]
+    times = np.linspace(0.0, 10.0, 20)
+    cycle = StickingCycle(
+        times=times,
+        speeds=0.005 / (1.0 + times),
+        bodies=np.where(times > 5.0, tray.count - 1.0, tray.count),
+        merges=np.array([5.0]),
+    )
+    sticking_estimate([cycle], slow_contacts(tray), tray.count)
+
+
+def warm_up() -> None:
+    """Push a few pictures of a square through a preprocessor.
+
+    From the cache on the disk this takes a second, without it some tens of seconds.
+    """
+    values = {'preprocess.regions_px': _REGION}
+    settings = with_values(PipelineSettings(), values, 'warm-up')
+    view = View(camera=Straight(width=_SIDE, height=_SIDE))
+    noise = np.random.default_rng(0).integers(90, 110, (3, _SIDE, _SIDE, 3), dtype=np.uint8)
+    x, y, width, height = _REGION
+    # The last is lost, and looked for.
+    noise[:2, y : y + height, x : x + width] += 80
+    for encoding in ('bgr8', 'mono8'):
+        stage = Preprocessor(settings, {1: load_trays()[1]}, 'warm-up', view)
+        # Enough frames for the look at the map of the trays.
+        for number in range(10):
+            image = noise[2 if number == 9 else number % 2]
+            pixels = image if encoding == 'bgr8' else np.ascontiguousarray(image[:, :, 0])
+            stage.push(Frame(stamp_ns=number, encoding=encoding, image=pixels))
+
+
+def warm_up_cooling() -> None:
+    """Hold a decay against the simulated ones, and a rebound beside it."""
+    fitter = HaffFitter(PipelineSettings(), load_trays()[1])
+    rebound = Rebound(
+        stamp_ns=2_000_000_000,
+        tray=1,
+        track=0,
+        species=0,
+        wall=0,
+        incoming=0.003,
+        incoming_error=1e-4,
+        outgoing=0.0028,
+        outgoing_error=1e-4,
+        tangential_incoming=0.0,
+        tangential_outgoing=0.0,
+        tangential_error=1e-4,
+        wall_velocity=0.0,
+        wall_velocity_error=0.0,
+        place=np.zeros(2),
+    )
+    fitter.push(rebound)
+    for number in range(1, 60):
+        time_ns = number * 100_000_000
+        speed = 0.005 / (1.0 + 1e-10 * time_ns)
+        fitter.push(
+            SpeedEstimate(
+                stamp_ns=time_ns,
+                tray=1,
+                cycle=1,
+                cycle_start_ns=0,
+                mean_projected_speed=speed,
+                mean_projected_speed_error=0.02 * speed,
+                window=0.1,
+                method=SpeedMethod.TRACKING,
+            )
+        )
+    fitter.flush()
+
+
+def warm_up_contacts() -> None:
+    """Follow three beads, of which one comes back from a wall and two from each other."""
+    tray = load_trays()[1]
+    finder, counter = ContactFinder(tray), BodyCounter(PipelineSettings(), tray)
+    radius = 0.5 * tray.diameter
+    for number in range(100):
+        # At 3 mm/s, and 30 pictures a second.
+        away = radius + 1e-4 * abs(number - 44.6)
+        places = [(away, 3e-3), (7.5e-3 - away, 11e-3), (7.5e-3 + away, 11e-3)]
+        tracks = Tracks(
+            stamp_ns=number * 33_333_333,
+            tray=tray.number,
+            ids=np.arange(3, dtype=np.int32),
+            species=np.zeros(3, dtype=np.int32),
+            displacement=np.zeros(2),
+            positions=np.array(places),
+            position_errors=np.full(3, 4e-6),
+            velocities=np.full((3, 2), 2e-3),
+            velocity_errors=np.full(3, 1e-5),
+            radii=np.full(3, radius),
+            radius_errors=np.full(3, 1e-6),
+            seen=np.ones(3, dtype=np.bool_),
+            expected=np.array([3], dtype=np.int32),
+        )
+        finder.push(tracks)
+        counter.push(tracks, 1)
+    finder.flush()
+
+
+def warm_up_speed() -> None:
+    """Push a few pictures of moving discs through what measures speeds in colour images."""
+    settings = PipelineSettings()
+    # Under chalk beads are looked for in another way.
+    for tray in (load_trays()[3], load_trays()[2]):
+        estimator = SpeedEstimator(settings, tray)
+        for number in range(8):
+            color = np.full((80, 160, 3), 150, dtype=np.uint8)
+            for k in range(8):
+                place = 18 + 18 * k
+                cv2.circle(color, (place, 20 + number), 12, (30, 30, 200), -1)
+                cv2.circle(color, (place, 60 - number), 7, (200, 60, 30), -1)
+            gray = np.ascontiguousarray(color[:, :, 0])
+            stamp_ns = number * 33_333_333
+            image = TrayImage(stamp_ns=stamp_ns, tray=tray.number, gray=gray, color=color)
+            estimator.push(image)
+    warm_up_contacts()

@@ -1,0 +1,213 @@
+"""The storage files behind a path: a rosbag2 folder, or one file."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import Any
+
+import yaml
+
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.recordings.film.natural_sort import natural
+from nanorocks_ros.recordings.mcap import mcap_blocks
+from nanorocks_ros.recordings.mcap.mcap_file import McapFile
+from nanorocks_ros.recordings.sqlite import sqlite_file
+from nanorocks_ros.recordings.sqlite.sqlite_file import SqliteFile
+from nanorocks_ros.recordings.storage import StorageFile
+
+_KINDS = 'a rosbag2 folder or an .mcap file'
+ROS1_MAGIC = b'#ROSBAG V'
+STORAGE_SUFFIXES = frozenset({'.mcap', '.db3'})
+# Ten times as fast where PyYAML was built with it.
+_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contents:
+    """What a path holds.
+
+    Parameters
+    ----------
+    files : tuple of StorageFile
+        At least one.
+    metadata : dict of str to str
+        Provenance kept by whoever recorded.
+    compressed_messages : bool
+        Each message is compressed on its own (zstd).
+    notices : tuple of str
+        What is wrong with the folder.
+    complete : bool
+        No file is missing.
+    expected : int or None
+        Messages that the recorder counted; None where it does not say.
+    """
+
+    files: tuple[StorageFile, ...]
+    metadata: dict[str, str]
+    compressed_messages: bool
+    notices: tuple[str, ...]
+    complete: bool
+    expected: int | None = None
+
+
+def contents(path: Path, *, salvaging: bool = False) -> Contents:
+    """Open what a path holds.
+
+    Parameters
+    ----------
+    path : Path
+    salvaging : bool
+        Files whose first bytes are damaged, too.
+
+    Returns
+    -------
+    Contents
+
+    Raises
+    ------
+    RecordingError
+        When there is nothing, or no recording.
+    """
+    try:
+        if not path.exists():
+            raise RecordingError(str(path), 'does not exist', f'pass {_KINDS}')
+        if path.is_dir():
+            return _folder(path, salvaging)
+        file = _open_file(path, salvaging)
+        information = _recorder_notes([file])
+        return Contents(
+            files=(file,),
+            metadata=_provenance(information),
+            compressed_messages=_are_messages_compressed(information),
+            notices=(),
+            complete=True,
+        )
+    except OSError as error:
+        raise RecordingError(
+            str(path), f'cannot be read ({error.strerror})', 'check its permissions'
+        ) from error
+
+
+def _open_file(path: Path, salvaging: bool) -> StorageFile:
+    with path.open('rb') as stream:
+        start = stream.read(16)
+    if not start:
+        raise RecordingError(
+            str(path), 'is empty (0 bytes)', 'record it again or pass another bag'
+        )
+    if start.startswith(ROS1_MAGIC):
+        raise RecordingError(
+            str(path),
+            'is a ROS 1 bag',
+            f'convert it first: {shlex.join(_conversion(path))}',
+        )
+    if start == sqlite_file.MAGIC:
+        return SqliteFile(path)
+    if path.suffix == '.mcap' or start.startswith(mcap_blocks.MAGIC):
+        return McapFile(path, salvaging=salvaging)
+    raise RecordingError(str(path), 'is not a bag', f'pass {_KINDS}')
+
+
+def _conversion(path: Path) -> list[str]:
+    """The command that makes a ROS 2 recording of a ROS 1 bag, beside it."""
+    target = path.with_suffix('')
+    # The converter goes by the ending of what it is to make, and overwrites nothing.
+    if target.suffix == '.bag' or target.exists():
+        target = path.with_name(f'{path.stem.removesuffix(".bag")}_ros2')
+    return ['rosbags-convert', '--src', str(path), '--dst', str(target)]
+
+
+def _folder(path: Path, salvaging: bool) -> Contents:
+    notices: list[str] = []
+    information = _information(path, notices)
+    names = _names(path, information)
+    if not names:
+        raise RecordingError(
+            str(path), 'is a folder without any .mcap or .db3 file', f'pass {_KINDS}'
+        )
+    _refuse_compressed_files(path, information)
+    files = _open_files(path, names, notices, salvaging)
+    count = information.get('message_count')
+    information = information or _recorder_notes(files)
+    return Contents(
+        files=tuple(files),
+        metadata=_provenance(information),
+        compressed_messages=_are_messages_compressed(information),
+        notices=tuple(notices),
+        complete=len(files) == len(names),
+        expected=count if isinstance(count, int) else None,
+    )
+
+
+def _provenance(information: dict[str, Any]) -> dict[str, str]:
+    custom = information.get('custom_data') or {}
+    return {str(k): str(v) for k, v in custom.items()} if isinstance(custom, dict) else {}
+
+
+def _are_messages_compressed(information: dict[str, Any]) -> bool:
+    return str(information.get('compression_mode') or '').lower() == 'message'
+
+
+def _recorder_notes(files: list[StorageFile]) -> dict[str, Any]:
+    """What the files say themselves, where metadata.yaml says nothing."""
+    for file in files:
+        try:
+            notes = yaml.load(file.recorder_notes, Loader=_LOADER)
+        except (yaml.YAMLError, ValueError, RecursionError):
+            continue
+        if isinstance(notes, dict):
+            return notes
+    return {}
+
+
+def _information(path: Path, notices: list[str]) -> dict[str, Any]:
+    place = path / 'metadata.yaml'
+    try:
+        document = yaml.load(place.read_text('utf-8'), Loader=_LOADER)
+        information = document['rosbag2_bagfile_information']
+        return dict(information)
+    except FileNotFoundError:
+        notices.append(f'{path}: has no metadata.yaml, as after a crash; it is read without')
+    except (yaml.YAMLError, KeyError, TypeError, ValueError, RecursionError):
+        notices.append(f'{place}: cannot be understood; the bag is read without')
+    return {}
+
+
+def _names(path: Path, information: dict[str, Any]) -> list[str]:
+    listed = information.get('relative_file_paths')
+    # Early versions listed paths that start with the folder.
+    names = [PurePath(str(name)).name for name in listed] if isinstance(listed, list) else []
+    if any((path / name).is_file() for name in names):
+        return names
+    found = (p.name for p in path.iterdir() if p.suffix in STORAGE_SUFFIXES and p.is_file())
+    return sorted(found, key=natural)
+
+
+def _refuse_compressed_files(path: Path, information: dict[str, Any]) -> None:
+    if str(information.get('compression_mode') or '').lower() == 'file':
+        raise RecordingError(
+            str(path),
+            "holds storage files that are compressed as a whole (compression_mode 'file')",
+            'unpack them with `zstd -d` and delete metadata.yaml',
+        )
+
+
+def _open_files(
+    path: Path, names: list[str], notices: list[str], salvaging: bool
+) -> list[StorageFile]:
+    files: list[StorageFile] = []
+    errors: list[RecordingError] = []
+    for name in names:
+        if not (path / name).is_file():
+            notices.append(f'{path / name}: is missing')
+            continue
+        try:
+            files.append(_open_file(path / name, salvaging))
+        except RecordingError as error:
+            errors.append(error)
+    if not files:
+        raise errors[0]
+    notices += [f'{error.where}: {error.what}' for error in errors]
+    return files

@@ -1,0 +1,281 @@
+"""Reading recordings: whole, cut short or damaged, in order of time and in bounded memory."""
+
+from __future__ import annotations
+
+import heapq
+import struct
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import zstandard
+from rosbags.serde import SerdeError
+from rosbags.typesys import TypesysError
+
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.recordings.bag.bag_folder import Contents, contents
+from nanorocks_ros.recordings.bag.provenance import Unfinished, unfinished
+from nanorocks_ros.recordings.messages.message_types import register, standard_types
+from nanorocks_ros.recordings.storage import BagMessage, StorageFile, TopicInfo
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Sequence
+
+    from rosbags.typesys.store import Typestore
+
+__all__ = ['BagMessage', 'BagReader', 'TopicInfo', 'open_bag']
+
+_NOT_CDR = (SerdeError, struct.error, ValueError, LookupError, AssertionError, MemoryError)
+# One message is unpacked at a time; the largest, an uncompressed 4K frame, has 25 MB.
+_MESSAGE_LIMIT = 2**30
+
+
+def open_bag(path: str | Path, *, salvaging: bool = False) -> BagReader:
+    """Open a recording.
+
+    Parameters
+    ----------
+    path : str or Path
+        A rosbag2 folder (MCAP or SQLite storage) or a storage file.
+    salvaging : bool
+        Read MCAP files whose first bytes are damaged, too, which otherwise are none.
+
+    Returns
+    -------
+    BagReader
+
+    Raises
+    ------
+    RecordingError
+        When there is nothing at the path, or no recording.
+    """
+    return BagReader(Path(path), salvaging=salvaging)
+
+
+class BagReader:
+    """A recording.
+
+    A whole MCAP file is opened by its index; one cut short is gone through once, to know what
+    there is. Damage inside a chunk shows only when the chunk is read: `complete`, `notices` and
+    `messages_lost` are final after `messages` has come to its end.
+
+    Parameters
+    ----------
+    path : Path
+    salvaging : bool
+        Read files whose first bytes are damaged, too.
+
+    Attributes
+    ----------
+    path : Path
+    topics : dict of str to TopicInfo
+    start_ns, end_ns : int, [ns]
+        Log times of the first and last message; both 0 in an empty bag.
+    metadata : dict of str to str
+        Provenance, as given to `BagWriter`.
+    expected : int or None
+        Messages that the recorder counted in all; None where it does not say.
+    """
+
+    def __init__(self, path: Path, *, salvaging: bool = False) -> None:
+        self.path = path
+        self._contents: Contents = contents(path, salvaging=salvaging)
+        self.metadata = self._contents.metadata
+        self.expected = self._contents.expected
+        self.topics = _merged_topics(self._contents.files)
+        used = [file for file in self._contents.files if _count(file)]
+        self.start_ns = min((file.start_ns for file in used), default=0)
+        self.end_ns = max((file.end_ns for file in used), default=0)
+        self._undone = 0
+        self._store: Typestore | None = None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The storage files that it consists of."""
+        return tuple(file.path for file in self._contents.files)
+
+    @property
+    def complete(self) -> bool:
+        """Nothing is known to be missing, so far."""
+        whole = all(file.complete for file in self._contents.files)
+        return whole and self._contents.complete and not self._undone and not self.unfinished
+
+    @property
+    def unfinished(self) -> tuple[Unfinished, ...]:
+        """What was interrupted when it was made of a film or of another recording."""
+        return unfinished(self.metadata)
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What was never written, what was salvaged and what is lost, so far."""
+        return (*(f'{self.path}: {one.what}' for one in self.unfinished), *self.damage)
+
+    @property
+    def damage(self) -> tuple[str, ...]:
+        """What was salvaged and what is lost, so far."""
+        notices = [*self._contents.notices]
+        for file in self._contents.files:
+            notices += file.notices
+        if self._undone:
+            notices.append(f'{self.path}: {self._undone} messages could not be decompressed')
+        return tuple(notices)
+
+    @property
+    def messages_lost(self) -> int:
+        """Messages known to be lost, so far; how many lie beyond a cut is not known."""
+        return self._undone + sum(file.messages_lost for file in self._contents.files)
+
+    def messages(
+        self,
+        topics: Collection[str] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+    ) -> Iterator[BagMessage]:
+        """The messages of some topics, or all, in order of log time.
+
+        Parameters
+        ----------
+        topics : collection of str, optional
+        start_ns, end_ns : int, optional, [ns]
+            Log times of the first and last message wanted; what lies wholly outside is not read.
+
+        Yields
+        ------
+        BagMessage
+        """
+        files = self._contents.files
+        streams = [file.messages(topics, start_ns, end_ns) for file in files]
+        found = _in_turn(files, streams)
+        return self._decompressed(found) if self._contents.compressed_messages else found
+
+    def _decompressed(self, messages: Iterator[BagMessage]) -> Iterator[BagMessage]:
+        self._undone = 0
+        for message in messages:
+            try:
+                cdr = zstandard.decompress(message.cdr, max_output_size=_MESSAGE_LIMIT)
+            except (zstandard.ZstdError, MemoryError):
+                self._undone += 1
+                continue
+            yield BagMessage(
+                topic=message.topic, type=message.type, log_time_ns=message.log_time_ns, cdr=cdr
+            )
+
+    def deserialize(self, message: BagMessage) -> Any:
+        """The message as an object with the attributes of its type.
+
+        Parameters
+        ----------
+        message : BagMessage
+
+        Raises
+        ------
+        RecordingError
+            When its type is not known or its bytes do not fit its type.
+        """
+        store = self._types_with(message)
+        try:
+            return store.deserialize_cdr(message.cdr, message.type)
+        except _NOT_CDR as error:
+            raise RecordingError(
+                f'{self.path}: {message.topic}',
+                f'the message at {message.log_time_ns} ns is no {message.type} '
+                f'({_in_one_line(error)})',
+                'record it again or pass another bag',
+            ) from error
+
+    def _types_with(self, message: BagMessage) -> Typestore:
+        if self._store is None:
+            self._store = standard_types()
+        info = self.topics.get(message.topic)
+        where = f'{self.path}: {message.topic}'
+        if info is not None and info.encoding != 'cdr':
+            raise RecordingError(
+                where, f"is encoded as '{info.encoding}', not cdr", 'record it with ROS 2'
+            )
+        if message.type in self._store.fielddefs:
+            return self._store
+        try:
+            if info is None or not info.definition:
+                raise TypesysError('the bag holds no definition')
+            register(self._store, message.type, info.definition, info.definition_format)
+        except (TypesysError, ValueError, LookupError) as error:
+            raise RecordingError(
+                where,
+                f"type '{message.type}' is not known ({_in_one_line(error)})",
+                'leave this topic out, or record it with its definition (MCAP storage)',
+            ) from error
+        return self._store
+
+    def require_topic(self, candidates: Sequence[str]) -> str:
+        """The first of some topics that the recording holds.
+
+        Parameters
+        ----------
+        candidates : sequence of str, at least one
+            Best first.
+
+        Returns
+        -------
+        str
+
+        Raises
+        ------
+        RecordingError
+            When none of them has a message.
+        """
+        held = [info for info in self.topics.values() if info.count]
+        if not held:
+            raise RecordingError(
+                str(self.path), 'holds no messages', 'record it again or pass another bag'
+            )
+        names = {info.name for info in held}
+        for name in candidates:
+            if name in names:
+                return name
+        missing = ' or '.join(f"'{name}'" for name in candidates)
+        found = ', '.join(f"'{info.name}' [{info.type}]" for info in held)
+        raise RecordingError(
+            str(self.path), f'no topic {missing} (found {found})', 'pass --image-topic'
+        )
+
+
+def _in_one_line(error: Exception) -> str:
+    return ' '.join(str(error).split())
+
+
+def _count(file: StorageFile) -> int:
+    return sum(info.count for info in file.topics.values())
+
+
+def _merged_topics(files: Sequence[StorageFile]) -> dict[str, TopicInfo]:
+    merged: dict[str, TopicInfo] = {}
+    for file in files:
+        for name, info in file.topics.items():
+            before = merged.get(name, info)
+            count = info.count + (before.count if name in merged else 0)
+            merged[name] = TopicInfo(
+                name=name,
+                type=before.type,
+                count=count,
+                encoding=before.encoding,
+                definition=before.definition or info.definition,
+                definition_format=before.definition_format,
+                qos=before.qos or info.qos,
+            )
+    return merged
+
+
+def _in_turn(
+    files: Sequence[StorageFile], streams: Sequence[Iterator[BagMessage]]
+) -> Iterator[BagMessage]:
+    """Messages of all files in order; a file is opened when its first message is due."""
+    queue: list[tuple[int, int, BagMessage | None]] = [
+        (file.start_ns, number, None) for number, file in enumerate(files) if _count(file)
+    ]
+    heapq.heapify(queue)
+    while queue:
+        _, number, message = heapq.heappop(queue)
+        if message is not None:
+            yield message
+        following = next(streams[number], None)
+        if following is not None:
+            heapq.heappush(queue, (following.log_time_ns, number, following))

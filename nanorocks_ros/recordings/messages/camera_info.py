@@ -1,0 +1,82 @@
+"""camera_info messages to views; works on messages of rosbags and of rclpy alike."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError, FrameError
+from nanorocks_ros.experiment.calibration import CameraInfo, view_of
+from nanorocks_ros.recordings.messages.message_builders import camera_info_message
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from nanorocks_ros.experiment.view import View
+
+
+def info_from_message(message: Any) -> CameraInfo:
+    """The numbers in a sensor_msgs/CameraInfo."""
+    return CameraInfo(
+        width=int(message.width),
+        height=int(message.height),
+        distortion_model=str(message.distortion_model),
+        d=_floats(message.d),
+        k=_floats(message.k),
+        r=_floats(message.r),
+        p=_floats(message.p),
+    )
+
+
+def info_message(info: CameraInfo, stamp_ns: int, frame_id: str) -> Any:
+    """The sensor_msgs/CameraInfo that says these numbers.
+
+    Parameters
+    ----------
+    info : CameraInfo
+    stamp_ns : int, [ns]
+    frame_id : str
+    """
+    message = camera_info_message(
+        stamp_ns,
+        frame_id,
+        (info.width, info.height),
+        np.array(info.k),
+        (info.distortion_model, info.d),
+    )
+    turned = replace(message, r=np.array(info.r, dtype=np.float64))
+    return replace(turned, p=np.array(info.p, dtype=np.float64)) if info.p else turned
+
+
+def view_from_message(message: Any, where: str) -> View:
+    """The rectified view that a sensor_msgs/CameraInfo describes.
+
+    Parameters
+    ----------
+    message : sensor_msgs/CameraInfo
+    where : str
+        The topic, for errors.
+
+    Raises
+    ------
+    FrameError
+        For a model that is not known, numbers that no camera has, or pictures that were binned
+        or cut.
+    """
+    roi = message.roi
+    binned = max(int(message.binning_x), int(message.binning_y)) > 1
+    if binned or roi.x_offset or roi.y_offset:
+        raise FrameError(
+            where, 'is of a binned or cut picture', 'record the whole picture at full size'
+        )
+    try:
+        return view_of(info_from_message(message), where)
+    except ConfigurationError as error:
+        remedy = f'{error.do}, or set preprocess.calibration'
+        raise FrameError(error.where, error.what, remedy) from error
+
+
+def _floats(numbers: Iterable[float]) -> tuple[float, ...]:
+    return tuple(float(one) for one in numbers)

@@ -1,0 +1,189 @@
+"""Clusters of a tray: autocorrelation, bodies, merges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.records.quality_flags import UNKNOWN, SizeStatus, StickingStatus, freeze_arrays
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClusterEstimate:
+    """Width of the autocorrelation of one tray image, and clusters by that and by tracks.
+
+    Parameters
+    ----------
+    stamp_ns : int
+    tray, cycle : int
+    level_area : float, [m^2]
+        Area around zero lag where the normalised autocorrelation exceeds the chosen level; 0 for a
+        uniform image.
+    correlation_length : float, [m]
+        Radius of the disc of that area.
+    axes_ratio : float, >= 1
+        Longer over shorter axis of that area.
+    direction : float, [rad], -pi/2 to pi/2
+        From the columns to its longer axis, positive towards the rows (down in the picture).
+    breadth : float, >= 1
+        `level_area` over the area at 0.7; less dependent on the camera than either.
+    cluster_size, cluster_size_error : float, [beads]
+        Number of beads per body, averaged over the beads (weight-averaged): 1 when all are single.
+    cluster_size_lower, cluster_size_upper : float, [beads]
+        Sizes between which the width is one standard deviation off or less; of a size that is
+        beyond the calibration, too.
+    size_status : SizeStatus
+    bodies, bodies_error : float
+        Free bodies by tracks: single beads and clusters; unknown where beads are not tracked.
+    mean_size, weighted_size, weighted_size_error : float, [beads]
+        By tracks: beads of a body, mean over the bodies and over the beads.
+    clustered_share : float, 0 to 1
+        Of the beads, in bodies of two and more, by tracks.
+    combined_size, combined_size_error : float, [beads]
+        Weight-averaged size by the autocorrelation and by tracks together.
+    onset : float, [s]
+        First merge of the cycle, since the shaking event; unknown before.
+    sticking_status : StickingStatus
+    sticking_speed, sticking_speed_lower, sticking_speed_upper : float, [m/s]
+        Beads that meet more slowly stick: by the merges of this cycle so far, with an interval.
+    mean_sticking_speed, mean_sticking_speed_lower, mean_sticking_speed_upper : float, [m/s]
+        By all cycles before this one.
+    """
+
+    stamp_ns: int
+    tray: int
+    cycle: int
+    level_area: float
+    correlation_length: float
+    axes_ratio: float = UNKNOWN
+    direction: float = UNKNOWN
+    breadth: float = UNKNOWN
+    cluster_size: float = UNKNOWN
+    cluster_size_error: float = UNKNOWN
+    cluster_size_lower: float = UNKNOWN
+    cluster_size_upper: float = UNKNOWN
+    size_status: SizeStatus = SizeStatus.UNCALIBRATED
+    bodies: float = UNKNOWN
+    bodies_error: float = UNKNOWN
+    mean_size: float = UNKNOWN
+    weighted_size: float = UNKNOWN
+    weighted_size_error: float = UNKNOWN
+    clustered_share: float = UNKNOWN
+    combined_size: float = UNKNOWN
+    combined_size_error: float = UNKNOWN
+    onset: float = UNKNOWN
+    sticking_status: StickingStatus = StickingStatus.UNKNOWN
+    sticking_speed: float = UNKNOWN
+    sticking_speed_lower: float = UNKNOWN
+    sticking_speed_upper: float = UNKNOWN
+    mean_sticking_speed: float = UNKNOWN
+    mean_sticking_speed_lower: float = UNKNOWN
+    mean_sticking_speed_upper: float = UNKNOWN
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Autocorrelation:
+    """Normalised autocorrelation of a tray image, zero lag in the centre.
+
+    Parameters
+    ----------
+    values : ndarray of float32, (rows, columns)
+        1 at zero lag.
+    """
+
+    stamp_ns: int
+    tray: int
+    values: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Merge:
+    """Two beads that stick to each other from some instant on.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Since when they stay beside each other.
+    known_ns : int
+        The picture that made it improbable enough that they are free.
+    tray, cycle : int
+    tracks : ndarray of int32, (2,)
+    joins : bool
+        Whether bodies became fewer by it; False for two beads of one body, or of one that only
+        seemed to be two.
+    """
+
+    stamp_ns: int
+    known_ns: int
+    tray: int
+    cycle: int
+    tracks: NDArray[np.int32]
+    joins: bool
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodyEstimate:
+    """Free bodies of one tray: single beads, and clusters of beads that stick together.
+
+    Errors hold beads that are not seen and pairs of which it is not known yet.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        The instant that is counted, some time before it was published.
+    tray, cycle : int
+    beads : int
+        In the tray.
+    followed : int
+        Of these, known at that instant; numbers of bodies are scaled to all beads.
+    bodies, bodies_error : float
+    mean_size, mean_size_error : float
+        Beads of a body: mean over the bodies.
+    weighted_size, weighted_size_error : float
+        Beads of the body of a bead: mean over the beads.
+    clustered_share, clustered_share_error : float, 0 to 1
+        Of the beads, in bodies of two and more.
+    clusters, clusters_error : float
+        Bodies of two and more beads.
+    sizes : ndarray (5,)
+        Bodies of 1, 2, 3, 4 to 6, and 7 or more beads.
+    first_merge_ns : int or None
+        When the first two beads of the cycle began to stick together; None before.
+    """
+
+    stamp_ns: int
+    tray: int
+    cycle: int
+    beads: int
+    followed: int
+    bodies: float
+    bodies_error: float
+    mean_size: float
+    mean_size_error: float
+    weighted_size: float
+    weighted_size_error: float
+    clustered_share: float
+    clustered_share_error: float
+    clusters: float
+    clusters_error: float
+    sizes: NDArray[np.float64]
+    first_merge_ns: int | None = None
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    @property
+    def merged(self) -> bool:
+        """Whether any beads stick together in this cycle."""
+        return self.first_merge_ns is not None

@@ -1,0 +1,109 @@
+"""Single contacts: rebounds from walls and collisions of two beads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.records.quality_flags import freeze_arrays
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rebound:
+    """A bead that came back from a side wall, as its track shows it.
+
+    Speeds are past the wall, which may swing; each has the error of its own straight line.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Of the contact, between two pictures.
+    tray, cycle, track, species : int
+    wall : int
+        0 to 3: low and high along columns, low and high along rows.
+    incoming, outgoing : float, [m/s]
+        Speeds along the normal, to the wall before and from it after.
+    incoming_error, outgoing_error : float, [m/s]
+    tangential_incoming, tangential_outgoing, tangential_error : float, [m/s]
+        Along the wall; the error is that of their difference.
+    wall_velocity, wall_velocity_error : float, [m/s]
+        Of the wall along the normal, to the outside; its error is in both speeds.
+    place : ndarray (2,), [m]
+        Of the centre of the bead, from the corner of the tray.
+    """
+
+    stamp_ns: int
+    tray: int
+    cycle: int = 0
+    track: int
+    species: int
+    wall: int
+    incoming: float
+    incoming_error: float
+    outgoing: float
+    outgoing_error: float
+    tangential_incoming: float
+    tangential_outgoing: float
+    tangential_error: float
+    wall_velocity: float
+    wall_velocity_error: float
+    place: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairCollision:
+    """Two beads that hit each other, as their tracks show it.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Of the contact, between two pictures.
+    tray, cycle : int
+    tracks, species : ndarray of int32, (2,)
+    radii, masses : ndarray (2,), [m], [kg]
+    radius_errors : ndarray (2,), [m]
+        0 where all beads of the species are alike.
+    before, after : ndarray (2, 2), [m/s]
+        Projected velocity of each bead.
+    before_errors, after_errors : ndarray (2,), [m/s]
+        Of each component.
+    separation : ndarray (2,), [m]
+        Projected, from the first centre to the second at the contact.
+    separation_error : float, [m]
+        Of each component.
+    temperatures : ndarray (2,), [m^2/s^2]
+        Of the species of each bead at that time: mean square of a horizontal component.
+    height : float, [m]
+        Of the tray, which limits how far beads can be above each other.
+    place : ndarray (2,), [m]
+        Of the first centre, from the corner of the tray.
+    """
+
+    stamp_ns: int
+    tray: int
+    cycle: int = 0
+    tracks: NDArray[np.int32]
+    species: NDArray[np.int32]
+    radii: NDArray[np.float64]
+    radius_errors: NDArray[np.float64]
+    masses: NDArray[np.float64]
+    before: NDArray[np.float64]
+    after: NDArray[np.float64]
+    before_errors: NDArray[np.float64]
+    after_errors: NDArray[np.float64]
+    separation: NDArray[np.float64]
+    separation_error: float
+    temperatures: NDArray[np.float64]
+    height: float
+    place: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)

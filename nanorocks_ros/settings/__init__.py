@@ -1,0 +1,83 @@
+"""Every number a user may change: one frozen dataclass per stage, one field per number.
+
+A field yields the ROS parameter with its range, the command-line flag and the row in the
+documentation. Nothing else holds a default.
+"""
+
+from nanorocks_ros.settings.graph_settings import (
+    BagSettings,
+    CameraSettings,
+    DashboardGraphSettings,
+    DashboardSettings,
+    LivePageSettings,
+    PacingSettings,
+    PlayerSettings,
+    RecordSettings,
+    SourceSettings,
+    WorkSettings,
+)
+from nanorocks_ros.settings.pipeline_settings import (
+    BodySettings,
+    ClusterSettings,
+    CoolingSettings,
+    PipelineSettings,
+    PreprocessSettings,
+    PriorSettings,
+    SpeedSettings,
+    StickingSettings,
+    TrackingSettings,
+)
+from nanorocks_ros.settings.setting_fields import (
+    Bounds,
+    Scalar,
+    SettingRow,
+    SettingsType,
+    Value,
+    problem,
+    rows,
+    setting,
+    with_values,
+)
+from nanorocks_ros.settings.simulation_settings import (
+    CompressionSettings,
+    FilmSettings,
+    SceneFilmSettings,
+    SceneSettings,
+    SimulationSettings,
+)
+
+__all__ = [
+    'BagSettings',
+    'BodySettings',
+    'Bounds',
+    'CameraSettings',
+    'ClusterSettings',
+    'CompressionSettings',
+    'CoolingSettings',
+    'DashboardGraphSettings',
+    'DashboardSettings',
+    'FilmSettings',
+    'LivePageSettings',
+    'PacingSettings',
+    'PipelineSettings',
+    'PlayerSettings',
+    'PreprocessSettings',
+    'PriorSettings',
+    'RecordSettings',
+    'Scalar',
+    'SceneFilmSettings',
+    'SceneSettings',
+    'SettingRow',
+    'SettingsType',
+    'SimulationSettings',
+    'SourceSettings',
+    'SpeedSettings',
+    'StickingSettings',
+    'TrackingSettings',
+    'Value',
+    'WorkSettings',
+    'problem',
+    'rows',
+    'setting',
+    'with_values',
+]

@@ -1,0 +1,151 @@
+"""Mechanism of settings: a dataclass field with range, unit and documentation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from nanorocks_ros.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+Scalar = bool | int | float | str
+
+
+Value = Scalar | tuple[int, ...] | tuple[float, ...]
+
+
+SettingsType = TypeVar('SettingsType')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """What a setting may be: a closed range, or a list of names."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    choices: tuple[str, ...] = ()
+    whole: bool = False
+
+
+def setting(default: Value, doc: str, unit: str = '', **bounds: Any) -> Any:
+    """A field of a settings class: default, documentation, unit and bounds."""
+    return field(default=default, metadata={'doc': doc, 'unit': unit, 'bounds': Bounds(**bounds)})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SettingRow:
+    """One setting, as the documentation, the ROS parameter and the flag need it."""
+
+    name: str
+    default: Value
+    doc: str
+    unit: str
+    bounds: Bounds
+
+
+def rows(settings: Any, prefix: str = '') -> Iterator[SettingRow]:
+    """Every setting under a dataclass of settings, nested ones with dotted names."""
+    for item in fields(settings):
+        value = getattr(settings, item.name)
+        if is_dataclass(value):
+            yield from rows(value, f'{prefix}{item.name}.')
+        else:
+            yield SettingRow(
+                name=prefix + item.name,
+                default=value,
+                doc=item.metadata['doc'],
+                unit=item.metadata['unit'],
+                bounds=item.metadata['bounds'],
+            )
+
+
+def _number_problem(value: float, bounds: Bounds) -> str | None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return f'{value!r} is not a number'
+    if not math.isfinite(value):
+        return f'{value!r} is not finite'
+    if bounds.whole and not float(value).is_integer():
+        return f'{value!r} is not a whole number'
+    if not bounds.low <= value <= bounds.high:
+        return f'{value!r} is outside [{bounds.low:g}, {bounds.high:g}]'
+    return None
+
+
+def problem(row: SettingRow, value: Any) -> str | None:
+    """Why a value cannot be this setting, or None when it can."""
+    if isinstance(row.default, bool):
+        return None if isinstance(value, bool) else f'{value!r} is neither true nor false'
+    if isinstance(row.default, str):
+        choices = row.bounds.choices
+        if not isinstance(value, str):
+            return f'{value!r} is not a text'
+        if choices and value not in choices:
+            return f'{value!r} is none of {", ".join(choices)}'
+        return None
+    if isinstance(row.default, tuple):
+        if isinstance(value, str):
+            return f'{value!r} is not a list of numbers'
+        found = (_number_problem(item, row.bounds) for item in _listed(value))
+        return next((text for text in found if text), None)
+    if isinstance(row.default, int) and isinstance(value, float) and not value.is_integer():
+        return f'{value!r} is not a whole number'
+    return _number_problem(value, row.bounds)
+
+
+def _listed(value: Any) -> list[Any]:
+    """A list as it is; a single number does for a list of one."""
+    return list(value) if hasattr(value, '__iter__') else [value]
+
+
+def _coerced(row: SettingRow, value: Any) -> Value:
+    if isinstance(row.default, tuple):
+        return tuple(int(item) if row.bounds.whole else float(item) for item in _listed(value))
+    kind = type(row.default)
+    return kind(value)
+
+
+def with_values(settings: SettingsType, values: Mapping[str, Any], where: str) -> SettingsType:
+    """The settings with some values replaced, all of them checked.
+
+    Parameters
+    ----------
+    settings : dataclass of settings
+    values : mapping
+        Dotted setting name to new value.
+    where : str
+        What to name in the error: a file, a node, the command line.
+
+    Raises
+    ------
+    ConfigurationError
+        For an unknown name or a value outside its range; every problem is listed.
+    """
+    known = {row.name: row for row in rows(settings)}
+    problems = [f'no setting {name!r}' for name in values if name not in known]
+    for name, value in values.items():
+        text = problem(known[name], value) if name in known else None
+        if text:
+            problems.append(f'{name}: {text}')
+    if problems:
+        raise ConfigurationError(
+            where, '; '.join(problems), 'see docs/parameters.md for names and ranges'
+        )
+    changed: SettingsType = _replaced(
+        settings, {name: _coerced(known[name], value) for name, value in values.items()}
+    )
+    return changed
+
+
+def _replaced(settings: Any, values: Mapping[str, Value]) -> Any:
+    own = {name: value for name, value in values.items() if '.' not in name}
+    for group in {name.split('.', 1)[0] for name in values if '.' in name}:
+        inner = {
+            name.split('.', 1)[1]: value
+            for name, value in values.items()
+            if name.startswith(f'{group}.')
+        }
+        own[group] = _replaced(getattr(settings, group), inner)
+    return replace(settings, **own)

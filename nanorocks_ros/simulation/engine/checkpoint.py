@@ -1,0 +1,100 @@
+"""A gas in a file: all of it, so that it goes on bit by bit as it would have."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import zipfile
+import zlib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.simulation.engine.collision_rules import Rules
+from nanorocks_ros.simulation.engine.gas_state import State
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+# Raised with every change of what a state holds.
+_FORM = 1
+_DIGEST = 'sha256'
+
+
+def _digest(arrays: dict[str, NDArray[Any]]) -> NDArray[np.uint8]:
+    """Fingerprint of the names, types, shapes and values."""
+    found = hashlib.sha256()
+    for name in sorted(arrays):
+        array = arrays[name]
+        found.update(f'{name} {array.dtype.str} {array.shape} '.encode())
+        found.update(np.ascontiguousarray(array).tobytes())
+    return np.frombuffer(found.digest(), dtype=np.uint8)
+
+
+def save(path: Path, state: State, rules: Rules, n_species: int) -> None:
+    """Write a gas to a file, whole or not at all.
+
+    Raises
+    ------
+    SimulationError
+        When it cannot be written.
+    """
+    arrays = {f'state.{name}': value for name, value in state._asdict().items()}
+    arrays |= {f'rules.{name}': np.asarray(value) for name, value in rules._asdict().items()}
+    arrays['form'] = np.asarray([_FORM, n_species])
+    partial = path.with_name(f'.{path.name}.part')
+    try:
+        with partial.open('wb') as file:
+            np.savez(file, **{**arrays, _DIGEST: _digest(arrays)})
+        os.replace(partial, path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise SimulationError(str(path), f'{error.strerror}', 'write elsewhere') from error
+
+
+def load(path: Path) -> tuple[State, Rules, int]:
+    """Read a gas from a file.
+
+    Raises
+    ------
+    SimulationError
+        When it cannot be read, is damaged, or was written by another release.
+    """
+    try:
+        with zipfile.ZipFile(path):
+            # Not a single array, nor a pickle: an archive, as it must be.
+            pass
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+    except OSError as error:
+        reason = error.strerror or 'is not a saved gas'
+        raise SimulationError(str(path), reason, 'name a file that was saved') from error
+    except (ValueError, EOFError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+        raise SimulationError(str(path), 'is damaged', 'use another saved state') from error
+    digest = arrays.pop(_DIGEST, None)
+    if digest is None or 'form' not in arrays:
+        raise SimulationError(str(path), 'is not a saved gas', 'name a file that was saved')
+    if not np.array_equal(digest, _digest(arrays)):
+        raise SimulationError(str(path), 'is damaged', 'use another saved state')
+    form, n_species = arrays['form'].tolist()
+    wanted = {f'state.{name}' for name in State._fields} | {
+        f'rules.{name}' for name in Rules._fields
+    }
+    if form != _FORM or not wanted <= set(arrays):
+        raise SimulationError(
+            str(path), 'was saved by another release', 'go on with that one, or start again'
+        )
+    state = State(*(arrays[f'state.{name}'] for name in State._fields))
+    return state, Rules(*(_rule(arrays[f'rules.{name}']) for name in Rules._fields)), n_species
+
+
+def _rule(value: NDArray[Any]) -> Any:
+    """A rule as compiled code takes it: a table, a tuple, or one value."""
+    if value.ndim == 2:
+        return value
+    if value.ndim == 1:
+        return tuple(value.tolist())
+    return value[()] if value.dtype == np.uint64 else value.item()

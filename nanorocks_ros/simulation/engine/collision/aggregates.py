@@ -1,0 +1,165 @@
+"""Rigid bodies of beads that stick together and do not rotate."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.numerics.compiled import inlined
+from nanorocks_ros.simulation.engine.gas_state import (
+    BODY,
+    COUNTER,
+    FOLLOWING,
+    OF_BODY,
+    OWN,
+    TIME,
+    VX,
+    VY,
+    VZ,
+    State,
+    X,
+    Y,
+    Z,
+)
+from nanorocks_ros.simulation.engine.integer_width import whole
+
+if TYPE_CHECKING:
+    from nanorocks_ros.simulation.engine.collision_rules import Rules
+
+
+@inlined
+def advance(state: State, i: int, now: float) -> None:
+    """Move a bead along its straight line to a time."""
+    rows = state.rows
+    since = now - rows[i, TIME]
+    rows[i, X] += rows[i, VX] * since
+    rows[i, Y] += rows[i, VY] * since
+    rows[i, Z] += rows[i, VZ] * since
+    rows[i, TIME] = now
+
+
+@inlined
+def mass_of(state: State, rules: Rules, i: int) -> float:
+    """Mass of the body of a bead, infinite when it is stuck to a wall, [kg]."""
+    if rules.sticky:
+        return state.masses[state.bodies[i, BODY], OF_BODY]
+    return state.masses[i, OWN]
+
+
+@inlined
+def turns(state: State, rules: Rules, i: int) -> bool:
+    """Whether a bead can rotate: one of its own, not stuck."""
+    if not rules.rough:
+        return False
+    if not rules.sticky:
+        return True
+    single = state.bodies[i, FOLLOWING] == i
+    return bool(single and not math.isinf(mass_of(state, rules, i)))
+
+
+@inlined
+def share(own: float, other: float) -> float:
+    """Part of a change of relative velocity that a body takes, by the masses of both."""
+    if math.isinf(own):
+        return 0.0
+    if math.isinf(other):
+        return 1.0
+    return other / (own + other)
+
+
+@inlined
+def spread(state: State, rules: Rules, i: int, now: float, marked: int) -> int:
+    """Give the velocity of a bead, just changed, to its body, and mark all of it.
+
+    Parameters
+    ----------
+    state : State
+    rules : Rules
+    i : int
+    now : float, [s]
+    marked : int
+        Beads marked before.
+
+    Returns
+    -------
+    int
+        Beads marked now.
+    """
+    rows = state.rows
+    state.links[i, COUNTER] += 1
+    state.dirty[marked] = i
+    marked += 1
+    if rules.sticky:
+        k = whole(state.bodies[i, FOLLOWING])
+        while k != i:
+            advance(state, k, now)
+            rows[k, VX] = rows[i, VX]
+            rows[k, VY] = rows[i, VY]
+            rows[k, VZ] = rows[i, VZ]
+            state.links[k, COUNTER] += 1
+            state.dirty[marked] = k
+            marked += 1
+            k = whole(state.bodies[k, FOLLOWING])
+    return marked
+
+
+@inlined
+def shift(state: State, rules: Rules, i: int, axis: int, by: float) -> None:
+    """Move the other beads of a body along an axis, [m]."""
+    if rules.sticky:
+        k = whole(state.bodies[i, FOLLOWING])
+        while k != i:
+            state.rows[k, X + axis] += by
+            k = whole(state.bodies[k, FOLLOWING])
+
+
+@inlined
+def stop_spinning(state: State, rules: Rules, i: int) -> None:
+    """Take the spin from a bead."""
+    if rules.rough:
+        for axis in range(3):
+            state.spins[i, axis] = 0.0
+
+
+@inlined
+def join(state: State, rules: Rules, i: int, j: int) -> None:
+    """Make one body of the bodies of two beads; velocities are left as they are."""
+    first = whole(state.bodies[i, BODY])
+    second = whole(state.bodies[j, BODY])
+    label = min(first, second)
+    mass = state.masses[first, OF_BODY] + state.masses[second, OF_BODY]
+    k = i
+    while True:
+        state.bodies[k, BODY] = label
+        stop_spinning(state, rules, k)
+        k = whole(state.bodies[k, FOLLOWING])
+        if k == i:
+            break
+    k = j
+    while True:
+        state.bodies[k, BODY] = label
+        stop_spinning(state, rules, k)
+        k = whole(state.bodies[k, FOLLOWING])
+        if k == j:
+            break
+    state.bodies[i, FOLLOWING], state.bodies[j, FOLLOWING] = (
+        state.bodies[j, FOLLOWING],
+        state.bodies[i, FOLLOWING],
+    )
+    state.masses[first, OF_BODY] = 0.0
+    state.masses[second, OF_BODY] = 0.0
+    state.masses[label, OF_BODY] = mass
+
+
+@inlined
+def fix(state: State, rules: Rules, i: int) -> None:
+    """Make the mass of a body infinite: it is stuck to a wall."""
+    state.masses[state.bodies[i, BODY], OF_BODY] = np.inf
+    k = i
+    while True:
+        stop_spinning(state, rules, k)
+        k = whole(state.bodies[k, FOLLOWING])
+        if k == i:
+            break

@@ -1,0 +1,129 @@
+"""Where momentum and angular momentum go that leave the beads."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from nanorocks_ros.numerics.compiled import inlined
+from nanorocks_ros.simulation.engine.collision.aggregates import advance, mass_of, turns
+from nanorocks_ros.simulation.engine.gas_state import (
+    AGGREGATE_SPIN,
+    FOLLOWING,
+    MOMENTUM,
+    OWN,
+    RADIUS,
+    SPIN,
+    VX,
+    State,
+    X,
+    Y,
+    Z,
+)
+from nanorocks_ros.simulation.engine.integer_width import whole
+
+if TYPE_CHECKING:
+    from nanorocks_ros.simulation.engine.collision_rules import Rules
+
+Vector = tuple[float, float, float]
+
+# Moment of inertia of a solid sphere: 2/5 m r^2.
+INERTIA = 0.4
+
+
+@inlined
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product."""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+@inlined
+def length(a: Vector) -> float:
+    """Length of a vector."""
+    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+@inlined
+def centre_of_mass(state: State, i: int, now: float) -> Vector:
+    """Centre of mass of the body of a bead; its beads are brought to the present."""
+    x, y, z, mass = 0.0, 0.0, 0.0, 0.0
+    k = i
+    while True:
+        advance(state, k, now)
+        x += state.masses[k, OWN] * state.rows[k, X]
+        y += state.masses[k, OWN] * state.rows[k, Y]
+        z += state.masses[k, OWN] * state.rows[k, Z]
+        mass += state.masses[k, OWN]
+        k = whole(state.bodies[k, FOLLOWING])
+        if k == i:
+            break
+    return x / mass, y / mass, z / mass
+
+
+@inlined
+def add(state: State, place: int, vector: Vector) -> None:
+    """Add a vector to three places of the books."""
+    for axis in range(3):
+        state.books[place + axis] += vector[axis]
+
+
+@inlined
+def book_lever(
+    state: State, rules: Rules, i: int, contact: Vector, impulse: Vector, now: float
+) -> None:
+    """Book what an impulse on a body should have turned, but cannot.
+
+    Parameters
+    ----------
+    state : State
+    rules : Rules
+    i : int
+    contact : tuple of 3 floats, [m]
+    impulse : tuple of 3 floats, [kg m/s]
+        On the body of bead i.
+    now : float, [s]
+    """
+    if not rules.sticky:
+        return
+    if math.isinf(mass_of(state, rules, i)):
+        add(state, MOMENTUM, impulse)
+        add(state, SPIN, cross(contact, impulse))
+    elif not turns(state, rules, i):
+        centre = centre_of_mass(state, i, now)
+        lever = contact[0] - centre[0], contact[1] - centre[1], contact[2] - centre[2]
+        add(state, AGGREGATE_SPIN, cross(lever, impulse))
+
+
+@inlined
+def orbit_and_spin(state: State, rules: Rules, i: int, now: float) -> Vector:
+    """Angular momentum about the origin of a body that is free to move, [kg m^2/s]."""
+    mass = mass_of(state, rules, i)
+    v = state.rows[i, VX], state.rows[i, VX + 1], state.rows[i, VX + 2]
+    x, y, z = cross(centre_of_mass(state, i, now), (mass * v[0], mass * v[1], mass * v[2]))
+    if rules.rough and state.bodies[i, FOLLOWING] == i:
+        radius = state.rows[i, RADIUS]
+        inertia = INERTIA * state.masses[i, OWN] * radius * radius
+        x += inertia * state.spins[i, 0]
+        y += inertia * state.spins[i, 1]
+        z += inertia * state.spins[i, 2]
+    return x, y, z
+
+
+@inlined
+def energy_of(state: State, rules: Rules, i: int) -> float:
+    """Kinetic energy of a body, 0 when stuck, [J]."""
+    mass = mass_of(state, rules, i)
+    if math.isinf(mass):
+        return 0.0
+    rows = state.rows
+    square = rows[i, VX] ** 2 + rows[i, VX + 1] ** 2 + rows[i, VX + 2] ** 2
+    energy = 0.5 * mass * square
+    if rules.rough and state.bodies[i, FOLLOWING] == i:
+        radius = rows[i, RADIUS]
+        spin = state.spins[i, 0] ** 2 + state.spins[i, 1] ** 2 + state.spins[i, 2] ** 2
+        energy += 0.5 * INERTIA * state.masses[i, OWN] * radius * radius * spin
+    return float(energy)

@@ -1,0 +1,145 @@
+"""When the next event of a bead happens, and with what."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.numerics.compiled import inlined
+from nanorocks_ros.simulation.engine.collision.wall_collisions import next_wall
+from nanorocks_ros.simulation.engine.event_queue import schedule
+from nanorocks_ros.simulation.engine.gas_state import (
+    COUNTER,
+    FLAGS,
+    HALF_SKIN,
+    LARGEST_RADIUS,
+    NEAR,
+    PARTNER,
+    PARTNER_COUNTER,
+    RENEW,
+    TIME,
+    VX,
+    VY,
+    VZ,
+    State,
+    X,
+    Y,
+    Z,
+)
+from nanorocks_ros.simulation.engine.integer_width import unsigned, whole
+from nanorocks_ros.simulation.engine.pair_times import speed_square, wait_for_contact
+
+if TYPE_CHECKING:
+    from nanorocks_ros.simulation.engine.collision.conservation_ledger import Vector
+    from nanorocks_ros.simulation.engine.collision_rules import Rules
+
+_ALL = 63
+
+
+@inlined
+def place_at(state: State, i: int, now: float) -> Vector:
+    """Where a bead is at a time, [m]."""
+    rows = state.rows
+    since = now - rows[i, TIME]
+    return (
+        rows[i, X] + rows[i, VX] * since,
+        rows[i, Y] + rows[i, VY] * since,
+        rows[i, Z] + rows[i, VZ] * since,
+    )
+
+
+@inlined
+def set_pending(state: State, i: int, time: float, partner: int) -> None:
+    """Make an event the pending one of a bead."""
+    state.links[i, PARTNER] = partner
+    if partner >= 0:
+        state.links[i, PARTNER_COUNTER] = state.links[partner, COUNTER]
+    schedule(state.times, state.levels, i, time)
+
+
+@inlined
+def image_horizon(state: State, rules: Rules, i: int, now: float) -> float:
+    """Until when the nearest image of every other bead is the one that can be met first."""
+    best = np.inf
+    for axis in range(3):
+        speed = abs(state.rows[i, VX + axis])
+        if rules.periodic[axis] and speed > 0.0:
+            # Two beads together move less than lies between the second image and a contact.
+            free = 0.25 * (rules.sides[axis] - 4.0 * state.reach[LARGEST_RADIUS])
+            best = min(best, now + free / speed)
+    return best
+
+
+@inlined
+def predict_among_all(state: State, rules: Rules, i: int, now: float, folded: bool) -> None:
+    """Find the earliest event of a bead from now on, asking every other bead and wall.
+
+    Walls come before beads and beads by index when times are equal.
+    """
+    best, partner = next_wall(state, rules, i, now, _ALL)
+    if folded:
+        horizon = image_horizon(state, rules, i, now)
+        if horizon < best:
+            best = horizon
+            partner = RENEW
+    place = place_at(state, i, now)
+    for j in range(state.rows.shape[0]):
+        if j != i:
+            when = now + wait_for_contact(state, rules, i, place, j, now, folded)
+            if when < best:
+                best = when
+                partner = j
+    set_pending(state, i, best, partner)
+
+
+@inlined
+def predict_among_neighbours(state: State, rules: Rules, i: int, now: float) -> None:
+    """Find the earliest event of a bead from now on, asking its neighbours and near walls."""
+    place = place_at(state, i, now)
+    near = state.links[i, FLAGS] & NEAR
+    partner = RENEW
+    best = shell_exit(state, i, now, place)
+    if near:
+        wall_time, wall = next_wall(state, rules, i, now, near)
+        if wall_time < best:
+            best = wall_time
+            partner = wall
+    neighbours = state.neighbours
+    for k in range(1, neighbours[i, 0] + 1):
+        j = unsigned(neighbours[i, k])
+        when = now + wait_for_contact(state, rules, i, place, j, now, near != 0)
+        if when < best:
+            best = when
+            partner = whole(j)
+    set_pending(state, i, best, partner)
+
+
+@inlined
+def shell_exit(state: State, i: int, now: float, place: Vector) -> float:
+    """When a bead leaves the shell in which its list of neighbours holds good."""
+    rows = state.rows
+    a = speed_square(rows, i)
+    if a == 0.0:
+        return np.inf
+    qx = place[0] - state.references[i, 0]
+    qy = place[1] - state.references[i, 1]
+    qz = place[2] - state.references[i, 2]
+    b = qx * rows[i, VX] + qy * rows[i, VY] + qz * rows[i, VZ]
+    c = qx * qx + qy * qy + qz * qz - state.reach[HALF_SKIN] * state.reach[HALF_SKIN]
+    if c >= 0.0:
+        return now
+    root = math.sqrt(b * b - a * c)
+    return now + (-c / (b + root) if b > 0.0 else (root - b) / a)
+
+
+@inlined
+def predict(state: State, rules: Rules, i: int, now: float) -> None:
+    """Find the earliest event of a bead from now on and make it pending."""
+    if state.references.shape[0]:
+        predict_among_neighbours(state, rules, i, now)
+    elif rules.periodic[0] or rules.periodic[1] or rules.periodic[2]:
+        predict_among_all(state, rules, i, now, True)
+    else:
+        predict_among_all(state, rules, i, now, False)

@@ -1,0 +1,205 @@
+"""The beads of a tray before anything happens: drawn sizes, random places, shaken speeds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.counter_rng import Purpose, key_for, uniform
+from nanorocks_ros.simulation.engine.collision_rules import (
+    CollisionRules,
+    UniformRestitution,
+    WallMotion,
+)
+from nanorocks_ros.simulation.engine.gas import Beads
+from nanorocks_ros.simulation.engine.input_checks import check_room
+from nanorocks_ros.simulation.packing.random_placement import placed_at_random
+from nanorocks_ros.simulation.velocities import maxwellian, uniform_speeds
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.settings import SimulationSettings
+
+_SPHERE = math.pi / 6.0
+_SMOOTH = -1.0
+# Largest speed of the walls of a tray that is really shaken, in mean speeds of the beads.
+_WALL_SPEED = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stock:
+    """What the beads of a tray are drawn from, one entry for each bead.
+
+    Parameters
+    ----------
+    diameter_low, diameter_high : ndarray (n,), [m]
+    density : ndarray (n,), [kg/m^3]
+    materials : tuple of str
+    species : ndarray of int32, (n,)
+        Place of the species in the list of the tray.
+    """
+
+    diameter_low: NDArray[np.float64]
+    diameter_high: NDArray[np.float64]
+    density: NDArray[np.float64]
+    materials: tuple[str, ...]
+    species: NDArray[np.int32]
+
+
+def stock(tray: Tray) -> Stock:
+    """The beads of a tray, species after species.
+
+    Raises
+    ------
+    SimulationError
+        For a tray without beads, or a species that cannot be.
+    """
+    where = f'tray {tray.number}'
+    for one in tray.species:
+        sizes = (one.diameter_low, one.diameter_high, one.density)
+        usable = all(math.isfinite(size) and size > 0.0 for size in sizes) and one.count >= 0
+        if not usable or one.diameter_low > one.diameter_high:
+            raise SimulationError(where, f'species {one}', 'give positive sizes, the lower first')
+    counts = [one.count for one in tray.species]
+    if sum(counts) < 1:
+        raise SimulationError(where, 'holds no bead', 'give at least one')
+    return Stock(
+        diameter_low=np.repeat([one.diameter_low for one in tray.species], counts),
+        diameter_high=np.repeat([one.diameter_high for one in tray.species], counts),
+        density=np.repeat([one.density for one in tray.species], counts),
+        materials=tuple(one.material for one in tray.species for _ in range(one.count)),
+        species=np.repeat(np.arange(len(counts), dtype=np.int32), counts),
+    )
+
+
+def rules_of(settings: SimulationSettings, tray: Tray, run: int = 0) -> CollisionRules:
+    """The box of a simulated tray, and what collisions do in it.
+
+    Raises
+    ------
+    SimulationError
+        For a restitution that reaches beyond 0 or 1.
+    """
+    restitution: float | UniformRestitution = settings.restitution
+    if settings.restitution_width > 0.0:
+        restitution = UniformRestitution(
+            mean=settings.restitution, width=settings.restitution_width
+        )
+    tangential: tuple[float | None, float | None] = (
+        settings.tangential_restitution,
+        settings.wall_tangential_restitution,
+    )
+    if max(settings.tangential_restitution, settings.wall_tangential_restitution) <= _SMOOTH:
+        tangential = None, None
+    return CollisionRules(
+        box=tray.dimensions,
+        restitution=restitution,
+        wall_restitution=_walls(settings),
+        sticking_speed=settings.sticking_speed,
+        wall_sticking_speed=settings.wall_sticking_speed,
+        sticking_measure=settings.sticking_measure,
+        tangential_restitution=tangential[0],
+        wall_tangential_restitution=tangential[1],
+        friction=settings.friction,
+        wall_friction=settings.wall_friction,
+        seed=settings.seed,
+        run=run,
+    )
+
+
+def _walls(settings: SimulationSettings) -> tuple[float, ...]:
+    """Restitution of the side walls, two for each axis, and of floor and lid."""
+    side = settings.wall_restitution
+    ends = min(max(side + settings.floor_lid_difference, 0.0), 1.0)
+    return (side, side, side, side, ends, ends)
+
+
+def wall_motion(settings: SimulationSettings) -> WallMotion:
+    """How the walls of a tray move that is really shaken: to and fro along its diagonal."""
+    amplitude = _WALL_SPEED * settings.mean_speed / (2.0 * math.pi * settings.shake_frequency)
+    along = amplitude / math.sqrt(3.0)
+    return WallMotion.sinusoidal(
+        (along, along, along), settings.shake_frequency, settings.shake_periods
+    )
+
+
+def resting_beads(settings: SimulationSettings, tray: Tray, run: int = 0) -> Beads:
+    """The beads of a tray at rest, at random places.
+
+    Parameters
+    ----------
+    settings : SimulationSettings
+    tray : Tray
+    run : int, >= 0
+        Runs of one seed differ.
+
+    Raises
+    ------
+    SimulationError
+        When the beads do not fit, or no place is found for one of them.
+    """
+    drawn = stock(tray)
+    rules = rules_of(settings, tray).compiled()
+    sizes_key = key_for(settings.seed, run, Purpose.DIAMETERS)
+    diameters = draw_diameters(drawn.diameter_low, drawn.diameter_high, sizes_key)
+    check_room(0.5 * diameters, rules)
+    places_key = key_for(settings.seed, run, Purpose.POSITIONS)
+    positions = placed_at_random(0.5 * diameters, tray.dimensions, key=places_key)
+    return Beads(
+        radii=0.5 * diameters,
+        masses=sphere_masses(diameters, drawn.density),
+        positions=positions,
+        velocities=np.zeros((diameters.size, 3)),
+        species=drawn.species,
+    )
+
+
+@compiled
+def draw_diameters(
+    low: NDArray[np.float64], high: NDArray[np.float64], key: np.uint64
+) -> NDArray[np.float64]:
+    """Diameters, even between the two ends of each bead's range, [m]."""
+    diameters = np.empty(low.size)
+    for i in range(low.size):
+        diameters[i] = low[i] + (high[i] - low[i]) * uniform(key, i)
+    return diameters
+
+
+@compiled
+def sphere_masses(
+    diameters: NDArray[np.float64], density: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Masses of spheres, [kg]."""
+    masses = np.empty(diameters.size)
+    for i in range(diameters.size):
+        masses[i] = density[i] * _SPHERE * diameters[i] * diameters[i] * diameters[i]
+    return masses
+
+
+@compiled
+def drawn_velocities(
+    masses: NDArray[np.float64],
+    mean_speed: float,
+    maxwell: bool,
+    vertical: float,
+    key: np.uint64,
+    shake: int,
+) -> NDArray[np.float64]:
+    """Velocities after a shaking event, (n, 3), [m/s]; walls give all masses the same speeds.
+
+    `vertical` is a factor on the velocities along z.
+    """
+    if maxwell:
+        velocities = maxwellian(masses, mean_speed, key, shake, False)
+    else:
+        velocities = uniform_speeds(masses.size, mean_speed, key, shake)
+    for i in range(masses.size):
+        velocities[i, 2] *= vertical
+    return velocities

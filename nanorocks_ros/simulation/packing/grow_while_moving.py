@@ -1,0 +1,193 @@
+"""Beads that find no room one after the other: they enter small, and grow while all move.
+
+Random places one after the other jam where a third of a wide box is filled, long before the
+beads themselves would. Here those left over enter at a part of their radius, so that each finds
+a place. Then all are moved at random, one by one, and a bead that is not yet of full size takes
+of the room its neighbours leave. At no time do two overlap, so nothing has to be repaired at
+the end; and moves at full size are those of the Metropolis method, which end in a fluid of hard
+spheres in equilibrium, not in the pattern of the squeeze.
+
+Where a few beads in a tight box have locked one another, a new attempt begins: all enter small,
+and grow more slowly than before.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.numerics.compiled import compiled, kernel
+from nanorocks_ros.numerics.counter_rng import hashed
+from nanorocks_ros.simulation.packing.cell_list import Packing, is_free
+from nanorocks_ros.simulation.packing.monte_carlo import adapt, first_steps, insert, move_all, stir
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# Squares of distances keep this clear: more than rounding, so that all gaps are positive.
+_APART = 1.0 + 1e-12
+
+# Tries of one size before a bead shrinks, and how often it may: 0.8^40 is 1/7500.
+_TRIES = 100
+_SHRINKS = 40
+
+# Sweeps (tries to move each bead) at full size, and more where they cost little. At a filling
+# of 0.45 they take a bead 0.6 of its diameter from where it was, and neighbours then touch as
+# often as after three times as many; waves of density longer than some 20 diameters take more.
+_LAST_SWEEPS = 300
+_LAST_MOVES = 30_000
+
+# A bead that cannot grow as much as it should is offered 1/2, 1/4, ... 1/2^8 of that, sweep by
+# sweep: a marble among grains finds no more room than that.
+_PARTS = 8
+
+# Size at which beads enter a new attempt, and what they may grow in a sweep of the first of
+# them; then half of that, and so on: the slower, the better they arrange themselves.
+_SMALL = 0.5
+_PACE = 0.01
+
+# No new attempt after so many moves: some seconds.
+_MOST_MOVES = 6_000_000
+# An attempt ends after so many sweeps, and more where they cost little; or earlier, when the
+# beads lack more than this part of what they lacked at half the time.
+_MOST_SWEEPS = 2000
+_LITTLE_PROGRESS = 0.8
+_FIRST_CHECK = 250
+_FIRST_CHECK_MOVES = 20_000
+
+
+@compiled
+def grown(packing: Packing, placed: int, key: np.uint64) -> bool:
+    """Find places for beads that fill a box too densely to be put there one after the other.
+
+    Parameters
+    ----------
+    packing : Packing
+    placed : int
+        How many are in the box: the last ones of the order. Without success, they will be
+        where they are now.
+    key : uint64
+
+    Returns
+    -------
+    bool
+        Whether all beads are in the box at full size, none touching another.
+    """
+    n = packing.radii.size
+    before = packing.positions.copy()
+    packing.apart[0] = _APART
+    pace = 2.0 * _PACE
+    moves = 0
+    attempt = 0
+    inside = placed
+    while moves < _MOST_MOVES:
+        enter_key, grow_key = hashed(key, 3 * attempt), hashed(key, 3 * attempt + 1)
+        if insert(packing, inside, enter_key, _TRIES, _SHRINKS) < n:
+            break
+        # The first attempt goes on from what is there, as fast as it can.
+        sweeps, lack = _grow(packing, 1.0 if attempt == 0 else pace, grow_key)
+        if lack == 0.0:
+            stir(packing, hashed(key, 3 * attempt + 2), _LAST_SWEEPS + _LAST_MOVES // n)
+            return _are_apart(packing)
+        moves += sweeps * n
+        pace *= 0.5
+        attempt += 1
+        _take_out(packing)
+        inside = 0
+    _put_back(packing, before)
+    return False
+
+
+@compiled
+def _grow(packing: Packing, pace: float, key: np.uint64) -> tuple[int, float]:
+    """Move all beads and let them grow, until they are full or do not get on.
+
+    Parameters
+    ----------
+    packing : Packing
+    pace : float
+        Most a bead may grow in a sweep, in its radius.
+    key : uint64
+
+    Returns
+    -------
+    sweeps : int
+    lack : float
+        What all beads lack of full size, in radii.
+    """
+    n = packing.radii.size
+    steps, tallies = first_steps(packing)
+    most = _MOST_SWEEPS + _MOST_MOVES // n
+    check = _FIRST_CHECK + _FIRST_CHECK_MOVES // n + np.int64(1.0 / pace)
+    lacked = np.inf
+    lack = np.inf
+    for sweep in range(1, most + 1):
+        move_all(packing, steps, tallies, hashed(key, sweep))
+        adapt(packing, steps, tallies)
+        lack = _grow_all(packing, pace, 1.0 / (1 << (1 + sweep % _PARTS)))
+        if lack == 0.0:
+            return sweep, lack
+        if sweep == check:
+            if lack > _LITTLE_PROGRESS * lacked:
+                return sweep, lack
+            lacked = lack
+            check *= 2
+    return most, lack
+
+
+@kernel
+def _grow_all(packing: Packing, pace: float, part: float) -> float:
+    """Let beads grow where there is room; returns what all lack of full size, in radii.
+
+    Parameters
+    ----------
+    packing : Packing
+    pace : float
+        Most a bead may grow, in its radius.
+    part : float
+        Of that, what it is offered when there is no room for it.
+    """
+    lack = 0.0
+    for i in range(packing.radii.size):
+        size, radius = packing.sizes[i], packing.radii[i]
+        if size == radius:
+            continue
+        growth = pace * radius
+        packing.sizes[i] = size + growth
+        if growth >= radius - size:
+            growth = radius - size
+            packing.sizes[i] = radius
+        if not is_free(packing, i):
+            packing.sizes[i] = size + part * growth
+            if not is_free(packing, i):
+                packing.sizes[i] = size
+        lack += 1.0 - packing.sizes[i] / radius
+    return lack
+
+
+@kernel
+def _are_apart(packing: Packing) -> bool:
+    """Whether no two beads touch."""
+    touching = 0
+    for i in range(packing.radii.size):
+        if not is_free(packing, i):
+            touching += 1
+    return touching == 0
+
+
+@kernel
+def _take_out(packing: Packing) -> None:
+    """Empty the box, and make all beads small."""
+    for cell in range(packing.heads.size):
+        packing.heads[cell] = -1
+    for i in range(packing.radii.size):
+        packing.sizes[i] = _SMALL * packing.radii[i]
+
+
+@kernel
+def _put_back(packing: Packing, positions: NDArray[np.float64]) -> None:
+    """Put beads where they were."""
+    for i in range(packing.radii.size):
+        for axis in range(3):
+            packing.positions[i, axis] = positions[i, axis]

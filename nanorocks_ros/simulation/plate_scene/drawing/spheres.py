@@ -1,0 +1,146 @@
+"""Beads: spheres and ovals with shading, a mirror image of the lamp, and dust."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.numerics.compiled import kernel
+from nanorocks_ros.simulation.plate_scene.simd_rectangles import (
+    ACROSS,
+    AMBIENT,
+    COLUMN,
+    COSINE,
+    DARKENING,
+    DIFFUSE,
+    DOWN,
+    DUST,
+    GLOW,
+    HALF,
+    HIGHLIGHT,
+    LAMP_X,
+    LAMP_Y,
+    LAMP_Z,
+    LEVELS,
+    LIT,
+    MATRIX,
+    ONE,
+    RADIUS,
+    ROW,
+    SHARE,
+    SHEEN,
+    SINE,
+    STEPS,
+    ZERO,
+    X,
+    Y,
+    box,
+    compose,
+    covered,
+    lay_out,
+    short,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# Half way between the lamp and the camera a mirror would show the lamp.
+_HALF_LENGTH = math.sqrt(LAMP_X**2 + LAMP_Y**2 + (1.0 + LAMP_Z) ** 2)
+_HALF_X, _HALF_Y, _HALF_Z = (
+    short(value / _HALF_LENGTH) for value in (LAMP_X, LAMP_Y, 1.0 + LAMP_Z)
+)
+_LAMP_ACROSS = short(0.60)
+_CHALK = np.array([226.0, 229.0, 231.0], dtype=np.float32)
+
+# Squares of the pattern of dust to the radius of a bead.
+_DUST_SQUARES = short(12.0)
+
+
+@kernel
+def bead_pixels(
+    out: NDArray[np.float32],
+    n: int,
+    place: NDArray[np.float32],
+    look: NDArray[np.float32],
+    width: float,
+) -> None:
+    """Shares and light of the pixels of a bead, without branches so that it runs in lanes.
+
+    The light is that of `drawing.shade`.
+
+    Parameters
+    ----------
+    out : ndarray (9, n or more)
+        Written: share of each pixel, levels, how it is lit, and the place on the bead, which
+        has turned.
+    place : ndarray (12,)
+    look : ndarray (9,)
+    width : float, [px]
+    """
+    xx, xy, yx, yy = place[MATRIX], place[MATRIX + 1], place[MATRIX + 2], place[MATRIX + 3]
+    radius, cosine, sine = place[RADIUS], place[COSINE], place[SINE]
+    ambient, diffuse, darkening = look[AMBIENT], look[DIFFUSE], look[DARKENING]
+    glow, sheen, highlight = look[GLOW], look[SHEEN], STEPS * look[HIGHLIGHT]
+    blue, green, red = STEPS * look[0], STEPS * look[1], STEPS * look[2]
+    for j in range(n):
+        dx, dy = out[X, j], out[Y, j]
+        x, y = xx * dx + xy * dy, yx * dx + yy * dy
+        distance = math.sqrt(x * x + y * y)
+        inward = ONE / max(distance, ONE)
+        x, y = x * inward, y * inward
+        z = math.sqrt(max(ONE - x * x - y * y, ZERO))
+        lamp = x * LAMP_X + y * LAMP_Y
+        lambert = max(lamp + z * LAMP_Z, ZERO)
+        mirror = max(x * _HALF_X + y * _HALF_Y + z * _HALF_Z, ZERO)
+        mirror = mirror * mirror
+        mirror = mirror * mirror
+        broad = mirror * mirror
+        narrow = broad * broad
+        narrow = narrow * narrow
+        away = max(-lamp / _LAMP_ACROSS, ZERO)
+        light = (ambient + diffuse * lambert) * (ONE - darkening * (ONE - z) * (ONE - z))
+        out[SHARE, j] = covered((distance - ONE) * radius, width)
+        light += glow * away * away * z + sheen * broad
+        out[LEVELS, j] = blue * light + highlight * narrow
+        out[LEVELS + 1, j] = green * light + highlight * narrow
+        out[LEVELS + 2, j] = red * light + highlight * narrow
+        out[LIT, j] = HALF + HALF * lambert
+        out[ACROSS, j] = x * cosine + y * sine
+        out[DOWN, j] = y * cosine - x * sine
+
+
+@kernel
+def put_dust(
+    out: NDArray[np.float32], n: int, dust: NDArray[np.float32], start: int, cover: float
+) -> None:
+    """Hide the pixels that `bead_pixels` left under dust."""
+    size = dust.shape[0]
+    for j in range(n):
+        y = int((out[DOWN, j] + ONE) * _DUST_SQUARES) + start
+        x = int((out[ACROSS, j] + ONE) * _DUST_SQUARES) + start // size
+        hidden = min(cover * dust[y % size, x % size], ONE)
+        for channel in range(3):
+            level = out[LEVELS + channel, j]
+            chalk = STEPS * _CHALK[channel] * out[LIT, j]
+            out[LEVELS + channel, j] = level + hidden * (chalk - level)
+
+
+@kernel
+def draw_bead(
+    canvas: NDArray[np.uint16],
+    place: NDArray[np.float32],
+    look: NDArray[np.float32],
+    dust: NDArray[np.float32],
+    start: int,
+    width: float,
+    buffer: NDArray[np.float32],
+) -> None:
+    """Draw a shaded sphere, or oval, under its dust; see `draw_bodies`."""
+    left, top, columns, rows = box(canvas, place, width)
+    n = lay_out(buffer, rows, columns, left + 0.5 - place[COLUMN], top + 0.5 - place[ROW])
+    bead_pixels(buffer, n, place, look, width)
+    if place[DUST] > 0.0:
+        put_dust(buffer, n, dust, start, place[DUST])
+    compose(canvas, buffer, left, top, columns, rows)

@@ -1,0 +1,251 @@
+"""The empty scene: the aluminium plate with its cells, in its housing, as the lens shows it.
+
+Painted once, in the rectified picture at twice the scale, then seen through the lens.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from nanorocks_ros.experiment.plate import PLATE
+from nanorocks_ros.simulation.plate_scene.drawing.chalk import dusted_floor
+from nanorocks_ros.simulation.plate_scene.simd_rectangles import LEVEL
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.plate import Region
+    from nanorocks_ros.simulation.plate_scene.scene_geometry import SceneGeometry
+
+    Picture = NDArray[np.float32]
+
+# Blue, green, red; aluminium is nearly gray.
+_TOP = np.array([141.0, 139.0, 135.0], np.float32)
+_FLOOR = np.array([160.0, 158.0, 154.0], np.float32)
+_HOUSING = np.array([33.0, 31.0, 30.0], np.float32)
+
+# Painted at so many times the scale of the picture.
+_FINE = 2
+# What is painted around the plate, [m].
+_SURROUNDINGS = 0.004
+# Chamfer of a cell, and of the plate itself, [m].
+_CHAMFER, _EDGE = 0.0005, 0.0009
+# Places of the screws on the plate and their radius, [m].
+_SCREWS = ((3, 3), (77, 3), (3, 77), (77, 77), (3, 34), (77, 34), (14, 67), (66, 67))
+_SCREW = 0.0016
+# Standard deviation of noise that is enlarged rather than blurred further, [px].
+_SMOOTH = 3.0
+# Blur of a pixel's own width, [px].
+_PIXEL_BLUR = 0.36
+
+
+def empty_scene(
+    geometry: SceneGeometry, *, defocus: float, chalk: dict[int, float], seed: int
+) -> NDArray[np.uint16]:
+    """The scene without beads.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+    defocus : float, [px]
+        Standard deviation of the blur.
+    chalk : dict of int to float
+        Dust in each tray, 0 to 2.
+    seed : int
+        Of all that is random in it.
+
+    Returns
+    -------
+    ndarray of uint16, (3, rows, columns), bgr, [1/64 gray levels]
+    """
+    rng = np.random.default_rng(seed)
+    left, top, _, _ = geometry.plate
+    margin = round(_SURROUNDINGS * geometry.scale)
+    corner = np.array([left - margin, top - margin])
+    painting = _Painting(geometry, margin, rng)
+    for number, region in geometry.regions.items():
+        # Of its own random numbers: dust in one cell changes nothing in another.
+        dice = np.random.default_rng([seed, number])
+        painting.cell(region, corner, chalk.get(number, 0.0), dice)
+    painted, opaque = painting.finished(np.hypot(_PIXEL_BLUR, defocus) * _FINE)
+    rows, columns = geometry.shape
+    grid = np.mgrid[0:rows, 0:columns][::-1].transpose(1, 2, 0) + 0.5
+    source = ((geometry.camera.rectified(grid) - corner) * _FINE - 0.5).astype(np.float32)
+    seen, share = (
+        cv2.remap(one, source[..., 0], source[..., 1], cv2.INTER_LINEAR, borderValue=0)
+        for one in (painted, opaque)
+    )
+    around = _housing(geometry.shape, rng)
+    scene = around + share[..., np.newaxis] * (seen - around)
+    levels = np.asarray(np.clip(scene, 0.0, 255.0) * LEVEL + 0.5, dtype=np.uint16)
+    return np.ascontiguousarray(levels.transpose(2, 0, 1))
+
+
+def streaks(
+    shape: tuple[int, int], rng: np.random.Generator, along: float, across: float
+) -> Picture:
+    """Noise of standard deviation 1 that holds over some pixels along rows and across them."""
+    # Smooth noise is made small and enlarged.
+    steps = max(int(across / _SMOOTH), 1), max(int(along / _SMOOTH), 1)
+    small = shape[0] // steps[0] + 2, shape[1] // steps[1] + 2
+    raw = rng.standard_normal(small, dtype=np.float32)
+    smooth = cv2.GaussianBlur(raw, (0, 0), sigmaX=along / steps[1], sigmaY=across / steps[0])
+    whole = small[1] * steps[1], small[0] * steps[0]
+    large = cv2.resize(smooth / smooth.std(), whole, interpolation=cv2.INTER_CUBIC)
+    return np.asarray(large[: shape[0], : shape[1]], dtype=np.float32)
+
+
+class _Painting:
+    """The plate in the rectified picture, finer than that."""
+
+    def __init__(self, geometry: SceneGeometry, margin: int, rng: np.random.Generator) -> None:
+        self._metre = geometry.scale * _FINE
+        size = [round(side * geometry.scale + 2 * margin) * _FINE for side in PLATE]
+        self._rows, self._columns = np.ogrid[0.5 : size[1], 0.5 : size[0]]
+        shape = size[1], size[0]
+        brushed = 1.0 + 0.022 * streaks(shape, rng, 60.0, 0.8) + 0.012 * streaks(shape, rng, 2, 2)
+        brushed += 0.03 * streaks(shape, rng, 400.0, 250.0)
+        self._image: Picture = np.asarray(brushed[..., np.newaxis] * _TOP, dtype=np.float32)
+        self._opaque = np.zeros(shape, dtype=np.float32)
+        edge = float(margin * _FINE)
+        self._edges = edge, edge, size[0] - edge, size[1] - edge
+        low = margin * _FINE
+        self._opaque[low : size[1] - low, low : size[0] - low] = 1.0
+        self._bevel(*self._edges, -_EDGE, (1.25, 1.15, 0.72, 0.66))
+        for across, down in _SCREWS:
+            self._screw(edge + across * 1e-3 * self._metre, edge + down * 1e-3 * self._metre)
+
+    def cell(
+        self,
+        region: Region,
+        corner: NDArray[np.float64],
+        chalk: float,
+        rng: np.random.Generator,
+    ) -> None:
+        """Mill a cell into the plate: a chamfer around, a floor, the shadow of its walls."""
+        left, top = (
+            (place - c) * _FINE for place, c in zip((region.x, region.y), corner, strict=True)
+        )
+        right, bottom = left + region.width * _FINE, top + region.height * _FINE
+        # Those that face the lamp, at the upper left, are the far ones of a hole.
+        self._bevel(left, top, right, bottom, _CHAMFER, (0.50, 0.44, 1.42, 1.55))
+        rows = slice(round(top), round(bottom))
+        columns = slice(round(left), round(right))
+        shape = rows.stop - rows.start, columns.stop - columns.start
+        milled = 1.0 + 0.012 * streaks(shape, rng, 1.5, 1.5)
+        milled += 0.02 * streaks(shape, rng, 90.0, 60.0)
+        milled += 0.018 * self._mill_marks(shape, rng)
+        floor = (milled * self._wall_shadow(shape))[..., np.newaxis] * _FLOOR
+        if chalk > 0.0:
+            floor = dusted_floor(floor, chalk, self._metre, rng)
+            self._dust_around(left, top, right, bottom, chalk, rng)
+        self._image[rows, columns] = floor
+
+    def finished(self, blur: float) -> tuple[Picture, Picture]:
+        """The painting and where it is opaque, both blurred by so many of its pixels."""
+        # What is around the plate takes its colour, so that its edge stays its own when blurred.
+        image, opaque = (
+            np.asarray(cv2.GaussianBlur(one, (0, 0), blur), dtype=np.float32)
+            for one in (self._image, self._opaque)
+        )
+        return image, opaque
+
+    def _bevel(
+        self,
+        left: float,
+        top: float,
+        right: float,
+        bottom: float,
+        width: float,
+        light: tuple[float, float, float, float],
+    ) -> None:
+        """Light on four slanted faces: left, top, right, bottom; outside, or inside if below 0."""
+        reach = width * self._metre
+        image, depths = self._around(left, top, right, bottom, max(reach, 0.0))
+        outside, face = depths.max(axis=0), depths.argmax(axis=0)
+        band = (outside > min(reach, 0.0)) & (outside <= max(reach, 0.0))
+        factor = np.asarray(light, dtype=np.float32)[face[band]]
+        image[band] *= factor[:, np.newaxis]
+
+    def _around(
+        self, left: float, top: float, right: float, bottom: float, reach: float
+    ) -> tuple[Picture, Picture]:
+        """The painting about a rectangle, and how far outside of each of its sides that is."""
+        low, high = max(int(left - reach) - 1, 0), max(int(top - reach) - 1, 0)
+        columns = slice(low, int(right + reach) + 2)
+        rows = slice(high, int(bottom + reach) + 2)
+        x, y = self._columns[:, columns], self._rows[rows]
+        depths = np.stack(np.broadcast_arrays(left - x, top - y, x - right, y - bottom))
+        image = np.asarray(self._image[rows, columns], dtype=np.float32)
+        return image, np.asarray(depths, dtype=np.float32)
+
+    def _mill_marks(self, shape: tuple[int, int], rng: np.random.Generator) -> Picture:
+        """Arcs of a cutter that went along the cell."""
+        y, x = np.ogrid[0.5 : shape[0], 0.5 : shape[1]]
+        spacing, radius = 0.0011 * self._metre, 0.006 * self._metre
+        bow = np.sqrt(np.maximum(radius**2 - (y - 0.5 * shape[0]) ** 2, 0.0))
+        marks = np.cos(2.0 * np.pi * (x - bow) / spacing)
+        return np.asarray(marks * (0.6 + 0.4 * streaks(shape, rng, 30, 30)), np.float32)
+
+    def _wall_shadow(self, shape: tuple[int, int]) -> Picture:
+        """Light that reaches the floor past the walls: less at those near the lamp."""
+        y, x = np.ogrid[0.5 : shape[0], 0.5 : shape[1]]
+        x, y = x / self._metre, y / self._metre
+        width, height = shape[1] / self._metre, shape[0] / self._metre
+        light = 1.0 - 0.34 * np.exp(-x / 0.0009) - 0.12 * np.exp(-(width - x) / 0.0004)
+        light = light * (1.0 - 0.38 * np.exp(-y / 0.0009) - 0.12 * np.exp(-(height - y) / 0.0004))
+        return np.asarray(light, dtype=np.float32)
+
+    def _dust_around(
+        self,
+        left: float,
+        top: float,
+        right: float,
+        bottom: float,
+        chalk: float,
+        rng: np.random.Generator,
+    ) -> None:
+        """Chalk on the walls and what was spilt beside the cell."""
+        fall = 0.0006 * self._metre
+        image, depths = self._around(left, top, right, bottom, 6.0 * fall)
+        share = 0.45 * chalk * np.exp(-np.maximum(depths.max(axis=0), 0.0) / fall)
+        patches = 0.5 + 0.5 * streaks((share.shape[0], share.shape[1]), rng, 9.0, 9.0)
+        share = np.clip(share * patches, 0.0, 0.8)[..., np.newaxis]
+        image += share * (np.array([214.0, 217.0, 219.0], np.float32) - image)
+
+    def _screw(self, x: float, y: float) -> None:
+        radius = _SCREW * self._metre
+        reach = round(1.5 * radius)
+        columns = slice(round(x) - reach, round(x) + reach)
+        rows = slice(round(y) - reach, round(y) + reach)
+        image = self._image[rows, columns]
+        across, down = self._columns[:, columns] - x, self._rows[rows] - y
+        distance = np.hypot(across, down) / radius
+        slope = (across + down) / radius
+        head = distance < 1.0
+        image[head] *= (0.92 + 0.10 * slope[head])[:, np.newaxis]
+        rim = (distance >= 1.0) & (distance < 1.18)
+        image[rim] *= 0.42
+        # A hexagonal socket.
+        u, v = np.abs(across) / radius, np.abs(down) / radius
+        socket = np.maximum(v * 0.866 + u * 0.5, u) < 0.48
+        image[socket] *= 0.22
+
+
+def _housing(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
+    """What is behind the plate: dark, out of focus, with the three springs that hold it."""
+    small = shape[0] // 4 + 1, shape[1] // 4 + 1
+    uneven = 1.0 + 0.16 * streaks(small, rng, 40.0, 40.0) + 0.03 * streaks(small, rng, 1.0, 1.0)
+    image = np.asarray(uneven[..., np.newaxis] * _HOUSING, dtype=np.float32)
+    scale = small[0] / 270.0
+    middle = 0.5 * small[1]
+    for column, row in ((-158.0, 136.0), (152.0, 62.0), (152.0, 208.0)):
+        for turn in range(4):
+            centre = round(middle + column * scale), round((row - 15 + 10 * turn) * scale)
+            axes = max(round(18 * scale), 1), max(round(5 * scale), 1)
+            cv2.ellipse(image, centre, axes, 0, 0, 360, (104.0, 103.0, 100.0), 1, cv2.LINE_AA)
+    blurred = cv2.GaussianBlur(image, (0, 0), 1.4 * scale)
+    return np.asarray(cv2.resize(blurred, shape[::-1], interpolation=cv2.INTER_CUBIC))

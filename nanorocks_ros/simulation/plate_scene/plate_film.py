@@ -1,0 +1,249 @@
+"""All trays of the plate, shaken together and filmed, with the truth about every bead."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError, SimulationError
+from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+from nanorocks_ros.records import BeadsTruth, Frame, GroundTruth
+from nanorocks_ros.settings import problem, rows, with_values
+from nanorocks_ros.simulation.initial_state import stock
+from nanorocks_ros.simulation.plate_scene.drawing.bead_appearance import turned_since
+from nanorocks_ros.simulation.plate_scene.moving_plate import FURTHEST_PX
+from nanorocks_ros.simulation.plate_scene.plate_camera import SceneCamera
+from nanorocks_ros.simulation.plate_scene.plate_oscillation import plate_motion, wall_motion_of
+from nanorocks_ros.simulation.shaken_tray import ShakenTray, check_settings
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.settings import SceneSettings, SimulationSettings
+    from nanorocks_ros.simulation.plate_scene.plate_oscillation import PlateMotion
+
+_NS = 1e9
+
+_EFFECTS: tuple[str, ...] = (
+    'fisheye',
+    'defocus_px',
+    'noise',
+    'vignetting',
+    'gradient',
+    'flicker',
+    'shadows',
+    'chalk',
+    'glare',
+    'ovality',
+    'irregularity',
+    'turning',
+    'swing',
+)
+
+
+def without_effects(scene: SceneSettings) -> SceneSettings:
+    """The same plate through a perfect camera, at rest, in even light; clean, round beads.
+
+    They are shaded all the same, as in a film of a single tray.
+    """
+    return with_values(scene, dict.fromkeys(_EFFECTS, 0.0), 'no effects')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneMoment:
+    """One frame of the scene and what is true of it.
+
+    Parameters
+    ----------
+    frame : Frame
+        ``bgr8``.
+    trays : tuple of GroundTruth
+        Of each tray as a whole; speeds past the camera.
+    beads : tuple of BeadsTruth
+        Of each tray; relative to its floor.
+    """
+
+    frame: Frame
+    trays: tuple[GroundTruth, ...]
+    beads: tuple[BeadsTruth, ...]
+
+
+class SceneFilm:
+    """A film of the plate; frames are made when they are asked for.
+
+    Parameters
+    ----------
+    simulation : SimulationSettings
+        Of the gas in every tray, the size of the pictures and the seed; `tray`, the scale and
+        the noise are not used.
+    scene : SceneSettings
+    trays : mapping of int to Tray, optional
+        All cells of the plate; by default those that were flown.
+    gases : mapping of int to SimulationSettings, optional
+        Of trays whose gas differs; seed, shaking events and camera are common to all.
+
+    Raises
+    ------
+    ConfigurationError
+        For a setting outside its range, or trays that cannot be filmed together.
+    SimulationError
+        When beads do not fit into their tray.
+    """
+
+    def __init__(
+        self,
+        simulation: SimulationSettings,
+        scene: SceneSettings,
+        trays: Mapping[int, Tray] | None = None,
+        gases: Mapping[int, SimulationSettings] | None = None,
+    ) -> None:
+        own = {
+            number: _in_common(simulation, (gases or {}).get(number, simulation))
+            for number in scene.trays
+        }
+        check_scene(scene)
+        for one in (simulation, *own.values()):
+            check_settings(one)
+            _check_swing(one, scene)
+        self._simulation = simulation
+        cells = dict(trays or load_trays())
+        self._swing = wall_motion_of(simulation, scene)
+        self._gases = {
+            number: _gas(own[number], scene, tray_by_number(cells, number))
+            for number in sorted(scene.trays)
+        }
+        self._species = {number: stock(cells[number]).species for number in self._gases}
+        radii = {number: gas.radii for number, gas in self._gases.items()}
+        self.camera = SceneCamera(simulation, scene, cells, radii)
+
+    def moments(self, frames: int | None = None, start_stamp_ns: int = 0) -> Iterator[SceneMoment]:
+        """Go from frame to frame; meant to be called once.
+
+        Parameters
+        ----------
+        frames : int or None, >= 0
+            How many; None goes on for ever.
+        start_stamp_ns : int, [ns]
+            Stamp of the first frame.
+
+        Raises
+        ------
+        SimulationError
+            For less than no frames.
+        """
+        if frames is not None and frames < 0:
+            raise SimulationError('frames', f'{frames}', 'give 0 or more')
+        return self._moments(count() if frames is None else range(frames), start_stamp_ns)
+
+    def _moments(self, numbers: Iterable[int], start_stamp_ns: int) -> Iterator[SceneMoment]:
+        for number in numbers:
+            stamp_ns = start_stamp_ns + round(number * _NS / self._simulation.frame_rate)
+            yield self.at(number, stamp_ns)
+
+    def at(self, number: int, stamp_ns: int) -> SceneMoment:
+        """The frame of a number; numbers must rise from call to call.
+
+        Raises
+        ------
+        SimulationError
+            When that frame has passed already.
+        """
+        time = number / self._simulation.frame_rate
+        states = {tray: gas.at(time) for tray, gas in self._gases.items()}
+        events = self._events(time)
+        since = time - events[-1] if events else None
+        # A frame within rounding of the shake belongs to the shake.
+        motion = plate_motion(self._swing, None if since is None else max(since, 0.0))
+        image = self.camera.picture(
+            {tray: positions for tray, (positions, _) in states.items()},
+            number,
+            time=time,
+            motion=motion,
+            turned=turned_since(time, events),
+        )
+        return SceneMoment(
+            frame=Frame(stamp_ns=stamp_ns, encoding='bgr8', image=image),
+            trays=tuple(
+                self._gases[tray].truth(stamp_ns, velocities)
+                for tray, (_, velocities) in states.items()
+            ),
+            beads=tuple(
+                self._truth(tray, stamp_ns, state, motion) for tray, state in states.items()
+            ),
+        )
+
+    def _events(self, time: float) -> list[float]:
+        """Shaking events up to a time, [s]."""
+        cycle = next(iter(self._gases.values())).cycle
+        first, period = self._simulation.first_shake, self._simulation.shake_period
+        return [first + k * period for k in range(cycle)]
+
+    def _truth(
+        self, tray: int, stamp_ns: int, state: tuple[np.ndarray, np.ndarray], motion: PlateMotion
+    ) -> BeadsTruth:
+        gas = self._gases[tray]
+        displacement, velocity = np.array(motion.displacement), np.array(motion.velocity)
+        return BeadsTruth(
+            stamp_ns=stamp_ns,
+            tray=tray,
+            cycle=gas.cycle,
+            displacement=displacement,
+            tray_velocity=velocity,
+            positions=state[0] - np.append(displacement, 0.0),
+            velocities=state[1] - np.append(velocity, 0.0),
+            radii=gas.radii,
+            species=self._species[tray],
+            bodies=gas.bodies,
+        )
+
+
+def _in_common(simulation: SimulationSettings, own: SimulationSettings) -> SimulationSettings:
+    """The gas of one tray, with what all trays of a film share."""
+    names = ('seed', 'first_shake', 'shake_period', 'frame_rate', 'width_px', 'height_px')
+    return replace(own, **{name: getattr(simulation, name) for name in names})
+
+
+def _gas(simulation: SimulationSettings, scene: SceneSettings, tray: Tray) -> ShakenTray:
+    # Trays with the same beads must not do the same: the number of the tray is its run.
+    swing = wall_motion_of(simulation, scene) if scene.swing_knocks else None
+    one = replace(simulation, tray=tray.number)
+    return ShakenTray(one, tray, run=tray.number, swing=swing)
+
+
+def _check_swing(simulation: SimulationSettings, scene: SceneSettings) -> None:
+    """Refuse a swing that would end the film at the first shaking event."""
+    furthest = FURTHEST_PX / scene.pixels_per_metre
+    if scene.swing >= furthest:
+        raise ConfigurationError(
+            'swing',
+            f'{scene.swing:g} m is {FURTHEST_PX} px or more in the picture',
+            f'give less than {furthest:.3g} m',
+        )
+    if scene.swing > 0.0 and simulation.wall_sticking_speed > 0.0:
+        raise ConfigurationError(
+            'wall_sticking_speed',
+            f'{simulation.wall_sticking_speed:g} m/s, but beads cannot stick to walls that swing',
+            'set it or the swing to 0',
+        )
+
+
+def check_scene(scene: SceneSettings) -> None:
+    """Refuse settings outside their ranges, all at once.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming every setting at fault.
+    """
+    found = ((row.name, problem(row, row.default)) for row in rows(scene))
+    wrong = [f'{name}: {text}' for name, text in found if text]
+    if not scene.trays or len(set(scene.trays)) != len(scene.trays):
+        wrong.append(f'trays: {scene.trays} name none, or one twice')
+    if wrong:
+        raise ConfigurationError(
+            'scene', '; '.join(wrong), 'see docs/parameters.md for names and ranges'
+        )

@@ -1,0 +1,146 @@
+"""Where the plate, its trays and their beads are in the picture of the scene."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.lens import Camera
+from nanorocks_ros.experiment.plate import PLATE, Region, regions_on_plate
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.settings import SceneSettings, SimulationSettings
+
+# Focal length of a lens that bends nothing by more than a thousandth of a pixel, [px].
+_STRAIGHT = 1e6
+_STEP_PX = 0.5
+
+
+def scene_camera(simulation: SimulationSettings, scene: SceneSettings) -> Camera:
+    """The camera that the scene is filmed with.
+
+    Raises
+    ------
+    ConfigurationError
+        For a list of numbers that is too short or too long, or a lens that cannot be.
+    """
+    if len(scene.lens_distortion) != 4 or len(scene.lens_offset_px) != 2:
+        raise ConfigurationError(
+            'scene',
+            f'lens_distortion {scene.lens_distortion}, lens_offset_px {scene.lens_offset_px}',
+            'give four numbers and two',
+        )
+    middle = 0.5 * simulation.width_px, 0.5 * simulation.height_px
+    if scene.fisheye == 0.0:
+        return _camera(simulation, _STRAIGHT, middle, (0.0, 0.0, 0.0, 0.0))
+    k1, k2, k3, k4 = scene.lens_distortion
+    column, row = scene.lens_offset_px
+    focal = middle[0] / math.tan(scene.fisheye)
+    return _camera(simulation, focal, (middle[0] + column, middle[1] + row), (k1, k2, k3, k4))
+
+
+def _camera(
+    simulation: SimulationSettings,
+    focal: float,
+    centre: tuple[float, float],
+    distortion: tuple[float, float, float, float],
+) -> Camera:
+    return Camera(
+        width=simulation.width_px,
+        height=simulation.height_px,
+        focal=(focal, focal),
+        centre=centre,
+        distortion=distortion,
+    )
+
+
+class SceneGeometry:
+    """Places on the plate and in the trays, in pixels of the picture that the lens makes.
+
+    Parameters
+    ----------
+    simulation : SimulationSettings
+        Size of the picture.
+    scene : SceneSettings
+        Scale and lens.
+    trays : mapping of int to Tray
+        All cells of the plate, with beads or without.
+
+    Raises
+    ------
+    ConfigurationError
+        For a lens that cannot be, or a tray that has no place in the picture.
+    """
+
+    def __init__(
+        self, simulation: SimulationSettings, scene: SceneSettings, trays: Mapping[int, Tray]
+    ) -> None:
+        self.camera = scene_camera(simulation, scene)
+        self.scale = float(scene.pixels_per_metre)
+        self.shape = simulation.height_px, simulation.width_px
+        self.regions = regions_on_plate(trays.values(), self.shape, self.scale)
+
+    @property
+    def plate(self) -> tuple[float, float, float, float]:
+        """Left, top, right and bottom of the plate in the rectified picture, [px]."""
+        across, down = (0.5 * self.scale * side for side in PLATE)
+        column, row = 0.5 * self.shape[1], 0.5 * self.shape[0]
+        return column - across, row - down, column + across, row + down
+
+    def rectified(self, tray: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where points of a tray are in the rectified picture, while the plate is in its place.
+
+        Parameters
+        ----------
+        tray : int
+        places : ndarray (n, 2 or 3), [m]
+            From the corner of the floor.
+
+        Returns
+        -------
+        ndarray (n, 2), [px]
+        """
+        region = self.regions[tray]
+        corner = np.array([region.x, region.y], dtype=np.float64)
+        return np.asarray(places)[:, :2] * self.scale + corner
+
+    def local_scales(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What the lens makes of a small step at points of the rectified picture.
+
+        Parameters
+        ----------
+        points : ndarray (n, 2), [px]
+
+        Returns
+        -------
+        ndarray (n, 2, 2)
+            Change of (column, row) in the picture, for a step along columns and along rows.
+        """
+        found = np.empty((len(points), 2, 2))
+        for axis in range(2):
+            step = np.zeros(2)
+            step[axis] = _STEP_PX
+            ahead = self.camera.distorted(points + step)
+            behind = self.camera.distorted(points - step)
+            found[:, :, axis] = (ahead - behind) / (2.0 * _STEP_PX)
+        return found
+
+    def bounds(self, left: float, top: float, right: float, bottom: float) -> Region:
+        """The smallest region of the picture that holds a rectangle of the rectified one, [px]."""
+        sides = np.linspace(0.0, 1.0, 33)
+        columns, rows = left + (right - left) * sides, top + (bottom - top) * sides
+        edges = [np.column_stack([columns, np.full(33, row)]) for row in (top, bottom)]
+        edges += [np.column_stack([np.full(33, column), rows]) for column in (left, right)]
+        seen = self.camera.distorted(np.concatenate(edges))
+        low = np.maximum(np.floor(seen.min(axis=0)), 0.0).astype(int)
+        high = np.minimum(np.ceil(seen.max(axis=0)), self.shape[::-1]).astype(int)
+        width, height = np.maximum(high - low, 0)
+        return Region(int(low[0]), int(low[1]), int(width), int(height))

@@ -1,1 +1,0 @@
-"""The whole plate with its eight trays as the flight camera saw it."""

@@ -1,0 +1,192 @@
+"""Width of the autocorrelation of a tray image, and the size of the clusters it goes with."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.inference.cluster_size.cluster_curve import curve_of
+from nanorocks_ros.inference.cluster_size.size_from_width import (
+    DARKER,
+    INNER_LEVEL,
+    SizeEstimate,
+    Width,
+)
+from nanorocks_ros.physics.autocorrelation import LevelRegion, autocorrelation, level_region
+from nanorocks_ros.records import (
+    UNKNOWN,
+    Autocorrelation,
+    ClusterEstimate,
+    Notice,
+    SizeStatus,
+    TrayImage,
+)
+from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.stages.clusters.background_removal import tray_contrast, tray_levels
+from nanorocks_ros.stages.preprocess.shake_detection import NS, CycleFollower
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.inference.cluster_size.size_from_width import ClusterCurve
+
+# From this scale on, two by two pixels show as much of the clusters as one does, in a quarter of
+# the time: then such a pixel is as large as one at half this scale. [px/m]
+_FINE = 9000.0
+_NO_SIZE = SizeEstimate(UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, SizeStatus.UNCALIBRATED)
+
+
+class Correlated(NamedTuple):
+    """The autocorrelation of what stands out in a tray image.
+
+    `values`: ndarray of float32, 1 at zero lag, in the centre; `side` of its pixels, [m];
+    `contrast`: standard deviation of what stands out, [gray levels]; `cover`: share of the picture
+    that does clearly.
+    """
+
+    values: NDArray[np.float32]
+    side: float
+    contrast: float
+    cover: float
+
+    def region(self, level: float) -> LevelRegion:
+        """Where it exceeds a level."""
+        return level_region(self.values, level)
+
+    def width(self, level_area: float) -> Width:
+        """With a level area that is known, [px^2]."""
+        inner = level_region(self.values, INNER_LEVEL).area
+        return Width(level_area * self.side**2, inner * self.side**2, self.contrast, self.cover)
+
+
+def correlated(gray: NDArray[np.uint8], pixels_per_metre: float) -> Correlated:
+    """The autocorrelation of what stands out in a tray image.
+
+    Parameters
+    ----------
+    gray : ndarray of uint8, (rows, columns)
+    pixels_per_metre : float
+        Fine images are taken at half their resolution.
+    """
+    halve = _halves(gray, pixels_per_metre)
+    return _correlated(tray_contrast(gray, halve=halve), pixels_per_metre, halve=halve)
+
+
+def correlated_with_shadows(gray: NDArray[np.uint8], pixels_per_metre: float) -> Correlated:
+    """The same of the image as it is, for methods that do not even the floor.
+
+    Parameters
+    ----------
+    gray, pixels_per_metre
+        As for `correlated`.
+    """
+    halve = _halves(gray, pixels_per_metre)
+    return _correlated(tray_levels(gray, halve=halve), pixels_per_metre, halve=halve)
+
+
+def _halves(gray: NDArray[np.uint8], pixels_per_metre: float) -> bool:
+    return pixels_per_metre >= _FINE and min(gray.shape) > 1
+
+
+def _correlated(
+    contrast: NDArray[np.float32], pixels_per_metre: float, *, halve: bool
+) -> Correlated:
+    side = (2.0 if halve else 1.0) / pixels_per_metre
+    cover = float(np.count_nonzero(contrast < DARKER * contrast.min())) / contrast.size
+    return Correlated(autocorrelation(contrast), side, float(contrast.std()), cover)
+
+
+class ClusterAutocorrelator:
+    """Follows the width of the autocorrelation of one tray.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    tray : Tray
+
+    Attributes
+    ----------
+    emit_image : bool
+        Also emit each :class:`Autocorrelation`; off by default since few look at it.
+
+    Raises
+    ------
+    ConfigurationError
+        For a calibration file that cannot be read, or has no curve of this tray.
+    """
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self._settings = settings
+        self._tray = tray
+        self._curve, self._notice = _curve(settings, tray)
+        self.emit_image = False
+        self._restart()
+
+    def _restart(self) -> None:
+        speed = self._settings.speed
+        self._shakes = CycleFollower(speed.shake_ratio, speed.shortest_cycle)
+        self._last_stamp_ns: int | None = None
+        self._next_ns: int | None = None
+
+    def push(self, image: TrayImage) -> tuple[ClusterEstimate | Autocorrelation | Notice, ...]:
+        """Take the next image of the tray; empty between two intervals."""
+        if self._last_stamp_ns is not None and image.stamp_ns <= self._last_stamp_ns:
+            self._restart()
+        self._last_stamp_ns = image.stamp_ns
+        self._shakes.push(image)
+        if self._next_ns is not None and image.stamp_ns < self._next_ns:
+            return ()
+        self._next_ns = image.stamp_ns + round(self._settings.clusters.interval * NS)
+        found: list[ClusterEstimate | Autocorrelation | Notice] = []
+        seen = correlated(image.gray, self._settings.preprocess.pixels_per_metre)
+        found.append(self._estimate(image.stamp_ns, seen))
+        if self.emit_image:
+            picture = Autocorrelation(stamp_ns=image.stamp_ns, tray=image.tray, values=seen.values)
+            found.append(picture)
+        if self._notice:
+            found.append(Notice(stamp_ns=image.stamp_ns, text=self._notice))
+            self._notice = ''
+        return tuple(found)
+
+    def _estimate(self, stamp_ns: int, seen: Correlated) -> ClusterEstimate:
+        region = seen.region(self._settings.clusters.level)
+        width = seen.width(region.area)
+        size = _NO_SIZE if self._curve is None else self._curve.size_of(width)
+        area, inner = width.level_area, width.inner_area
+        return ClusterEstimate(
+            stamp_ns=stamp_ns,
+            tray=self._tray.number,
+            cycle=self._shakes.cycle,
+            level_area=area,
+            correlation_length=math.sqrt(area / math.pi),
+            axes_ratio=region.axes_ratio,
+            direction=region.direction,
+            breadth=area / inner if inner > 0.0 else UNKNOWN,
+            cluster_size=size.size,
+            cluster_size_error=size.error,
+            cluster_size_lower=size.lower,
+            cluster_size_upper=size.upper,
+            size_status=size.status,
+        )
+
+
+def _curve(settings: PipelineSettings, tray: Tray) -> tuple[ClusterCurve | None, str]:
+    """The calibration, or None and why there is none."""
+    try:
+        curve = curve_of(tray, settings.clusters.curve)
+    except ConfigurationError as error:
+        # Speeds and restitutions do not need it; a file that was named is another matter.
+        if settings.clusters.curve:
+            raise
+        return None, f'{error}; until then cluster sizes are unknown'
+    level, mix = settings.clusters.level, settings.preprocess.gray_mix
+    if level != curve.level or mix != PipelineSettings().preprocess.gray_mix:
+        return None, (
+            f'tray {tray.number}: cluster sizes are unknown: they are calibrated for '
+            f'clusters.level {curve.level:g} and the default preprocess.gray_mix'
+        )
+    return curve, ''

@@ -1,0 +1,231 @@
+"""Whether the trays are where the settings say, and if not, which number looks wrong."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from nanorocks_ros.numerics.compiled import compiled
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.plate import Region
+    from nanorocks_ros.experiment.view import View
+    from nanorocks_ros.settings import PreprocessSettings
+
+# One pixel of the reduced picture is so many of the frame.
+_REDUCED = 4
+# What is tried beside what is set: scales, and shifts in reduced pixels.
+_SCALES = np.geomspace(0.2, 5.0, 323)
+_SHIFT = 16
+# Scales this close to one another are of the same trays.
+_NEARLY = 0.1
+# A slope is an edge when it is so many times the usual one, and so many gray levels.
+_TIMES_USUAL = 3.0
+_LEAST_SLOPE = 6.0
+# Share of the sides that lie on edges: where the trays are for certain, how much less where they
+# are not, and of a single tray that is not where the others say.
+_FOUND = 0.65
+_CLEARLY = 0.12
+# At a scale that is off by more than this, what has four sides need not be a tray: more is asked.
+_FAR, _FOUND_FAR = 1.35, 0.85
+_ABSENT = 0.4
+_AS_GOOD = 0.01
+_SCALE_MATTERS = 0.02
+_SHIFT_MATTERS_PX = 8.0
+# Reduced pixels around the trays that have to be there, and by which a size must differ.
+_ROOM, _RESOLVED = 2.0, 5.0
+
+
+@compiled
+def _coverage(
+    across: NDArray[np.int64],
+    down: NDArray[np.int64],
+    boxes: NDArray[np.float64],
+    scale: float,
+    shift: tuple[float, float],
+    shares: NDArray[np.float64],
+) -> float:
+    """Share of the sides of the boxes that lies on edges; `shares` gets that of each box."""
+    rows, columns = down.shape[0], across.shape[1]
+    total, length = 0.0, 0.0
+    for k in range(boxes.shape[0]):
+        x0 = int(0.5 * columns + scale * (boxes[k, 0] - 0.5 * columns) + shift[0] + 0.5)
+        y0 = int(0.5 * rows + scale * (boxes[k, 1] - 0.5 * rows) + shift[1] + 0.5)
+        x1, y1 = int(x0 + scale * boxes[k, 2] + 0.5), int(y0 + scale * boxes[k, 3] + 0.5)
+        own = 2.0 * (x1 - x0 + y1 - y0)
+        length += own
+        shares[k] = 0.0
+        if x0 < 0 or y0 < 0 or x1 >= columns or y1 >= rows:
+            continue
+        on = across[y1, x0] - across[y0, x0] + across[y1, x1] - across[y0, x1]
+        on += down[y0, x1] - down[y0, x0] + down[y1, x1] - down[y1, x0]
+        shares[k] = on / own
+        total += on
+    return total / length
+
+
+@compiled
+def _best(
+    across: NDArray[np.int64],
+    down: NDArray[np.int64],
+    boxes: NDArray[np.float64],
+    scales: NDArray[np.float64],
+    reach: int,
+    found: NDArray[np.float64],
+) -> None:
+    """Scale and shift at which the sides lie on edges least by chance: share, scale, shifts.
+
+    Edges are a few pixels wide, so several are as good: the middle of these.
+    """
+    shares = np.empty(boxes.shape[0])
+    side = 2 * reach + 1
+    tried = np.empty((scales.size, side, side))
+    perimeter = 2.0 * (boxes[:, 2].sum() + boxes[:, 3].sum())
+    area = float(down.shape[0] * across.shape[1])
+    usual = 0.5 * (across[-1].sum() + down[:, -1].sum()) / area
+    chosen, highest = 0, -np.inf
+    for k in range(scales.size):
+        # What small boxes do by chance, large ones do not.
+        weight = math.sqrt(scales[k] * perimeter)
+        for i in range(side):
+            for j in range(side):
+                shift = (float(j - reach), float(i - reach))
+                tried[k, i, j] = _coverage(across, down, boxes, scales[k], shift, shares)
+                score = weight * (tried[k, i, j] - usual)
+                if score > highest:
+                    chosen, highest = k, score
+    near = np.abs(scales / scales[chosen] - 1.0) < _NEARLY
+    best, count = tried[near].max(), 0
+    found[:] = 0.0
+    for k in range(scales.size):
+        if not near[k]:
+            continue
+        for i in range(side):
+            for j in range(side):
+                if tried[k, i, j] >= best - _AS_GOOD:
+                    found[1] += scales[k]
+                    found[2] += j - reach
+                    found[3] += i - reach
+                    count += 1
+    found /= count
+    found[0] = best
+
+
+def _edge_sums(
+    image: NDArray[np.uint8], view: View
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Edges across rows and columns of the reduced straight picture, summed along them."""
+    rows, columns = image.shape[0] // _REDUCED, image.shape[1] // _REDUCED
+    x = _REDUCED * (np.arange(columns) + 0.5)
+    y = _REDUCED * (np.arange(rows) + 0.5)
+    places = view.source(np.stack(np.meshgrid(x, y), axis=-1)).astype(np.float32) - 0.5
+    gray = image[:, :, 0] if image.shape[2] == 1 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    # An average first: single pixels of the frame would be noise.
+    smooth = cv2.blur(gray, (_REDUCED, _REDUCED)).astype(np.float32)
+    small = cv2.remap(smooth, places[..., 0], places[..., 1], cv2.INTER_LINEAR)
+    sums = []
+    for axis in (1, 0):
+        slope = np.abs(np.gradient(small, axis=axis))
+        level = max(_LEAST_SLOPE, _TIMES_USUAL * float(np.median(slope)))
+        # A pixel to each side: what is set may be off by that much.
+        edges = cv2.dilate((slope > level).astype(np.uint8), np.ones((3, 3), np.uint8))
+        front = ((1, 0), (0, 0)) if axis == 1 else ((0, 0), (1, 0))
+        sums.append(np.pad(np.cumsum(edges, axis=1 - axis, dtype=np.int64), front))
+    return sums[0], sums[1]
+
+
+def map_problem(
+    image: NDArray[np.uint8],
+    view: View,
+    regions: Sequence[Region],
+    trays: Sequence[int],
+    settings: PreprocessSettings,
+) -> tuple[str, frozenset[int]]:
+    """What looks wrong with scale or regions, in one line, and in which trays; '' when nothing.
+
+    Said only when the trays are plainly seen somewhere else: a picture without clear edges
+    proves nothing.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, (height, width, channels)
+    view : View
+    regions : sequence of Region
+    trays : sequence of int
+        Their numbers.
+    settings : PreprocessSettings
+    """
+    boxes = np.array(regions, dtype=np.float64) / _REDUCED
+    ends = boxes[:, :2] + boxes[:, 2:]
+    room = min(boxes[:, :2].min(), (np.array(image.shape[1::-1]) / _REDUCED - ends).min())
+    if room < _ROOM:
+        return '', frozenset()
+    across, down = _edge_sums(image, view)
+    shares = np.empty(len(boxes))
+    own = _coverage(across, down, boxes, 1.0, (0.0, 0.0), shares)
+    found = np.empty(4)
+    _best(across, down, boxes, _SCALES, _SHIFT, found)
+    share, scale, x, y = (float(one) for one in found)
+    near = 1.0 / _FAR < scale < _FAR
+    if share < (_FOUND if near else _FOUND_FAR):
+        return '', frozenset()
+    if own >= share - _CLEARLY:
+        return _one_tray(shares, trays, settings)
+    what = _source(settings)
+    extent = float((ends.max(axis=0) - boxes[:, :2].min(axis=0)).max())
+    if abs(scale - 1.0) > max(_SCALE_MATTERS, _RESOLVED / extent):
+        set_to = settings.pixels_per_metre
+        text = (
+            f'{what} looks wrong: the trays look as at {set_to * scale:.0f} px/m, '
+            f'not at {set_to:.0f}; {_remedy(settings, set_to * scale)}'
+        )
+        return text, frozenset(trays)
+    if max(abs(x), abs(y)) * _REDUCED > _SHIFT_MATTERS_PX:
+        text = (
+            f'{what} looks wrong: the trays look shifted by {x * _REDUCED:.0f}, '
+            f'{y * _REDUCED:.0f} px; {_remedy(settings)}'
+        )
+        return text, frozenset(trays)
+    return '', frozenset()
+
+
+def _one_tray(
+    shares: NDArray[np.float64], trays: Sequence[int], settings: PreprocessSettings
+) -> tuple[str, frozenset[int]]:
+    absent = [tray for tray, share in zip(trays, shares, strict=True) if share < _ABSENT]
+    if not absent or 2 * len(absent) >= len(trays):
+        return '', frozenset()
+    names = ', '.join(str(tray) for tray in absent)
+    text = (
+        f'{_source(settings)} looks wrong for tray {names}: no walls are seen around it; '
+        f'{_remedy(settings)}'
+    )
+    return text, frozenset(absent)
+
+
+def _source(settings: PreprocessSettings) -> str:
+    """The setting that says where the trays are."""
+    if settings.calibration:
+        return settings.calibration
+    if settings.regions_px:
+        return 'preprocess.regions_px'
+    return 'preprocess.pixels_per_metre'
+
+
+def _remedy(settings: PreprocessSettings, scale: float = 0.0) -> str:
+    """What to do about it."""
+    if settings.calibration:
+        remedy = 'calibrate again'
+    elif scale and not settings.regions_px:
+        # Around the floor there may be a rim, which looks like a tray as well.
+        remedy = 'set it to about that and see with nanorocks look that the floor fills the crop'
+    else:
+        remedy = 'set preprocess.regions_px'
+    return f'{remedy}, or set preprocess.check_map to false'

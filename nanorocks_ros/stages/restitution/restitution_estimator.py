@@ -1,0 +1,254 @@
+"""From speeds and contacts to the coefficient of restitution of the cycle, updated as it cools."""
+
+from __future__ import annotations
+
+import math
+from functools import partial, reduce
+from operator import or_
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.errors import FitError
+from nanorocks_ros.experiment.colours import hue_of
+from nanorocks_ros.records import (
+    CorEstimate,
+    CorStatus,
+    Merge,
+    PairCollision,
+    Quality,
+    Rebound,
+    SpeedEstimate,
+    SpeedMethod,
+)
+from nanorocks_ros.stages.contacts.cycle_contacts import ContactsOfCycle
+from nanorocks_ros.stages.preprocess.shake_detection import NS
+from nanorocks_ros.stages.restitution.restitution_methods import (
+    Decay,
+    LibraryReading,
+    PaperReading,
+    Reading,
+)
+from nanorocks_ros.stages.restitution.species_decays import species_decays
+
+if TYPE_CHECKING:
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.inference.cycle_likelihoods import Evidence, MeanRestitution
+    from nanorocks_ros.settings import PipelineSettings
+
+
+# Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
+_STAMP_ROUNDING_NS = 1_000_000
+# The first speed may come that much later for other reasons than a tray that swings.
+_LATE_NS = 500_000_000
+# Standard deviations by which decay, rebounds and collisions may disagree without a flag.
+_TENSE = 3.0
+
+
+class HaffFitter:
+    """Reads restitutions from the speeds and contacts of each cycle, and of all of them.
+
+    While a cycle cools it publishes an estimate every `update_interval`; the last one of the
+    cycle, at the end of the cooling window or at the next shaking event, is final.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    tray : Tray
+
+    Raises
+    ------
+    ConfigurationError
+        For a window that cannot be, or a tray without a library of simulated decays.
+    """
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self._settings = settings.cooling
+        self._tray = tray
+        reading = LibraryReading if self._settings.relation == 'library' else PaperReading
+        self._make_reading = partial(reading, settings, tray)
+        self._grains = any(hue_of(one.material) == 0 for one in tray.species)
+        self._contacts = ContactsOfCycle(self._settings)
+        self._restart()
+
+    def _restart(self) -> None:
+        self._last_stamp_ns: int | None = None
+        self._samples: list[SpeedEstimate] = []
+        self._cycle = 0
+        self._finished = True
+        self._merged = False
+        self._last_update_ns: int | None = None
+        self._reading: Reading = self._make_reading()
+
+    @property
+    def evidence(self) -> Evidence | None:
+        """What the cycles finished since time last went back say; None without any."""
+        return self._reading.evidence
+
+    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+        """What cycles say together, also such of other recordings of the tray.
+
+        Raises
+        ------
+        FitError
+            When they were read in another way.
+        """
+        return self._reading.mean_of(evidence)
+
+    def push(
+        self, record: SpeedEstimate | Rebound | PairCollision | Merge
+    ) -> tuple[CorEstimate, ...]:
+        """Take the next speed, contact or merge; empty between two updates and before any shake.
+
+        A speed whose stamp goes back ends the cycle and starts all afresh, running mean included.
+        """
+        if isinstance(record, SpeedEstimate):
+            return self._push_speed(record)
+        if isinstance(record, Merge):
+            return self._push_merge(record)
+        self._contacts.push(record)
+        return ()
+
+    def _push_merge(self, merge: Merge) -> tuple[CorEstimate, ...]:
+        """End the window where beads began to stick, which is known some time later."""
+        if not self._settings.until_merge or merge.cycle != self._cycle:
+            return ()
+        if not self._finished:
+            self._samples = [one for one in self._samples if one.stamp_ns < merge.stamp_ns]
+            self._merged = True
+        return self.flush()
+
+    def _push_speed(self, speed: SpeedEstimate) -> tuple[CorEstimate, ...]:
+        found: tuple[CorEstimate, ...] = ()
+        if self._last_stamp_ns is not None and speed.stamp_ns <= self._last_stamp_ns:
+            found = self.flush()
+            self._restart()
+            self._contacts.restart(speed.stamp_ns)
+        self._last_stamp_ns = speed.stamp_ns
+        if speed.cycle != self._cycle:
+            found = (*found, *self.flush())
+            self._cycle, self._samples, self._finished = speed.cycle, [], False
+            self._last_update_ns = None
+            self._merged = False
+            self._contacts.next_cycle()
+        if speed.cycle_start_ns is None or self._finished:
+            return found
+        age = (speed.stamp_ns - speed.cycle_start_ns) / NS
+        if not self._samples and self._driven(speed):
+            # A tray that swings drives the gas, but does nothing to a single contact.
+            self._count_contacts(speed)
+            return found
+        first = self._samples[0] if self._samples else speed
+        if speed.stamp_ns - self._start_ns(first) > self._settings.duration * NS:
+            return (*found, *self.flush())
+        if age > 0.0 and age >= self._settings.delay and _usable(speed):
+            self._samples.append(speed)
+            self._count_contacts(speed)
+            if self._update_due(speed.stamp_ns):
+                found = (*found, *self._estimate(CorStatus.COOLING))
+        return found
+
+    def _count_contacts(self, speed: SpeedEstimate) -> None:
+        """Count those since the shaking was over, up to shortly before a speed."""
+        shake_ns = speed.cycle_start_ns or 0
+        self._contacts.count(shake_ns + round(self._settings.delay * NS), speed.stamp_ns)
+
+    def _driven(self, speed: SpeedEstimate) -> bool:
+        """Whether the tray still swings too fast for the gas in it to cool freely."""
+        calm = self._settings.calm_share * speed.mean_projected_speed
+        return speed.tray_speed > calm
+
+    def _start_ns(self, first: SpeedEstimate) -> int:
+        """When the gas began to cool, by the first speed used."""
+        shake_ns = first.cycle_start_ns or 0
+        # A tray that swung on drove the gas until shortly before the window.
+        late_ns = first.stamp_ns - shake_ns - round(self._settings.delay * NS)
+        return shake_ns + (late_ns if late_ns > _LATE_NS else 0)
+
+    def flush(self) -> tuple[CorEstimate, ...]:
+        """End the cycle: its final estimate, if it has samples and had none yet."""
+        if self._finished:
+            return ()
+        self._finished = True
+        return self._estimate(CorStatus.FINAL)
+
+    def _update_due(self, stamp_ns: int) -> bool:
+        if len(self._samples) < self._settings.fewest_samples:
+            return False
+        last = self._last_update_ns
+        interval = self._settings.update_interval * NS - _STAMP_ROUNDING_NS
+        if last is not None and stamp_ns - last < interval:
+            return False
+        self._last_update_ns = stamp_ns
+        return True
+
+    def _undetermined(self) -> tuple[CorEstimate, ...]:
+        """What is said of a cycle with too few speeds: that they tell nothing."""
+        stamp_ns = self._samples[-1].stamp_ns if self._samples else self._last_stamp_ns
+        if stamp_ns is None or not (self._samples or self._merged):
+            return ()
+        return (
+            CorEstimate(
+                stamp_ns=stamp_ns,
+                tray=self._tray.number,
+                cycle=self._cycle,
+                status=CorStatus.UNDETERMINED,
+                relation=self._reading.relation,
+                restitution_lower=0.0,
+                restitution_upper=1.0,
+                samples=len(self._samples),
+            ),
+        )
+
+    def _estimate(self, status: CorStatus) -> tuple[CorEstimate, ...]:
+        if len(self._samples) < self._settings.fewest_samples:
+            return self._undetermined() if status is CorStatus.FINAL else ()
+        last = self._samples[-1]
+        shake_ns, start_ns = last.cycle_start_ns or 0, self._start_ns(self._samples[0])
+        decay = Decay(
+            time=np.array([(one.stamp_ns - start_ns) / NS for one in self._samples]),
+            speed=np.array([one.mean_projected_speed for one in self._samples]),
+            error=np.array([one.mean_projected_speed_error for one in self._samples]),
+            of_grains=self._grains
+            and any(one.method is SpeedMethod.STRUCTURE_FUNCTION for one in self._samples),
+        )
+        fields: dict[str, Any] = {'status': status}
+        final = status is CorStatus.FINAL
+        quality = reduce(or_, {one.quality for one in self._samples})
+        try:
+            if quality & Quality.WRONG_SCALE:
+                # Speeds and places are wrong by nobody knows how much.
+                fields = _nothing(CorStatus.UNDETERMINED)
+            else:
+                fields.update(self._reading.read(decay, self._contacts.terms, final=final))
+        except FitError:
+            # Nothing is known of the restitution then, and that is what is published.
+            fields = _nothing(CorStatus.NO_DECAY)
+        if status is CorStatus.FINAL:
+            few = self._settings.fewest_samples
+            fields.update(species_decays(self._tray, decay.time, self._samples, few))
+        if fields.get('tension', 0.0) > _TENSE:
+            quality |= Quality.INCONSISTENT
+        return (
+            CorEstimate(
+                stamp_ns=last.stamp_ns,
+                tray=last.tray,
+                cycle=last.cycle,
+                relation=self._reading.relation,
+                samples=len(self._samples),
+                quality=Quality(quality),
+                window_start=(self._samples[0].stamp_ns - shake_ns) / NS,
+                window_end=(last.stamp_ns - shake_ns) / NS,
+                cooling_start=(start_ns - shake_ns) / NS,
+                **fields,
+            ),
+        )
+
+
+def _nothing(status: CorStatus) -> dict[str, Any]:
+    return {'status': status, 'restitution_lower': 0.0, 'restitution_upper': 1.0}
+
+
+def _usable(speed: SpeedEstimate) -> bool:
+    value, error = speed.mean_projected_speed, speed.mean_projected_speed_error
+    return math.isfinite(value) and math.isfinite(error) and value > 0.0 and error > 0.0

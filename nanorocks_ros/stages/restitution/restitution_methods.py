@@ -1,0 +1,315 @@
+"""What turns the decay of one cycle into a restitution: simulated decays, or the paper's form."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from scipy import special
+
+from nanorocks_ros.errors import FitError
+from nanorocks_ros.inference.cycle_likelihoods import Evidence, MeanRestitution
+from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
+from nanorocks_ros.inference.posterior import Posterior, check_walls, posterior_of, tables_of
+from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
+from nanorocks_ros.records import CorRelation, CorStatus
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+    from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood
+    from nanorocks_ros.settings import PipelineSettings
+
+# With less known than that, nothing is: anything from 0 to 1 has a deviation of 0.29.
+_LEAST_KNOWN = 0.2
+_UNKNOWN = {
+    'status': CorStatus.UNDETERMINED,
+    'restitution_lower': 0.0,
+    'restitution_upper': 1.0,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decay:
+    """Speeds of one cycle.
+
+    Parameters
+    ----------
+    time : ndarray (n,), [s]
+        Since the shaking event.
+    speed, error : ndarray (n,), [m/s]
+    of_grains : bool
+        Whether the speeds are those of grains, by how their pictures change.
+    """
+
+    time: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    error: NDArray[np.float64]
+    of_grains: bool = False
+
+
+class Reading(Protocol):
+    """What a way to read decays does; it remembers the cycles that are finished."""
+
+    relation: CorRelation
+    evidence: Evidence | None
+
+    def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
+        """Fields of a CorEstimate; raises FitError where there is no decay."""
+
+    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+        """What all cycles of some evidence say together, those of other recordings, too."""
+
+
+class PaperReading:
+    """The closed form of [B19] on a fit of Haff's law.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    tray : Tray
+    """
+
+    relation = CorRelation.PAPER
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self._probability = settings.cooling.probability
+        self._tray = tray
+        self.evidence: Evidence | None = None
+
+    def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
+        """Fields of a CorEstimate; contacts are nothing that the paper uses.
+
+        Raises
+        ------
+        FitError
+            When the speeds do not fall.
+        """
+        del contacts
+        fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
+        quantile = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + 0.5 * self._probability))
+        spread = math.exp(quantile * fit.log_decay_rate_error)
+        value, lower, upper = (
+            _by_paper(rate, self._tray)
+            for rate in (fit.decay_rate, fit.decay_rate * spread, fit.decay_rate / spread)
+        )
+        if final:
+            own = Evidence(cycles=1, by_form=((value, (upper - lower) / (2.0 * quantile)),))
+            self.evidence = self.evidence + own if self.evidence else own
+        mean = self.mean_of(self.evidence) if self.evidence else None
+        return {
+            'restitution': value,
+            'restitution_lower': lower,
+            'restitution_upper': upper,
+            'paper_restitution': value,
+            'reduced_chi_square': fit.reduced_chi_square,
+            'mean_restitution': mean.restitution if mean else math.nan,
+            'mean_restitution_error': mean.restitution_error if mean else math.nan,
+            **_haff_fields(fit),
+        }
+
+    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+        """Mean and standard error by the scatter of the cycles; of one, its own error."""
+        values, errors = np.array(evidence.by_form).T
+        mean, error, freedom = float(values.mean()), float(errors[0]), math.inf
+        if values.size > 1:
+            error = float(values.std(ddof=1) / math.sqrt(values.size))
+            freedom = values.size - 1.0
+        reach = error * float(special.stdtrit(freedom, 0.5 + 0.5 * self._probability))
+        return MeanRestitution(
+            cycles=evidence.cycles,
+            restitution=mean,
+            restitution_error=error,
+            restitution_lower=mean - reach,
+            restitution_upper=mean + reach,
+        )
+
+
+class LibraryReading:
+    """Simulated decays of the tray, held against the measured one.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    tray : Tray
+
+    Raises
+    ------
+    ConfigurationError
+        When there is no library of such a tray, or no walls are as the prior says.
+    """
+
+    relation = CorRelation.LIBRARY
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self._tray = tray
+        known = settings.prior
+        library = library_of(tray, settings.cooling.decay_library)
+        self._tables = tables_of(library, tray, known)
+        # What the library itself is off by acts as a wrong scale would.
+        scale = math.hypot(known.scale_error, library.misfit)
+        self._camera = {
+            False: (scale, known.speed_bias),
+            True: (math.hypot(scale, known.grain_scale_error), known.grain_speed_bias),
+        }
+        self._biases = (known.collision_bias, known.rebound_bias)
+        self._walls = (known.wall_low, known.wall_high)
+        check_walls(self._walls)
+        half = 0.5 * settings.cooling.probability
+        self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
+        self.evidence: Evidence | None = None
+        self._mean_so_far: dict[str, float] = {}
+
+    def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
+        """Fields of a CorEstimate.
+
+        Raises
+        ------
+        FitError
+            When the speeds do not fall.
+        """
+        if (decay.time - decay.time.mean()) @ np.log(decay.speed) >= 0.0:
+            raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
+        if decay.of_grains and not contacts.rebounds and not contacts.collisions:
+            # How such speeds are off changes while grains slow down: intervals of filmed trays 6
+            # and 8 lay beside the truth, and over many cycles that does not average out.
+            return {**self._speeds(decay, final=final), **_UNKNOWN}
+        likelihood = decay_likelihood(
+            self._tables, decay.time, decay.speed, decay.error, self._camera[decay.of_grains]
+        )
+        integrated = likelihood.integrated()
+        posterior = self._posterior(integrated, contacts)
+        best = int(np.argmax(integrated))
+        fields = {
+            'rebounds': contacts.rebounds,
+            'collisions': contacts.collisions,
+            'tension': posterior.tension,
+            **self._speeds(decay, final=final),
+            'reduced_chi_square': likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
+        }
+        if math.sqrt(posterior.covariance[0, 0]) > _LEAST_KNOWN:
+            return {**fields, **_UNKNOWN, **self._mean(likelihood, contacts, final=final)}
+        return {
+            **fields,
+            **_known(posterior, self._ends),
+            **self._mean(likelihood, contacts, final=final),
+        }
+
+    def _posterior(self, integrated: NDArray[np.float64], contacts: ContactTerms) -> Posterior:
+        return posterior_of(
+            self._tables,
+            integrated,
+            self._walls,
+            of_beads=contacts.of_beads(self._biases[0]),
+            of_walls=contacts.of_walls(self._biases[1]),
+        )
+
+    def _mean(
+        self, likelihood: DecayLikelihood, contacts: ContactTerms, *, final: bool
+    ) -> dict[str, float]:
+        """The mean of what all finished cycles together say; a final one is among them."""
+        if not final:
+            return self._mean_so_far
+        own = Evidence(cycles=1, decay=likelihood, contacts=contacts)
+        self.evidence = self.evidence + own if self.evidence else own
+        mean = self.mean_of(self.evidence)
+        self._mean_so_far = {
+            'mean_restitution': mean.restitution,
+            'mean_restitution_error': mean.restitution_error,
+            'mean_wall_restitution': mean.wall_restitution,
+            'mean_wall_restitution_error': mean.wall_restitution_error,
+        }
+        return self._mean_so_far
+
+    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+        """What the cycles say together: what is not known is the same in all of them.
+
+        Raises
+        ------
+        FitError
+            When they were not read by a library, or by one of another grid.
+        """
+        decay, contacts = evidence.decay, evidence.contacts
+        if (
+            decay is None
+            or contacts is None
+            or decay.deviation.shape[-1] != self._tables.mean.shape[0]
+        ):
+            raise FitError(
+                f'tray {self._tray.number}',
+                'cycles were not read by this library of decays',
+                'analyse their recordings again',
+            )
+        posterior = self._posterior(decay.integrated(), contacts)
+        error, wall_error = np.sqrt(np.diag(posterior.covariance)).tolist()
+        known = _known(posterior, self._ends)
+        return MeanRestitution(
+            cycles=evidence.cycles,
+            restitution=posterior.mean[0],
+            restitution_error=error,
+            wall_restitution=posterior.mean[1],
+            wall_restitution_error=wall_error,
+            tension=posterior.tension,
+            rebounds=contacts.rebounds,
+            collisions=contacts.collisions,
+            **{
+                f'{name}_{end}': known[f'{name}_{end}']
+                for name in ('restitution', 'wall_restitution')
+                for end in ('lower', 'upper')
+            },
+        )
+
+    def _speeds(self, decay: Decay, *, final: bool) -> dict[str, float]:
+        """Speed at the shaking event, and Haff time; with errors once the cycle is over."""
+        if final:
+            with suppress(FitError):
+                # Next to elastic beads may have no Haff time, but have a restitution.
+                fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
+                return {
+                    **_haff_fields(fit),
+                    'paper_restitution': _by_paper(fit.decay_rate, self._tray),
+                }
+        # A straight line through 1/v, as Haff's law is one; a proper fit takes too long.
+        slope, offset = (float(one) for one in np.polyfit(decay.time, 1.0 / decay.speed, 1))
+        falling = slope > 0.0 and offset > 0.0
+        return {
+            'initial_speed': 1.0 / offset if falling else math.nan,
+            'haff_time': offset / slope if falling else math.nan,
+            'paper_restitution': _by_paper(max(slope, 0.0), self._tray),
+        }
+
+
+def _known(posterior: Posterior, ends: NDArray[np.float64]) -> dict[str, float]:
+    lower, value, upper = (float(one) for one in posterior.quantiles(ends))
+    wall_lower, wall, wall_upper = (float(one) for one in posterior.wall_quantiles(ends))
+    spread = posterior.covariance
+    product = math.sqrt(spread[0, 0] * spread[1, 1])
+    return {
+        'restitution': value,
+        'restitution_lower': lower,
+        'restitution_upper': upper,
+        'wall_restitution': wall,
+        'wall_restitution_lower': wall_lower,
+        'wall_restitution_upper': wall_upper,
+        'correlation': float(spread[0, 1]) / product if product > 0.0 else 0.0,
+    }
+
+
+def _haff_fields(fit: HaffFit) -> dict[str, float]:
+    return {
+        'initial_speed': fit.initial_speed,
+        'initial_speed_error': fit.initial_speed_error,
+        'haff_time': fit.haff_time,
+        'haff_time_error': fit.haff_time_error,
+    }
+
+
+def _by_paper(rate: float, tray: Tray) -> float:
+    return paper_restitution_of_decay(rate, tray.diameter, tray.number_density)

@@ -1,0 +1,104 @@
+"""Mean projected speed from the area that changed: the paper's recipe ([B19] section 3.2)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.physics.moving_area import mean_displacement
+from nanorocks_ros.records import MotionMask, Quality, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.stages.preprocess.shake_detection import NS, CycleFollower
+from nanorocks_ros.stages.speed.motion_mask import MotionMasker
+
+if TYPE_CHECKING:
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.settings import PipelineSettings
+
+# Standard deviation of a Rayleigh distribution over its mean.
+_RAYLEIGH_SPREAD = math.sqrt(4.0 / math.pi - 1.0)
+# Displacements between the pictures compared that an area can tell: in pixels at least, and in
+# bead diameters at most.
+_LEAST_PX, _MOST_DIAMETERS = 1.0, 1.0
+
+
+class AreaSpeed:
+    """Measures the speed by the binarised area, and makes the mask that it is read from.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    tray : Tray
+
+    Attributes
+    ----------
+    emit_mask : bool
+        Also emit a :class:`MotionMask` per image; off by default since few look at it.
+    emit_speed : bool
+        Emit speeds.
+    """
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self._settings = settings.speed
+        self._scale = settings.preprocess.pixels_per_metre
+        self._tray = tray
+        self._masker = MotionMasker(settings.speed)
+        self._last_ns: int | None = None
+        self.emit_mask = False
+        self.emit_speed = False
+
+    def push(
+        self, image: TrayImage, shakes: CycleFollower, shaken: bool
+    ) -> tuple[SpeedEstimate | MotionMask, ...]:
+        """Take the next image; empty while there are too few for a mask."""
+        if shaken:
+            self._masker.clear()
+        self._masker.push(image.stamp_ns, image.gray)
+        if not self._masker.full or not (self.emit_mask or self.emit_speed):
+            return ()
+        mask = self._masker.mask(shakes.noise_power)
+        found: list[SpeedEstimate | MotionMask] = []
+        if self.emit_mask:
+            found.append(MotionMask(stamp_ns=image.stamp_ns, tray=image.tray, mask=mask))
+        if self.emit_speed and self._due(image.stamp_ns, shaken):
+            found.append(self._speed(int(np.count_nonzero(mask)), image, shakes))
+        return tuple(found)
+
+    def _due(self, stamp_ns: int, shaken: bool) -> bool:
+        last = self._last_ns
+        if not shaken and last is not None and stamp_ns - last < self._settings.interval * NS:
+            return False
+        self._last_ns = stamp_ns
+        return True
+
+    def _speed(self, moving_pixels: int, image: TrayImage, shakes: CycleFollower) -> SpeedEstimate:
+        area = moving_pixels / self._scale**2 / self._tray.count
+        radius = 0.5 * self._tray.diameter
+        raw = mean_displacement(area, radius, self._settings.geometry)
+        speed = self._settings.area_factor * raw / self._masker.time_step
+        speed += self._settings.area_offset
+        first, last = self._masker.span_ns
+        return SpeedEstimate(
+            stamp_ns=(first + last) // 2,
+            tray=self._tray.number,
+            cycle=shakes.cycle,
+            cycle_start_ns=shakes.cycle_start_ns,
+            mean_projected_speed=speed,
+            # The spread over so many beads; the bias of the method is larger (docs/physics.md).
+            mean_projected_speed_error=abs(speed) * _RAYLEIGH_SPREAD / math.sqrt(self._tray.count),
+            window=(last - first) / NS,
+            method=SpeedMethod.BINARISED_AREA,
+            quality=image.quality | self._range(raw),
+        )
+
+    def _range(self, displacement: float) -> Quality:
+        """What is to be said of a speed from a displacement, [m]."""
+        quality = Quality(0)
+        if self._settings.area_factor == 1.0 and self._settings.area_offset == 0.0:
+            # No reading of the recipe is right without manual tracks (docs/speed.md).
+            quality |= Quality.UNCALIBRATED
+        most = _MOST_DIAMETERS * self._tray.diameter
+        if not _LEAST_PX / self._scale <= displacement <= most:
+            quality |= Quality.UNCERTAIN
+        return quality

@@ -1,0 +1,159 @@
+"""Mean speeds of the species of a tray, and of all its beads, from images of each species."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from nanorocks_ros.stages.preprocess.shake_detection import NS
+from nanorocks_ros.stages.speed.structure_function import Sample, StructureFunction
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.settings import SpeedSettings
+
+# Estimates kept back for a species whose beads do not move enough to be known.
+_MOST_HELD = 3000
+
+
+@dataclass(frozen=True, slots=True)
+class MeanMotion:
+    """Mean speed of the beads in the picture at one instant.
+
+    Parameters
+    ----------
+    stamp_ns, window_ns : int, [ns]
+        Middle and length of the time between the two images compared, the shortest of all species.
+    cycle : int
+    cycle_start_ns : int or None
+    speed, error : float, [px/s]
+        Of all beads.
+    species : tuple of (float, float), [px/s]
+        Speed and its error for each species.
+    in_range : bool
+        Whether no species went too far between two pictures.
+    """
+
+    stamp_ns: int
+    window_ns: int
+    cycle: int
+    cycle_start_ns: int | None
+    speed: float
+    error: float
+    species: tuple[tuple[float, float], ...]
+    in_range: bool
+
+
+class MeanMotions:
+    """Follows all species about the same instants; silent until it knows the beads of each.
+
+    Parameters
+    ----------
+    settings : SpeedSettings
+    diameters_px : sequence of float, [px]
+        Mean diameter of the beads of each species.
+    counts : sequence of int
+        Beads of each species.
+    factors : sequence of (float, float)
+        What the speed of each species is to be multiplied by, and the error of that.
+    """
+
+    def __init__(
+        self,
+        settings: SpeedSettings,
+        diameters_px: Sequence[float],
+        counts: Sequence[int],
+        factors: Sequence[tuple[float, float]],
+    ) -> None:
+        self._counts = tuple(counts)
+        self._factors = tuple(factors)
+        self._parts = [
+            StructureFunction(settings, diameter, count, centred=len(self._counts) > 1)
+            for diameter, count in zip(diameters_px, counts, strict=True)
+        ]
+        self._held: list[tuple[Sample, ...]] = []
+        self._last_emitted_ns: int | None = None
+
+    def shaken(self) -> None:
+        """Forget the images from before a shaking event, all but the last."""
+        for part in self._parts:
+            part.shaken()
+
+    def push(
+        self,
+        stamp_ns: int,
+        images: Sequence[NDArray[np.uint8]],
+        cycle: tuple[int, int | None],
+        noise_powers: Sequence[float],
+        shift_px: tuple[float, float] = (0.0, 0.0),
+    ) -> tuple[MeanMotion, ...]:
+        """Take the next image of each species.
+
+        Parameters
+        ----------
+        stamp_ns : int, [ns]
+        images : sequence of ndarray of uint8, (rows, columns)
+        cycle : tuple
+            The cycle, and the stamp at which it started.
+        noise_powers : sequence of float, [gray levels^2]
+            Mean squared difference per pixel of a scene at rest, for each.
+        shift_px : tuple of 2 floats, [px]
+            By which the tray had left its place when the images were moved back.
+
+        Returns
+        -------
+        tuple of MeanMotion
+            In order of time; empty between two samples.
+        """
+        samples = tuple(
+            sample
+            for part, image, noise in zip(self._parts, images, noise_powers, strict=True)
+            if (sample := part.push(stamp_ns, image, cycle, noise, shift_px)) is not None
+        )
+        if len(samples) != len(self._parts):
+            return ()
+        self._held.append(samples)
+        del self._held[:-_MOST_HELD]
+        if not all(part.ready for part in self._parts):
+            return ()
+        held, self._held = self._held, []
+        found = []
+        for one in map(self._motion, held):
+            if self._last_emitted_ns is None or one.stamp_ns > self._last_emitted_ns:
+                self._last_emitted_ns = one.stamp_ns
+                found.append(one)
+        return tuple(found)
+
+    def _motion(self, samples: tuple[Sample, ...]) -> MeanMotion:
+        lags = [part.longest_lag(one) for part, one in zip(self._parts, samples, strict=True)]
+        windows = [int(one.windows_ns[lag]) for one, lag in zip(samples, lags, strict=True)]
+        species = []
+        for part, one, lag, window, factor in zip(
+            self._parts, samples, lags, windows, self._factors, strict=True
+        ):
+            path, error = part.displacement(one, lag)
+            speed = path * NS / window
+            error = math.hypot(factor[0] * error * NS / window, factor[1] * speed)
+            species.append((factor[0] * speed, error))
+        shares = [count / sum(self._counts) for count in self._counts]
+        fastest = windows.index(min(windows))
+        return MeanMotion(
+            stamp_ns=int(samples[fastest].middles_ns[lags[fastest]]),
+            window_ns=windows[fastest],
+            cycle=samples[0].cycle,
+            cycle_start_ns=samples[0].cycle_start_ns,
+            speed=sum(share * one for share, (one, _) in zip(shares, species, strict=True)),
+            error=math.hypot(
+                *(share * one for share, (_, one) in zip(shares, species, strict=True))
+            ),
+            species=tuple(species),
+            in_range=all(
+                part.in_range(one, lag)
+                for part, one, lag in zip(self._parts, samples, lags, strict=True)
+            ),
+        )

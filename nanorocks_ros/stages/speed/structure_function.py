@@ -1,0 +1,280 @@
+"""Mean projected speed from the structure function of the tray image.
+
+S(L), the sum of the squared differences of two images L apart in time less what noise alone
+gives, grows with the mean displacement of the beads in that time. The largest lag still well
+below the plateau is used, and the curve that turns S into a displacement is learnt from the
+same recording (:mod:`nanorocks_ros.stages.speed.structure_calibration`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.stages.preprocess.shake_detection import NS, difference_power
+from nanorocks_ros.stages.speed.structure_calibration import BeadResponse
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.settings import SpeedSettings
+
+# Path, in bead diameters, after which two images are taken to be unrelated but for a share
+# that is made up for; and how many such pairs are needed before speeds are released.
+_UNRELATED_PATH = 4.0
+_PAIRS_NEEDED = 6
+# A bead deflected between two images has come further than it is away. Share of the path lost
+# per path of one diameter, and variance of that loss for one bead per unit of it: measured on
+# simulated gases in tray 1; the rates of deflection per diameter in trays 3 and 5 are alike.
+_DEFLECTION_LOSS = 0.25
+_DEFLECTION_SCATTER = 0.75
+# Of that loss, what differs from one gas to another; and of what a tray that swings adds to a
+# displacement, what may be left when it is taken off.
+_DEFLECTION_UNSURE = 0.3
+_SHIFT_UNSURE = 0.5
+# Of the plateau: beyond it a displacement can hardly be read, and a sixth of the simulated
+# estimates were off by more than 20 %.
+_OUT_OF_RANGE = 0.65
+_PAIRS_KEPT = 400
+_KEY_INTERVAL_NS = NS // 4
+_KEYS_KEPT = 48
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Structure function at every lag, at one instant.
+
+    Parameters
+    ----------
+    cycle : int
+    cycle_start_ns : int or None, [ns]
+    noise_power : float, [gray levels^2]
+    middles_ns, windows_ns : ndarray of int64, (n_lags,), [ns]
+        Middle and length of the time between the two images.
+    shifts_px : ndarray (n_lags,), [px]
+        How far the tray moved between them.
+    powers : ndarray (n_lags,), [gray levels^2]
+        Sums over the image, free of noise.
+    """
+
+    cycle: int
+    cycle_start_ns: int | None
+    noise_power: float
+    middles_ns: NDArray[np.int64]
+    windows_ns: NDArray[np.int64]
+    shifts_px: NDArray[np.float64]
+    powers: NDArray[np.float64]
+
+
+class StructureFunction:
+    """Turns images of one species into mean displacements, once it knows its beads.
+
+    Parameters
+    ----------
+    settings : SpeedSettings
+    diameter_px : float, [px]
+        Mean bead diameter.
+    beads : int
+    centred : bool
+        Whether all pairs of images have one middle, so that species that differ in speed can
+        have lags of their own; otherwise all end with the last image, which is half the longest
+        lag earlier.
+    """
+
+    def __init__(
+        self, settings: SpeedSettings, diameter_px: float, beads: int, centred: bool = False
+    ) -> None:
+        self._settings = settings
+        self._centred = centred
+        self._diameter_px = diameter_px
+        self._lags = _ladder(settings.longest_lag_frames)
+        self._images: deque[tuple[int, NDArray[np.uint8]]] = deque(
+            maxlen=settings.longest_lag_frames + 1
+        )
+        self._shifts: deque[tuple[float, float]] = deque(maxlen=settings.longest_lag_frames + 1)
+        self._keys: list[tuple[int, NDArray[np.uint8]]] = []
+        self._key_interval_ns = _KEY_INTERVAL_NS
+        self._response = BeadResponse(diameter_px, beads)
+        self._first_guess = BeadResponse(diameter_px, beads)
+        self._beads = beads
+        self._path_stamps: list[int] = []
+        self._path: list[float] = []
+        self._next_sample_ns: int | None = None
+
+    def shaken(self) -> None:
+        """Forget the images from before a shaking event, all but the last."""
+        if not self._images:
+            return
+        last, shift = self._images[-1], self._shifts[-1]
+        self._images.clear()
+        self._images.append(last)
+        self._shifts.clear()
+        self._shifts.append(shift)
+        self._keys.clear()
+        self._key_interval_ns = _KEY_INTERVAL_NS
+        self._path_stamps.clear()
+        self._path.clear()
+        self._next_sample_ns = None
+
+    def push(
+        self,
+        stamp_ns: int,
+        gray: NDArray[np.uint8],
+        cycle: tuple[int, int | None],
+        noise_power: float,
+        shift_px: tuple[float, float] = (0.0, 0.0),
+    ) -> Sample | None:
+        """Take the next image; a sample when one is due.
+
+        Parameters
+        ----------
+        stamp_ns : int, [ns]
+        gray : ndarray of uint8, (rows, columns)
+        cycle : tuple
+            The cycle, and the stamp at which it started.
+        noise_power : float, [gray levels^2]
+            Mean squared difference per pixel of a scene at rest.
+        shift_px : tuple of 2 floats, [px]
+            By which the tray had left its place when the image was moved back.
+        """
+        self._images.append((stamp_ns, gray))
+        self._shifts.append(shift_px)
+        if self._next_sample_ns is None:
+            self._next_sample_ns = stamp_ns
+        found = None
+        if stamp_ns >= self._next_sample_ns and len(self._images) > 1:
+            self._next_sample_ns += round(self._settings.interval * NS)
+            self._next_sample_ns = max(self._next_sample_ns, stamp_ns + 1)
+            found = self._sample(cycle, noise_power, self._centred)
+        if self._response.pairs >= _PAIRS_KEPT:
+            # All is learnt.
+            self._keys.clear()
+        elif not self._keys or stamp_ns - self._keys[-1][0] >= self._key_interval_ns:
+            self._learn(stamp_ns, gray, noise_power)
+            self._keep(stamp_ns, gray)
+        return found
+
+    @property
+    def ready(self) -> bool:
+        """Whether enough unrelated image pairs have been seen."""
+        return self._response.pairs >= _PAIRS_NEEDED
+
+    def _sample(
+        self, cycle: tuple[int, int | None], noise_power: float, centred: bool = False
+    ) -> Sample:
+        lags = [lag for lag in self._lags if lag < len(self._images)]
+        last = len(self._images) - 1
+        # The later of the two images: the last one, or so that all pairs have one middle.
+        ends = [last - (last - lag) // 2 if centred else last for lag in lags]
+        pairs = [
+            (self._images[end], self._images[end - lag])
+            for end, lag in zip(ends, lags, strict=True)
+        ]
+        quiet = noise_power * self._images[-1][1].size
+        shifts = np.array(
+            [
+                (self._shifts[end], self._shifts[end - lag])
+                for end, lag in zip(ends, lags, strict=True)
+            ]
+        ).reshape(-1, 2, 2)
+        return Sample(
+            cycle=cycle[0],
+            cycle_start_ns=cycle[1],
+            noise_power=noise_power,
+            middles_ns=np.array([(later[0] + earlier[0]) // 2 for later, earlier in pairs]),
+            windows_ns=np.array([later[0] - earlier[0] for later, earlier in pairs]),
+            shifts_px=np.hypot(*(shifts[:, 0] - shifts[:, 1]).T),
+            powers=np.array(
+                [difference_power(later[1], earlier[1]) - quiet for later, earlier in pairs]
+            ),
+        )
+
+    def longest_lag(self, sample: Sample) -> int:
+        """Place of the longest lag over which the beads have not gone too far."""
+        return self._lag_below_plateau(sample, self._response)
+
+    def displacement(self, sample: Sample, lag: int) -> tuple[float, float]:
+        """Mean path of the beads over a lag, and its error, [px].
+
+        Parameters
+        ----------
+        sample : Sample
+        lag : int
+            Place in `sample.windows_ns`.
+        """
+        power = sample.powers[lag : lag + 1]
+        pixels = self._images[-1][1].size
+        away = float(self._response.displacement(power)[0])
+        error = float(self._response.displacement_error(power, sample.noise_power, pixels)[0])
+        # Beads fly past the camera, and the images follow the tray: the mean of distances that
+        # are Rayleigh distributed grows like this when all are shifted.
+        square = away**2 - 0.25 * np.pi * float(sample.shifts_px[lag]) ** 2
+        if square > 0.0:
+            error *= away / np.sqrt(square)
+        left = float(np.sqrt(max(square, 0.0)))
+        loss = min(0.5, _DEFLECTION_LOSS * left / self._diameter_px)
+        scatter = np.sqrt(_DEFLECTION_SCATTER * loss / self._beads) * left
+        unsure = (_DEFLECTION_UNSURE * loss * left, _SHIFT_UNSURE * (away - left))
+        return left / (1.0 - loss), math.hypot(error, scatter, *unsure)
+
+    def in_range(self, sample: Sample, lag: int) -> bool:
+        """Whether the beads have not gone so far over a lag that it can hardly be read."""
+        return bool(sample.powers[lag] <= _OUT_OF_RANGE * self._response.plateau)
+
+    def _lag_below_plateau(self, sample: Sample, response: BeadResponse) -> int:
+        low_enough = sample.powers <= self._settings.saturation * response.plateau
+        # The lags before the first that is too long, so that a chance return is no choice.
+        return max(0, int(np.argmin(np.append(low_enough, False))) - 1)
+
+    def _learn(self, stamp_ns: int, gray: NDArray[np.uint8], noise_power: float) -> None:
+        if not self._keys:
+            return
+        if not self.ready:
+            self._guess(gray, noise_power)
+        self._extend_path(stamp_ns, noise_power)
+        path_now = self._path[-1]
+        for key_stamp, key in self._keys:
+            path = path_now - float(np.interp(key_stamp, self._path_stamps, self._path))
+            if path >= _UNRELATED_PATH * self._diameter_px:
+                self._response.add(gray, key, noise_power, path)
+                return
+
+    def _keep(self, stamp_ns: int, gray: NDArray[np.uint8]) -> None:
+        self._keys.append((stamp_ns, gray))
+        if len(self._keys) > _KEYS_KEPT:
+            # Slow beads need images ever further apart: keep every other, all the way back.
+            del self._keys[1::2]
+            self._key_interval_ns *= 2
+
+    def _guess(self, gray: NDArray[np.uint8], noise_power: float) -> None:
+        """A response from the two images furthest apart, until there is a better one."""
+        self._first_guess = BeadResponse(self._diameter_px, self._beads)
+        self._first_guess.add(gray, self._keys[0][1], noise_power)
+
+    def _extend_path(self, stamp_ns: int, noise_power: float) -> None:
+        """How far a bead has come since the shaking event, on average, in pixels."""
+        if not self._path:
+            self._path_stamps.append(self._keys[-1][0])
+            self._path.append(0.0)
+        step = 0.0
+        response = self._response if self.ready else self._first_guess
+        # Without motion the guess is made of noise and would lead anywhere.
+        if response.plateau > noise_power * self._images[-1][1].size:
+            sample = self._sample((0, None), noise_power)
+            lag = self._lag_below_plateau(sample, response)
+            pixels = float(response.displacement(sample.powers[lag : lag + 1])[0])
+            step = pixels * (stamp_ns - self._path_stamps[-1]) / float(sample.windows_ns[lag])
+        self._path_stamps.append(stamp_ns)
+        self._path.append(self._path[-1] + step)
+
+
+def _ladder(longest: int) -> tuple[int, ...]:
+    """Lags that grow by about a third each, from one frame to the longest."""
+    lags = [1]
+    while lags[-1] < longest:
+        lags.append(min(longest, max(lags[-1] + 1, (4 * lags[-1] + 1) // 3)))
+    return tuple(lags)

@@ -1,0 +1,195 @@
+"""A campaign cycle by cycle: peak speeds, restitutions and cluster sizes from many recordings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.inference.trend_tests import (
+    QuietPeriod,
+    Trend,
+    quiet_periods,
+    robust_trend,
+)
+from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.studies.analysis.cycle_summaries import (
+    CycleSummary,
+    SizeMeasure,
+    cycles_of,
+    size_measure,
+)
+from nanorocks_ros.studies.analysis.result_tables import trays_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+QUANTITIES = ('peak_speed', 'restitution', 'cluster_size')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Campaign:
+    """Many cycles of some trays.
+
+    Parameters
+    ----------
+    cycles : tuple of CycleSummary
+        In order of place, then tray.
+    places : int
+        Cycles in all.
+    measure : SizeMeasure
+    trends : dict of (tray, quantity) to Trend
+        Change of a quantity in a cycle.
+    periods : tuple of QuietPeriod
+        By place.
+    """
+
+    cycles: tuple[CycleSummary, ...]
+    places: int
+    measure: SizeMeasure
+    trends: dict[tuple[int, str], Trend]
+    periods: tuple[QuietPeriod, ...]
+
+    @property
+    def trays(self) -> tuple[int, ...]:
+        """Numbers of the trays."""
+        return tuple(sorted({one.tray for one in self.cycles}))
+
+    def values(self, tray: int, quantity: str) -> NDArray[np.float64]:
+        """One quantity of one tray by place, (places,); NaN where not known."""
+        found = np.full(self.places, math.nan)
+        for one in self.cycles:
+            if one.tray == tray:
+                found[one.place] = getattr(one, quantity)
+        return found
+
+
+def read_campaign(folders: Sequence[Path], false_alarms: float = 0.01) -> Campaign:
+    """Everything that results of `nanorocks analyse` say cycle by cycle.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        In order of time.
+    false_alarms : float
+        See `quiet_periods`.
+
+    Raises
+    ------
+    RecordingError
+        When a folder holds no results, or none of them a cycle.
+    ConfigurationError
+        For a rate of false alarms that is none, or a folder that is named twice.
+    """
+    places_of = [folder.resolve() for folder in folders]
+    if len(set(places_of)) < len(places_of):
+        again = next(one for one in places_of if places_of.count(one) > 1)
+        raise ConfigurationError(str(again), 'is named twice', 'name each recording once')
+    trays = {folder: trays_of(folder, 'speed') for folder in folders}
+    measure = size_measure(trays)
+    recordings = [
+        {number: cycles_of(folder, number, measure) for number in numbers}
+        for folder, numbers in trays.items()
+    ]
+    if not any(own for found in recordings for own in found.values()):
+        raise RecordingError(
+            ', '.join(str(one) for one in folders),
+            'hold no cycle after a shaking event',
+            'analyse recordings with shaking events',
+        )
+    return campaign_of(recordings, measure, false_alarms)
+
+
+def campaign_of(
+    recordings: Sequence[Mapping[int, Sequence[CycleSummary]]],
+    measure: SizeMeasure,
+    false_alarms: float = 0.01,
+) -> Campaign:
+    """Cycles of many recordings, one after the other.
+
+    Parameters
+    ----------
+    recordings : sequence of mappings of int to sequences of CycleSummary
+        Of each recording the cycles of each tray; one cycle at least in all.
+    measure : SizeMeasure
+        By which their sizes were read.
+    false_alarms : float
+        See `quiet_periods`.
+
+    Raises
+    ------
+    ConfigurationError
+        For a rate of false alarms that is none.
+    """
+    cycles: list[CycleSummary] = []
+    places = 0
+    for found in recordings:
+        # Trays are filmed together, but a shaking event may be missed in one of them.
+        known = sorted({one.cycle for own in found.values() for one in own})
+        cycles += [
+            _placed(one, places + known.index(one.cycle)) for own in found.values() for one in own
+        ]
+        places += len(known)
+    cycles.sort(key=lambda one: (one.place, one.tray))
+    campaign = Campaign(
+        cycles=tuple(cycles), places=places, measure=measure, trends={}, periods=()
+    )
+    x = np.arange(places, dtype=np.float64)
+    sizes = np.array([campaign.values(number, 'cluster_size') for number in campaign.trays])
+    return Campaign(
+        cycles=campaign.cycles,
+        places=places,
+        measure=measure,
+        trends={
+            (number, name): robust_trend(x, campaign.values(number, name))
+            for number in campaign.trays
+            for name in QUANTITIES
+        },
+        periods=quiet_periods(sizes, false_alarms),
+    )
+
+
+def write_campaign(campaign: Campaign, path: Path) -> None:
+    """One row for each cycle of each tray, as CSV.
+
+    Raises
+    ------
+    RecordingError
+        When it cannot be written.
+    """
+    size = campaign.measure.unit
+    units = {
+        'recording': 'name',
+        'place': '1',
+        'tray': '1',
+        'cycle': '1',
+        'start': 's',
+        'peak_speed': 'm/s',
+        'peak_speed_error': 'm/s',
+        'restitution': '1',
+        'restitution_lower': '1',
+        'restitution_upper': '1',
+        'cluster_size': size,
+        'cluster_size_error': size,
+        'quiet': '1',
+    }
+    rows = [
+        [*(getattr(one, name) for name in list(units)[:-1]), int(in_period(campaign, one.place))]
+        for one in campaign.cycles
+    ]
+    write_csv(path, list(units), list(units.values()), rows)
+
+
+def in_period(campaign: Campaign, place: int) -> bool:
+    """Whether a cycle is in a quiet period."""
+    return any(one.first <= place <= one.last for one in campaign.periods)
+
+
+def _placed(one: CycleSummary, place: int) -> CycleSummary:
+    return replace(one, place=place)

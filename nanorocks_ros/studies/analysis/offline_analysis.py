@@ -1,0 +1,243 @@
+"""Analysis of a bag as fast as the machine can, by the same stages as the live graph."""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import FrameError, RecordingError
+from nanorocks_ros.outputs.disk_list import Spool, SpoolFile
+from nanorocks_ros.pipeline.composition import Pipeline
+from nanorocks_ros.records import (
+    BodyEstimate,
+    ClusterEstimate,
+    CorEstimate,
+    Frame,
+    GroundTruth,
+    Merge,
+    Notice,
+    PairCollision,
+    Rebound,
+    SpeedEstimate,
+    TrayImage,
+)
+from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from pathlib import Path
+
+    from nanorocks_ros.inference.cycle_likelihoods import Evidence
+    from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
+    from nanorocks_ros.jobs.progress import Progress
+    from nanorocks_ros.settings import PipelineSettings
+
+NS = 1_000_000_000
+
+# Where the records of a tray are kept.
+_LISTS: dict[type, str] = {
+    SpeedEstimate: 'speeds',
+    ClusterEstimate: 'clusters',
+    CorEstimate: 'cors',
+    Rebound: 'rebounds',
+    PairCollision: 'collisions',
+    BodyEstimate: 'bodies',
+    Merge: 'merges',
+}
+# A gap of more than this many usual intervals means that frames are missing.
+_GAP = 1.5
+
+
+@dataclass(slots=True, kw_only=True)
+class TrayResults:
+    """Everything that was measured in one tray, in order of time.
+
+    Beside the records stands what its cycles say of restitutions and sticking, so that those of
+    other recordings can be added: `evidence`, `sticking`.
+    """
+
+    speeds: list[SpeedEstimate] | Spool[SpeedEstimate] = field(default_factory=list)
+    clusters: list[ClusterEstimate] | Spool[ClusterEstimate] = field(default_factory=list)
+    cors: list[CorEstimate] | Spool[CorEstimate] = field(default_factory=list)
+    rebounds: list[Rebound] | Spool[Rebound] = field(default_factory=list)
+    collisions: list[PairCollision] | Spool[PairCollision] = field(default_factory=list)
+    bodies: list[BodyEstimate] | Spool[BodyEstimate] = field(default_factory=list)
+    merges: list[Merge] | Spool[Merge] = field(default_factory=list)
+    truth: list[GroundTruth] = field(default_factory=list)
+    evidence: Evidence | None = None
+    sticking: tuple[StickingCycle, ...] = ()
+
+
+@dataclass(slots=True, kw_only=True)
+class Analysis:
+    """Everything that was measured in a bag.
+
+    Parameters
+    ----------
+    epoch_ns : int
+        What times count from.
+    stamps_ns : array of 64-bit int, [ns]
+        Of the frames analysed.
+    trays : dict of int to TrayResults
+    notices : list of str
+        What the user should know: salvage, late frames, restarts.
+    complete : bool
+        Whether every frame was analysed.
+    error : FrameError or None
+        Why the first of the frames that could not be used could not; the others were.
+    refused : int
+        Frames that could not be used.
+    metadata : dict of str to str
+        Provenance that the recording holds.
+    """
+
+    epoch_ns: int
+    trays: dict[int, TrayResults]
+    stamps_ns: array[int] = field(default_factory=lambda: array('q'))
+    notices: list[str] = field(default_factory=list)
+    complete: bool = True
+    error: FrameError | None = None
+    refused: int = 0
+    metadata: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def frames(self) -> int:
+        """Frames analysed."""
+        return len(self.stamps_ns)
+
+    @property
+    def seconds(self) -> float:
+        """Time from the first frame to the last, [s]."""
+        if not self.stamps_ns:
+            return 0.0
+        return (max(self.stamps_ns) - min(self.stamps_ns)) / NS
+
+    @property
+    def frames_lost(self) -> int:
+        """Frames missing from the sequence, judged by the usual interval between two."""
+        steps = np.diff(np.array(self.stamps_ns, dtype=np.int64)).astype(np.float64)
+        steps = steps[steps > 0]
+        if steps.size == 0:
+            return 0
+        usual = float(np.median(steps))
+        gaps = steps[steps > _GAP * usual]
+        return int(np.sum(np.rint(gaps / usual) - 1))
+
+
+def analyse(
+    path: str | Path,
+    settings: PipelineSettings,
+    *,
+    image_topic: str = '',
+    progress: Progress | None = None,
+    scratch: Path | None = None,
+) -> Analysis:
+    """Push every frame of a bag through the pipeline.
+
+    Parameters
+    ----------
+    path : str or Path
+    settings : PipelineSettings
+    image_topic : str, optional
+        Where the bag's camera has another name than the graph's.
+    progress : callable, optional
+        Called with the frames done and the frames there are.
+    scratch : Path, optional
+        Folder on a disk with room for the records, which are kept in memory otherwise.
+
+    Returns
+    -------
+    Analysis
+        Holds what could be analysed even if a frame in the middle could not.
+
+    Raises
+    ------
+    RecordingError
+        When the bag cannot be read or holds no camera.
+    ConfigurationError
+        When the settings cannot be used.
+    FrameError
+        When no frame can be used.
+    """
+    bag = BagFrames(path, image_topic)
+    epoch_ns = bag.epoch_ns()
+    if epoch_ns is None:
+        raise RecordingError(bag.where, 'holds no frame', 'pass another bag or --image-topic')
+    view = None if settings.preprocess.calibration else bag.view()
+    pipeline = Pipeline(settings, bag.where, view)
+    truth = bag.truth(epoch_ns)
+    result = Analysis(
+        epoch_ns=epoch_ns,
+        trays=_empty(settings.trays, truth, scratch),
+        complete=bag.reader.complete,
+        metadata=bag.reader.metadata,
+    )
+    for number, frame in enumerate(bag.frames(), start=1):
+        try:
+            if isinstance(frame, FrameError):
+                raise frame
+            _push(result, pipeline, frame)
+        except FrameError as error:
+            result.refused += 1
+            result.error = result.error or error
+        if progress is not None:
+            progress(number, bag.count)
+    if not result.stamps_ns:
+        raise result.error or FrameError(
+            bag.where, 'no frame can be used: all are black, white or broken', 'record it again'
+        )
+    result.notices += _remarks(pipeline, bag.where)
+    if result.refused:
+        result.notices.append(f'{bag.where}: {result.refused} frames could not be used')
+        result.complete = False
+    for record in pipeline.flush():
+        getattr(result.trays[record.tray], _LISTS[type(record)]).append(record)
+    for number, stages in pipeline.trays.items():
+        result.trays[number].evidence = stages.cooling.evidence
+        result.trays[number].sticking = stages.clusters.cycles
+    # Known only after reading: where a damaged bag ends.
+    result.notices[:0] = [*bag.reader.notices, *bag.notices]
+    result.complete = result.complete and bag.reader.complete
+    return result
+
+
+def _empty(
+    trays: Iterable[int], truth: Mapping[int, list[GroundTruth]], scratch: Path | None
+) -> dict[int, TrayResults]:
+    """A place for the records of each tray."""
+    if scratch is None:
+        return {n: TrayResults(truth=truth.get(n, [])) for n in trays}
+    file = SpoolFile(scratch)
+    found = {}
+    for n in trays:
+        found[n] = TrayResults(truth=truth.get(n, []))
+        for name in _LISTS.values():
+            setattr(found[n], name, Spool(file))
+    return found
+
+
+def _remarks(pipeline: Pipeline, where: str) -> list[str]:
+    """What the user should know of the frames as a whole."""
+    stage = pipeline.preprocessor
+    remarks = []
+    if stage.view is None:
+        remarks.append(
+            f'{where}: no camera_info and no calibration file; the picture is taken as straight'
+        )
+    if stage.duplicates:
+        remarks.append(f'{where}: {stage.duplicates} frames were stored twice and left out')
+    return remarks
+
+
+def _push(result: Analysis, pipeline: Pipeline, frame: Frame) -> None:
+    records = pipeline.push(frame)
+    if any(isinstance(record, TrayImage) for record in records):
+        result.stamps_ns.append(frame.stamp_ns)
+    for record in records:
+        if isinstance(record, Notice):
+            result.notices.append(record.text)
+        elif type(record) in _LISTS:
+            getattr(result.trays[record.tray], _LISTS[type(record)]).append(record)

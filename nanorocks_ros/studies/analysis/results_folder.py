@@ -1,0 +1,222 @@
+"""Results of an analysis as tables and a results bag."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import json
+import os
+import re
+import shutil
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros import __version__
+from nanorocks_ros.errors import RecordingError, UnwritableError
+from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.parquet import Column, write_parquet
+from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
+from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.writer import BagWriter
+from nanorocks_ros.recordings.messages.message_builders import float_array_message, time_message
+from nanorocks_ros.settings import rows
+from nanorocks_ros.studies.analysis.offline_analysis import TrayResults
+from nanorocks_ros.wire import topics
+from nanorocks_ros.wire.array_layouts import ArrayRecord, layout, to_array
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from nanorocks_ros.settings import PipelineSettings
+    from nanorocks_ros.studies.analysis.offline_analysis import Analysis
+
+BAG_NAME = 'results_bag'
+# Beside the tables in a batch.
+SUMMARY, EVIDENCE = 'bag.json', 'evidence.npz'
+
+FORMATS = ('csv', 'parquet')
+"""Forms of the tables of results; the first unless another is asked for."""
+
+# Rows of a table that are put together in memory.
+_PIECE = 1000
+_NEVER_NS = np.iinfo(np.int64).max
+
+
+def check_results_folder(folder: Path) -> Path:
+    """See before hours of work that results may go to a folder.
+
+    Returns
+    -------
+    Path
+        The folder nearest to it that there is, on the same disk.
+
+    Raises
+    ------
+    RecordingError
+        When it holds something else.
+    """
+    if folder.exists() and not (folder / RESULTS_MARK).is_file():
+        raise RecordingError(
+            str(folder), 'exists and holds no results of ours', 'pass another --output'
+        )
+    return next(one for one in folder.absolute().parents if one.is_dir())
+
+
+def write_results(
+    analysis: Analysis,
+    folder: Path,
+    source: Path,
+    settings: PipelineSettings,
+    form: str = FORMATS[0],
+    more: Callable[[Path], None] | None = None,
+) -> None:
+    """Tables and a results bag in a folder of their own, complete or not at all.
+
+    Earlier results in the same folder are replaced, once the new ones are complete; what else
+    lies there stays.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    folder : Path
+    source : Path
+        The bag that was analysed, for the provenance.
+    settings : PipelineSettings
+    form : str
+        Of the tables, one of `FORMATS`.
+    more : callable, optional
+        Called with the folder when the rest is in it, to add to it.
+
+    Raises
+    ------
+    ConfigurationError
+        When pyarrow, which writes Parquet, is not installed.
+    RecordingError
+        When the folder cannot be written, or holds something else.
+    """
+    check_results_folder(folder)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=f'.{folder.name}.', dir=folder.parent) as scratch:
+            fresh = Path(scratch) / 'fresh'
+            fresh.mkdir()
+            (fresh / RESULTS_MARK).touch()
+            provenance = _provenance(source, settings)
+            for number, results in analysis.trays.items():
+                for name, records in _tables(results).items():
+                    if records:
+                        path = fresh / f'tray_{number}_{name}.{form}'
+                        _write_table(path, records, analysis.epoch_ns, provenance)
+            _write_bag(analysis, fresh / BAG_NAME, provenance)
+            if more is not None:
+                more(fresh)
+            if folder.exists():
+                _keep_others(folder, fresh)
+                folder.rename(Path(scratch) / 'earlier')
+            fresh.rename(folder)
+    except OSError as error:
+        raise UnwritableError(
+            str(folder), f'cannot be written: {error.strerror}', 'pass a writable --output'
+        ) from error
+
+
+def _keep_others(folder: Path, fresh: Path) -> None:
+    """Take over what somebody put beside earlier results: a figure, notes."""
+    # What an earlier analysis wrote, also that of a batch, would not belong to the new one.
+    tables = rf'tray_\d+_({"|".join(_tables(TrayResults()))})\.({"|".join(FORMATS)})'
+    names = map(re.escape, (RESULTS_MARK, BAG_NAME, SUMMARY, EVIDENCE))
+    ours = re.compile('|'.join([tables, *names]))
+    for one in folder.iterdir():
+        if ours.fullmatch(one.name) or (fresh / one.name).exists():
+            continue
+        if one.is_dir() and not one.is_symlink():
+            shutil.copytree(one, fresh / one.name, symlinks=True, copy_function=_linked)
+        else:
+            _linked(one, fresh / one.name)
+
+
+def _linked(source: str | Path, target: str | Path) -> None:
+    """A second name of a file, or a copy of it where there can be none."""
+    try:
+        os.link(source, target, follow_symlinks=False)
+    except OSError:
+        shutil.copy2(source, target, follow_symlinks=False)
+
+
+def _tables(results: TrayResults) -> dict[str, Sequence[ArrayRecord]]:
+    return {
+        'speed': results.speeds,
+        'cluster': results.clusters,
+        'cor': results.cors,
+        'rebound': results.rebounds,
+        'collision': results.collisions,
+        'bodies': results.bodies,
+        'merge': results.merges,
+    }
+
+
+def _write_table(
+    path: Path, records: Sequence[ArrayRecord], epoch_ns: int, provenance: dict[str, str]
+) -> None:
+    fields = layout(type(records[0])).fields
+    values = (to_array(one, epoch_ns) for one in records)
+    if path.suffix == '.csv':
+        names, units = zip(*((field.name, field.unit) for field in fields), strict=True)
+        write_csv(path, names, units, (row.tolist() for row in values))
+        return
+    columns = [field.name for field in fields]
+    pieces = iter(lambda: [*itertools.islice(values, _PIECE)], [])
+    write_parquet(
+        path,
+        [Column(name=field.name, kind='f8', unit=field.unit) for field in fields],
+        (dict(zip(columns, np.array(piece, dtype=np.float64).T, strict=True)) for piece in pieces),
+        json.dumps(provenance),
+    )
+
+
+def _provenance(source: Path, settings: PipelineSettings) -> dict[str, str]:
+    return {
+        'nanorocks_ros': __version__,
+        'source': source.name,
+        **{row.name: str(row.default) for row in rows(settings)},
+    }
+
+
+def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> None:
+    epoch_topic = topics.EPOCH.absolute()
+    table = {epoch_topic: offered(topics.EPOCH)}
+    streams: list[Iterator[tuple[str, ArrayRecord]]] = []
+    for number, results in analysis.trays.items():
+        for topic, records in (
+            (topics.SPEED, results.speeds),
+            (topics.CLUSTER, results.clusters),
+            (topics.COR, results.cors),
+            (topics.REBOUND, results.rebounds),
+            (topics.COLLISION, results.collisions),
+            (topics.BODIES, results.bodies),
+            (topics.MERGE, results.merges),
+        ):
+            name = topic.absolute(number)
+            table[name] = offered(topic)
+            streams.append(zip(itertools.repeat(name), _in_order(records)))
+    with BagWriter(path, table, metadata=provenance) as bag:
+        bag.write(epoch_topic, analysis.epoch_ns, time_message(analysis.epoch_ns))
+        for name, record in heapq.merge(*streams, key=lambda item: item[1].stamp_ns):
+            values = to_array(record, analysis.epoch_ns)
+            labels = [field.name for field in layout(type(record)).fields]
+            bag.write(name, record.stamp_ns, float_array_message(labels, values))
+
+
+def _in_order(records: Sequence[ArrayRecord]) -> Iterator[ArrayRecord]:
+    """By their stamps; in memory are only those that wait for earlier ones further on."""
+    stamps = np.fromiter((one.stamp_ns for one in records), np.int64, len(records))
+    # The earliest of those that come later.
+    to_come = np.minimum.accumulate(np.append(stamps, _NEVER_NS)[::-1])[::-1][1:]
+    waiting: list[tuple[int, int, ArrayRecord]] = []
+    for number, (record, earliest) in enumerate(zip(records, to_come, strict=True)):
+        heapq.heappush(waiting, (record.stamp_ns, number, record))
+        while waiting and waiting[0][0] <= earliest:
+            yield heapq.heappop(waiting)[2]

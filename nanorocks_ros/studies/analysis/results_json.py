@@ -1,0 +1,200 @@
+"""Results of an analysis as a JSON object."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.records import ClusterEstimate, CorEstimate, CorStatus
+from nanorocks_ros.wire.array_layouts import NS, layout
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
+    """The final estimate of every cycle, or its last where none is final."""
+    latest: dict[tuple[int, int], CorEstimate] = {}
+    passes = 0
+    last: CorEstimate | None = None
+    for one in cors:
+        # Time went back: cycles are counted from 1 again, and are others.
+        if last is not None and one.stamp_ns < last.stamp_ns and not _ended_by_merge(last, one):
+            passes += 1
+        last = one
+        before = latest.get((passes, one.cycle))
+        if before is None or before.status is not CorStatus.FINAL:
+            latest[passes, one.cycle] = one
+    return list(latest.values())
+
+
+def _ended_by_merge(last: CorEstimate, one: CorEstimate) -> bool:
+    """Whether an earlier stamp is that of a merge, known later, which ended the cycle's window."""
+    final = CorStatus.FINAL
+    return (
+        one.cycle == last.cycle
+        and last.status is not final
+        and one.status is not CorStatus.COOLING
+    )
+
+
+def as_json(analysis: Analysis, *, series: bool = True) -> dict[str, Any]:
+    """The analysis as the command-line contract wants it: SI units, null for unknown.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    series : bool
+        With what was measured at every instant, not only cycle by cycle.
+    """
+    return {
+        'frames': analysis.frames,
+        'frames_lost': analysis.frames_lost,
+        'seconds': analysis.seconds,
+        'complete': analysis.complete,
+        'notices': list(analysis.notices),
+        'trays': {
+            str(number): _tray_as_json(analysis, results, series=series)
+            for number, results in analysis.trays.items()
+        },
+    }
+
+
+def _tray_as_json(analysis: Analysis, results: TrayResults, *, series: bool) -> dict[str, Any]:
+    epoch_ns = analysis.epoch_ns
+    cycles = last_of_each_cycle(results.cors)
+    wanted = {one.stamp_ns for one in cycles}
+    starts = {one.stamp_ns: one.cycle_start_ns for one in results.speeds if one.stamp_ns in wanted}
+    clusters = _ends_of_cycles(results.clusters)
+    return {
+        **(_series_as_json(results, epoch_ns) if series else {}),
+        'cycles': [
+            _cycle_as_json(
+                one,
+                ((starts[one.stamp_ns] or 0) - epoch_ns) / NS,
+                _end_of_cycle(clusters.get(one.cycle, []), one),
+            )
+            for one in cycles
+        ],
+        'truth': _truth_as_json(analysis, results, series=series),
+    }
+
+
+def _series_as_json(results: TrayResults, epoch_ns: int) -> dict[str, Any]:
+    return {
+        'time': [(one.stamp_ns - epoch_ns) / NS for one in results.speeds],
+        'mean_projected_speed': [_known(one.mean_projected_speed) for one in results.speeds],
+        'mean_projected_speed_error': [
+            _known(one.mean_projected_speed_error) for one in results.speeds
+        ],
+        'first_species_speed': [_known(one.first_species_speed) for one in results.speeds],
+        'second_species_speed': [_known(one.second_species_speed) for one in results.speeds],
+        'method': [one.method.name.lower() for one in results.speeds],
+        'quality': [one.quality.names() for one in results.speeds],
+    }
+
+
+def _ends_of_cycles(
+    clusters: Iterable[ClusterEstimate],
+) -> dict[int, list[tuple[int, ClusterEstimate]]]:
+    """Of each cycle, and every time it was played: stamp of the first estimate, and the last."""
+    found: dict[int, list[tuple[int, ClusterEstimate]]] = {}
+    for one in clusters:
+        parts = found.setdefault(one.cycle, [])
+        if parts and one.stamp_ns > parts[-1][1].stamp_ns:
+            parts[-1] = parts[-1][0], one
+        else:
+            parts.append((one.stamp_ns, one))
+    return found
+
+
+def _end_of_cycle(
+    parts: Sequence[tuple[int, ClusterEstimate]], cor: CorEstimate
+) -> ClusterEstimate | None:
+    """That of the same time, of a recording that was played twice."""
+    near = [last for first, last in parts if first <= cor.stamp_ns <= last.stamp_ns]
+    return near[-1] if near else parts[-1][1] if parts else None
+
+
+def _cycle_as_json(
+    cor: CorEstimate, start: float, clusters: ClusterEstimate | None
+) -> dict[str, Any]:
+    return {
+        'cycle': cor.cycle,
+        'start': start,
+        'initial_speed': _known(cor.initial_speed),
+        'initial_speed_error': _known(cor.initial_speed_error),
+        'haff_time': _known(cor.haff_time),
+        'haff_time_error': _known(cor.haff_time_error),
+        'restitution': _known(cor.restitution),
+        'restitution_lower': _known(cor.restitution_lower),
+        'restitution_upper': _known(cor.restitution_upper),
+        'wall_restitution': _known(cor.wall_restitution),
+        'wall_restitution_lower': _known(cor.wall_restitution_lower),
+        'wall_restitution_upper': _known(cor.wall_restitution_upper),
+        'correlation': _known(cor.correlation),
+        'paper_restitution': _known(cor.paper_restitution),
+        'mean_restitution': _known(cor.mean_restitution),
+        'mean_restitution_error': _known(cor.mean_restitution_error),
+        'mean_wall_restitution': _known(cor.mean_wall_restitution),
+        'mean_wall_restitution_error': _known(cor.mean_wall_restitution_error),
+        'rebounds': cor.rebounds,
+        'collisions': cor.collisions,
+        'tension': _known(cor.tension),
+        'quality': int(cor.quality),
+        'window_start': _known(cor.window_start),
+        'window_end': _known(cor.window_end),
+        'cooling_start': _known(cor.cooling_start),
+        **{
+            name: _known(getattr(cor, name))
+            for name in (field.name for field in layout(CorEstimate).fields)
+            if '_species_' in name
+        },
+        'relation': cor.relation.name.lower(),
+        'status': cor.status.name.lower(),
+        'reduced_chi_square': _known(cor.reduced_chi_square),
+        'samples': cor.samples,
+        **_clusters_as_json(clusters),
+    }
+
+
+def _clusters_as_json(last: ClusterEstimate | None) -> dict[str, Any]:
+    """What is known of the clusters at the end of a cycle."""
+    if last is None:
+        return dict.fromkeys(('cluster_size', 'bodies', 'onset', 'sticking_speed'))
+    return {
+        'cluster_size': _known(last.combined_size),
+        'cluster_size_error': _known(last.combined_size_error),
+        'bodies': _known(last.bodies),
+        'bodies_error': _known(last.bodies_error),
+        'onset': _known(last.onset),
+        'sticking_status': last.sticking_status.name.lower(),
+        'sticking_speed': _known(last.sticking_speed),
+        'sticking_speed_lower': _known(last.sticking_speed_lower),
+        'sticking_speed_upper': _known(last.sticking_speed_upper),
+    }
+
+
+def _truth_as_json(
+    analysis: Analysis, results: TrayResults, *, series: bool
+) -> dict[str, Any] | None:
+    truth = results.truth
+    if not truth:
+        return None
+    found: dict[str, Any] = {
+        'time': [(one.stamp_ns - analysis.epoch_ns) / NS for one in truth],
+        'mean_projected_speed': [one.mean_projected_speed for one in truth],
+        'bodies': [one.bodies for one in truth],
+    }
+    return {
+        **(found if series else {}),
+        'restitution': truth[-1].restitution,
+        'wall_restitution': truth[-1].wall_restitution,
+        'sticking_speed': truth[-1].sticking_speed,
+    }

@@ -1,0 +1,119 @@
+"""Tracks as tables: CSV, or Parquet where pyarrow is installed."""
+
+from __future__ import annotations
+
+import csv
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros import __version__
+from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.parquet import Column, write_parquet
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.records import Tracks
+    from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag
+
+TABLES = '.csv', '.parquet'
+"""Endings of the files below."""
+
+COLUMNS = (
+    Column(name='time', kind='f8', unit='s'),
+    Column(name='frame', kind='i4'),
+    Column(name='tray', kind='i4'),
+    Column(name='id', kind='i4'),
+    Column(name='species', kind='text'),
+    Column(name='x', kind='f8', unit='m'),
+    Column(name='y', kind='f8', unit='m'),
+    Column(name='position_error', kind='f8', unit='m'),
+    Column(name='vx', kind='f8', unit='m/s'),
+    Column(name='vy', kind='f8', unit='m/s'),
+    Column(name='velocity_error', kind='f8', unit='m/s'),
+    Column(name='radius', kind='f8', unit='m'),
+    Column(name='radius_error', kind='f8', unit='m'),
+    Column(name='seen', kind='i4'),
+)
+"""Columns of the table, a row for each bead in each frame: positions from the corner of the
+tray floor, velocities past the camera, `seen` 0 where the bead is hidden and predicted."""
+
+# Digits of a number in CSV: nanometres of a tray, and less than any error.
+_DIGITS = 7
+_NS = 1e9
+
+
+def write_tracks(path: Path, found: TrackedBag) -> None:
+    """Write the tracks of every tray, frame by frame.
+
+    Parameters
+    ----------
+    path : Path
+        ``.csv`` or ``.parquet``; a file there is replaced, once the new one is complete. CSV
+        leaves empty what is not known, and names the units in its first line.
+    found : TrackedBag
+
+    Raises
+    ------
+    ConfigurationError
+        When pyarrow, which writes Parquet, is not installed.
+    RecordingError
+        When the file cannot be written.
+    """
+    if path.suffix == '.parquet':
+        write_parquet(path, COLUMNS, _pieces(found), _provenance(found))
+        return
+    with whole_file(path) as part, part.open('w', encoding='utf-8', newline='') as stream:
+        units = ', '.join(f'{one.name} [{one.unit}]' for one in COLUMNS if one.unit)
+        stream.write(f'# {units}\n')
+        writer = csv.writer(stream, lineterminator='\n')
+        writer.writerow([one.name for one in COLUMNS])
+        for piece in _pieces(found):
+            columns = [_as_text(piece[one.name]) for one in COLUMNS]
+            writer.writerows(zip(*columns, strict=True))
+
+
+def _pieces(found: TrackedBag) -> Iterator[dict[str, NDArray[Any]]]:
+    for number in found.trays:
+        frames = zip(found.tracks[number], found.numbers[number], strict=True)
+        for tracks, frame in frames:
+            if tracks.ids.size:
+                yield _rows(tracks, frame, found)
+
+
+def _rows(tracks: Tracks, frame: int, found: TrackedBag) -> dict[str, NDArray[Any]]:
+    n = tracks.ids.size
+    materials = np.array([one.material for one in found.trays[tracks.tray].species])
+    return {
+        'time': np.full(n, (tracks.stamp_ns - found.epoch_ns) / _NS),
+        'frame': np.full(n, frame, dtype=np.int32),
+        'tray': np.full(n, tracks.tray, dtype=np.int32),
+        'id': tracks.ids,
+        'species': materials[tracks.species],
+        'x': tracks.positions[:, 0],
+        'y': tracks.positions[:, 1],
+        'position_error': tracks.position_errors,
+        'vx': tracks.velocities[:, 0],
+        'vy': tracks.velocities[:, 1],
+        'velocity_error': tracks.velocity_errors,
+        'radius': tracks.radii,
+        'radius_error': tracks.radius_errors,
+        'seen': tracks.seen.astype(np.int32),
+    }
+
+
+def _as_text(values: NDArray[Any]) -> list[str]:
+    if values.dtype.kind != 'f':
+        return [str(one) for one in values.tolist()]
+    return ['' if one != one else f'{one:.{_DIGITS}g}' for one in values.tolist()]
+
+
+def _provenance(found: TrackedBag) -> str:
+    return json.dumps(
+        {'version': __version__, 'trays': sorted(found.trays), 'epoch_ns': found.epoch_ns}
+    )

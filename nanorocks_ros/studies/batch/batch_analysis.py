@@ -1,0 +1,264 @@
+"""Many recordings analysed, by many workers, so that no one of them matters to the others."""
+
+from __future__ import annotations
+
+from contextlib import closing, suppress
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.jobs.tasks import as_finished_apart
+from nanorocks_ros.outputs.safe_text import shown
+from nanorocks_ros.pipeline.composition import Pipeline
+from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
+from nanorocks_ros.recordings.film.natural_sort import natural
+from nanorocks_ros.studies.batch.batch_store import BatchStore, Entry
+from nanorocks_ros.studies.batch.batch_task import (
+    DONE,
+    FAILED,
+    PARTIAL,
+    UNWRITTEN,
+    BagOutcome,
+    analyse_bag,
+    read_summary,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from nanorocks_ros.jobs.tasks import Workers
+    from nanorocks_ros.recordings.bag.find_bags import FoundBags
+    from nanorocks_ros.settings import PipelineSettings
+    from nanorocks_ros.studies.batch.batch_task import BagTask
+
+# Of so many recordings the same is said one by one.
+_MOST_ALIKE = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BatchPlan:
+    """What to analyse, and how.
+
+    Parameters
+    ----------
+    bags : FoundBags
+    folder : Path
+        For results.
+    settings : PipelineSettings
+    image_topic : str
+    """
+
+    bags: FoundBags
+    folder: Path
+    settings: PipelineSettings
+    image_topic: str = ''
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BagResults:
+    """A recording that was analysed.
+
+    Parameters
+    ----------
+    name : str
+        For people.
+    folder : Path
+        Of its results.
+    summary : dict
+        What `nanorocks analyse --json` gives, without the series, and more.
+    twin : str
+        Name of the recording that holds the same, bit by bit or imported from the same film, and
+        counts in its place.
+    """
+
+    name: str
+    folder: Path
+    summary: dict[str, Any]
+    twin: str = ''
+
+    @property
+    def notes(self) -> list[str]:
+        """What is to be said of it, one line each."""
+        same = [f'is the same as {self.twin}, and not counted'] if self.twin else []
+        reason = [self.summary['reason']] if self.summary['reason'] else []
+        return [*same, *reason, *self.summary['notices']]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Failure:
+    """A recording, or an input, that could not be used, or not as a whole.
+
+    Parameters
+    ----------
+    name, reason : str
+    analysed : bool
+        Whether there are results of a part of it.
+    """
+
+    name: str
+    reason: str
+    analysed: bool = False
+
+
+@dataclass(slots=True, kw_only=True)
+class Batch:
+    """What became of all recordings.
+
+    Parameters
+    ----------
+    results : list of BagResults
+        In order of time, or of their names where they began at the same time.
+    failed : list of Failure
+    """
+
+    results: list[BagResults] = field(default_factory=list)
+    failed: list[Failure] = field(default_factory=list)
+
+    @property
+    def counted(self) -> list[BagResults]:
+        """Each recording once."""
+        return [one for one in self.results if not one.twin]
+
+
+def told(results: Sequence[BagResults]) -> list[str]:
+    """What is to be said of recordings, the same of many in one line."""
+    found: dict[str, list[BagResults]] = {}
+    for one in results:
+        for text in one.notes:
+            what = text.removeprefix(one.name).lstrip(':/ ')
+            found.setdefault(what, []).append(one)
+    lines = []
+    for what, own in found.items():
+        if len(own) > _MOST_ALIKE:
+            lines.append(f'{len(own)} recordings, such as {own[0].name}: {what}')
+        else:
+            lines += [f'{one.name}: {what}' for one in own]
+    return lines
+
+
+class Watcher(Protocol):
+    """Who is told how it goes."""
+
+    def begin(self, store: BatchStore, sizes: dict[str, int], done: int) -> None:
+        """So many bytes of each recording, by folder, are left to do; so many are done."""
+
+    def finished(self, name: str, outcome: BagOutcome) -> None:
+        """A recording is done, or failed."""
+
+    def notice(self, text: str) -> None:
+        """One line of what the user should know."""
+
+
+def run_batch(plan: BatchPlan, workers: Workers, watcher: Watcher) -> Batch:
+    """Analyse all recordings that are not analysed yet.
+
+    What is done is kept in the folder: after an interruption the same call goes on from there,
+    and does again what has changed.
+
+    Parameters
+    ----------
+    plan : BatchPlan
+    workers : Workers
+    watcher : Watcher
+
+    Raises
+    ------
+    ConfigurationError
+        When the settings cannot be used.
+    RecordingError
+        When the folder cannot be used, or written any more.
+    NanorocksError
+        When a cluster cannot be used.
+    KeyboardInterrupt
+        Ctrl-C; its text says what is kept.
+    """
+    # Before hours of work, and not once for every recording.
+    Pipeline(plan.settings, 'settings')
+    workers.check()
+    with BatchStore(plan.folder, plan.settings, plan.image_topic) as store:
+        tasks = store.add(plan.bags.bags)
+        for text in store.notices:
+            watcher.notice(text)
+        store.write()
+        try:
+            _run(store, tasks, workers, watcher)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(_kept(store)) from None
+        finally:
+            # On a full disk what came before is the better message.
+            with suppress(RecordingError):
+                store.write()
+        return _gathered(plan, store)
+
+
+def _run(store: BatchStore, tasks: dict[str, BagTask], workers: Workers, watcher: Watcher) -> None:
+    sizes = {name: _size(task.path) for name, task in tasks.items()}
+    watcher.begin(store, sizes, len(store.entries) - len(tasks))
+    # The largest first, so that no worker is left alone with one in the end.
+    ordered = {name: tasks[name] for name in sorted(tasks, key=lambda one: -sizes[one])}
+
+    def lost(name: str, what: str) -> BagOutcome:
+        return BagOutcome(state=FAILED, reason=f'{shown(tasks[name].path)}: {what}')
+
+    with closing(as_finished_apart(analyse_bag, ordered, workers, lost)) as outcomes:
+        for name, outcome in outcomes:
+            store.finish(name, outcome)
+            if outcome.state == UNWRITTEN:
+                # So would all others be, after as much work.
+                raise RecordingError(
+                    str(store.folder),
+                    f'cannot be written any more ({outcome.reason})',
+                    f'make room; {_kept(store)}',
+                )
+            store.write()
+            watcher.finished(name, outcome)
+
+
+def _size(path: Path) -> int:
+    try:
+        return total_size(file_states(path))
+    except OSError:
+        return 0
+
+
+def _kept(store: BatchStore) -> str:
+    done = sum(one.outcome.state in (DONE, PARTIAL) for one in store.entries.values())
+    return (
+        f'{done} of {len(store.entries)} recordings are done and kept in {store.folder}; the same '
+        'command goes on from there'
+    )
+
+
+def _gathered(plan: BatchPlan, store: BatchStore) -> Batch:
+    batch = Batch()
+    for text, error in plan.bags.missing.items():
+        batch.failed.append(Failure(name=shown(text), reason=shown(str(error))))
+    entries = sorted(store.entries.values(), key=lambda one: natural(str(one.path)))
+    found: list[tuple[Entry, dict[str, Any]]] = []
+    for entry in entries:
+        outcome = entry.outcome
+        there = outcome.state in (DONE, PARTIAL)
+        summary = read_summary(store.place(entry)) if there else None
+        if summary is not None:
+            found.append((entry, summary))
+        if outcome.state != DONE or summary is None:
+            reason = outcome.reason or f'{store.place(entry)}: its results are gone; try again'
+            batch.failed.append(
+                Failure(name=shown(entry.path), reason=reason, analysed=summary is not None)
+            )
+    found.sort(key=lambda one: one[1]['start_ns'])
+    first: dict[str, str] = {}
+    for entry, summary in found:
+        name = shown(entry.path)
+        # A film that was copied and imported twice is no second measurement either.
+        twin = first.setdefault(summary.get('film') or summary['content'], name)
+        batch.results.append(
+            BagResults(
+                name=name,
+                folder=store.place(entry),
+                summary=summary,
+                twin='' if twin == name else twin,
+            )
+        )
+    return batch

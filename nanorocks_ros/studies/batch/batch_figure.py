@@ -1,0 +1,119 @@
+"""How the gas of every tray cools, in all cycles of a batch."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+import numpy as np
+
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.safe_text import counted
+from nanorocks_ros.studies.decays.cooling_curves import read_cycles
+
+mpl.use('Agg')
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.studies.batch.campaign_means import TrayMeans
+    from nanorocks_ros.studies.decays.cooling_curves import CycleSpeeds
+
+_MM = 1e3
+# More lines than this show nothing more.
+_MOST = 60
+_EDGES = np.geomspace(0.1, 600.0, 40)
+
+
+def decays_figure(path: Path, folders: Sequence[Path], trays: Sequence[TrayMeans]) -> bool:
+    """Speeds since the shaking event of each tray, their median, and Haff's law.
+
+    Parameters
+    ----------
+    path : Path
+        Picture to write.
+    folders : sequence of Path
+        Results of recordings.
+    trays : sequence of TrayMeans
+
+    Returns
+    -------
+    bool
+        Whether there was anything to draw.
+
+    Raises
+    ------
+    RecordingError
+        When the picture cannot be written.
+    """
+    found = [(one, _cycles(folders, one.tray)) for one in trays if one.cycles]
+    found = [(one, cycles) for one, cycles in found if cycles]
+    if not found:
+        return False
+    columns = 1 if len(found) == 1 else 2
+    rows = math.ceil(len(found) / columns)
+    figure = Figure(figsize=(9.5, 1.0 + 2.6 * rows), layout='constrained')
+    panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
+    for axes, (means, cycles) in zip(panels, found, strict=False):
+        _draw(axes, means, cycles)
+    for axes in panels[len(found) :]:
+        axes.set_axis_off()
+    for axes in panels[max(len(found) - columns, 0) : len(found)]:
+        axes.set_xlabel('time since the shaking event [s]')
+        axes.tick_params(labelbottom=True)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=110)
+    return True
+
+
+def _cycles(folders: Sequence[Path], tray: int) -> list[CycleSpeeds]:
+    """Evenly over all recordings, as many as can be told apart."""
+    step = max(1, math.ceil(len(folders) / _MOST))
+    found: list[CycleSpeeds] = []
+    for folder in folders[::step]:
+        try:
+            found += read_cycles(folder / f'tray_{tray}_speed.csv')
+        except RecordingError:
+            # Without a cycle of this tray.
+            continue
+    return found[:: max(1, math.ceil(len(found) / _MOST))]
+
+
+def _draw(axes: Axes, means: TrayMeans, cycles: Sequence[CycleSpeeds]) -> None:
+    lines = [np.column_stack((one.times, _MM * one.speed)) for one in cycles]
+    axes.add_collection(LineCollection(lines, colors='#30506f', linewidths=0.5, alpha=0.35))
+    times, speeds = _median(cycles)
+    axes.plot(times, _MM * speeds, color='#30506f', lw=2.0, label='median')
+    start, tau = means.means['initial_speed'], means.means['haff_time']
+    if start.cycles and tau.cycles:
+        law = _MM * start.mean / (1.0 + times / tau.mean)
+        axes.plot(
+            times, law, color='#c23b22', lw=1.2, ls='--', label="Haff's law, mean v0 and tau"
+        )
+    axes.set_xscale('log')
+    axes.set_yscale('log')
+    axes.autoscale_view()
+    axes.set_ylabel('mean speed [mm/s]')
+    some = '' if len(cycles) >= means.cycles else f', {len(cycles)} of them drawn'
+    axes.set_title(f'Tray {means.tray}: {counted(means.cycles, "cycle")}{some}', fontsize=10)
+    axes.grid(alpha=0.25)
+    axes.legend(frameon=False, fontsize=8)
+
+
+def _median(cycles: Sequence[CycleSpeeds]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    times = np.concatenate([one.times for one in cycles])
+    speeds = np.concatenate([one.speed for one in cycles])
+    places = np.digitize(times, _EDGES)
+    inside = [k for k in range(1, _EDGES.size) if (places == k).any()]
+    return (
+        np.array([np.median(times[places == k]) for k in inside]),
+        np.array([np.median(speeds[places == k]) for k in inside]),
+    )

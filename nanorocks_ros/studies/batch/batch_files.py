@@ -1,0 +1,54 @@
+"""What a batch leaves in its folder besides the results of each recording."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from nanorocks_ros import __version__
+from nanorocks_ros.settings import rows
+from nanorocks_ros.studies.batch.batch_report import write_batch_report
+from nanorocks_ros.studies.batch.batch_tables import write_tables
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from nanorocks_ros.settings import PipelineSettings
+    from nanorocks_ros.studies.batch.batch_analysis import Batch
+    from nanorocks_ros.studies.batch.campaign_means import Combined
+
+REPORT = 'report.html'
+
+
+def write_batch(
+    folder: Path, batch: Batch, together: Combined, settings: PipelineSettings, kind: str
+) -> Path:
+    """Write tables and report.
+
+    Parameters
+    ----------
+    folder : Path
+    batch : Batch
+    together : Combined
+    settings : PipelineSettings
+    kind : 'csv' or 'parquet'
+        Of the tables.
+
+    Returns
+    -------
+    Path
+        Of the report.
+
+    Raises
+    ------
+    RecordingError
+        When something cannot be written.
+    """
+    provenance = {
+        'nanorocks_ros': __version__,
+        **{row.name: row.default for row in rows(settings)},
+    }
+    write_tables(together, folder, kind, json.dumps(provenance))
+    path = folder / REPORT
+    write_batch_report(path, batch, together, settings)
+    return path

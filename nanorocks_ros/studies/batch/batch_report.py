@@ -1,0 +1,306 @@
+"""The report of a batch: one page, with its pictures in it."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros import __version__
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.outputs.html_report import Picture, Section, Table, number, write_report
+from nanorocks_ros.outputs.safe_text import counted
+from nanorocks_ros.settings import PipelineSettings, rows
+from nanorocks_ros.studies.batch.batch_analysis import told
+from nanorocks_ros.studies.batch.batch_figure import decays_figure
+from nanorocks_ros.studies.batch.campaign_means import means_as_json
+from nanorocks_ros.studies.figures.long_term_figure import long_term_figure
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from nanorocks_ros.studies.batch.batch_analysis import BagResults, Batch
+    from nanorocks_ros.studies.batch.campaign_means import Combined, CycleRow, TrayMeans
+
+_MM = 1e3
+_SHORTEST_DAY = 86_400 * 365
+
+
+def write_batch_report(
+    path: Path, batch: Batch, together: Combined, settings: PipelineSettings
+) -> None:
+    """Write what was analysed, what all cycles say, every cycle, and what failed.
+
+    Parameters
+    ----------
+    path : Path
+    batch : Batch
+    together : Combined
+    settings : PipelineSettings
+
+    Raises
+    ------
+    RecordingError
+        When it cannot be written.
+    """
+    frames = sum(one.summary['frames'] for one in batch.results)
+    seconds = sum(one.summary['seconds'] for one in batch.results)
+    cycles = len(together.cycles)
+    failed = f'; {len(batch.failed)} failed' if batch.failed else ''
+    summary = (
+        f'nanorocks_ros {__version__}: {counted(len(batch.results), "recording")}, '
+        f'{counted(frames, "frame")}, {seconds:.0f} s{failed}. '
+        f'{counted(cycles, "cooling cycle")} of '
+        f'{counted(sum(one.cycles > 0 for one in together.trays.values()), "tray")}.'
+    )
+    try:
+        with TemporaryDirectory() as scratch:
+            sections = [
+                _restitutions(together),
+                _clusters(together),
+                _figures(Path(scratch), batch, together),
+                *_cycles(together),
+                _recordings(batch, settings),
+            ]
+            if batch.failed:
+                sections.insert(0, _failures(batch))
+            write_report(path, 'NanoRocks, all recordings', summary, sections)
+    except OSError as error:
+        raise RecordingError(
+            str(path), f'cannot be written ({error.strerror})', 'make room for its pictures'
+        ) from error
+
+
+def _failures(batch: Batch) -> Section:
+    return Section(
+        title='What failed',
+        parts=[
+            Table(
+                head=('recording', 'why', 'results'),
+                rows=[
+                    (one.name, one.reason, 'of a part of it' if one.analysed else 'none')
+                    for one in batch.failed
+                ],
+            )
+        ],
+    )
+
+
+def _restitutions(together: Combined) -> Section:
+    return Section(
+        title='Restitution of all cycles together',
+        parts=[
+            Table(
+                head=('tray', 'cycles', 'beads', 'walls', 'rebounds', 'collisions', 'tension'),
+                rows=[_together(one) for one in _known(together)],
+                caption='What decays, rebounds and collisions of all cycles say together. What is '
+                'not known of tray, camera and start is the same in all of them: it is part of '
+                'the interval, and does not become less with more cycles. A dash: hardly known. '
+                'A tension beyond 3 means that something happens that is not simulated.',
+            ),
+            Table(
+                head=('tray', 'COR of a cycle', "by the paper's closed form", 'v0 [mm/s]',
+                      'peak [mm/s]', 'tau [s]'),
+                rows=[
+                    (str(one.tray), *(_mean(one, name, factor) for name, factor in (
+                        ('cycle_restitution', 1.0), ('paper_restitution', 1.0),
+                        ('initial_speed', _MM), ('peak_speed', _MM), ('haff_time', 1.0))))
+                    for one in _known(together)
+                ],
+                caption='Means over the cycles ± scatter of a single cycle, as the paper reports '
+                'them over its 178 runs; in brackets how many cycles are known. v0 and tau count '
+                'where the fit knows them to half of their value.',
+            ),
+            *(_unread(together)),
+        ],
+    )  # fmt: skip
+
+
+def _unread(together: Combined) -> list[str]:
+    return [f'{one}.' for one in together.notices]
+
+
+def _known(together: Combined) -> list[TrayMeans]:
+    return [one for _, one in sorted(together.trays.items()) if one.cycles]
+
+
+def _together(one: TrayMeans) -> tuple[str, ...]:
+    values = means_as_json(one)
+    return (
+        str(one.tray),
+        str(values['cycles_read']),
+        _interval(values, 'restitution'),
+        _interval(values, 'wall_restitution'),
+        str(values['rebounds']),
+        str(values['collisions']),
+        number(values['tension'], 2),
+    )
+
+
+def _interval(values: dict[str, Any], name: str, digits: int = 4, factor: float = 1.0) -> str:
+    middle, low, high = (values.get(f'{name}{end}') for end in ('', '_lower', '_upper'))
+    ends = ', '.join(number(one, digits, factor) for one in (low, high))
+    if low is None and high is None:
+        return '–'
+    return f'{number(middle, digits, factor)} [{ends}]'
+
+
+def _mean(one: TrayMeans, name: str, factor: float = 1.0) -> str:
+    mean = one.means[name]
+    if not mean.cycles:
+        return '–'
+    scatter = f' ± {number(mean.scatter, 2, factor)}' if mean.cycles > 1 else ''
+    return f'{number(mean.mean, 4, factor)}{scatter} ({mean.cycles})'
+
+
+def _clusters(together: Combined) -> Section:
+    in_mm = together.size_unit == 'm'
+    size = 'correlation length [mm]' if in_mm else 'cluster size [beads]'
+    rows = []
+    for one in _known(together):
+        values = means_as_json(one)
+        status = (values['sticking_status'] or 'not looked for').replace('_', ' ')
+        merges = values['merges']
+        rows.append(
+            (
+                str(one.tray),
+                _interval(values, 'sticking_speed', 3, _MM),
+                status,
+                '–' if merges is None else str(merges),
+                _mean(one, 'cluster_size', _MM if in_mm else 1.0),
+                _mean(one, 'bodies'),
+                _mean(one, 'onset'),
+            )
+        )
+    return Section(
+        title='Sticking and clusters',
+        parts=[
+            Table(
+                head=('tray', 'sticking speed [mm/s]', 'status', 'merges', size, 'bodies',
+                      'onset [s]'),
+                rows=rows,
+                caption='Sticking speed by the merges of all cycles together, with its interval; '
+                'the others at the end of the cycle, mean ± scatter of a cycle (cycles known).',
+            )
+        ],
+    )  # fmt: skip
+
+
+def _figures(scratch: Path, batch: Batch, together: Combined) -> Section:
+    section = Section(title='Figures')
+    folders = [one.folder for one in batch.counted]
+    decays, long_term = scratch / 'decays.png', scratch / 'long_term.png'
+    if decays_figure(decays, folders, _known(together)):
+        section.parts.append(
+            Picture(
+                path=decays,
+                caption='Mean projected speed as the gas cools: single cycles, their median, and '
+                "Haff's law with the means over the cycles.",
+            )
+        )
+    if together.campaign is not None:
+        long_term_figure(long_term, together.campaign)
+        section.parts.append(
+            Picture(
+                path=long_term,
+                caption='Cycle by cycle, with trends: cluster sizes, peak speeds, restitutions '
+                '(figure 9 of the paper).',
+            )
+        )
+    if not section.parts:
+        section.parts.append('There is no cycle after a shaking event to draw.')
+    return section
+
+
+def _cycles(together: Combined) -> list[Section]:
+    sections = []
+    size, factor = ('length [mm]', _MM) if together.size_unit == 'm' else ('size [beads]', 1.0)
+    for one in _known(together):
+        own = [row for row in together.cycles if row.tray == one.tray]
+        table = Table(
+            head=('recording', 'cycle', 'start [s]', 'COR', 'walls', "paper's form", 'v0 [mm/s]',
+                  'tau [s]', 'peak [mm/s]', size, 'sticking [mm/s]', 'status'),
+            rows=[_cycle(row, factor) for row in own],
+        )  # fmt: skip
+        sections.append(Section(title=f'Cycles of tray {one.tray}', parts=[table]))
+    return sections
+
+
+def _cycle(row: CycleRow, factor: float) -> tuple[str, ...]:
+    values = row.values
+    return (
+        Path(row.recording).name,
+        str(values['cycle']),
+        number(values['start'], 4),
+        _interval(values, 'restitution'),
+        _interval(values, 'wall_restitution'),
+        number(values['paper_restitution'], 4),
+        number(values['initial_speed'], 3, _MM),
+        number(values['haff_time'], 3),
+        number(values['peak_speed'], 3, _MM),
+        number(values['cluster_size'], 3, factor),
+        _interval(values, 'sticking_speed', 3, _MM),
+        values['status'].replace('_', ' '),
+    )
+
+
+def _recordings(batch: Batch, settings: PipelineSettings) -> Section:
+    usual = {row.name: row.default for row in rows(PipelineSettings())}
+    changed = [
+        (row.name, str(row.default)) for row in rows(settings) if row.default != usual[row.name]
+    ]
+    metadata = _metadata(batch.results)
+    section = Section(
+        title='What was analysed',
+        parts=[
+            Table(
+                head=('recording', 'began', 'frames', 'lost', 'seconds', 'cycles', 'complete'),
+                rows=[_recording(one) for one in batch.results],
+            )
+        ],
+    )
+    for head, found, caption in (
+        (('what is to be said of them',), [(one,) for one in told(batch.results)], ''),
+        (('entry', 'value'), metadata, 'Provenance that they hold, and in how many it differs'),
+        (('setting', 'value'), changed, 'Settings other than the defaults'),
+    ):
+        if found:
+            section.parts.append(Table(head=head, rows=found, caption=caption))
+    return section
+
+
+def _recording(one: BagResults) -> tuple[str, ...]:
+    summary = one.summary
+    cycles = max((len(tray['cycles']) for tray in summary['trays'].values()), default=0)
+    return (
+        one.name,
+        _date(summary['start_ns']),
+        str(summary['frames']),
+        str(summary['frames_lost']),
+        f'{summary["seconds"]:.1f}',
+        str(cycles),
+        'yes' if summary['complete'] else 'no',
+    )
+
+
+def _date(stamp_ns: int) -> str:
+    """In UTC; a clock that counts from its own start has no date."""
+    seconds = stamp_ns / 1e9
+    if seconds < _SHORTEST_DAY:
+        return f'{seconds:.1f} s'
+    return time.strftime('%Y-%m-%d %H:%M:%S', time.gmtime(seconds))
+
+
+def _metadata(results: Sequence[BagResults]) -> list[tuple[str, str]]:
+    """Entries of all recordings, with the value that most of them have."""
+    values: dict[str, list[str]] = {}
+    for one in results:
+        for key, value in one.summary['metadata'].items():
+            values.setdefault(key, []).append(value)
+    found = []
+    for key, own in values.items():
+        usual = max(set(own), key=own.count)
+        others = len(results) - own.count(usual)
+        found.append((key, f'{usual} (other or none in {others})' if others else usual))
+    return found

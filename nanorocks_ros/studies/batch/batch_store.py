@@ -1,0 +1,305 @@
+"""The folder that a batch keeps its results in, and the manifest that says of what."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros import __version__
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.jobs.folder_lock import hold_folder
+from nanorocks_ros.outputs.npz_archive import write_whole
+from nanorocks_ros.outputs.safe_text import shown
+from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
+from nanorocks_ros.settings import rows
+from nanorocks_ros.studies.analysis.results_folder import SUMMARY
+from nanorocks_ros.studies.batch.batch_task import (
+    DONE,
+    PARTIAL,
+    BagOutcome,
+    BagTask,
+    read_summary,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from nanorocks_ros.settings import PipelineSettings
+
+MANIFEST, BAGS = 'manifest.json', 'bags'
+_MARK, _NOTES = '.nanorocks_batch', '.under_way'
+_WAITING = 'waiting'
+# Of the name of a folder, of the 255 bytes that file systems take.
+_LONGEST_NAME = 150
+
+
+@dataclass(slots=True, kw_only=True)
+class Entry:
+    """A recording in the manifest.
+
+    Parameters
+    ----------
+    path : Path
+        Absolute.
+    folder : str
+        Name of the folder of its results.
+    outcome : BagOutcome
+    """
+
+    path: Path
+    folder: str
+    outcome: BagOutcome
+
+
+class BatchStore:
+    """Results of many recordings, each in a folder of its own, held by one process at a time.
+
+    Parameters
+    ----------
+    folder : Path
+        New, empty, or that of an earlier batch.
+    settings : PipelineSettings
+    image_topic : str
+
+    Attributes
+    ----------
+    notices : list of str
+
+    Raises
+    ------
+    RecordingError
+        When the folder holds something else, is in use, or cannot be written.
+    """
+
+    def __init__(self, folder: Path, settings: PipelineSettings, image_topic: str) -> None:
+        self.folder = folder.absolute()
+        self.notices: list[str] = []
+        self._settings, self._image_topic = settings, image_topic
+        self._question = _question(settings, image_topic)
+        self.entries: dict[Path, Entry] = {}
+        self._by_task: dict[str, Entry] = {}
+        self._check_place()
+        self._lock = hold_folder(self.folder, _MARK)
+        try:
+            self._known = self._read()
+            for name in (BAGS, _NOTES):
+                (self.folder / name).mkdir(exist_ok=True)
+            self._sweep()
+        except OSError as error:
+            os.close(self._lock)
+            raise RecordingError(
+                str(folder), f'cannot be written ({error.strerror})', 'pass another --output'
+            ) from error
+
+    def __enter__(self) -> BatchStore:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        shutil.rmtree(self.folder / _NOTES, ignore_errors=True)
+        os.close(self._lock)
+
+    def _check_place(self) -> None:
+        try:
+            others = self.folder.exists() and any(self.folder.iterdir())
+        except OSError as error:
+            raise RecordingError(
+                str(self.folder), f'cannot be read ({error.strerror})', 'pass another --output'
+            ) from error
+        if others and not (self.folder / _MARK).is_file():
+            raise RecordingError(
+                str(self.folder), 'exists and holds no batch of ours', 'pass another --output'
+            )
+
+    def _sweep(self) -> None:
+        """What killed workers left."""
+        for one in (*(self.folder / BAGS).glob('.*'), *(self.folder / _NOTES).iterdir()):
+            if one.is_dir() and not one.is_symlink():
+                shutil.rmtree(one, ignore_errors=True)
+            else:
+                one.unlink(missing_ok=True)
+
+    def place(self, entry: Entry) -> Path:
+        """The folder of the results of a recording."""
+        return self.folder / BAGS / entry.folder
+
+    def add(self, bags: Sequence[Path]) -> dict[str, BagTask]:
+        """Take recordings in.
+
+        Parameters
+        ----------
+        bags : sequence of Path
+
+        Returns
+        -------
+        dict of str to BagTask
+            What is left to do, by the name of the folder; those that are done and have not
+            been touched since are not in it.
+        """
+        taken = {one.folder.casefold(): path for path, one in self._known.items()}
+        tasks: dict[str, BagTask] = {}
+        for bag in bags:
+            path = bag.absolute()
+            before = self._known.get(path)
+            name = before.folder if before else _free_name(path, taken)
+            taken[name.casefold()] = path
+            entry = Entry(path=path, folder=name, outcome=BagOutcome(state=_WAITING))
+            self.entries[path] = entry
+            if before is not None and self._untouched(before):
+                entry.outcome = before.outcome
+                continue
+            tasks[name] = BagTask(
+                path=path,
+                folder=self.place(entry),
+                settings=self._settings,
+                image_topic=self._image_topic,
+                question=self._question,
+                note=self.folder / _NOTES / name,
+                earlier=() if before else self._gone(path),
+            )
+            self._by_task[name] = entry
+        return tasks
+
+    def _gone(self, path: Path) -> tuple[Path, ...]:
+        """Results of recordings of this size that are not where they were: it may be this one."""
+        try:
+            size = total_size(file_states(path))
+        except OSError:
+            return ()
+        return tuple(
+            self.place(one)
+            for one in self._known.values()
+            if total_size(one.outcome.files) == size and not os.path.lexists(one.path)
+        )
+
+    def _untouched(self, before: Entry) -> bool:
+        outcome = before.outcome
+        if outcome.state not in (DONE, PARTIAL):
+            return False
+        summary = read_summary(self.place(before))
+        if summary is None:
+            return False
+        try:
+            same = file_states(before.path) == outcome.files
+        except OSError:
+            return False
+        there = summary['content'], summary['question']
+        return same and there == (outcome.content, self._question)
+
+    def finish(self, name: str, outcome: BagOutcome) -> None:
+        """Say what became of a recording."""
+        entry = self._by_task[name]
+        entry.outcome = outcome
+        if outcome.folder:
+            entry.folder = outcome.folder
+            gone = [path for path, one in self._known.items() if one.folder == outcome.folder]
+            for path in gone:
+                del self._known[path]
+
+    def under_way(self) -> dict[str, tuple[int, int]]:
+        """Frames done and in all of recordings that are being analysed, by folder."""
+        found = {}
+        for note in (self.folder / _NOTES).glob('*'):
+            with suppress(OSError, ValueError):
+                done, total = (int(one) for one in note.read_text('ascii').split())
+                found[note.name] = done, total
+        return found
+
+    def write(self) -> None:
+        """Write the manifest, those of earlier calls that are not part of this one included.
+
+        Raises
+        ------
+        RecordingError
+            When it cannot be written.
+        """
+        content = {
+            'format': 1,
+            'nanorocks_ros': __version__,
+            'image_topic': self._image_topic,
+            'settings': {row.name: row.default for row in rows(self._settings)},
+            'bags': [_as_json(one) for one in {**self._known, **self.entries}.values()],
+        }
+        write_whole(self.folder / MANIFEST, json.dumps(content, indent=1).encode())
+
+    def _read(self) -> dict[Path, Entry]:
+        path = self.folder / MANIFEST
+        try:
+            content = json.loads(path.read_text('utf-8'))
+            return {one.path: one for one in map(_from_json, content['bags'])}
+        except FileNotFoundError:
+            return {}
+        except (OSError, ValueError, KeyError, TypeError):
+            self.notices.append(f'{path}: is damaged; recordings are looked at anew')
+            return self._from_folders()
+
+    def _from_folders(self) -> dict[Path, Entry]:
+        found = {}
+        for place in sorted((self.folder / BAGS).glob(f'*/{SUMMARY}')):
+            summary = read_summary(place.parent)
+            if summary is not None:
+                path = Path(summary['bag'])
+                outcome = BagOutcome(state=_WAITING)
+                found[path] = Entry(path=path, folder=place.parent.name, outcome=outcome)
+        return found
+
+
+def _question(settings: PipelineSettings, image_topic: str) -> str:
+    """A hash of everything besides the recording that results depend on."""
+    digest = hashlib.blake2b(digest_size=16)
+    for row in rows(settings):
+        digest.update(f'{row.name}={row.default!r}\n'.encode(errors='surrogateescape'))
+        if isinstance(row.default, str) and row.default and Path(row.default).is_file():
+            # A calibration, trays or decays in a file of that name may be others next time.
+            with suppress(OSError):
+                digest.update(Path(row.default).read_bytes())
+    digest.update(f'{__version__} {image_topic}'.encode(errors='surrogateescape'))
+    return digest.hexdigest()
+
+
+def _free_name(path: Path, taken: Iterable[str]) -> str:
+    """The name of the recording, and a number where another recording has that name."""
+    name = path.stem if path.suffix in {'.mcap', '.db3', '.bag'} else path.name
+    name = re.sub(r'[^\w.,+=@ -]', '_', shown(name)).strip('. ') or 'recording'
+    name = name.encode()[:_LONGEST_NAME].decode(errors='ignore')
+    number, found = 1, name
+    while found.casefold() in taken:
+        number += 1
+        found = f'{name}-{number}'
+    return found
+
+
+def _as_json(entry: Entry) -> dict[str, Any]:
+    outcome = entry.outcome
+    return {
+        'bag': str(entry.path),
+        'folder': f'{BAGS}/{entry.folder}',
+        'state': outcome.state,
+        'reason': outcome.reason,
+        'content': outcome.content,
+        'files': [list(one) for one in outcome.files],
+    }
+
+
+def _from_json(found: dict[str, Any]) -> Entry:
+    name = Path(found['folder']).name
+    if not name:
+        raise ValueError
+    return Entry(
+        path=Path(found['bag']),
+        folder=name,
+        outcome=BagOutcome(
+            state=str(found['state']),
+            reason=str(found['reason']),
+            content=str(found['content']),
+            files=tuple(
+                (str(a), int(b), int(c), int(d), int(e)) for a, b, c, d, e in found['files']
+            ),
+        ),
+    )

@@ -1,0 +1,246 @@
+"""One recording of a batch: analysed, and written into a folder that says what it is of."""
+
+from __future__ import annotations
+
+import json
+import time
+import traceback
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+
+from nanorocks_ros.errors import NanorocksError, RecordingError, UnwritableError
+from nanorocks_ros.outputs.npz_archive import Arrays, write_archive, write_whole
+from nanorocks_ros.outputs.safe_text import shown
+from nanorocks_ros.recordings.bag.fingerprint import FileState, content_hash, file_states
+from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleSummary, cycles_of
+from nanorocks_ros.studies.analysis.offline_analysis import Analysis, analyse
+from nanorocks_ros.studies.analysis.results_folder import EVIDENCE, SUMMARY, write_results
+from nanorocks_ros.studies.analysis.results_json import as_json
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from nanorocks_ros.settings import PipelineSettings
+
+TROUBLE = 'trouble.txt'
+DONE, PARTIAL, FAILED, UNWRITTEN = 'done', 'partial', 'failed', 'unwritten'
+# How far a recording has come is said so often, [s].
+_NOTE = 1.0
+# Provenance kept of a recording: so many entries, each so long.
+_MOST_ENTRIES, _LONGEST = 100, 500
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BagTask:
+    """A recording to analyse.
+
+    Parameters
+    ----------
+    path : Path
+        Absolute; so are the others: a worker may be elsewhere.
+    folder : Path
+        For its results.
+    settings : PipelineSettings
+    image_topic : str
+    question : str
+        Hash of all else that results depend on.
+    note : Path
+        Where it says how far it has come: frames done and in all.
+    earlier : tuple of Path
+        Folders that may hold its results, from when it lay elsewhere.
+    """
+
+    path: Path
+    folder: Path
+    settings: PipelineSettings
+    image_topic: str
+    question: str
+    note: Path
+    earlier: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BagOutcome:
+    """What became of it.
+
+    Parameters
+    ----------
+    state : str
+        `DONE`; `PARTIAL`: there are results, but some frames could not be used; `FAILED`: there
+        are none; `UNWRITTEN`: none could be written.
+    reason : str
+        One line, unless it is done.
+    content : str
+        Hash of the recording; empty where it could not be read.
+    files : tuple of FileState
+    frames : int
+        Analysed by this call.
+    folder : str
+        Name of the folder of its results where that is not the one of the task.
+    """
+
+    state: str
+    reason: str = ''
+    content: str = ''
+    files: tuple[FileState, ...] = ()
+    frames: int = 0
+    folder: str = ''
+
+
+def analyse_bag(task: BagTask) -> BagOutcome:
+    """Analyse a recording and write its results, complete or not at all; it never raises."""
+    # The cores are busy with other recordings.
+    cv2.setNumThreads(1)
+    try:
+        return _analysed(task)
+    except UnwritableError as error:
+        return BagOutcome(state=UNWRITTEN, reason=shown(str(error)))
+    except NanorocksError as error:
+        return BagOutcome(state=FAILED, reason=shown(str(error)))
+    except MemoryError:
+        return BagOutcome(
+            state=FAILED, reason=f'{shown(task.path)}: takes more memory than is left'
+        )
+    except OSError as error:
+        return BagOutcome(
+            state=FAILED, reason=f'{shown(task.path)}: cannot be read ({error.strerror})'
+        )
+    except Exception as error:
+        # A fault of ours, or of a library, over one recording; the others know nothing of it.
+        place = task.folder.with_name(f'{task.folder.name}.{TROUBLE}')
+        with suppress(OSError):
+            place.write_text(traceback.format_exc(), 'utf-8', 'backslashreplace')
+        what = shown(' '.join(f'{type(error).__name__}: {error}'.split()))
+        return BagOutcome(
+            state=FAILED,
+            reason=f'{shown(task.path)}: cannot be analysed ({what}); please report {place}',
+        )
+    finally:
+        with suppress(OSError):
+            task.note.unlink(missing_ok=True)
+
+
+def _analysed(task: BagTask) -> BagOutcome:
+    files = file_states(task.path)
+    content = content_hash(task.path)
+    for folder in (task.folder, *task.earlier):
+        known = read_summary(folder)
+        if known is not None and (known['content'], known['question']) == (content, task.question):
+            other = '' if folder == task.folder else folder.name
+            return replace(_outcome(known, files), folder=other)
+    analysis = analyse(
+        task.path,
+        task.settings,
+        image_topic=task.image_topic,
+        progress=_noting(task.note),
+        scratch=task.folder.parent,
+    )
+    if file_states(task.path) != files:
+        raise RecordingError(
+            str(task.path), 'changed while it was analysed', 'analyse it again when it is complete'
+        )
+    summary = {
+        'format': 1,
+        'bag': str(task.path),
+        'content': content,
+        'film': analysis.metadata.get('source_sha256', ''),
+        'question': task.question,
+        **_summary(analysis),
+    }
+
+    def more(folder: Path) -> None:
+        for number, tray in summary['trays'].items():
+            tray['by_cycle'] = _cycles(folder, int(number))
+        write_archive(folder / EVIDENCE, _evidence(analysis))
+        write_whole(folder / SUMMARY, json.dumps(summary, allow_nan=False).encode())
+
+    write_results(analysis, task.folder, task.path, task.settings, more=more)
+    return replace(_outcome(summary, files), frames=analysis.frames)
+
+
+def _outcome(summary: dict[str, Any], files: tuple[FileState, ...]) -> BagOutcome:
+    return BagOutcome(
+        state=summary['state'],
+        reason=summary['reason'],
+        content=summary['content'],
+        files=files,
+    )
+
+
+def read_summary(folder: Path) -> dict[str, Any] | None:
+    """What a folder of results says it is of; None where it says nothing."""
+    try:
+        found = json.loads((folder / SUMMARY).read_text('utf-8'))
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) and found.get('format') == 1 else None
+
+
+def _noting(note: Path) -> Any:
+    last = 0.0
+
+    def progress(done: int, total: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= _NOTE:
+            last = now
+            # Nobody's results depend on it.
+            with suppress(OSError):
+                note.write_text(f'{done} {total}', 'ascii')
+
+    return progress
+
+
+def _summary(analysis: Analysis) -> dict[str, Any]:
+    found = as_json(analysis, series=False)
+    error = analysis.error
+    return {
+        **found,
+        'notices': [shown(one) for one in analysis.notices],
+        'state': DONE if error is None else PARTIAL,
+        'reason': '' if error is None else shown(str(error)),
+        'start_ns': min(analysis.stamps_ns),
+        'metadata': {
+            shown(key)[:_LONGEST]: shown(value)[:_LONGEST]
+            for key, value in list(analysis.metadata.items())[:_MOST_ENTRIES]
+        },
+    }
+
+
+def _cycles(folder: Path, tray: int) -> dict[str, list[dict[str, Any]]]:
+    """Cycles by each measure of cluster size that was known in the recording."""
+    if not (folder / f'tray_{tray}_speed.csv').is_file():
+        return {}
+    found = {}
+    for measure in SIZE_MEASURES:
+        cycles = cycles_of(folder, tray, measure)
+        if measure is SIZE_MEASURES[-1] or _any_size(cycles):
+            found[measure.column] = [_finite(one) for one in cycles]
+    return found
+
+
+def _any_size(cycles: list[CycleSummary]) -> bool:
+    return any(np.isfinite(one.cluster_size) for one in cycles)
+
+
+def _finite(cycle: CycleSummary) -> dict[str, Any]:
+    return {
+        name: None if isinstance(value, float) and not np.isfinite(value) else value
+        for name, value in asdict(cycle).items()
+    }
+
+
+def _evidence(analysis: Analysis) -> Arrays:
+    found: Arrays = {}
+    for number, results in analysis.trays.items():
+        if results.evidence is not None:
+            for name, values in results.evidence.arrays().items():
+                found[f'{number}/cor/{name}'] = values
+        for k, cycle in enumerate(results.sticking):
+            for name in ('times', 'speeds', 'bodies', 'merges'):
+                found[f'{number}/sticking/{k:05d}/{name}'] = getattr(cycle, name)
+    return found

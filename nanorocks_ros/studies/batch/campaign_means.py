@@ -1,0 +1,316 @@
+"""What all cycles of all recordings of a batch say together, tray by tray."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from nanorocks_ros.errors import FitError, RecordingError
+from nanorocks_ros.experiment.calibration_file import calibrated
+from nanorocks_ros.inference.cycle_likelihoods import Evidence
+from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
+from nanorocks_ros.numerics.sample_mean import mean_of
+from nanorocks_ros.outputs.npz_archive import read_archive
+from nanorocks_ros.pipeline.composition import TrayStages, trays_of
+from nanorocks_ros.records import Quality
+from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleSummary
+from nanorocks_ros.studies.analysis.long_term import Campaign, campaign_of
+from nanorocks_ros.studies.analysis.results_folder import EVIDENCE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.inference.cycle_likelihoods import MeanRestitution
+    from nanorocks_ros.inference.sticking.sticking_speed import StickingEstimate
+    from nanorocks_ros.settings import PipelineSettings
+    from nanorocks_ros.studies.batch.batch_analysis import BagResults
+
+# Of a cycle, what a mean is taken of.
+MEANS = {
+    'initial_speed': 'm/s',
+    'peak_speed': 'm/s',
+    'haff_time': 's',
+    'cycle_restitution': '1',
+    'paper_restitution': '1',
+    'cluster_size': '1',
+    'bodies': '1',
+    'onset': 's',
+}
+# Of these a decay that is too short tells nothing, and its fit anything: they are not part of a
+# mean unless they are known to this part of themselves.
+_FITTED, _WORST_FIT = ('initial_speed', 'haff_time'), 0.5
+# Less known than this nothing is: anything from 0 to 1 has a deviation of 0.29.
+_LEAST_KNOWN = 0.2
+
+
+class Mean(NamedTuple):
+    """Mean over cycles, its standard error, scatter of a cycle, and cycles that are known."""
+
+    mean: float
+    error: float
+    scatter: float
+    cycles: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrayMeans:
+    """All cycles of one tray.
+
+    Parameters
+    ----------
+    tray : int
+    recordings, cycles : int
+        With a cycle of this tray.
+    restitution : MeanRestitution or None
+        Of all cycles together; None where none was read.
+    sticking : StickingEstimate or None
+    means : dict of str to Mean
+        Of `MEANS`.
+    """
+
+    tray: int
+    recordings: int
+    cycles: int
+    restitution: MeanRestitution | None
+    sticking: StickingEstimate | None
+    means: dict[str, Mean]
+
+
+class CycleRow(NamedTuple):
+    """A cycle of a tray: name of its recording, and what is known of it."""
+
+    recording: str
+    tray: int
+    values: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Combined:
+    """A whole batch.
+
+    Parameters
+    ----------
+    trays : dict of int to TrayMeans
+    cycles : list of CycleRow
+        In order of recordings, trays, cycles.
+    campaign : Campaign or None
+        For its figure; None without a cycle.
+    size_unit : str
+        Of cluster sizes: ``1``, beads, or ``m`` where only correlation lengths are known.
+    notices : list of str
+    """
+
+    trays: dict[int, TrayMeans]
+    cycles: list[CycleRow]
+    campaign: Campaign | None
+    size_unit: str
+    notices: list[str]
+
+
+def combined(
+    results: Sequence[BagResults],
+    settings: PipelineSettings,
+    progress: Callable[[int, int], None] | None = None,
+) -> Combined:
+    """Put the cycles of all recordings together.
+
+    Parameters
+    ----------
+    results : sequence of BagResults
+        Each recording once, in order of time.
+    settings : PipelineSettings
+        By which all of them were analysed.
+    progress : callable, optional
+        Called with the steps done and the steps there are.
+    """
+    notices: list[str] = []
+    column, unit = _measure(results)
+    rows = [row for one in results for row in _rows(one, column)]
+    evidence, sticking = _added_up(results, notices, progress)
+    trays: dict[int, TrayMeans] = {}
+    settings = calibrated(settings)
+    for number, tray in trays_of(settings).items():
+        own = [one for one in rows if one.tray == number]
+        stages = TrayStages(settings, tray)
+        mean = None
+        if number in evidence:
+            try:
+                mean = stages.cooling.mean_of(evidence[number])
+            except FitError as error:
+                notices.append(str(error))
+        trays[number] = TrayMeans(
+            tray=number,
+            recordings=len({one.recording for one in own}),
+            cycles=len(own),
+            restitution=mean,
+            sticking=stages.clusters.together(sticking.get(number, [])),
+            means={name: _mean(own, name) for name in MEANS},
+        )
+    return Combined(
+        trays=trays,
+        cycles=rows,
+        campaign=_campaign(results, column),
+        size_unit=unit,
+        notices=notices,
+    )
+
+
+def _measure(results: Sequence[BagResults]) -> tuple[str, str]:
+    """The best measure of cluster sizes that every tray of every recording with cycles has.
+
+    Of a tray filmed at a wrong scale no size is known, and nobody else's is given up for that.
+    """
+    last = SIZE_MEASURES[-1]
+    trays = [
+        tray['by_cycle']
+        for one in results
+        for tray in one.summary['trays'].values()
+        if tray['by_cycle'].get(last.column)
+        and not any(cycle['quality'] & Quality.WRONG_SCALE for cycle in tray['cycles'])
+    ]
+    for one in SIZE_MEASURES:
+        if trays and all(one.column in tray for tray in trays):
+            return one.column, one.unit
+    return last.column, last.unit
+
+
+def _rows(one: BagResults, column: str) -> Iterable[CycleRow]:
+    for number, tray in one.summary['trays'].items():
+        by_cycle = {own['cycle']: own for own in tray['by_cycle'].get(column, [])}
+        for cycle in tray['cycles']:
+            own = by_cycle.get(cycle['cycle'], {})
+            values = {
+                **cycle,
+                'cycle_restitution': cycle['restitution'],
+                'peak_speed': own.get('peak_speed'),
+                'peak_speed_error': own.get('peak_speed_error'),
+                'cluster_size': own.get('cluster_size'),
+                'cluster_size_error': own.get('cluster_size_error'),
+            }
+            yield CycleRow(one.name, int(number), values)
+
+
+def _mean(rows: Sequence[CycleRow], name: str) -> Mean:
+    values = [one.values for one in rows]
+    if name in _FITTED:
+        values = [one for one in values if _fitted(one, name)]
+    mean, scatter, count = mean_of([one.get(name) for one in values])
+    error = scatter / math.sqrt(count) if count else math.nan
+    return Mean(mean=mean, error=error, scatter=scatter, cycles=count)
+
+
+def _fitted(values: Mapping[str, Any], name: str) -> bool:
+    value, error = values.get(name), values.get(f'{name}_error')
+    return value is not None and error is not None and error <= _WORST_FIT * value
+
+
+def _added_up(
+    results: Sequence[BagResults],
+    notices: list[str],
+    progress: Callable[[int, int], None] | None,
+) -> tuple[dict[int, Evidence], dict[int, list[StickingCycle]]]:
+    """One recording after the other: never more than one of them in memory."""
+    evidence: dict[int, Evidence] = {}
+    sticking: dict[int, list[StickingCycle]] = {}
+    for done, one in enumerate(results, start=1):
+        try:
+            arrays = read_archive(one.folder / EVIDENCE)
+            for number in map(int, one.summary['trays']):
+                own = _below(arrays, f'{number}/cor/')
+                if own:
+                    found = Evidence.from_arrays(own, str(one.folder / EVIDENCE))
+                    evidence[number] = evidence[number] + found if number in evidence else found
+                sticking.setdefault(number, []).extend(_sticking(arrays, number))
+        except (RecordingError, FitError, ValueError) as error:
+            notices.append(
+                f'{one.name}: is not part of what all cycles say together ({error}); delete '
+                f'{one.folder} and run the command again'
+            )
+        if progress is not None:
+            progress(done, len(results))
+    return evidence, sticking
+
+
+def _below(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[Any]]:
+    return {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
+
+
+def _sticking(arrays: Mapping[str, NDArray[Any]], number: int) -> list[StickingCycle]:
+    found: dict[str, dict[str, NDArray[Any]]] = {}
+    for name, values in _below(arrays, f'{number}/sticking/').items():
+        cycle, _, what = name.partition('/')
+        found.setdefault(cycle, {})[what] = values
+    names = {one.name for one in fields(StickingCycle)}
+    return [StickingCycle(**found[cycle]) for cycle in sorted(found) if names == {*found[cycle]}]
+
+
+def _campaign(results: Sequence[BagResults], column: str) -> Campaign | None:
+    measure = next(one for one in SIZE_MEASURES if one.column == column)
+    recordings = []
+    for one in results:
+        own = {
+            int(number): [
+                replace(_cycle(cycle), recording=one.name)
+                for cycle in tray['by_cycle'].get(column, [])
+            ]
+            for number, tray in one.summary['trays'].items()
+        }
+        recordings.append(own)
+    if not any(cycles for own in recordings for cycles in own.values()):
+        return None
+    return campaign_of(recordings, measure)
+
+
+def _cycle(values: Mapping[str, Any]) -> CycleSummary:
+    found: dict[str, Any] = {k: math.nan if v is None else v for k, v in values.items()}
+    return CycleSummary(**found)
+
+
+def means_as_json(one: TrayMeans) -> dict[str, Any]:
+    """What all cycles of a tray say, in SI; None where not known.
+
+    A restitution that is hardly known has an interval, but no value.
+    """
+    found: dict[str, Any] = {'recordings': one.recordings, 'cycles': one.cycles}
+    mean = one.restitution
+    vague = mean is None or not mean.restitution_error <= _LEAST_KNOWN
+    names = [
+        f'{which}{part}'
+        for which in ('restitution', 'wall_restitution')
+        for part in ('', '_error', '_lower', '_upper')
+    ]
+    values = asdict(mean) if mean is not None else {}
+    for name in names:
+        unknown = mean is None or (vague and name in ('restitution', 'restitution_error'))
+        found[name] = None if unknown else _known(values[name])
+    found |= {
+        'cycles_read': mean.cycles if mean else 0,
+        'tension': _known(mean.tension) if mean else None,
+        'rebounds': mean.rebounds if mean else 0,
+        'collisions': mean.collisions if mean else 0,
+    }
+    sticking = one.sticking
+    found |= {
+        'sticking_status': sticking.status.name.lower() if sticking else None,
+        'sticking_speed': _known(sticking.sticking_speed) if sticking else None,
+        'sticking_speed_lower': _known(sticking.lower) if sticking else None,
+        'sticking_speed_upper': _known(sticking.upper) if sticking else None,
+        'merges': sticking.merges if sticking else None,
+    }
+    for name, value in one.means.items():
+        found |= {
+            f'mean_{name}': _known(value.mean),
+            f'mean_{name}_error': _known(value.error),
+            f'{name}_scatter': _known(value.scatter),
+            f'{name}_cycles': value.cycles,
+        }
+    return found
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

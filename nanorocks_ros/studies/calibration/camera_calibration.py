@@ -1,0 +1,204 @@
+"""Calibration of the camera from a recording of the trays, and pictures that show one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from nanorocks_ros.errors import FrameError, RecordingError
+from nanorocks_ros.experiment.plate import Region
+from nanorocks_ros.experiment.view import Straight, View
+from nanorocks_ros.stages.preprocess.plate_search import guess_plate
+from nanorocks_ros.stages.preprocess.rectify import nodes_of, resample_color
+from nanorocks_ros.studies.calibration.plate_fit import PlateFit, fit_plate
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.calibration import Calibration
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.records import Frame
+    from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+
+# Pictures from all over the recording whose median shows the trays without what moves in them.
+_PICTURES = 31
+# Mean slope along the sides of the trays over that of the whole picture: chance gives about 2.
+_LEAST_CONTRAST = 2.5
+_FEWEST_EDGES = 0.6
+LARGEST_RESIDUAL_PX = 0.5
+_GREEN, _RED, _WHITE = (60, 220, 60), (60, 60, 240), (255, 255, 255)
+
+
+def calibrate(
+    frames: BagFrames, trays: Sequence[Tray], scale: tuple[float, float] | None = None
+) -> tuple[PlateFit, NDArray[np.uint8]]:
+    """Lens, pose of the plate and regions of the trays from a recording.
+
+    Parameters
+    ----------
+    frames : BagFrames
+    trays : sequence of Tray
+        All that are on the plate, each with its place.
+    scale : tuple of 2 floats, [px/m], optional
+        Between which the scale lies.
+
+    Returns
+    -------
+    PlateFit
+    ndarray of uint8, (height, width[, 3])
+        The picture that was fitted.
+
+    Raises
+    ------
+    RecordingError
+        When no trays are found, or they do not fit where they should be.
+    """
+    picture = still_picture(frames)
+    gray = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+    gray = np.asarray(gray, dtype=np.uint8)
+    guess = guess_plate(gray, trays, scale)
+    remedy = 'see that the whole plate is in the picture, or give its scale and --trays'
+    if guess is None or guess.contrast < _LEAST_CONTRAST:
+        raise RecordingError(frames.where, 'the trays are not found in the picture', remedy)
+    fit = fit_plate(gray.astype(np.float32), trays, guess)
+    if fit is None:
+        raise RecordingError(
+            frames.where, 'too few edges of the trays are seen to calibrate by', remedy
+        )
+    seen = len(fit.residuals) / fit.edges.expected
+    residual = fit.calibration.residual_px
+    if residual > LARGEST_RESIDUAL_PX or seen < _FEWEST_EDGES:
+        raise RecordingError(
+            frames.where,
+            f'the trays do not lie where they should: their edges are off by {residual:.2f} px '
+            f'(at most {LARGEST_RESIDUAL_PX} px), {100 * seen:.0f} % of them are seen',
+            remedy,
+        )
+    return fit, picture
+
+
+def still_picture(frames: BagFrames) -> NDArray[np.uint8]:
+    """Median over time of a recording: the scene without what moves in it.
+
+    Raises
+    ------
+    RecordingError
+        When there is no frame that can be used.
+    """
+    pictures = [frame.image for frame in _spread(frames)]
+    if not pictures:
+        raise RecordingError(frames.where, 'holds no frame that can be used', 'pass another')
+    size = pictures[0].shape
+    stack = [one for one in pictures if one.shape == size]
+    median = np.empty(size, dtype=np.uint8)
+    # Some rows at a time: all at once would take gigabytes.
+    for row in range(0, size[0], 64):
+        rows = slice(row, row + 64)
+        part = np.stack([one[rows] for one in stack])
+        part.partition(len(stack) // 2, axis=0)
+        median[rows] = part[len(stack) // 2]
+    return median
+
+
+def _spread(frames: BagFrames) -> Iterator[Frame]:
+    """Some of the frames, evenly spread over the recording, as bgr or gray."""
+    count = max(1, frames.count)
+    wanted = {int(one) for one in np.linspace(0, count - 1, min(_PICTURES, count))}
+    for number, frame in enumerate(frames.frames()):
+        if number not in wanted or isinstance(frame, FrameError):
+            continue
+        if frame.encoding == 'rgb8':
+            raise RecordingError(frames.where, 'holds rgb8 pictures', 'record bgr8 or JPEGs')
+        yield frame
+
+
+def rectified_picture(image: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
+    """The whole picture as the calibration straightens it.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, (height, width, 3), bgr
+    view : View
+    """
+    height, width = image.shape[:2]
+    nodes = nodes_of(Region(0, 0, width, height), view)
+    gray = np.empty((height, width), dtype=np.uint8)
+    color = np.empty((height, width, 3), dtype=np.uint8)
+    resample_color(
+        np.ascontiguousarray(image), nodes, (0.0, 0.0), np.zeros(3, np.int64), color, gray
+    )
+    return color
+
+
+def shown(
+    picture: NDArray[np.uint8], calibration: Calibration, trays: Sequence[Tray]
+) -> NDArray[np.uint8]:
+    """The calibration on a picture: straightened, with the regions and a scale drawn in.
+
+    Parameters
+    ----------
+    picture : ndarray of uint8, (height, width[, 3])
+    calibration : Calibration
+    trays : sequence of Tray
+
+    Returns
+    -------
+    ndarray of uint8, (height, width, 3), bgr
+    """
+    color = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if picture.ndim == 2 else picture
+    canvas = rectified_picture(np.asarray(color, dtype=np.uint8), calibration.view)
+    for number, region in calibration.regions.items():
+        corners = (region.x, region.y), (region.x + region.width, region.y + region.height)
+        # A line is drawn on pixels; the region ends between two of them.
+        cv2.rectangle(canvas, corners[0], (corners[1][0] - 1, corners[1][1] - 1), _GREEN, 1)
+        at = (region.x + 4, region.y - 8)
+        cv2.putText(canvas, f'tray {number}', at, 0, 0.6, _GREEN, 1, cv2.LINE_AA)
+    _draw_scale(canvas, calibration.pixels_per_metre)
+    return canvas
+
+
+def _draw_scale(canvas: NDArray[np.uint8], scale: float) -> None:
+    """A bar of a centimetre, in the lower left corner."""
+    length = round(0.01 * scale)
+    start = (30, canvas.shape[0] - 30)
+    cv2.line(canvas, start, (start[0] + length, start[1]), _WHITE, 2)
+    text = f'10 mm, {scale / 1e3:.2f} px/mm'
+    cv2.putText(canvas, text, (start[0], start[1] - 10), 0, 0.6, _WHITE, 1, cv2.LINE_AA)
+
+
+def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
+    """Write a picture; the name says how.
+
+    Raises
+    ------
+    RecordingError
+        When it cannot be written.
+    """
+    try:
+        done = cv2.imwrite(str(path), picture)
+    except cv2.error:
+        done = False
+    if not done:
+        raise RecordingError(str(path), 'cannot be written', 'name a .png in a folder that exists')
+
+
+def largest_bend(calibration: Calibration) -> float:
+    """How far the lens moves any corner of a tray, at most, [px]."""
+    corners = [
+        (region.x + a * region.width, region.y + b * region.height)
+        for region in calibration.regions.values()
+        for a in (0, 1)
+        for b in (0, 1)
+    ]
+    straight = View(
+        camera=Straight(width=calibration.info.width, height=calibration.info.height),
+        homography=calibration.view.homography,
+    )
+    points = np.array(corners, dtype=np.float64)
+    moved = calibration.view.source(points) - straight.source(points)
+    return float(np.hypot(moved[:, 0], moved[:, 1]).max())

@@ -1,0 +1,167 @@
+"""A decay of the mean projected speed, and how far each point of a sweep is from it."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.outputs.npz_archive import read_archive
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.settings import Scalar
+    from nanorocks_ros.studies.sweeps.sweep_result import Sweep
+
+_TIME, _SPEED, _ERROR = 'time', 'mean_projected_speed', 'mean_projected_speed_error'
+_FORM = f'give the columns {_TIME} [s], {_SPEED} [m/s] and, if known, {_ERROR} [m/s]'
+# Values that were written as decimals and meant to be equal.
+_EQUAL = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedCurve:
+    """Mean projected speed of a cooling gas.
+
+    Parameters
+    ----------
+    times : ndarray (n,), [s]
+        Since the shaking event; rising.
+    speed : ndarray (n,), [m/s]
+    error : ndarray (n,), [m/s]
+        One standard error; 0 where it is not known.
+    point : tuple of float, int, str or bool, or None
+        Where on the grid of a sweep the curve was taken from.
+    cycles : int or None
+        How many measured decays it is the mean of; None: it is simulated, or not known, and
+        `error` holds all of its scatter.
+    """
+
+    times: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    error: NDArray[np.float64]
+    point: tuple[Scalar, ...] | None = None
+    cycles: int | None = None
+
+
+def read_curve(path: Path) -> SpeedCurve:
+    """A curve from a CSV table, or from an ``.npz`` file such as a sweep of a single point.
+
+    Parameters
+    ----------
+    path : Path
+        Columns, or arrays, `time` (or `times`), `mean_projected_speed` and, if known,
+        `mean_projected_speed_error`, in SI units; a unit may follow in brackets.
+
+    Raises
+    ------
+    RecordingError
+        When the file cannot be read or holds no such curve.
+    """
+    columns = _arrays(path) if path.suffix == '.npz' else _table(path)
+    if _TIME not in columns or _SPEED not in columns:
+        raise RecordingError(str(path), 'holds no curve', _FORM)
+    times, speed = columns[_TIME], columns[_SPEED]
+    error = columns.get(_ERROR, np.zeros_like(times))
+    if not times.ndim == speed.ndim == error.ndim == 1 or not len(times) == len(speed) == len(
+        error
+    ):
+        raise RecordingError(
+            str(path), f'{_SPEED} has the shape {speed.shape}', 'name a file of one curve'
+        )
+    known = np.isfinite(times) & np.isfinite(speed)
+    times, speed, error = times[known], speed[known], np.nan_to_num(error[known])
+    if len(times) < 2 or (np.diff(times) <= 0.0).any():
+        raise RecordingError(str(path), 'its times do not rise', 'name a file of one decay')
+    return SpeedCurve(times=times, speed=speed, error=error)
+
+
+def _arrays(path: Path) -> dict[str, NDArray[np.float64]]:
+    found = read_archive(path)
+    numbers = {name: array for name, array in found.items() if array.dtype.kind in 'fiu'}
+    if 'times' in numbers:
+        numbers[_TIME] = numbers['times']
+    return {name: array.astype(np.float64) for name, array in numbers.items()}
+
+
+def _table(path: Path) -> dict[str, NDArray[np.float64]]:
+    try:
+        with path.open(encoding='utf-8', newline='') as stream:
+            header, *lines = [line for line in csv.reader(stream) if line]
+        names = [name.split('[')[0].strip() for name in header]
+        wanted = [k for k, name in enumerate(names) if name in (_TIME, _SPEED, _ERROR)]
+        values = [[float(line[k]) for k in wanted] for line in lines]
+    except OSError as error:
+        raise RecordingError(
+            str(path), f'cannot be read ({error.strerror})', 'name another file'
+        ) from error
+    except (ValueError, IndexError, csv.Error) as error:
+        raise RecordingError(str(path), 'is no table of numbers', _FORM) from error
+    columns = np.array(values, dtype=np.float64).reshape(len(values), len(wanted)).T
+    return {names[k]: column for k, column in zip(wanted, columns, strict=True)}
+
+
+def curve_at(sweep: Sweep, values: Sequence[Scalar]) -> SpeedCurve:
+    """The curve at a point of a sweep.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    values : sequence of float, int, str or bool, (n_axes,)
+
+    Raises
+    ------
+    ConfigurationError
+        When the grid has no such point.
+    """
+    place = place_of({axis.name: axis.values for axis in sweep.axes}, values)
+    return SpeedCurve(
+        times=sweep.times,
+        speed=sweep.mean_projected_speed[place],
+        error=np.nan_to_num(sweep.mean_projected_speed_error[place]),
+        point=tuple(axis.values[k] for axis, k in zip(sweep.axes, place, strict=True)),
+    )
+
+
+def place_of(axes: dict[str, tuple[Scalar, ...]], values: Sequence[Scalar]) -> tuple[int, ...]:
+    """Indices of a point of a grid.
+
+    Parameters
+    ----------
+    axes : dict of str to tuple
+        Names and values of the axes.
+    values : sequence of float, int, str or bool, (n_axes,)
+
+    Raises
+    ------
+    ConfigurationError
+        When the grid has no such point.
+    """
+    if len(values) != len(axes):
+        raise ConfigurationError(
+            '--reference',
+            f'{len(values)} values for {len(axes)} axes',
+            f'give one each for {", ".join(axes) or "no axis"}',
+        )
+    place = []
+    for (name, known), value in zip(axes.items(), values, strict=True):
+        found = [k for k, one in enumerate(known) if _equal(one, value)]
+        if not found:
+            shown = ', '.join(str(one) for one in known)
+            raise ConfigurationError('--reference', f'{name} {value}', f'choose one of {shown}')
+        place.append(found[0])
+    return tuple(place)
+
+
+def _equal(one: Scalar, other: Scalar) -> bool:
+    if isinstance(one, int | float) and isinstance(other, int | float):
+        return math.isclose(one, other, rel_tol=_EQUAL, abs_tol=_EQUAL)
+    return one == other

@@ -1,0 +1,191 @@
+"""The energy of each species of a mixture as it cools, and how they share it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.errors import FitError, RecordingError
+from nanorocks_ros.experiment.colours import COLOURS
+from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
+from nanorocks_ros.physics.haff_law import granular_energy, haff_speed
+from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED
+from nanorocks_ros.studies.decays.cooling_curves import check_errors, mean_cycle
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Species, Tray
+    from nanorocks_ros.studies.decays.cooling_curves import CycleSpeeds
+    from nanorocks_ros.studies.decays.decay_curve import SpeedCurve
+
+_NANOJOULE, _MM = 1e9, 1e3
+_MOST_GRAY = 255.0
+_UNKNOWN = (90.0, 90.0, 90.0)
+# Of a line over points of its own colour.
+_DARKER = 0.7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeciesEnergy:
+    """The decay of one species.
+
+    Parameters
+    ----------
+    species : Species
+    cycles : tuple of CycleSpeeds
+    curve : SpeedCurve
+        Their mean.
+    fit : HaffFit or None
+        None where the speeds do not fall.
+    """
+
+    species: Species
+    cycles: tuple[CycleSpeeds, ...]
+    curve: SpeedCurve
+    fit: HaffFit | None
+
+
+def species_energies(
+    tray: Tray,
+    cycles: Sequence[Sequence[CycleSpeeds]],
+    span: tuple[float, float],
+    origin: float = 0.0,
+) -> tuple[SpeciesEnergy, ...]:
+    """The decay of each species of a mixture, with a fit of Haff's law of its own.
+
+    Parameters
+    ----------
+    tray : Tray
+    cycles : sequence of sequences of CycleSpeeds
+        Of each species, in the order of `Tray.species`.
+    span : tuple of 2 floats, [s]
+        First and last time since the shaking event that is fitted.
+    origin : float, [s], optional
+        From when on the fitted times count, since the shaking event.
+
+    Returns
+    -------
+    tuple of SpeciesEnergy
+        Empty where speeds of two species are not known over that time.
+    """
+    found = []
+    for species, own in zip(tray.species, cycles, strict=False):
+        try:
+            curve = mean_cycle(own, *span)
+            check_errors(curve)
+        except RecordingError:
+            return ()
+        try:
+            beads = species.count * len(own)
+            fit: HaffFit | None = fit_haff(curve.times - origin, curve.speed, curve.error, beads)
+        except FitError:
+            fit = None
+        found.append(SpeciesEnergy(species=species, cycles=tuple(own), curve=curve, fit=fit))
+    return tuple(found) if len(found) > 1 else ()
+
+
+def relative_energy(speed: float, mass: float) -> float:
+    """Energy at twice the mean speed, [J], as the paper takes it."""
+    return granular_energy(RELATIVE_TO_MEAN_SPEED * speed, mass)
+
+
+def energy_ratio(found: Sequence[SpeciesEnergy]) -> tuple[float, float]:
+    """Energy of a bead of the first species over that of one of the second, and its error.
+
+    From the mean speeds and the masses of beads of the middle diameter; 1 were equipartition.
+
+    Parameters
+    ----------
+    found : sequence of SpeciesEnergy
+        Two.
+
+    Returns
+    -------
+    ratio, error : float
+        Mean over the time all cycles cover; the error is from the scatter of the cycles, NaN for
+        a single one.
+    """
+    first, second = (_log_energies(one) for one in found[:2])
+    ratio = math.exp(float(first.mean() - second.mean()))
+    if first.size != second.size or first.size < 2:
+        return ratio, math.nan
+    return ratio, ratio * float((first - second).std(ddof=1) / math.sqrt(first.size))
+
+
+def _log_energies(one: SpeciesEnergy) -> NDArray[np.float64]:
+    """Mean over the times of the logarithm of the energy in each cycle, (n_cycles,)."""
+    times = one.curve.times
+    logs = [np.log(np.interp(times, each.times, each.speed)).mean() for each in one.cycles]
+    return math.log(relative_energy(1.0, one.species.bead_mass)) + 2.0 * np.array(logs)
+
+
+def species_values(found: Sequence[SpeciesEnergy]) -> dict[str, Any]:
+    """What was fitted to each species, in SI, and how they share the energy; JSON has it."""
+    if not found:
+        return {'species': None, 'energy_ratio': None, 'energy_ratio_error': None}
+    ratio, error = energy_ratio(found)
+    return {
+        'species': [
+            {
+                'material': one.species.material,
+                'initial_speed': one.fit and one.fit.initial_speed,
+                'initial_speed_error': one.fit and one.fit.initial_speed_error,
+                'haff_time': one.fit and one.fit.haff_time,
+                'haff_time_error': one.fit and one.fit.haff_time_error,
+            }
+            for one in found
+        ],
+        'energy_ratio': ratio,
+        'energy_ratio_error': error if math.isfinite(error) else None,
+    }
+
+
+def draw_species(axes: Axes, found: Sequence[SpeciesEnergy], origin: float = 0.0) -> None:
+    """Energies of both species over time, each in its colour with its fit."""
+    for one, line in zip(found, ('-', '--'), strict=False):
+        curve, fit, name = one.curve, one.fit, one.species.material
+        scale = relative_energy(1.0, one.species.bead_mass) * _NANOJOULE
+        colour = np.array(COLOURS.get(name, _UNKNOWN))[::-1] / _MOST_GRAY
+        axes.errorbar(
+            curve.times,
+            scale * curve.speed**2,
+            yerr=2.0 * scale * curve.speed * curve.error,
+            fmt='o',
+            ms=2.5,
+            lw=0.8,
+            alpha=0.5,
+            color=tuple(colour),
+            label=f'{name}: the speeds do not fall' if fit is None else None,
+        )
+        if fit is None:
+            continue
+        axes.plot(
+            curve.times,
+            scale * haff_speed(curve.times - origin, fit.initial_speed, fit.haff_time) ** 2,
+            line,
+            lw=2,
+            color=tuple(_DARKER * colour),
+            label=f'{name}: {_fit_text(fit)}',
+        )
+    ratio, error = energy_ratio(found)
+    names = ' bead over that of one '.join(one.species.material for one in found)
+    spread = f' ± {error:.2f}' if math.isfinite(error) else ''
+    axes.set_title(f'Energy of one {names} bead: {ratio:.2f}{spread}', fontsize=10)
+    axes.set_yscale('log')
+    axes.set_ylabel(r'the same of each species, its own $m$ and $\bar{v}$ [nJ]')
+    axes.legend(frameon=False, fontsize=9)
+    axes.grid(alpha=0.25)
+
+
+def _fit_text(fit: HaffFit) -> str:
+    return (
+        f'v0 {fit.initial_speed * _MM:.2f} ± {fit.initial_speed_error * _MM:.2f} mm/s, '
+        f'tau {fit.haff_time:.2f} ± {fit.haff_time_error:.2f} s'
+    )

@@ -1,0 +1,274 @@
+"""The figure of a measured decay after the paper's figure 7."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from scipy import optimize
+
+from nanorocks_ros.errors import ConfigurationError, FitError
+from nanorocks_ros.inference.decay.confined_decay import confined_restitution
+from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
+from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.physics.error_propagation import Estimate
+from nanorocks_ros.physics.haff_law import haff_speed
+from nanorocks_ros.physics.paper_formulas import paper_restitution
+from nanorocks_ros.studies.decays.best_fit_decay import LibraryDecay, library_decay
+from nanorocks_ros.studies.decays.cooling_curves import check_errors, mean_cycle
+from nanorocks_ros.studies.decays.species_energy import (
+    draw_species,
+    relative_energy,
+    species_energies,
+    species_values,
+)
+
+mpl.use('Agg')
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.studies.decays.cooling_curves import CycleSpeeds
+    from nanorocks_ros.studies.decays.decay_curve import SpeedCurve
+
+_NANOJOULE = 1e9
+_MEASURED, _FIT, _PAPER, _LIBRARY = '#30506f', '#c23b22', '#e8b93c', '#000000'
+
+
+def decay_figure(
+    path: Path,
+    tray: Tray,
+    cycles: Sequence[CycleSpeeds],
+    *,
+    wall_restitution: float,
+    span: tuple[float, float],
+    species: Sequence[Sequence[CycleSpeeds]] = (),
+    start: float = 0.0,
+) -> dict[str, Any]:
+    """The energy of each cycle and of their mean, with our fit, the library's and the paper's.
+
+    Of a mixture the energy of each species is drawn below, with a fit of its own.
+
+    Parameters
+    ----------
+    path : Path
+    tray : Tray
+    cycles : sequence of CycleSpeeds
+    wall_restitution : float, [0, 1]
+        For the confined theory.
+    span : tuple of 2 floats, [s]
+        First and last time since the shaking event that is fitted.
+    species : sequence of sequences of CycleSpeeds, optional
+        The cycles of each species of a mixture, in the order of `Tray.species`.
+    start : float, [s], optional
+        From when on the gas cools, since the shaking event: initial speeds are those of then,
+        unless `span` begins before it.
+
+    Returns
+    -------
+    dict
+        What was fitted, in SI; None where a relation has no value, or the tray no library.
+
+    Raises
+    ------
+    FitError
+        When the mean speed does not fall.
+    RecordingError
+        When the cycles have too few times in common, or errors are not known.
+
+    References
+    ----------
+    [B19] fig. 7.
+    """
+    curve = mean_cycle(cycles, *span)
+    check_errors(curve)
+    origin = min(start, span[0])
+    age = curve.times - origin
+    fit = fit_haff(age, curve.speed, curve.error, tray.count * len(cycles))
+    energy, time = _paper_fit(age, curve.speed, tray.mean_mass)
+    found: dict[str, Any] = _values(tray, fit, (energy, time), wall_restitution)
+    library = _library(tray, cycles, curve, start)
+    each = species_energies(tray, species, span, origin)
+    figure = Figure(figsize=(8.0, 9.0 if each else 5.5), layout='constrained')
+    panels = figure.subplots(2 if each else 1, 1, sharex=True, squeeze=False)[:, 0]
+    _draw_energy(panels[0], tray, cycles, curve)
+    _draw_laws(panels[0], tray, (curve.times, age), (fit, energy, time), found)
+    _draw_library(panels[0], tray, library)
+    panels[0].legend(frameon=False, fontsize=9)
+    for one in panels[1:]:
+        draw_species(one, each, origin)
+    panels[-1].set_xlabel('time since the shaking event [s]')
+    panels[0].set_title(
+        f'Tray {tray.number}, {len(cycles)} cycle{"s" if len(cycles) > 1 else ""}: '
+        f'1/(v0 tau) = {fit.decay_rate:.3g} ± {fit.decay_rate * fit.log_decay_rate_error:.2g} /m',
+        fontsize=10,
+    )
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=110)
+    return {
+        **found,
+        'cooling_start': origin,
+        'library': None if library is None else _library_values(library),
+        **species_values(each),
+    }
+
+
+def _library(
+    tray: Tray, cycles: Sequence[CycleSpeeds], curve: SpeedCurve, start: float
+) -> LibraryDecay | None:
+    try:
+        return library_decay(tray, cycles, curve, start)
+    except (ConfigurationError, FitError):
+        # Another tray than those flown; too short a decay.
+        return None
+
+
+def _library_values(library: LibraryDecay) -> dict[str, float]:
+    found = {'initial_speed': library.initial_speed}
+    for name in ('restitution', 'wall_restitution'):
+        value, lower, upper = getattr(library, name)
+        found |= {name: value, f'{name}_lower': lower, f'{name}_upper': upper}
+    return found
+
+
+def _draw_laws(
+    axes: Axes,
+    tray: Tray,
+    times: tuple[NDArray[np.float64], NDArray[np.float64]],
+    fits: tuple[HaffFit, float, float],
+    found: dict[str, Any],
+) -> None:
+    """Our fit of Haff's law and the paper's (its energy [J] and time [s]).
+
+    Times are those since the shaking event and since the gas began to cool.
+    """
+    fit, energy, time = fits
+    shown, age = times
+    scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
+    law = haff_speed(age, fit.initial_speed, fit.haff_time)
+    label = f"Haff's law, speeds weighted: {_cor_text('confined theory', found, 'confined')}"
+    axes.plot(shown, scale * law**2, color=_FIT, lw=2, zorder=3, label=label)
+    axes.plot(
+        shown,
+        _NANOJOULE * energy / (1.0 + age / time) ** 2,
+        color=_PAPER,
+        lw=2,
+        ls='--',
+        zorder=4,
+        label=f'as the paper fits, energies alike: {_cor_text("its COR", found, "paper")}',
+    )
+
+
+def _draw_library(axes: Axes, tray: Tray, library: LibraryDecay | None) -> None:
+    if library is None:
+        return
+    scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
+    axes.plot(
+        library.times,
+        scale * library.speed**2,
+        color=_LIBRARY,
+        lw=1.6,
+        ls=':',
+        zorder=5,
+        label=f'simulated decays: COR {_interval(library.restitution)}, '
+        f'walls {_interval(library.wall_restitution)}',
+    )
+
+
+def _interval(values: tuple[float, float, float]) -> str:
+    value, lower, upper = values
+    return f'{value:.3f} [{lower:.3f}, {upper:.3f}]'
+
+
+def _paper_fit(
+    times: NDArray[np.float64], speed: NDArray[np.float64], mass: float
+) -> tuple[float, float]:
+    """T0 [J] and tau0 [s] of the paper's fit: least squares of the energies, all alike."""
+    scale = relative_energy(1.0, mass)
+    energies = scale * speed**2
+
+    def residual(logs: NDArray[np.float64]) -> NDArray[np.float64]:
+        law = np.exp(logs[0]) / (1.0 + times * np.exp(-logs[1])) ** 2
+        difference: NDArray[np.float64] = (energies - law) / energies[0]
+        return difference
+
+    start = np.log([energies[0], 0.3 * times[-1] + 1e-9])
+    best = optimize.least_squares(residual, start).x
+    return float(np.exp(best[0])), float(np.exp(best[1]))
+
+
+def _values(
+    tray: Tray, fit: HaffFit, paper: tuple[float, float], walls: float
+) -> dict[str, float | None]:
+    rate = fit.decay_rate
+    error = rate * fit.log_decay_rate_error
+    found: dict[str, float | None] = {
+        'initial_speed': fit.initial_speed,
+        'haff_time': fit.haff_time,
+        'decay_rate': rate,
+        'decay_rate_error': error,
+        'paper_energy': paper[0],
+        'paper_haff_time': paper[1],
+        'paper': None,
+        'confined': None,
+        'confined_error': None,
+        'wall_restitution': walls,
+    }
+    try:
+        found['paper'] = paper_restitution(
+            *paper, tray.mean_mass, tray.diameter, tray.number_density
+        )
+    except FitError:
+        found['paper'] = None
+    try:
+        cor = confined_restitution(tray, Estimate(value=rate, error=error), walls)
+    except FitError:
+        return found
+    return {**found, 'confined': cor.value, 'confined_error': cor.error}
+
+
+def _cor_text(name: str, found: dict[str, float | None], key: str) -> str:
+    value, error = found[key], found.get(f'{key}_error')
+    if value is None:
+        return f'{name} has no value'
+    walls = f', walls {found["wall_restitution"]:g}' if key == 'confined' else ''
+    return f'{name} {value:.3f}' + (f' ± {error:.3f}' if error else '') + walls
+
+
+def _draw_energy(axes: Axes, tray: Tray, cycles: Sequence[CycleSpeeds], curve: SpeedCurve) -> None:
+    scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
+    if len(cycles) > 1:
+        lines = [np.column_stack((one.times, scale * one.speed**2)) for one in cycles]
+        axes.add_collection(
+            LineCollection(
+                lines,
+                colors=_MEASURED,
+                linewidths=0.7,
+                alpha=max(0.06, min(0.5, 4.0 / len(cycles))),
+                label=f'{len(cycles)} cycles',
+            )
+        )
+    axes.errorbar(
+        curve.times,
+        scale * curve.speed**2,
+        yerr=2.0 * scale * curve.speed * curve.error,
+        fmt='o',
+        ms=2.5,
+        lw=0.8,
+        color=_MEASURED,
+        zorder=2,
+        label='at their mean speed' if len(cycles) > 1 else 'measured',
+    )
+    axes.set_yscale('log')
+    # Noise about zero reaches down without end.
+    axes.set_ylim(bottom=0.3 * scale * float(curve.speed.min()) ** 2)
+    axes.set_ylabel(r'energy at the relative speed $\frac{1}{2} m (2\bar{v})^2$ [nJ]')
+    axes.grid(alpha=0.25)

@@ -1,0 +1,159 @@
+"""Pictures of results, for people."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+import numpy as np
+
+from nanorocks_ros.physics.haff_law import granular_energy, haff_speed
+from nanorocks_ros.records import CorRelation, CorStatus
+from nanorocks_ros.wire.array_layouts import NS
+
+mpl.use('Agg')
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.records import CorEstimate, GroundTruth, SpeedEstimate
+
+_MM = 1e3
+_NANOJOULE = 1e9
+_MEASURED, _FIT, _TRUTH = '#30506f', '#c23b22', '#8a8a8a'
+
+
+def cooling_figure(
+    path: Path,
+    tray: Tray,
+    speeds: Sequence[SpeedEstimate],
+    cors: Sequence[CorEstimate],
+    truth: Sequence[GroundTruth] = (),
+) -> None:
+    """The decay of one cycle, its fit, and the restitution as it converged, as a PNG.
+
+    Parameters
+    ----------
+    path : Path
+    tray : Tray
+    speeds, cors, truth : sequences of records
+        Of one cycle, in order of time; `cors` must not be empty.
+
+    References
+    ----------
+    Upper panel after [B19] fig. 7.
+    """
+    figure = Figure(figsize=(8.0, 7.5), layout='constrained')
+    energy, convergence = figure.subplots(2, 1, height_ratios=(3, 2), sharex=True)
+    start_ns = next(one.cycle_start_ns for one in speeds if one.cycle_start_ns is not None)
+    _draw_energy(energy, tray, (speeds, cors, truth), start_ns)
+    _draw_convergence(convergence, cors, truth, start_ns)
+    figure.savefig(path, dpi=110)
+
+
+def _draw_energy(
+    axes: Axes,
+    tray: Tray,
+    records: tuple[Sequence[SpeedEstimate], Sequence[CorEstimate], Sequence[GroundTruth]],
+    start_ns: int,
+) -> None:
+    speeds, cors, truth = records
+    mass = tray.mean_mass
+
+    def energy(values: Sequence[float]) -> list[float]:
+        return [granular_energy(v, mass) * _NANOJOULE for v in values]
+
+    if truth:
+        axes.plot(
+            [(one.stamp_ns - start_ns) / NS for one in truth],
+            energy([one.mean_projected_speed for one in truth]),
+            color=_TRUTH,
+            lw=3,
+            alpha=0.6,
+            label='truth (simulator)',
+        )
+    time = np.array([(one.stamp_ns - start_ns) / NS for one in speeds])
+    axes.plot(
+        time,
+        energy([one.mean_projected_speed for one in speeds]),
+        'o',
+        ms=3.5,
+        color=_MEASURED,
+        label='from the frames',
+    )
+    last = cors[-1]
+    if math.isfinite(last.haff_time):
+        begin = last.cooling_start if math.isfinite(last.cooling_start) else 0.0
+        line = np.linspace(begin, max(time), 300)
+        fitted = haff_speed(line - begin, last.initial_speed, last.haff_time)
+        axes.plot(
+            line,
+            energy(list(fitted)),
+            color=_FIT,
+            lw=1.8,
+            label=f"Haff's law, $v_0$ = {last.initial_speed * _MM:.2f} mm/s, "
+            rf'$\tau$ = {last.haff_time:.2f} s',
+        )
+    axes.set_yscale('log')
+    axes.set_ylabel(r'energy per bead $\frac{1}{2} m \bar{v}^2$ [nJ]')
+    axes.set_title(f'Tray {tray.number}, cycle {last.cycle}: cooling after the shaking event')
+    axes.legend(frameon=False)
+    axes.grid(alpha=0.25)
+
+
+def _draw_convergence(
+    axes: Axes, cors: Sequence[CorEstimate], truth: Sequence[GroundTruth], start_ns: int
+) -> None:
+    known = [one for one in cors if one.status is not CorStatus.NO_DECAY]
+    by_paper = bool(cors) and cors[-1].relation is CorRelation.PAPER
+    time = [(one.stamp_ns - start_ns) / NS for one in known]
+    axes.fill_between(
+        time,
+        [one.restitution_lower for one in known],
+        [one.restitution_upper for one in known],
+        color=_FIT,
+        alpha=0.2,
+        lw=0,
+        label='interval (statistics only)' if by_paper else 'interval',
+    )
+    axes.plot(
+        time,
+        [one.restitution for one in known],
+        '-o',
+        ms=3,
+        color=_FIT,
+        label=_name(known[-1], by_paper) if known else None,
+    )
+    if truth:
+        axes.axhline(
+            truth[-1].restitution,
+            color=_TRUTH,
+            lw=2,
+            ls='--',
+            label=f'truth: {truth[-1].restitution:g}',
+        )
+    axes.set_xlabel('time since the shaking event [s]')
+    axes.set_ylabel('coefficient of restitution')
+    if not by_paper:
+        axes.plot(
+            time,
+            [one.paper_restitution for one in known],
+            ':',
+            lw=1.2,
+            color=_MEASURED,
+            label='closed form of the paper',
+        )
+    axes.set_ylim(top=1.005)
+    axes.legend(frameon=False, loc='lower right')
+    axes.grid(alpha=0.25)
+
+
+def _name(last: CorEstimate, by_paper: bool) -> str:
+    what = 'closed form of the paper' if by_paper else 'from simulated decays'
+    return f'{what}: {last.restitution:.3f}'

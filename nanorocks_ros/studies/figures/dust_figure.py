@@ -1,0 +1,237 @@
+"""Sticking thresholds against mass beside published collision models, as the paper's figure 14."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.physics.dust_models import (
+    ALWAYS_BOUNCING,
+    BOUNCING_SLOPE,
+    BOUNCING_SLOPE_SOURCE,
+    CURVES,
+    MILLIMETRE_STICKS_BELOW,
+    PAPER_STICKING_SPEEDS,
+    STICKING_SEEN,
+    UNVERIFIED,
+    MeasuredThreshold,
+)
+
+mpl.use('Agg')
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+
+    from nanorocks_ros.experiment.trays import Tray
+
+_MM, _MG = 1e3, 1e6
+_PAPER, _MEASURED, _CURVE, _SLOPE, _SEEN = '#e8b93c', '#c23b22', '#7a7a7a', '#30506f', '#4c8c5b'
+PAPER_SOURCE = 'the paper, twice the mean speed at its onset'
+_MASSES = 1e-10, 1e-3
+# The part of the masses over which a slope without a height is shown.
+_SLOPE_SPAN = 12.0
+
+
+def threshold_of_tray(
+    tray: Tray,
+    speed: float,
+    interval: tuple[float, float] | None = None,
+    source: str = 'measured',
+) -> MeasuredThreshold:
+    """A threshold [m/s] and its interval, at the masses of the beads of a tray.
+
+    Raises
+    ------
+    ConfigurationError
+        For numbers that are not positive, or an interval that does not hold the threshold.
+    """
+    masses = [one.bead_mass for one in tray.species]
+    lower, upper = (speed, speed) if interval is None else interval
+    return MeasuredThreshold(
+        tray=tray.number,
+        mass=tray.mean_mass,
+        lightest=min(masses),
+        heaviest=max(masses),
+        speed=speed,
+        lower=lower,
+        upper=upper,
+        source=source,
+    )
+
+
+def paper_thresholds(trays: Mapping[int, Tray]) -> tuple[MeasuredThreshold, ...]:
+    """Those that the paper gives, of the trays that are there."""
+    return tuple(
+        threshold_of_tray(trays[number], speed, source=PAPER_SOURCE)
+        for number, speed in PAPER_STICKING_SPEEDS.items()
+        if number in trays
+    )
+
+
+def dust_figure(path: Path, points: Sequence[MeasuredThreshold]) -> dict[str, Any]:
+    """Draw thresholds against mass, with every published curve, unverified ones marked.
+
+    Parameters
+    ----------
+    path : Path
+    points : sequence of MeasuredThreshold
+        One or more.
+
+    Returns
+    -------
+    dict
+        The points, and what the published curves say at their masses; SI units.
+
+    Raises
+    ------
+    ConfigurationError
+        For no point.
+    RecordingError
+        When the picture cannot be written.
+
+    References
+    ----------
+    [B19] fig. 14.
+    """
+    if not points:
+        raise ConfigurationError('thresholds', 'there is none', 'give one with --measured')
+    figure = Figure(figsize=(8.5, 6.0), layout='constrained')
+    axes = figure.subplots()
+    _draw_published(axes, points)
+    _draw_points(axes, points)
+    axes.set_xscale('log')
+    axes.set_yscale('log')
+    axes.set_xlim(*(_MG * one for one in _MASSES))
+    axes.set_ylim(0.02, 2000.0)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter('{x:g}')
+    axes.set_xlabel('mass of a particle [mg]')
+    axes.set_ylabel('relative speed [mm/s]')
+    axes.set_title('Sticking thresholds and published collision models', fontsize=10)
+    axes.legend(frameon=False, fontsize=8.5, loc='upper right')
+    axes.grid(alpha=0.25)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=110)
+    return {'points': [_as_dict(one) for one in points], 'curves': _curves_as_dict()}
+
+
+def _as_dict(point: MeasuredThreshold) -> dict[str, Any]:
+    return {
+        'tray': point.tray,
+        'source': point.source,
+        'mass': point.mass,
+        'lightest': point.lightest,
+        'heaviest': point.heaviest,
+        'sticking_speed': point.speed,
+        'sticking_speed_lower': point.lower,
+        'sticking_speed_upper': point.upper,
+        'all_bounce_above': float(ALWAYS_BOUNCING.threshold(point.mass)),
+        'all_bounce_above_verified': ALWAYS_BOUNCING.verified,
+    }
+
+
+def _curves_as_dict() -> list[dict[str, Any]]:
+    return [
+        {
+            'name': one.name,
+            'mass': one.mass,
+            'speed': one.speed,
+            'exponent': one.exponent,
+            'source': one.source,
+            'verified': one.verified,
+        }
+        for one in CURVES
+    ]
+
+
+def _draw_published(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
+    masses = np.geomspace(*_MASSES, 50)
+    for curve, style in zip(CURVES, ('--', ':'), strict=True):
+        axes.plot(
+            _MG * masses,
+            _MM * curve.threshold(masses),
+            style,
+            color=_CURVE,
+            lw=1.6,
+            label=curve.label,
+        )
+        if not curve.verified:
+            # On the curve as well: a legend can be cut off.
+            place = 1.5e-10
+            axes.annotate(
+                f'{curve.name} ({UNVERIFIED})',
+                (_MG * place, _MM * float(curve.threshold(place))),
+                xytext=(0, 7),
+                textcoords='offset points',
+                fontsize=8,
+                color=_CURVE,
+                va='bottom',
+            )
+    axes.axhspan(
+        _MM * STICKING_SEEN.lower,
+        _MM * STICKING_SEEN.upper,
+        color=_SEEN,
+        alpha=0.12,
+        lw=0,
+        label=f'{STICKING_SEEN.name}: {STICKING_SEEN.source}',
+    )
+    axes.axhline(
+        _MM * MILLIMETRE_STICKS_BELOW,
+        color=_SEEN,
+        lw=1.2,
+        label=f'aggregates of a millimetre always stick below: {STICKING_SEEN.source}',
+    )
+    middle = np.exp(np.mean(np.log([(one.mass, one.speed) for one in points]), axis=0))
+    ends = middle[0] * np.array([1.0 / _SLOPE_SPAN, _SLOPE_SPAN])
+    axes.plot(
+        _MG * ends,
+        _MM * middle[1] * (ends / middle[0]) ** BOUNCING_SLOPE,
+        '-.',
+        color=_SLOPE,
+        lw=1.3,
+        label=f'slope only, {BOUNCING_SLOPE:g}, at a height of ours: {BOUNCING_SLOPE_SOURCE}',
+    )
+
+
+def _draw_points(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
+    labelled: set[str] = set()
+    for one in points:
+        of_paper = one.source == PAPER_SOURCE
+        colour = _PAPER if of_paper else _MEASURED
+        axes.errorbar(
+            _MG * one.mass,
+            _MM * one.speed,
+            xerr=_MG * np.array([[one.mass - one.lightest], [one.heaviest - one.mass]]),
+            yerr=_MM * np.array([[one.speed - one.lower], [one.upper - one.speed]]),
+            fmt='D' if of_paper else 'o',
+            ms=7,
+            mec='black',
+            mew=0.6,
+            color=colour,
+            ecolor='black',
+            elinewidth=0.8,
+            capsize=2,
+            zorder=5,
+            label=None if one.source in labelled else f'{one.source} (bar: masses in the tray)',
+        )
+        labelled.add(one.source)
+        above = one.speed == max(other.speed for other in points)
+        left = one.mass == min(other.mass for other in points) and not above
+        axes.annotate(
+            f'tray {one.tray}',
+            (_MG * one.mass, _MM * one.speed),
+            xytext=(-6 if left else 6, 7 if above else -14),
+            textcoords='offset points',
+            ha='right' if left else 'left',
+            fontsize=8.5,
+            bbox={'facecolor': 'white', 'alpha': 0.7, 'lw': 0, 'pad': 0.5},
+            zorder=6,
+        )

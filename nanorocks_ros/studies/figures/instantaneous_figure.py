@@ -1,0 +1,192 @@
+"""The figure of restitution against speed after the paper's figure 13."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+
+from nanorocks_ros.inference.decay.instantaneous_restitution import instantaneous_cor
+from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.physics.confined_theory import confined_gas
+from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED
+from nanorocks_ros.studies.decays.cooling_curves import check_errors, mean_cycle
+
+mpl.use('Agg')
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.inference.decay.instantaneous_restitution import InstantaneousCor
+    from nanorocks_ros.studies.decays.cooling_curves import CycleSpeeds
+
+_MM = 1e3
+# Of a few cycles longer stretches are needed to see a slope.
+_WINDOWS, _MANY = 8, 6
+_MEASURED, _FIT, _BAND = '#30506f', '#c23b22', '#e0a458'
+
+
+def instantaneous_figure(
+    path: Path,
+    tray: Tray,
+    cycles: Sequence[CycleSpeeds],
+    *,
+    wall_restitution: float,
+    span: tuple[float, float],
+) -> InstantaneousCor:
+    """Restitution against speed: the paper's estimate, what noise alone makes of it, and ours.
+
+    Parameters
+    ----------
+    path : Path
+    tray : Tray
+    cycles : sequence of CycleSpeeds
+    wall_restitution : float, [0, 1]
+        For the local slopes; taken for known.
+    span : tuple of 2 floats, [s]
+        First and last time since the shaking event that is used.
+
+    Raises
+    ------
+    ConfigurationError
+        When the tray is too crowded for the confined theory, or the decay too short.
+    FitError
+        When the mean speed does not fall.
+    RecordingError
+        When the cycles have too few times in common, or errors are not known.
+
+    References
+    ----------
+    [B19] fig. 13.
+    """
+    curve = mean_cycle(cycles, *span)
+    check_errors(curve)
+    found = instantaneous_cor(
+        (curve.times, curve.speed, curve.error),
+        tray,
+        confined_gas(tray),
+        wall_restitution=wall_restitution,
+        cycles=len(cycles),
+        windows=_WINDOWS if len(cycles) >= _MANY else _WINDOWS // 2,
+    )
+    figure = Figure(figsize=(9.0, 8.0), layout='constrained')
+    above, below = figure.subplots(2, 1, sharex=True)
+    _draw_paper(above, found)
+    _draw_local(below, found, wall_restitution)
+    above.set_title(
+        f'Tray {tray.number}, '
+        + (f'mean over {len(cycles)} cycles' if len(cycles) > 1 else 'one cycle'),
+        fontsize=10,
+    )
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=110)
+    return found
+
+
+def _draw_paper(axes: Axes, found: InstantaneousCor) -> None:
+    speed = found.fitted_collision_speed * _MM
+    fluctuating, noise = found.noise_and_gas, found.noise
+    axes.fill_between(
+        speed,
+        fluctuating[0],
+        fluctuating[3],
+        color=_BAND,
+        alpha=0.3,
+        lw=0,
+        label='95 % of what noise and the fluctuations of so few beads make of one restitution',
+    )
+    axes.fill_between(
+        speed,
+        noise[0],
+        noise[3],
+        color=_BAND,
+        alpha=0.6,
+        lw=0,
+        label='95 % with the errors of the speeds alone',
+    )
+    axes.plot(
+        speed,
+        found.paper,
+        'o',
+        ms=3.5,
+        color=_MEASURED,
+        label="the paper's estimate, from speeds 1 s apart",
+    )
+    axes.axhline(1.0, color='black', lw=0.7)
+    low, high = np.nanmin(fluctuating[0]), min(float(np.nanmax(fluctuating[3])), 2.5)
+    margin = 0.35 * (high - low)
+    axes.set_ylim(max(0.0, float(low) - margin), high + margin)
+    axes.set_ylabel("COR by the paper's logarithm")
+    axes.legend(frameon=False, fontsize=9)
+    axes.grid(alpha=0.25)
+
+
+def _draw_local(axes: Axes, found: InstantaneousCor, walls: float) -> None:
+    local = found.local
+    known = np.isfinite(local.restitution)
+    value = np.where(known, local.restitution, 0.5 * (local.lower + local.upper))
+    spread = np.stack((value - local.lower, local.upper - value))
+    axes.errorbar(
+        RELATIVE_TO_MEAN_SPEED * local.speed[known] * _MM,
+        value[known],
+        yerr=np.maximum(spread[:, known], 0.0),
+        fmt='o',
+        ms=6,
+        capsize=3,
+        color=_FIT,
+        label=f'slope of 1/v through the confined theory, walls {walls:g}',
+    )
+    if not known.all():
+        axes.vlines(
+            RELATIVE_TO_MEAN_SPEED * local.speed[~known] * _MM,
+            local.lower[~known],
+            local.upper[~known],
+            color=_FIT,
+            alpha=0.4,
+            label='no value; this range is allowed',
+        )
+    if np.isfinite(found.whole):
+        label = f'the same from the whole decay, {found.whole:.3f}'
+        axes.axhline(found.whole, color=_FIT, lw=1.2, ls='--', label=label)
+    axes.axhline(1.0, color='black', lw=0.7)
+    axes.set_ylim(max(0.0, float(local.lower.min()) - 0.05), 1.05)
+    axes.set_ylabel('COR by the local slope')
+    axes.set_xlabel('collision speed, twice the mean speed by the fit [mm/s]')
+    axes.set_xscale('log')
+    axes.xaxis.set_major_formatter('{x:g}')
+    axes.xaxis.set_minor_formatter('{x:g}')
+    # All numbers on one line.
+    axes.tick_params(axis='x', which='both', length=4, pad=4)
+    axes.legend(frameon=False, fontsize=9)
+    axes.grid(alpha=0.25)
+
+
+def instantaneous_values(found: InstantaneousCor) -> dict[str, Any]:
+    """What was found, in SI, as JSON has it: None for NaN."""
+    local = found.local
+    arrays = {
+        'collision_speed': found.collision_speed,
+        'paper_restitution': found.paper,
+        'noise_95': found.noise[[0, 3]],
+        'noise_and_gas_95': found.noise_and_gas[[0, 3]],
+        'local_speed': local.speed,
+        'local_decay_rate': local.decay_rate,
+        'local_decay_rate_error': local.decay_rate_error,
+        'local_restitution': local.restitution,
+        'local_restitution_lower': local.lower,
+        'local_restitution_upper': local.upper,
+    }
+    return {name: _known(array.tolist()) for name, array in arrays.items()}
+
+
+def _known(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_known(one) for one in value]
+    return value if math.isfinite(value) else None

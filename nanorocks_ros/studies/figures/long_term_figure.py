@@ -1,0 +1,168 @@
+"""The figure of a campaign cycle by cycle, after the paper's figure 9."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+
+from nanorocks_ros.outputs.atomic_files import whole_file
+
+mpl.use('Agg')
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.studies.analysis.long_term import Campaign
+
+_MM = 1e3
+_COLOURS = ('#30506f', '#c23b22', '#e8b93c', '#4c8c5b', '#8a5fa8', '#5f5f5f', '#d07fae', '#2b8f9c')
+_MARKS = 'o', 's', '^', 'D', 'v', 'x', 'P', '*'
+_QUIET = '#9fc5e8'
+_MANY = 40
+
+
+def long_term_figure(path: Path, campaign: Campaign) -> None:
+    """Cluster sizes, peak speeds and restitutions by cycle, with trends and quiet periods.
+
+    Parameters
+    ----------
+    path : Path
+    campaign : Campaign
+
+    Raises
+    ------
+    RecordingError
+        When the picture cannot be written.
+
+    References
+    ----------
+    [B19] fig. 9 for the cluster sizes.
+    """
+    figure = Figure(figsize=(9.5, 8.5), layout='constrained')
+    sizes, peaks, cors = figure.subplots(3, 1, sharex=True)
+    in_mm = campaign.measure.unit == 'm'
+    for axes, quantity, scale, text in (
+        (
+            sizes,
+            'cluster_size',
+            _MM if in_mm else 1.0,
+            f'{campaign.measure.text}{" [mm]" if in_mm else ""}',
+        ),
+        (peaks, 'peak_speed', _MM, 'peak of the mean speed [mm/s]'),
+        (cors, 'restitution', 1.0, 'coefficient of restitution'),
+    ):
+        for k, number in enumerate(campaign.trays):
+            _draw(axes, campaign, number, (quantity, scale, k))
+        for period in campaign.periods:
+            axes.axvspan(period.first + 0.5, period.last + 1.5, color=_QUIET, alpha=0.35, lw=0)
+        axes.set_ylabel(text)
+        axes.grid(alpha=0.25)
+        if not axes.has_data():
+            axes.text(0.5, 0.5, 'not known', transform=axes.transAxes, ha='center', va='center')
+    found = len(campaign.periods)
+    sizes.set_title(
+        f'{campaign.places} cycle{"s" * (campaign.places != 1)}; '
+        + (f'{found} quiet period{"s" * (found > 1)}, shaded' if found else 'no quiet period'),
+        fontsize=10,
+    )
+    sizes.legend(frameon=False, fontsize=8.5, ncols=len(campaign.trays), loc='upper left')
+    low, high = sizes.get_ylim()
+    sizes.set_ylim(low, high + 0.2 * (high - low))
+    cors.set_xlabel('cycle')
+    cors.set_xlim(0.5, campaign.places + 0.5)
+    cors.xaxis.set_major_locator(MaxNLocator(integer=True))
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=110)
+
+
+def _draw(axes: Axes, campaign: Campaign, tray: int, what: tuple[str, float, int]) -> None:
+    quantity, scale, k = what
+    values = scale * campaign.values(tray, quantity)
+    known = np.isfinite(values)
+    if not known.any():
+        return
+    x = np.arange(campaign.places, dtype=np.float64)
+    # Trays side by side, not over each other.
+    off = 0.12 * (k - 0.5 * (len(campaign.trays) - 1))
+    colour = _COLOURS[k % len(_COLOURS)]
+    axes.errorbar(
+        x[known] + 1.0 + off,
+        values[known],
+        yerr=scale * _errors(campaign, tray, quantity)[:, known],
+        fmt=_MARKS[k % len(_MARKS)],
+        ms=4 if campaign.places <= _MANY else 2.5,
+        lw=0.7,
+        color=colour,
+        label=f'tray {tray}',
+    )
+    trend = campaign.trends[tray, quantity]
+    if math.isfinite(trend.slope):
+        axes.plot(x + 1.0, scale * trend.at(x), color=colour, lw=1.0, alpha=0.7)
+
+
+def _errors(campaign: Campaign, tray: int, quantity: str) -> NDArray[np.float64]:
+    """Bars below and above, (2, places); 0 where not known."""
+    if quantity == 'restitution':
+        middle = campaign.values(tray, quantity)
+        ends = [campaign.values(tray, f'restitution_{end}') for end in ('lower', 'upper')]
+        bars = np.abs(np.stack(ends) - middle)
+    else:
+        bars = np.tile(campaign.values(tray, f'{quantity}_error'), (2, 1))
+    return np.asarray(np.nan_to_num(bars))
+
+
+def campaign_values(campaign: Campaign) -> dict[str, Any]:
+    """Everything about a campaign for JSON, SI units, None where not known."""
+
+    def known(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    fields = (
+        'peak_speed',
+        'peak_speed_error',
+        'restitution',
+        'restitution_lower',
+        'restitution_upper',
+        'cluster_size',
+        'cluster_size_error',
+    )
+    return {
+        'cycles': campaign.places,
+        'cluster_size': campaign.measure.column,
+        'cluster_size_unit': campaign.measure.unit,
+        'quiet_periods': [
+            {
+                'first': one.first + 1,
+                'last': one.last + 1,
+                'excess': one.excess,
+                'chance': one.chance,
+            }
+            for one in campaign.periods
+        ],
+        'trays': {
+            str(number): {
+                'trends': {
+                    name: {
+                        'slope': known(trend.slope),
+                        'slope_error': known(trend.slope_error),
+                        'cycles': trend.samples,
+                    }
+                    for (tray, name), trend in campaign.trends.items()
+                    if tray == number
+                },
+                **{
+                    name: [known(value) for value in campaign.values(number, name).tolist()]
+                    for name in fields
+                },
+            }
+            for number in campaign.trays
+        },
+    }

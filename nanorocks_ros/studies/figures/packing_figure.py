@@ -1,0 +1,226 @@
+"""The figure of how clusters are packed, after the paper's figure 10."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+
+from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.physics.filling_factor import (
+    HEXAGONAL_LAYER,
+    PAPER_COMPACTION,
+    RANDOM_CLOSE_PACKING,
+)
+from nanorocks_ros.studies.analysis.cluster_packing import compaction, paper_filling_of_level_area
+
+mpl.use('Agg')
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.studies.analysis.cluster_packing import Compaction, PackingCurve
+
+_COLOURS = ('#30506f', '#c23b22', '#e8b93c', '#4c8c5b', '#8a5fa8', '#5f5f5f', '#d07fae', '#2b8f9c')
+_BINS = 30
+# Of the first part of a cycle: beads are single then.
+_SINGLE = 1.5
+
+
+def packing_figure(
+    path: Path, trays: Mapping[int, Tray], curves: Mapping[int, Sequence[PackingCurve]]
+) -> dict[str, Any]:
+    """Draw filling factors over a cycle, where places are known, and the apparent compaction.
+
+    Parameters
+    ----------
+    path : Path
+    trays : mapping of int to Tray
+    curves : mapping of int to sequence of PackingCurve
+        The cycles of each tray.
+
+    Returns
+    -------
+    dict
+        By tray: cycles, compaction as the paper has it and in truth with their standard errors
+        over the cycles, and filling factors at the end; None where not known.
+
+    Raises
+    ------
+    RecordingError
+        When a cycle is too short, or the picture cannot be written.
+    """
+    found = {number: [compaction(one) for one in own] for number, own in curves.items()}
+    figure = Figure(figsize=(11.0, 4.8), layout='constrained')
+    left, right = figure.subplots(1, 2, width_ratios=(3, 2))
+    known = any(np.isfinite(one.filling).any() for own in curves.values() for one in own)
+    (_draw_fillings if known else _draw_areas)(left, curves)
+    _draw_compaction(right, found)
+    left.set_xlabel('time since the shaking event [s]')
+    for axes in (left, right):
+        axes.grid(alpha=0.25)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=110)
+    return {
+        str(number): _values(trays[number], own, found[number]) for number, own in curves.items()
+    }
+
+
+def _values(
+    tray: Tray, curves: Sequence[PackingCurve], found: Sequence[Compaction]
+) -> dict[str, Any]:
+    apparent = _mean([one.apparent for one in found])
+    true = _mean([one.true for one in found])
+    single = float(
+        np.median(np.concatenate([one.level_area[one.times < _SINGLE] for one in curves]))
+    )
+    end = float(np.mean([one.end for one in found]))
+    return {
+        'cycles': len(curves),
+        'apparent_compaction': apparent[0],
+        'apparent_compaction_error': apparent[1],
+        'true_compaction': true[0],
+        'true_compaction_error': true[1],
+        'paper_compaction': PAPER_COMPACTION.get(tray.number),
+        'paper_filling_from_picture': (
+            paper_filling_of_level_area(tray, end, single) if single > 0.0 else None
+        ),
+        'layer_filling': _mean([one.filling[-1] for one in curves])[0],
+        'paper_filling': _mean([one.paper[-1] for one in curves])[0],
+        'filling_in_space': _mean([one.in_space[-1] for one in curves])[0],
+        'beads_per_cluster': _mean([one.beads[-1] for one in curves])[0],
+    }
+
+
+def _mean(values: Sequence[float]) -> tuple[float | None, float | None]:
+    """Mean and its standard error over what is known."""
+    known = np.array(values, dtype=np.float64)
+    known = known[np.isfinite(known)]
+    if known.size == 0:
+        return None, None
+    error = float(known.std(ddof=1)) / math.sqrt(known.size) if known.size > 1 else None
+    return float(known.mean()), error
+
+
+def _binned(
+    curves: Sequence[PackingCurve], values: Sequence[NDArray[np.float64]]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean over all cycles by time; times without a value are left out."""
+    times = np.concatenate([one.times for one in curves])
+    every = np.concatenate(values)
+    edges = np.linspace(0.0, float(times.max()) * (1.0 + 1e-9), _BINS + 1)
+    place = np.digitize(times, edges) - 1
+    rows = [
+        (times[own].mean(), every[own].mean())
+        for k in range(_BINS)
+        if (own := (place == k) & np.isfinite(every)).any()
+    ]
+    middle, mean = np.array(rows).reshape(-1, 2).T
+    return middle, mean
+
+
+def _draw_fillings(axes: Axes, curves: Mapping[int, Sequence[PackingCurve]]) -> None:
+    for colour, (number, own) in zip(_COLOURS, curves.items(), strict=False):
+        for style, kind, text in (
+            ('-', 'filling', 'layer one bead high'),
+            (':', 'in_space', 'true height'),
+        ):
+            times, mean = _binned(own, [getattr(one, kind) for one in own])
+            axes.plot(times, mean, style, color=colour, lw=1.8, label=f'tray {number}, {text}')
+    axes.axhline(HEXAGONAL_LAYER, color='black', lw=1.0, ls='--')
+    axes.text(
+        0.99,
+        HEXAGONAL_LAYER - 0.008,
+        f'hexagonal layer of equal beads, {HEXAGONAL_LAYER:.3f}',
+        ha='right',
+        va='top',
+        fontsize=8.5,
+        transform=axes.get_yaxis_transform(),
+    )
+    axes.axhline(RANDOM_CLOSE_PACKING, color='#8a8a8a', lw=1.0, ls='--')
+    axes.text(
+        0.99,
+        RANDOM_CLOSE_PACKING + 0.005,
+        f'random close packing in space, {RANDOM_CLOSE_PACKING:g}',
+        ha='right',
+        va='bottom',
+        fontsize=8.5,
+        color='#5f5f5f',
+        transform=axes.get_yaxis_transform(),
+    )
+    axes.set_ylim(0.0, 0.95)
+    axes.set_ylabel('filling factor of the hulls of clusters')
+    axes.set_title('True places: mean over cycles', fontsize=10)
+    axes.legend(frameon=False, fontsize=8.5, ncols=2, loc='upper right')
+
+
+def _draw_areas(axes: Axes, curves: Mapping[int, Sequence[PackingCurve]]) -> None:
+    for colour, (number, own) in zip(_COLOURS, curves.items(), strict=False):
+        ends = [compaction(one).end for one in own]
+        relative = [end / one.level_area for one, end in zip(own, ends, strict=True)]
+        times, mean = _binned(own, relative)
+        axes.plot(times, mean, '-', color=colour, lw=1.8, label=f'tray {number}')
+    axes.axhline(1.0, color='black', lw=0.7)
+    axes.set_ylabel('end of the cycle over level area')
+    axes.set_title("The paper's filling factor, over that at the end", fontsize=10)
+    axes.legend(frameon=False)
+
+
+def _draw_compaction(axes: Axes, found: Mapping[int, Sequence[Compaction]]) -> None:
+    labelled: set[str] = set()
+    for place, (number, own) in enumerate(found.items()):
+        shown = [
+            (
+                -0.2,
+                "the paper's rule, these pictures",
+                'o',
+                '#30506f',
+                [c.apparent for c in own],
+            ),
+            (0.2, 'true', 's', '#c23b22', [c.true for c in own]),
+        ]
+        for off, text, mark, colour, values in shown:
+            mean, error = _mean(values)
+            if mean is None:
+                continue
+            axes.errorbar(
+                place + off,
+                100.0 * mean,
+                yerr=100.0 * (error or 0.0),
+                fmt=mark,
+                ms=6,
+                capsize=3,
+                color=colour,
+                label=None if text in labelled else text,
+            )
+            labelled.add(text)
+        printed = PAPER_COMPACTION.get(number)
+        if printed is not None:
+            text = 'printed in the paper'
+            axes.plot(
+                place,
+                100.0 * printed,
+                'D',
+                ms=6,
+                color='#e8b93c',
+                mec='black',
+                mew=0.5,
+                label=None if text in labelled else text,
+            )
+            labelled.add(text)
+    axes.axhline(0.0, color='black', lw=0.7)
+    axes.set_xticks(range(len(found)), [f'tray {one}' for one in found])
+    axes.set_xlim(-0.6, len(found) - 0.4)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.4 * (high - low))
+    axes.set_ylabel('compaction [%]')
+    axes.set_title('From the widest autocorrelation to the end', fontsize=10)
+    axes.legend(frameon=False, fontsize=8.5)

@@ -1,0 +1,165 @@
+"""The picture of a sweep over two settings: which points agree with a decay, and which do not."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.settings import SimulationSettings, rows
+from nanorocks_ros.studies.decays.chi_square_map import chi_square
+from nanorocks_ros.studies.decays.sweep_contours import contours
+
+mpl.use('Agg')
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.studies.decays.decay_curve import SpeedCurve
+    from nanorocks_ros.studies.sweeps.sweep_plan import Axis
+    from nanorocks_ros.studies.sweeps.sweep_result import Sweep
+
+_PICTURES = ('.png', '.pdf', '.svg')
+_MARK = '#ffffff'
+_OUTLINE = [withStroke(linewidth=4.5, foreground='black')]
+_LABEL_WIDTH = 55
+# Below this, two curves are alike; colours are not spent on noise.
+_ALIKE = 0.5
+
+
+def check_drawable(path: Path, axes: tuple[Axis, ...]) -> None:
+    """Refuse what is no picture, or a grid that is no map.
+
+    Raises
+    ------
+    ConfigurationError
+        Unless there are two axes with two numbers or more each, and the picture's name ends in
+        ``.png``, ``.pdf`` or ``.svg``.
+    """
+    if path.suffix not in _PICTURES:
+        raise ConfigurationError(
+            '--figure', f'{str(path)!r} is no picture', f'end it in {", ".join(_PICTURES)}'
+        )
+    numbers = [
+        axis
+        for axis in axes
+        if len(axis.values) > 1 and all(isinstance(one, int | float) for one in axis.values)
+    ]
+    if len(axes) != 2 or len(numbers) != 2:
+        shape = ' x '.join(str(len(axis.values)) for axis in axes) or 'a single point'
+        raise ConfigurationError(
+            '--figure', f'the grid is {shape}', 'vary two numbers, with two values or more each'
+        )
+
+
+def chi_square_figure(
+    path: Path, sweep: Sweep, curve: SpeedCurve, *, scaled: bool = False
+) -> None:
+    """Map of the deviation of a sweep over two settings from a decay, as a picture.
+
+    Over restitutions of beads and walls, or the width of their distribution, the lines are drawn
+    along which closed forms give the same decay.
+
+    Parameters
+    ----------
+    path : Path
+    sweep : Sweep
+        Over two settings.
+    curve : SpeedCurve
+    scaled : bool, optional
+        Whether the initial speed is free, see `chi_square`.
+
+    Raises
+    ------
+    ConfigurationError
+        When the sweep is not over two settings, or cannot be compared with the curve, or the
+        name is no picture's.
+
+    References
+    ----------
+    After [B19] fig. 12.
+    """
+    check_drawable(path, sweep.axes)
+    values = chi_square(sweep, curve, scaled=scaled)
+    across, up = (np.array(axis.values, dtype=np.float64) for axis in sweep.axes)
+    order = np.ix_(np.argsort(across), np.argsort(up))
+    figure = Figure(figsize=(7.5, 6.0), layout='constrained')
+    axes = figure.subplots()
+    shown = np.maximum(values[order].T, _ALIKE)
+    mesh = axes.pcolormesh(
+        np.sort(across),
+        np.sort(up),
+        shown,
+        shading='nearest',
+        cmap='turbo',
+        norm=LogNorm(vmin=_ALIKE, vmax=max(float(shown.max()), 2.0)),
+    )
+    figure.colorbar(mesh, ax=axes, label=r'mean $\chi^2$ over the times', extend='min')
+    _draw_contours(axes, sweep, curve)
+    _mark(axes, sweep, values, curve)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=110)
+
+
+def _mark(axes: Axes, sweep: Sweep, values: NDArray[np.float64], curve: SpeedCurve) -> None:
+    first, second = sweep.axes
+    if curve.point is not None:
+        point, marker, label = curve.point, '*', 'reference'
+    else:
+        best = np.unravel_index(int(np.argmin(values)), values.shape)
+        point = first.values[int(best[0])], second.values[int(best[1])]
+        marker, label = 'o', f'best: {point[0]:g}, {point[1]:g}'
+    axes.plot(
+        *([float(one)] for one in point),
+        marker,
+        ms=14,
+        color=_MARK,
+        mec='black',
+        ls='none',
+        clip_on=False,
+        label=label,
+    )
+    axes.set_xlabel(_label(first))
+    axes.set_ylabel(_label(second))
+    axes.set_title(f'{_held(sweep)}{sweep.runs} runs at each of {values.size} points')
+    # Beside the map, whose corners may hold what matters.
+    figure: Any = axes.figure
+    figure.legend(loc='outside lower center', ncols=3, fontsize=9, facecolor='#c8ccd4')
+
+
+def _held(sweep: Sweep) -> str:
+    """Tray and walls, where they do not vary."""
+    settings = json.loads(sweep.question)['settings']
+    names = {'tray': 'tray', 'wall_restitution': 'walls'}
+    varied = {axis.name for axis in sweep.axes}
+    held = [f'{text} {settings[name]:g}' for name, text in names.items() if name not in varied]
+    return f'{", ".join(held).capitalize()}: ' if held else ''
+
+
+def _draw_contours(axes: Axes, sweep: Sweep, curve: SpeedCurve) -> None:
+    """Lines of one decay rate, within the map."""
+    ends = axes.get_xlim(), axes.get_ylim()
+    for one, style in zip(contours(sweep, curve), ('-', '--'), strict=False):
+        first = sweep.axes[0].name == 'restitution'
+        x, y = (one.restitution, one.other) if first else (one.other, one.restitution)
+        seen = (x >= ends[0][0]) & (x <= ends[0][1]) & (y >= ends[1][0]) & (y <= ends[1][1])
+        label = one.label if seen.any() else f'{one.label} (outside)'
+        axes.plot(x, y, style, color=_MARK, lw=2.2, label=label, path_effects=_OUTLINE)
+    axes.set_xlim(*ends[0])
+    axes.set_ylim(*ends[1])
+
+
+def _label(axis: Axis) -> str:
+    (row,) = (one for one in rows(SimulationSettings()) if one.name == axis.name)
+    return textwrap.fill(f'{row.doc} [{row.unit}]' if row.unit else row.doc, _LABEL_WIDTH)

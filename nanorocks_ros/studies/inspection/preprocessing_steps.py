@@ -1,0 +1,256 @@
+"""What each step of the preprocessing makes of one frame, as in [B19] fig. 4."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError, FrameError
+from nanorocks_ros.experiment.view import Straight, View
+from nanorocks_ros.stages.preprocess.rectify import (
+    mix_weights,
+    nodes_of,
+    resample_color,
+    resample_gray,
+)
+from nanorocks_ros.stages.preprocess.shake_detection import CycleFollower
+from nanorocks_ros.stages.speed.motion_mask import MotionMasker
+from nanorocks_ros.stages.tracking.tracker import Tracker
+from nanorocks_ros.studies.analysis.bag_images import BagImages
+from nanorocks_ros.wire.array_layouts import NS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.plate import Region
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.records import Frame, Tracks, TrayImage
+    from nanorocks_ros.settings import PipelineSettings
+    from nanorocks_ros.studies.analysis.bag_images import Shot
+
+# Of the frame, shown around the floor of a tray.
+_MARGIN_PX = 12
+# Points along each side of a floor, so that a side that the lens bends looks bent.
+_SIDE_POINTS = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TraySteps:
+    """One tray of one frame, step by step.
+
+    Parameters
+    ----------
+    tray : Tray
+    raw : ndarray of uint8, (h, w, 3), bgr, or (h, w)
+        Part of the frame as the camera gave it.
+    outline : ndarray (n, 2), [px]
+        Edge of the floor in `raw`, where the settings say it is at rest.
+    straight : ndarray of uint8, (rows, columns, 3), bgr, or (rows, columns)
+        Cut out through lens and pose of the plate alone.
+    image : TrayImage
+        The same with the motion of the tray taken out.
+    darkness : ndarray of uint8, (rows, columns), or None
+        Where the tracker looks for beads; None for a gray camera.
+    difference : ndarray (rows, columns), or None, [gray levels]
+        Of the averages that the binarised area compares; None while there are too few frames.
+    mask : ndarray of uint8, (rows, columns), or None
+        255 where that is motion.
+    tracks : Tracks or None
+    pixels_per_metre : float, [px/m]
+    """
+
+    tray: Tray
+    raw: NDArray[np.uint8]
+    outline: NDArray[np.float64]
+    straight: NDArray[np.uint8]
+    image: TrayImage
+    darkness: NDArray[np.uint8] | None
+    difference: NDArray[np.uint8] | NDArray[np.float32] | None
+    mask: NDArray[np.uint8] | None
+    tracks: Tracks | None
+    pixels_per_metre: float
+
+    @property
+    def moving_area(self) -> float | None:
+        """Area in which something moves, [m^2]; None while there are too few frames."""
+        if self.mask is None:
+            return None
+        return float(np.count_nonzero(self.mask)) / self.pixels_per_metre**2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrameSteps:
+    """One frame, step by step.
+
+    Parameters
+    ----------
+    number : int
+        Of the frame in the bag, counted from 0.
+    time : float, [s]
+        Since the first frame that could be used.
+    trays : dict of int to TraySteps
+    notices : list of str
+    """
+
+    number: int
+    time: float
+    trays: dict[int, TraySteps]
+    notices: list[str]
+
+
+def steps_of_bag(
+    path: Path,
+    settings: PipelineSettings,
+    *,
+    number: int | None = None,
+    time: float | None = None,
+    image_topic: str = '',
+    progress: Callable[[int, int], None] | None = None,
+) -> FrameSteps:
+    """Follow a bag up to one frame, and keep every step of that one.
+
+    All frames before it are gone through as in an analysis, since what is made of a frame depends
+    on them: where the tray was at first, how the floor looks, how strong the noise is.
+
+    Parameters
+    ----------
+    path : Path
+    settings : PipelineSettings
+    number : int, optional
+        Of the frame, counted from 0; by default the one in the middle.
+    time : float, optional, [s]
+        In place of the number: the first frame so long after the first.
+    image_topic : str, optional
+    progress : callable, optional
+
+    Raises
+    ------
+    RecordingError
+        When the bag cannot be read.
+    ConfigurationError
+        When the settings cannot be used, or the bag ends before that frame.
+    FrameError
+        When that frame cannot be used.
+    """
+    images = BagImages(path, settings, image_topic)
+    wanted = images.bag.count // 2 if number is None else number
+    followers = {key: _Follower(images.settings, tray) for key, tray in images.trays.items()}
+    first_ns: int | None = None
+    for shot in images.shots(progress):
+        first_ns = shot.frame.stamp_ns if first_ns is None else first_ns
+        elapsed = (shot.frame.stamp_ns - first_ns) / NS
+        for image in shot.images:
+            followers[image.tray].push(image)
+        if (shot.number < wanted) if time is None else (elapsed < time):
+            continue
+        if not shot.images or (time is None and shot.number > wanted):
+            break
+        return FrameSteps(
+            number=shot.number,
+            time=elapsed,
+            trays=_steps(shot, images, followers),
+            notices=images.notices,
+        )
+    else:
+        flag, asked = ('--frame', str(wanted)) if time is None else ('--at', f'{time:g} s')
+        raise ConfigurationError(
+            flag, f'{asked}, and the recording has {images.frames} frames', 'choose an earlier one'
+        )
+    reason = f' ({images.refused.what})' if images.refused else ''
+    raise FrameError(
+        f'{images.bag.where}: frame {wanted if time is None else shot.number}',
+        f'cannot be used{reason}',
+        'choose another',
+    )
+
+
+class _Follower:
+    """What the stages behind a tray image know of it."""
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self._shakes = CycleFollower(settings.speed.shake_ratio, settings.speed.shortest_cycle)
+        self._masker = MotionMasker(settings.speed)
+        self._tracker = Tracker(settings, tray)
+        self.tracks: Tracks | None = None
+
+    def push(self, image: TrayImage) -> None:
+        if self._shakes.push(image):
+            self._masker.clear()
+        self._masker.push(image.stamp_ns, image.gray)
+        self.tracks = next(iter(self._tracker.push(image)), None)
+
+    @property
+    def darkness(self) -> NDArray[np.uint8] | None:
+        return self._tracker.darkness
+
+    @property
+    def difference(self) -> NDArray[np.uint8] | NDArray[np.float32] | None:
+        return self._masker.difference() if self._masker.full else None
+
+    @property
+    def mask(self) -> NDArray[np.uint8] | None:
+        return self._masker.mask(self._shakes.noise_power) if self._masker.full else None
+
+
+def _steps(shot: Shot, images: BagImages, followers: dict[int, _Follower]) -> dict[int, TraySteps]:
+    height, width = shot.frame.image.shape[:2]
+    view = images.view or View(camera=Straight(width=width, height=height))
+    found = {}
+    for image in shot.images:
+        region = images.stage.regions[image.tray]
+        raw, outline = _as_filmed(shot.frame, region, view)
+        follower = followers[image.tray]
+        found[image.tray] = TraySteps(
+            tray=images.trays[image.tray],
+            raw=raw,
+            outline=outline,
+            straight=_straight(shot.frame, region, view),
+            image=image,
+            darkness=follower.darkness,
+            difference=follower.difference,
+            mask=follower.mask,
+            tracks=follower.tracks,
+            pixels_per_metre=images.settings.preprocess.pixels_per_metre,
+        )
+    return found
+
+
+def _as_filmed(
+    frame: Frame, region: Region, view: View
+) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """The part of the frame that shows a tray, and the edge of its floor there."""
+    along = np.linspace(0.0, 1.0, _SIDE_POINTS, endpoint=False)
+    none, full = np.zeros(_SIDE_POINTS), np.ones(_SIDE_POINTS)
+    sides = [(along, none), (full, along), (1.0 - along, full), (none, 1.0 - along)]
+    edge = np.concatenate([np.stack(one, axis=-1) for one in sides])
+    places = view.source((region.x, region.y) + edge * (region.width, region.height))
+    size = frame.image.shape[1::-1]
+    low = np.clip(np.floor(places.min(axis=0)) - _MARGIN_PX, 0, size).astype(int)
+    high = np.clip(np.ceil(places.max(axis=0)) + _MARGIN_PX, 0, size).astype(int)
+    part = _as_bgr(frame.image, frame.encoding)[low[1] : high[1], low[0] : high[0]]
+    return part, places - low
+
+
+def _straight(frame: Frame, region: Region, view: View) -> NDArray[np.uint8]:
+    """The floor of a tray, straight, wherever the tray has swung to."""
+    nodes = nodes_of(region, view)
+    image = np.ascontiguousarray(frame.image).reshape(*frame.image.shape[:2], -1)
+    gray = np.empty((region.height, region.width), dtype=np.uint8)
+    if image.shape[2] == 1:
+        resample_gray(image[:, :, 0], nodes, (0.0, 0.0), gray)
+        return gray
+    color = np.empty((*gray.shape, 3), dtype=np.uint8)
+    resample_color(image, nodes, (0.0, 0.0), mix_weights((0.0, 0.0, 0.0)), color, gray)
+    return _as_bgr(color, frame.encoding)
+
+
+def _as_bgr(image: NDArray[np.uint8], encoding: str) -> NDArray[np.uint8]:
+    if encoding != 'rgb8':
+        return image
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2BGR), dtype=np.uint8)

@@ -1,0 +1,145 @@
+"""The picture of one cycle: the speed by every method, and the truth where it is known."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+
+from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.studies.inspection.speed_comparison import AUTO, METHODS
+from nanorocks_ros.wire.array_layouts import NS
+
+mpl.use('Agg')
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+
+    from nanorocks_ros.records import SpeedEstimate
+    from nanorocks_ros.studies.inspection.speed_comparison import BagSpeeds, ComparedSpeeds
+
+_MM = 1e3
+_COLOURS = {
+    'tracking': '#1b7837',
+    'structure_function': '#2166ac',
+    'binarised_area': '#c23b22',
+}
+_TRUTH, _CHOSEN = '#8a8a8a', '#111111'
+_WIDTH, _HEIGHT, _DPI = 12.0, 3.4, 110
+# Of the largest true speed, or the largest by tracking and structure function: what is higher is
+# cut off.
+_HEADROOM = 1.6
+# Estimates over the truth that are shown, and within which they should lie.
+_RATIOS, _GOAL = (0.4, 10.0), 0.1
+
+
+def speeds_figure(path: Path, found: BagSpeeds, cycle: int) -> None:
+    """Draw the speeds of one cycle by every method, a row for each tray.
+
+    Bands are one standard error, as the method states it; dots are what is chosen from the data.
+    Beside it, where the truth is known, the estimates over it.
+
+    Parameters
+    ----------
+    path : Path
+    found : BagSpeeds
+    cycle : int
+        One of `ComparedSpeeds.cycles`; times count from its shaking event, those of cycle 0
+        from the epoch.
+
+    Raises
+    ------
+    RecordingError
+        When the picture cannot be written.
+
+    References
+    ----------
+    After [B19] fig. 2.
+    """
+    known = any(one.truth for one in found.trays.values())
+    figure = Figure(figsize=(_WIDTH, _HEIGHT * len(found.trays) + 0.4), layout='constrained')
+    shares: dict[str, Any] = {'width_ratios': (3, 2)} if known else {}
+    rows = figure.subplots(len(found.trays), 1 + known, squeeze=False, sharex=True, **shares)
+    for row, (number, tray) in zip(rows, found.trays.items(), strict=True):
+        start_ns = _start_ns(found, cycle)
+        _draw_speeds(row[0], tray, cycle, start_ns)
+        row[0].set_title(f'tray {number}, cycle {cycle}', loc='left', fontsize=10)
+        if known:
+            _draw_ratios(row[1], tray, cycle, start_ns)
+    since = 'since the shaking event' if cycle else 'since the beginning'
+    for axes in rows[-1]:
+        axes.set_xlabel(f'time {since} [s]')
+    rows[0, 0].legend(frameon=False, fontsize=8)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=_DPI)
+
+
+def _start_ns(found: BagSpeeds, cycle: int) -> int:
+    starts = [
+        one.cycle_start_ns
+        for tray in found.trays.values()
+        for speeds in tray.speeds.values()
+        for one in speeds
+        if one.cycle == cycle and one.cycle_start_ns is not None
+    ]
+    return min(starts, default=found.epoch_ns)
+
+
+def _of(tray: ComparedSpeeds, method: str, cycle: int) -> list[SpeedEstimate]:
+    return [one for one in tray.speeds[method] if one.cycle == cycle]
+
+
+def _draw_speeds(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) -> None:
+    tops = [0.0]
+    truth = [one for one in tray.truth if one.cycle == cycle]
+    if truth:
+        values = [_MM * one.mean_projected_speed for one in truth]
+        times = [(one.stamp_ns - start_ns) / NS for one in truth]
+        axes.plot(times, values, color=_TRUTH, lw=4, alpha=0.6, label='truth')
+        tops += values
+    for method in METHODS:
+        found = _of(tray, method, cycle)
+        times = [(one.stamp_ns - start_ns) / NS for one in found]
+        speed = _MM * np.array([one.mean_projected_speed for one in found])
+        error = _MM * np.array([one.mean_projected_speed_error for one in found])
+        colour = _COLOURS[method]
+        axes.fill_between(times, speed - error, speed + error, color=colour, alpha=0.2, lw=0)
+        axes.plot(times, speed, color=colour, lw=1.2, label=method.replace('_', ' '))
+        if not truth and method != 'binarised_area':
+            tops += speed[np.isfinite(speed)].tolist()
+    chosen = _of(tray, AUTO, cycle)
+    axes.plot(
+        [(one.stamp_ns - start_ns) / NS for one in chosen],
+        [_MM * one.mean_projected_speed for one in chosen],
+        '.',
+        ms=3.5,
+        color=_CHOSEN,
+        label='chosen from the data',
+    )
+    if max(tops) > 0.0:
+        axes.set_ylim(0.0, _HEADROOM * max(tops))
+    axes.set_ylabel('mean projected speed [mm/s]')
+    axes.grid(alpha=0.25)
+
+
+def _draw_ratios(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) -> None:
+    axes.axhspan(1.0 - _GOAL, 1.0 + _GOAL, color=_TRUTH, alpha=0.25, lw=0)
+    for method in METHODS:
+        found = _of(tray, method, cycle)
+        true = tray.true_speeds(found)
+        times = [(one.stamp_ns - start_ns) / NS for one in found]
+        speeds = np.array([one.mean_projected_speed for one in found])
+        with np.errstate(divide='ignore', invalid='ignore'):
+            axes.plot(times, speeds / true, color=_COLOURS[method], lw=1.2)
+    axes.set_yscale('log')
+    axes.set_ylim(*_RATIOS)
+    axes.set_yticks([0.5, 0.8, 1.0, 1.25, 2.0, 3.0, 5.0, 10.0])
+    axes.yaxis.set_major_formatter('{x:g}')
+    axes.yaxis.set_minor_locator(mpl.ticker.NullLocator())
+    axes.set_ylabel('estimate / truth')
+    axes.set_title(f'grey: within {100 * _GOAL:.0f} %', loc='left', fontsize=10)
+    axes.grid(alpha=0.25)

@@ -1,0 +1,159 @@
+"""The picture of the preprocessing of a frame, step by step and tray by tray."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import matplotlib as mpl
+import numpy as np
+
+from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.studies.inspection.track_overlay import overlay
+
+mpl.use('Agg')
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.settings import SpeedSettings
+    from nanorocks_ros.studies.inspection.preprocessing_steps import FrameSteps, TraySteps
+
+_WIDTH, _COLUMNS, _DPI = 15.0, 4, 110
+# Of each panel its title, and of each tray its headline, [in].
+_TITLE, _HEADLINE = 0.45, 0.35
+_MM2 = 1e6
+_EDGE = '#3cdc3c'
+_AVERAGES = {
+    'none': 'two frames, subtracted',
+    'running_mean': 'running means of {} frames, subtracted',
+    'block_mean': 'means of {} frames and the next, subtracted',
+}
+
+
+def steps_figure(path: Path, steps: FrameSteps, settings: SpeedSettings) -> None:
+    """Draw every step of the preprocessing of a frame, eight panels for each tray.
+
+    Parameters
+    ----------
+    path : Path
+    steps : FrameSteps
+    settings : SpeedSettings
+        Of the binarised area.
+
+    Raises
+    ------
+    RecordingError
+        When the picture cannot be written.
+
+    References
+    ----------
+    After [B19] fig. 4.
+    """
+    panels = [_panels(one, settings) for one in steps.trays.values()]
+    heights = [_height(one) for one in steps.trays.values()]
+    figure = Figure(figsize=(_WIDTH, sum(heights)), layout='constrained')
+    parts: Any = figure.subfigures(len(panels), 1, height_ratios=heights, squeeze=False)
+    for part, one, drawn in zip(parts[:, 0], steps.trays.values(), panels, strict=True):
+        part.suptitle(_headline(one, steps), fontsize=11, x=0.01, ha='left', weight='bold')
+        axes = part.subplots(2, _COLUMNS, squeeze=False).ravel()
+        for place, (title, draw) in zip(axes, drawn, strict=True):
+            place.set_title(title, fontsize=9, loc='left')
+            place.set_axis_off()
+            draw(place)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=_DPI)
+
+
+def _height(steps: TraySteps) -> float:
+    rows, columns = steps.raw.shape[:2]
+    panel = _TITLE + _WIDTH / _COLUMNS * rows / columns
+    return float(_HEADLINE + 2.0 * panel)
+
+
+def _headline(steps: TraySteps, frame: FrameSteps) -> str:
+    flags = ', '.join(steps.image.quality.names()) or 'none'
+    return (
+        f'tray {steps.tray.number}, frame {frame.number} at {frame.time:.2f} s, '
+        f'cycle {steps.image.cycle}; flags: {flags}'
+    )
+
+
+_Panel = tuple[str, 'Callable[[Axes], None]']
+
+
+def _panels(steps: TraySteps, settings: SpeedSettings) -> list[_Panel]:
+    image = steps.image
+    steady = image.gray if image.color is None else image.color
+    averages = _AVERAGES[settings.averaging].format(settings.averaged_frames)
+    return [
+        ('1  as filmed, with the floor when at rest', lambda axes: _filmed(axes, steps)),
+        ('2  straightened', lambda axes: _show(axes, steps.straight)),
+        (f'3  stabilised: {_moved(steps)}', lambda axes: _show(axes, steady)),
+        ('4  gray mix', lambda axes: _show(axes, image.gray)),
+        ('5  darkness, as the tracker sees it', lambda axes: _show(axes, steps.darkness)),
+        (f'6  tracked: {_found(steps)}', lambda axes: _tracked(axes, steps)),
+        (f'7  {averages}', lambda axes: _show(axes, _stretched(steps.difference))),
+        (f'8  {_binarised(steps, settings)}', lambda axes: _show(axes, steps.mask)),
+    ]
+
+
+def _moved(steps: TraySteps) -> str:
+    shift = np.array(steps.image.displacement) * steps.pixels_per_metre
+    if np.isnan(shift).any():
+        return 'not followed'
+    return f'the tray is {shift[0]:+.2f}, {shift[1]:+.2f} px from its place'
+
+
+def _found(steps: TraySteps) -> str:
+    tracks = steps.tracks
+    if tracks is None:
+        return 'nothing, the camera is gray'
+    return ', '.join(
+        f'{int((tracks.seen & (tracks.species == k)).sum())} of {one.count} {one.material}'
+        for k, one in enumerate(steps.tray.species)
+    )
+
+
+def _binarised(steps: TraySteps, settings: SpeedSettings) -> str:
+    if steps.moving_area is None:
+        return 'binarised: too few frames since the beginning or the shaking event'
+    return (
+        f'despeckled, over {settings.threshold:g} sigma: {_MM2 * steps.moving_area:.1f} mm$^2$ '
+        'move'
+    )
+
+
+def _filmed(axes: Axes, steps: TraySteps) -> None:
+    _show(axes, steps.raw)
+    # Pixels are drawn around their number; ours are counted from the corner of the first.
+    closed = np.vstack([steps.outline, steps.outline[:1]]) - 0.5
+    axes.plot(*closed.T, color=_EDGE, lw=0.9)
+
+
+def _tracked(axes: Axes, steps: TraySteps) -> None:
+    if steps.tracks is None:
+        _show(axes, None)
+    else:
+        _show(axes, overlay(steps.image, [steps.tracks], steps.pixels_per_metre))
+
+
+def _show(axes: Axes, picture: NDArray[Any] | None) -> None:
+    if picture is None:
+        axes.text(0.5, 0.5, 'none', ha='center', transform=axes.transAxes)
+    elif picture.ndim == 3:
+        axes.imshow(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), interpolation='nearest')
+    else:
+        axes.imshow(picture, cmap='gray', vmin=0, vmax=255, interpolation='nearest')
+
+
+def _stretched(difference: NDArray[Any] | None) -> NDArray[Any] | None:
+    """From black to white, whatever the largest difference is."""
+    if difference is None:
+        return None
+    return difference * (255.0 / max(float(difference.max()), 1.0))

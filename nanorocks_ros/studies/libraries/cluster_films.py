@@ -1,0 +1,257 @@
+"""Films of clusters that grow, from which cluster sizes are told from autocorrelations.
+
+Every run has a sticking speed of its own, so that all sizes occur, and a camera, light and dust of
+its own, anything from perfect to half as bad again as in flight: what that does to the width is in
+its scatter.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from nanorocks_ros import __version__
+from nanorocks_ros.experiment.view import View
+from nanorocks_ros.inference.cluster_size.cluster_curve import curve_key
+from nanorocks_ros.inference.cluster_size.size_from_width import Width
+from nanorocks_ros.records import Frame, TrayImage
+from nanorocks_ros.settings import (
+    PipelineSettings,
+    SceneSettings,
+    SimulationSettings,
+    with_values,
+)
+from nanorocks_ros.stages.clusters.correlation_width import correlated
+from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.simulation.plate_scene.plate_film import SceneMoment
+
+# Since the shaking event, [s]: clusters grow ever more slowly.
+TIMES = (0.4, 0.8, 1.2, 1.7, 2.3, 3.0, 4.0, 5.5, 7.5, 10.0, 14.0, 19.0, 25.0, 32.0)
+# Of the sticking speed, [m/s]: from hardly any cluster to one.
+_SLOWEST, _FASTEST = 1e-4, 2e-2
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+# Effects whose strength is drawn.
+EFFECTS = (
+    'defocus_px',
+    'noise',
+    'vignetting',
+    'gradient',
+    'flicker',
+    'shadows',
+    'chalk',
+    'glare',
+    'ovality',
+    'irregularity',
+)
+# One bead in so many may be missing, or too many.
+_COUNT_SPREAD = 0.05
+_QUALITY = 85
+_FIRST_SHAKE = 0.1
+_NS = 1e9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClusterPlan:
+    """What curves of cluster sizes are made of.
+
+    Parameters
+    ----------
+    cells : mapping of int to Tray
+        All cells of the plate, by number.
+    trays : tuple of int
+        Those that curves are made for.
+    runs : int
+    seed : int
+    level : float
+        Of the autocorrelation.
+    strengths : tuple of 2 floats, >= 0
+        Weakest and strongest that effects of camera, light and dust are, relative to flight. The
+        better a camera is known, the narrower, and the smaller the errors.
+    moments : int
+        How many of `TIMES` are filmed.
+    """
+
+    cells: Mapping[int, Tray]
+    trays: tuple[int, ...]
+    runs: int
+    seed: int = 1
+    level: float = 0.5
+    strengths: tuple[float, float] = (0.0, 1.5)
+    moments: int = len(TIMES)
+
+    def question(self) -> str:
+        """Everything that the curves depend on, as a JSON object."""
+        keys = {str(number): json.loads(curve_key(self.cells[number])) for number in self.trays}
+        return json.dumps(
+            {
+                'version': __version__,
+                'runs': self.runs,
+                'seed': self.seed,
+                'level': self.level,
+                'strengths': self.strengths,
+                'moments': self.moments,
+                'trays': keys,
+            }
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClusterRun:
+    """What is drawn for one run.
+
+    Parameters
+    ----------
+    sticking_speed : float, [m/s]
+    strengths : dict of str to float
+        Of the effects, relative to flight.
+    counts : dict of int to float
+        Of the beads of each tray, relative to those listed.
+    """
+
+    sticking_speed: float
+    strengths: dict[str, float]
+    counts: dict[int, float]
+
+
+def drawn_run(plan: ClusterPlan, run: int) -> ClusterRun:
+    """What is drawn for a run; depends on the plan's seed and the run alone."""
+    generator = np.random.default_rng((plan.seed, run))
+    # Even steps that never repeat fill the range with any number of runs.
+    part = (0.5 + run * _GOLDEN) % 1.0
+    strengths = generator.uniform(*plan.strengths, len(EFFECTS))
+    counts = generator.uniform(1.0 - _COUNT_SPREAD, 1.0 + _COUNT_SPREAD, len(plan.cells))
+    return ClusterRun(
+        sticking_speed=_SLOWEST * (_FASTEST / _SLOWEST) ** part,
+        strengths=dict(zip(EFFECTS, strengths.tolist(), strict=True)),
+        counts=dict(zip(sorted(plan.cells), counts.tolist(), strict=True)),
+    )
+
+
+def cluster_sizes(bodies: NDArray[np.int32]) -> tuple[float, float]:
+    """Weight- and number-averaged number of beads per body.
+
+    Parameters
+    ----------
+    bodies : ndarray of int, (n,)
+        The body of each bead.
+    """
+    sizes = np.unique(bodies, return_counts=True)[1].astype(np.float64)
+    return float((sizes**2).sum() / sizes.sum()), float(sizes.mean())
+
+
+def samples_of_run(plan: ClusterPlan, run: int) -> NDArray[np.float32]:
+    """Film a run, and measure the pictures of its trays as the pipeline does.
+
+    Parameters
+    ----------
+    plan : ClusterPlan
+    run : int, >= 0
+
+    Returns
+    -------
+    ndarray of float32, (n_samples, 7)
+        Tray, run, time since the shaking event [s], weight-averaged size, level area and inner
+        area [m^2], contrast.
+
+    Raises
+    ------
+    ConfigurationError
+        For trays that cannot be filmed together.
+    SimulationError
+        When the beads do not fit, or a run has events without end.
+    """
+    return filmed_run(plan, run, drawn_run(plan, run), TIMES[: plan.moments])[:, :-1]
+
+
+def filmed_run(
+    plan: ClusterPlan, run: int, drawn: ClusterRun, times: Sequence[float]
+) -> NDArray[np.float32]:
+    """The same for a run that is given, at given times.
+
+    Parameters
+    ----------
+    plan : ClusterPlan
+    run : int, >= 0
+        Of which the gas is.
+    drawn : ClusterRun
+    times : sequence of float, [s]
+        Since the shaking event, rising.
+
+    Returns
+    -------
+    ndarray of float32, (n_samples, 8)
+        As `samples_of_run`, and the share of the picture that is covered.
+    """
+    from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
+
+    simulation, scene, cells = _settings(plan, run, drawn)
+    film = SceneFilm(simulation, scene, cells)
+    names = {
+        'trays': list(plan.trays),
+        'preprocess.layout': 'plate',
+        'preprocess.pixels_per_metre': scene.pixels_per_metre,
+    }
+    settings = with_values(PipelineSettings(), names, 'cluster films')
+    view = View(camera=film.camera.geometry.camera)
+    preprocessor = Preprocessor(settings, cells, 'cluster film', view)
+    rows = []
+    for time in times:
+        number = round((_FIRST_SHAKE + time) * simulation.frame_rate)
+        moment = film.at(number, round(_NS * number / simulation.frame_rate))
+        for tray, size, width in _measured(moment, preprocessor, plan.level, scene):
+            rows.append((tray, run, time, size, *width))
+    return np.array(rows, dtype=np.float32).reshape(-1, 8)
+
+
+def _measured(
+    moment: SceneMoment, preprocessor: Preprocessor, level: float, scene: SceneSettings
+) -> list[tuple[int, float, Width]]:
+    """Tray, weight-averaged size and width of the pictures in a frame, after its JPEG."""
+    jpeg = cv2.imencode('.jpg', moment.frame.image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1]
+    image = np.asarray(cv2.imdecode(jpeg, cv2.IMREAD_COLOR), dtype=np.uint8)
+    frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
+    sizes = {beads.tray: cluster_sizes(beads.bodies)[0] for beads in moment.beads}
+    found = []
+    for record in preprocessor.push(frame):
+        if isinstance(record, TrayImage):
+            seen = correlated(record.gray, scene.pixels_per_metre)
+            width = seen.width(seen.region(level).area)
+            found.append((record.tray, sizes[record.tray], width))
+    return found
+
+
+def _settings(
+    plan: ClusterPlan, run: int, drawn: ClusterRun
+) -> tuple[SimulationSettings, SceneSettings, dict[int, Tray]]:
+    flown = SceneSettings()
+    strong = {name: getattr(flown, name) * by for name, by in drawn.strengths.items()}
+    scene = with_values(flown, {'trays': plan.trays, **strong}, 'cluster films')
+    values = {
+        # Another gas for every run, and for every seed.
+        'seed': int(np.random.SeedSequence((plan.seed, run)).generate_state(1)[0] >> 1),
+        'sticking_speed': drawn.sticking_speed,
+        'first_shake': _FIRST_SHAKE,
+        'shake_period': 10.0 * TIMES[-1],
+    }
+    simulation = with_values(SimulationSettings(), values, 'cluster films')
+    cells = {
+        number: _with_count(tray, drawn.counts[number]) for number, tray in plan.cells.items()
+    }
+    return simulation, scene, cells
+
+
+def _with_count(tray: Tray, factor: float) -> Tray:
+    species = tuple(replace(one, count=max(1, round(one.count * factor))) for one in tray.species)
+    return replace(tray, species=species)

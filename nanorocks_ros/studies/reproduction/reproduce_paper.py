@@ -1,0 +1,141 @@
+"""The paper again, from simulated films: every figure and table, beside what is true."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from nanorocks_ros import __version__
+from nanorocks_ros.errors import FitError, RecordingError
+from nanorocks_ros.outputs.html_report import Section, Table, write_report
+from nanorocks_ros.studies.reproduction.chapters.chapter_context import Chapter, Context
+from nanorocks_ros.studies.reproduction.chapters.cluster_chapter import (
+    cluster_chapter,
+    onset_chapter,
+    packing_chapter,
+)
+from nanorocks_ros.studies.reproduction.chapters.experiment_chapter import (
+    experiment_chapter,
+    processing_chapter,
+)
+from nanorocks_ros.studies.reproduction.chapters.restitution_chapter import (
+    restitution_chapter,
+    simulation_chapter,
+)
+from nanorocks_ros.studies.reproduction.chapters.rotation_chapter import rotation_chapter
+from nanorocks_ros.studies.reproduction.chapters.speed_chapter import speed_chapter
+from nanorocks_ros.studies.reproduction.simulated_campaign import prepare_campaign, run_campaign
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from nanorocks_ros.jobs.tasks import Workers
+    from nanorocks_ros.studies.reproduction.simulated_campaign import CampaignPlan
+
+# CPU time for a second of film, and its two analyses.
+_SECONDS = 5.0
+REPORT, PICTURES = 'report.html', 'pictures'
+_CHAPTERS: dict[str, Callable[[Context], Chapter]] = {
+    'experiment': experiment_chapter,
+    'processing': processing_chapter,
+    'speeds': speed_chapter,
+    'restitution': restitution_chapter,
+    'clusters': cluster_chapter,
+    'packing': packing_chapter,
+    'onset': onset_chapter,
+    'simulation': simulation_chapter,
+    'rotation': rotation_chapter,
+}
+
+
+def reproduce(
+    folder: Path,
+    plan: CampaignPlan,
+    workers: Workers,
+    runs: int,
+    progress: Callable[[str, float], None],
+    notice: Callable[[str], None],
+) -> Path:
+    """Simulate, film and analyse a campaign, and write the report.
+
+    What an earlier call left in the folder is taken up again.
+
+    Parameters
+    ----------
+    folder : Path
+    plan : CampaignPlan
+    workers : Workers
+    runs : int
+        At each point of the searches.
+    progress : callable
+        Called with what is being done and the part of it that is done, 0 to 1.
+    notice : callable
+        Called with what the user should know, one line each.
+
+    Returns
+    -------
+    Path
+        Of the report.
+
+    Raises
+    ------
+    RecordingError
+        When the folder holds something else, or cannot be written.
+    KeyboardInterrupt
+        Ctrl-C; what is complete is kept.
+    """
+    prepare_campaign(folder, plan)
+    cycles = run_campaign(folder, plan, workers, lambda done: progress('films', done))
+    pictures = folder / PICTURES
+    pictures.mkdir(exist_ok=True)
+    chapters = []
+    for name, make in _CHAPTERS.items():
+        context = Context(
+            folder=pictures,
+            plan=plan,
+            cycles=cycles,
+            workers=workers,
+            runs=runs,
+            notice=notice,
+            progress=lambda done, name=name: progress(name, done),  # type: ignore[misc]
+        )
+        progress(name, 0.0)
+        try:
+            chapters.append(make(context))
+        except (FitError, RecordingError) as error:
+            # Too short a campaign for one chapter is none for the others.
+            notice(f'{name}: {error}')
+            missing = Section(title=name.capitalize(), parts=[f'Could not be made: {error}.'])
+            chapters.append(Chapter(section=missing))
+        progress(name, 1.0)
+    path = folder / REPORT
+    differences = [row for chapter in chapters for row in chapter.differences]
+    first = Section(
+        title='Differences to the paper',
+        parts=[
+            Table(
+                head=('', 'the paper', 'its method, on our films', 'ours', 'truth'),
+                rows=differences,
+                caption='What the paper reports of its flight, what its own method makes of our '
+                'films, what our default makes of them, and what was put in.',
+            )
+        ],
+    )
+    cycle = 'cycle' if plan.cycles == 1 else 'cycles'
+    write_report(
+        path,
+        'NanoRocks, reproduced',
+        f'nanorocks_ros {__version__}: {plan.cycles} {cycle} without and {plan.cycles} with '
+        f'sticking, {plan.seconds:g} s of film each, seed {plan.seed}; {runs} runs at every '
+        'point of the searches.',
+        [first, *(chapter.section for chapter in chapters)],
+    )
+    return path
+
+
+def minutes(plan: CampaignPlan, cores: int) -> int:
+    """About how long the films and their analysis take."""
+    return math.ceil(
+        2 * plan.cycles * plan.seconds * _SECONDS / max(min(cores, 2 * plan.cycles), 1) / 60
+    )

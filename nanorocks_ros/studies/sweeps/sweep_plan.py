@@ -1,0 +1,237 @@
+"""What a sweep asks: which settings, over which grid, at which times, in how many runs."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros import __version__
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+from nanorocks_ros.settings import SimulationSettings, rows, with_values
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.settings import Scalar, Value
+
+MOST_RUNS = 2**31
+MOST_POINTS = 10**6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Axis:
+    """One setting and its values along one axis of the grid.
+
+    Parameters
+    ----------
+    name : str
+        Of a field of `SimulationSettings`.
+    values : tuple of float, int, str or bool, (n_values,)
+    """
+
+    name: str
+    values: tuple[Scalar, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepPlan:
+    """A question whose answer does not depend on who works it out.
+
+    Make one with `sweep_plan`, which checks it. Points of the grid are numbered with the last
+    axis running fastest.
+
+    Parameters
+    ----------
+    settings : SimulationSettings
+        Where no axis says otherwise; the seed is the root of every random number.
+    axes : tuple of Axis
+        None: a single point.
+    times : tuple of float, (n_times,), [s]
+        Since the shaking event; rising.
+    runs : int
+        At every point.
+    common_random_numbers : bool
+        Whether run k starts alike at every point, which makes differences between points less
+        noisy but correlates their errors. By default every run of every point is independent.
+    keep_runs : bool
+        Whether the result holds every single run, for covariances, beside the means.
+    trays : tuple of Tray
+        Those that occur, in order of their number.
+    """
+
+    settings: SimulationSettings
+    axes: tuple[Axis, ...]
+    times: tuple[float, ...]
+    runs: int
+    common_random_numbers: bool = False
+    keep_runs: bool = False
+    trays: tuple[Tray, ...]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values along each axis."""
+        return tuple(len(axis.values) for axis in self.axes)
+
+    @property
+    def points(self) -> int:
+        """Points of the grid."""
+        return math.prod(self.shape)
+
+    @property
+    def total_runs(self) -> int:
+        """Runs over the whole grid."""
+        return self.points * self.runs
+
+    def point(self, number: int) -> tuple[SimulationSettings, Tray]:
+        """Settings and tray of a point of the grid.
+
+        Parameters
+        ----------
+        number : int, from 0
+        """
+        places = np.unravel_index(number, self.shape)
+        values = {
+            axis.name: axis.values[int(place)]
+            for axis, place in zip(self.axes, places, strict=True)
+        }
+        settings = with_values(self.settings, values, 'sweep')
+        (tray,) = (one for one in self.trays if one.number == settings.tray)
+        return settings, tray
+
+    def name(self, number: int) -> str:
+        """A point of the grid, for people."""
+        places = np.unravel_index(number, self.shape)
+        return ', '.join(
+            f'{axis.name} {axis.values[int(place)]}'
+            for axis, place in zip(self.axes, places, strict=True)
+        )
+
+    def run_numbers(self, point: int, first: int, last: int) -> list[int]:
+        """Numbers of the runs first, first + 1, ..., last - 1 of a point.
+
+        Run k of point p is number 2^32 p + k of the root seed: numpy's `SeedSequence` takes
+        the two halves as words of their own, so no two runs share a random number, and more
+        runs or points leave those there were as they are.
+        """
+        offset = 0 if self.common_random_numbers else point << 32
+        return [offset + run for run in range(first, last)]
+
+    def question(self) -> str:
+        """Everything that the answer depends on, as a JSON object."""
+        return json.dumps(
+            {
+                'version': __version__,
+                'runs': self.runs,
+                'common_random_numbers': self.common_random_numbers,
+                'axes': {axis.name: axis.values for axis in self.axes},
+                'times': self.times,
+                'settings': {row.name: row.default for row in rows(self.settings)},
+                'trays': {str(one.number): asdict(one) for one in self.trays},
+            }
+        )
+
+
+def sweep_plan(
+    settings: SimulationSettings,
+    axes: Mapping[str, Sequence[Scalar]],
+    times: Sequence[float] | NDArray[np.float64],
+    runs: int,
+    *,
+    common_random_numbers: bool = False,
+    keep_runs: bool = False,
+) -> SweepPlan:
+    """A plan that can be carried out.
+
+    Parameters
+    ----------
+    settings : SimulationSettings
+    axes : mapping of str to sequences
+        Field of `SimulationSettings` to its values; no two alike. Empty: a single point.
+    times : array_like (n_times,), [s]
+        Since the shaking event; rising.
+    runs : int, > 0
+        At every point.
+    common_random_numbers, keep_runs : bool, optional
+        See `SweepPlan`.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming what cannot be used: an unknown field, a value outside its range, times that do
+        not rise.
+    """
+    settings = with_values(settings, {row.name: row.default for row in rows(settings)}, 'settings')
+    checked = tuple(_axis(settings, name, values) for name, values in axes.items())
+    if isinstance(runs, bool) or not isinstance(runs, int) or not 1 <= runs <= MOST_RUNS:
+        raise ConfigurationError(
+            '--runs', f'{runs!r}', f'give a whole number from 1 to {MOST_RUNS}'
+        )
+    points = math.prod(len(axis.values) for axis in checked)
+    if points > MOST_POINTS:
+        raise ConfigurationError(
+            'sweep', f'a grid of {points} points', f'give at most {MOST_POINTS}'
+        )
+    numbers = next((axis.values for axis in checked if axis.name == 'tray'), (settings.tray,))
+    return SweepPlan(
+        settings=settings,
+        axes=checked,
+        times=_times(times),
+        runs=runs,
+        common_random_numbers=common_random_numbers,
+        keep_runs=keep_runs,
+        trays=_trays(numbers),
+    )
+
+
+def _axis(settings: SimulationSettings, name: str, values: Iterable[Any]) -> Axis:
+    known: dict[str, Value] = {}
+    plain = [one.item() if isinstance(one, np.generic) else one for one in values]
+    where = f'axis {name}'
+    if not plain:
+        raise ConfigurationError(where, 'has no values', 'give one or more')
+    found = []
+    for value in plain:
+        changed = with_values(settings, {name: value}, where)
+        known = {row.name: row.default for row in rows(changed)}
+        found.append(known[name])
+    if any(isinstance(value, tuple) for value in found):
+        raise ConfigurationError(where, 'is a list by itself', 'vary a single number')
+    if len(set(found)) < len(found):
+        raise ConfigurationError(where, 'holds a value twice', 'give each value once')
+    return Axis(name=name, values=tuple(found))  # type: ignore[arg-type]  # no tuples among them
+
+
+def _times(times: Sequence[float] | NDArray[np.float64]) -> tuple[float, ...]:
+    try:
+        found = tuple(float(one) for one in times)
+    except (TypeError, ValueError) as error:
+        raise ConfigurationError('--times', f'{times!r}', 'give numbers of seconds') from error
+    steps = itertools.pairwise(found)
+    if (
+        not found
+        or not all(math.isfinite(one) and one >= 0.0 for one in found)
+        or not all(later > earlier for earlier, later in steps)
+    ):
+        raise ConfigurationError(
+            '--times', f'{_shown(found)} [s]', 'give one or more, rising, none below 0'
+        )
+    return found
+
+
+def _shown(values: Sequence[float]) -> str:
+    more = ', ...' if len(values) > 6 else ''
+    return (', '.join(f'{one:g}' for one in values[:6]) or 'no times') + more
+
+
+def _trays(numbers: Iterable[Scalar]) -> tuple[Tray, ...]:
+    flown = load_trays()
+    return tuple(tray_by_number(flown, int(number)) for number in sorted(numbers))

@@ -1,0 +1,164 @@
+"""The mean decay at every point of a grid, as a record and as a file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.npz_archive import read_archive, write_archive
+from nanorocks_ros.studies.sweeps.sweep_parts import COUNTS
+from nanorocks_ros.studies.sweeps.sweep_plan import Axis
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.outputs.npz_archive import Arrays
+
+CURVES = ('mean_speed', 'mean_speed_error', 'mean_projected_speed', 'mean_projected_speed_error')
+_RUNS = ('run_mean_speed', 'run_mean_projected_speed')
+_QUESTION, _TIMES, _AXIS = 'question', 'times', 'axis_'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sweep:
+    """Mean speeds of a cooling gas over the runs, at every point of a grid.
+
+    Parameters
+    ----------
+    axes : tuple of Axis
+        Settings that vary; none for a single point, whose `grid` below is empty.
+    times : ndarray (n_times,), [s]
+        Since the shaking event.
+    runs : int
+        At every point.
+    question : str
+        A JSON object, everything that the numbers depend on: version, settings with the seed,
+        axes, times, runs, trays.
+    mean_speed, mean_projected_speed : ndarray (*grid, n_times), [m/s]
+        Over beads and runs.
+    mean_speed_error, mean_projected_speed_error : ndarray (*grid, n_times), [m/s]
+        One standard error, from the scatter of the runs; NaN for a single run. Errors at
+        different times go together, since a run that is slow stays slow.
+    pair_collisions, wall_collisions : ndarray of int64, (*grid,)
+        Sums over the runs.
+    run_mean_speed, run_mean_projected_speed : ndarray (*grid, n_runs, n_times) or None, [m/s]
+        Run by run, where that was asked for.
+    """
+
+    axes: tuple[Axis, ...]
+    times: NDArray[np.float64]
+    runs: int
+    question: str
+    mean_speed: NDArray[np.float64]
+    mean_speed_error: NDArray[np.float64]
+    mean_projected_speed: NDArray[np.float64]
+    mean_projected_speed_error: NDArray[np.float64]
+    pair_collisions: NDArray[np.int64]
+    wall_collisions: NDArray[np.int64]
+    run_mean_speed: NDArray[np.float64] | None = None
+    run_mean_projected_speed: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        for array in (self.times, *self._arrays().values()):
+            array.setflags(write=False)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values along each axis."""
+        return tuple(len(axis.values) for axis in self.axes)
+
+    def _arrays(self) -> Arrays:
+        every = {name: getattr(self, name) for name in (*CURVES, *COUNTS, *_RUNS)}
+        return {name: array for name, array in every.items() if array is not None}
+
+    def save(self, path: Path) -> None:
+        """Write an ``.npz`` file, complete or not at all.
+
+        Beside the arrays under their own names it holds ``axis_NAME`` for each axis, and
+        ``question``.
+
+        Raises
+        ------
+        RecordingError
+            When the file cannot be written.
+        """
+        axes = {f'{_AXIS}{axis.name}': np.array(axis.values) for axis in self.axes}
+        question = np.array(self.question)
+        write_archive(path, {_QUESTION: question, **axes, _TIMES: self.times, **self._arrays()})
+
+    @classmethod
+    def load(cls, path: Path) -> Sweep:
+        """Read what `save` wrote.
+
+        Raises
+        ------
+        RecordingError
+            When the file cannot be read, is damaged, or holds something else.
+        """
+        arrays = read_archive(path)
+        try:
+            question = str(arrays[_QUESTION])
+            asked = json.loads(question)
+            axes = tuple(
+                Axis(name=name, values=tuple(values)) for name, values in asked['axes'].items()
+            )
+            found = cls(
+                axes=axes,
+                times=arrays[_TIMES],
+                runs=asked['runs'],
+                question=question,
+                **{name: arrays[name] for name in (*CURVES, *COUNTS)},
+                **{name: arrays[name] for name in _RUNS if name in arrays},
+            )
+            found._check_shapes()
+        except (KeyError, ValueError, TypeError, AttributeError) as error:
+            raise RecordingError(
+                str(path), 'holds no sweep', 'name a file that `nanorocks sweep` wrote'
+            ) from error
+        return found
+
+    def _check_shapes(self) -> None:
+        times = (len(self.times),)
+        ends = {**dict.fromkeys(CURVES, times), **dict.fromkeys(COUNTS, ())}
+        ends.update(dict.fromkeys(_RUNS, (self.runs, *times)))
+        for name, array in self._arrays().items():
+            if array.shape != (*self.shape, *ends[name]):
+                raise ValueError(f'{name} has the shape {array.shape}')
+
+    def rows(self) -> Iterator[tuple[Any, ...]]:
+        """Values of the axes, time and the four curves, point by point and time by time."""
+        curves = [getattr(self, name) for name in CURVES]
+        for place in np.ndindex(*self.shape):
+            values = [axis.values[k] for axis, k in zip(self.axes, place, strict=True)]
+            for k, time in enumerate(self.times.tolist()):
+                yield (*values, time, *(float(curve[place][k]) for curve in curves))
+
+    def write_table(self, path: Path, units: dict[str, str]) -> None:
+        """Write the curves as a CSV table, complete or not at all.
+
+        Parameters
+        ----------
+        path : Path
+        units : dict of str to str
+            Of the axes, where they have one.
+
+        Raises
+        ------
+        RecordingError
+            When the file cannot be written.
+        """
+        names = [axis.name for axis in self.axes]
+        write_csv(
+            path,
+            [*names, 'time', *CURVES],
+            [*(units.get(name) or '1' for name in names), 's', *('m/s' for _ in CURVES)],
+            self.rows(),
+        )

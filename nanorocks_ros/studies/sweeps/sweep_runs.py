@@ -1,0 +1,236 @@
+"""Many runs at every point of a grid of settings: divided, handed out, kept and added up."""
+
+from __future__ import annotations
+
+import math
+import time
+from contextlib import closing, nullcontext
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.jobs.journal import Journal, difference
+from nanorocks_ros.jobs.tasks import Workers, as_finished
+from nanorocks_ros.studies.sweeps.sweep_parts import (
+    COUNTS,
+    SPEEDS,
+    RunRange,
+    check_points,
+    cool,
+    divided,
+    missing_runs,
+    points_in_order,
+)
+from nanorocks_ros.studies.sweeps.sweep_result import Sweep
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.outputs.npz_archive import Arrays
+    from nanorocks_ros.studies.sweeps.sweep_plan import SweepPlan
+
+# A part of more numbers than this is a burden to send.
+_MOST_NUMBERS = 2_000_000
+
+
+def parts_folder(output: Path) -> Path:
+    """Where the finished parts of a sweep lie until it is complete."""
+    return output.with_name(f'{output.name}.parts')
+
+
+def sweep(
+    plan: SweepPlan,
+    output: Path | None = None,
+    workers: Workers | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    notice: Callable[[str], None] | None = None,
+) -> Sweep:
+    """Let the gas cool in many runs at every point of a grid.
+
+    The numbers do not depend on the workers: each run has random numbers of its own, and runs
+    are added up in their order.
+
+    Parameters
+    ----------
+    plan : SweepPlan
+    output : Path, optional
+        File for the result. Finished parts are kept in a folder beside it, ``OUTPUT.parts``,
+        until the sweep is complete; called again, it goes on with what is missing. A file that
+        answers the same plan is read.
+    workers : Workers, optional
+        By default processes on all cores.
+    progress : callable, optional
+        Called with the runs done and the runs there are, before and after every task.
+    notice : callable, optional
+        Called with what the user should know, one line each.
+
+    Raises
+    ------
+    ConfigurationError
+        For a setting, or a combination of them, that cannot be used.
+    SimulationError
+        When the gas cannot be prepared or followed at a point; names it.
+    RecordingError
+        When the output cannot be written, or it or its parts belong to another plan.
+    NanorocksError
+        When workers end again and again, or the cluster cannot be used.
+    KeyboardInterrupt
+        Ctrl-C; with an output its text says what is kept.
+    """
+    found = None if output is None else _answer(plan, output)
+    if found is not None:
+        return found
+    workers = workers or Workers()
+    check_points(plan)
+    workers.check()
+    with nullcontext() if output else TemporaryDirectory(prefix='nanorocks_sweep.') as scratch:
+        folder = parts_folder(output) if output else Path(str(scratch))
+        with Journal(folder, plan.question()) as journal:
+            work = _Work(plan, journal, progress or (lambda done, total: None))
+            try:
+                work.run(workers, notice or (lambda text: None))
+                result = assembled(plan, journal)
+                if output is not None:
+                    result.save(output)
+            except KeyboardInterrupt:
+                if output is None:
+                    raise
+                raise KeyboardInterrupt(
+                    f'{work.done} of {plan.total_runs} runs are kept in {folder}; the same '
+                    'command goes on from there'
+                ) from None
+            if output is not None:
+                journal.delete()
+    return result
+
+
+def _answer(plan: SweepPlan, output: Path) -> Sweep | None:
+    """What the output holds already, if it answers the plan."""
+    if not output.exists():
+        return None
+    remedy = 'delete it, or pass another --output'
+    try:
+        found = Sweep.load(output)
+    except RecordingError as error:
+        raise RecordingError(str(output), 'exists and is no sweep of ours', remedy) from error
+    if found.question != plan.question():
+        text = difference(found.question, plan.question())
+        raise RecordingError(str(output), f'holds another sweep ({text})', remedy)
+    if plan.keep_runs and found.run_mean_speed is None:
+        raise RecordingError(str(output), 'holds no single runs', remedy)
+    return found
+
+
+class _Work:
+    """The runs that are missing in a journal, handed out to workers."""
+
+    def __init__(
+        self, plan: SweepPlan, journal: Journal, progress: Callable[[int, int], None]
+    ) -> None:
+        self.done = 0
+        self._plan = plan
+        self._journal = journal
+        self._progress = progress
+
+    def run(self, workers: Workers, notice: Callable[[str], None]) -> None:
+        missing = missing_runs(self._plan, self._journal.good_keys())
+        for text in self._journal.notices:
+            notice(text)
+        self.done = self._plan.total_runs - sum(one.size for one in missing)
+        self._progress(self.done, self._plan.total_runs)
+        if not missing:
+            return
+        # One run to compile or load the code, one to see how long a run takes. The last point
+        # is the most elastic one of most grids, with the most collisions.
+        first, last = missing[0].first, missing[-1].last - 1
+        self._keep(first, cool(_part(self._plan, first)))
+        begin = time.perf_counter()
+        part = cool(_part(self._plan, last))
+        seconds = time.perf_counter() - begin
+        if last > first:
+            self._keep(last, part)
+        missing = missing_runs(self._plan, self._journal.keys())
+        size = _task_size(self._plan, sum(one.size for one in missing), seconds, workers)
+        tasks = {one.key: one for piece in missing for one in divided(piece, size)}
+        with closing(as_finished(cool, tasks, workers)) as results:
+            for key, part in results:
+                self._keep(tasks[key].first, part)
+
+    def _keep(self, first: int, part: Arrays) -> None:
+        size = len(part[COUNTS[0]])
+        self._journal.write(f'{first}-{first + size}', part)
+        self.done += size
+        self._progress(self.done, self._plan.total_runs)
+
+
+def _part(plan: SweepPlan, run: int) -> RunRange:
+    return RunRange(plan=plan, first=run, last=run + 1)
+
+
+def _task_size(plan: SweepPlan, runs: int, seconds: float, workers: Workers) -> int:
+    size = min(workers.task_seconds / max(seconds, 1e-6), _MOST_NUMBERS / len(plan.times))
+    if workers.scheduler is None:
+        # Something for everybody.
+        size = min(size, runs / workers.count)
+    return max(1, math.ceil(size))
+
+
+def assembled(plan: SweepPlan, journal: Journal) -> Sweep:
+    """The result, from the finished parts.
+
+    Parameters
+    ----------
+    plan : SweepPlan
+    journal : Journal
+        Of a plan that is finished.
+
+    Raises
+    ------
+    RecordingError
+        When a part is missing or cannot be read.
+    """
+    arrays: dict[str, Any] = {}
+    curve = (*plan.shape, len(plan.times))
+    for name in SPEEDS:
+        arrays[name], arrays[f'{name}_error'] = np.empty(curve), np.empty(curve)
+        if plan.keep_runs:
+            arrays[f'run_{name}'] = np.empty((*plan.shape, plan.runs, len(plan.times)))
+    for name in COUNTS:
+        arrays[name] = np.empty(plan.shape, dtype=np.int64)
+    for point, runs in enumerate(points_in_order(plan, journal)):
+        place = np.unravel_index(point, plan.shape)
+        for name in SPEEDS:
+            arrays[name][place], arrays[f'{name}_error'][place] = _mean(runs[name])
+            if plan.keep_runs:
+                arrays[f'run_{name}'][place] = runs[name]
+        for name in COUNTS:
+            arrays[name][place] = runs[name].sum()
+    return Sweep(
+        axes=plan.axes,
+        times=np.array(plan.times),
+        runs=plan.runs,
+        question=plan.question(),
+        **arrays,
+    )
+
+
+def _mean(runs: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean and its standard error of (n_runs, n_times), added up run by run."""
+    # Not ndarray.sum: the order of its additions depends on the shape of the array and on the
+    # machine, and with it the last digit.
+    count = len(runs)
+    mean = np.zeros(runs.shape[1])
+    for one in runs:
+        mean += one
+    mean /= count
+    squares = np.zeros(runs.shape[1])
+    for one in runs:
+        squares += (one - mean) ** 2
+    if count == 1:
+        return mean, np.full_like(mean, np.nan)
+    return mean, np.sqrt(squares / (count - 1) / count)

@@ -1,0 +1,194 @@
+"""A simulated run filmed from close by into a video that people can play."""
+
+from __future__ import annotations
+
+import math
+from contextlib import contextmanager
+from dataclasses import replace
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+
+from nanorocks_ros import __version__
+from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.recordings.film.pyav import pyav
+from nanorocks_ros.simulation.tray_camera.tray_film import film
+from nanorocks_ros.simulation.tray_camera.tray_renderer import RIM
+from nanorocks_ros.studies.synthetic.simulated_plan import check_duration
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.jobs.progress import Progress
+    from nanorocks_ros.settings import SimulationSettings
+
+    Picture = NDArray[np.uint8]
+
+# OpenCV 5 moved it.
+_opencv_log: Any = getattr(cv2.utils, 'logging', cv2)
+_SILENT = 0
+
+VIDEOS = '.mp4', '.avi'
+"""Endings of videos: H.264, which plays everywhere, and Motion JPEG, which needs nothing more."""
+
+# The largest picture of a close-up.
+_WIDTH_PX, _HEIGHT_PX = 1280, 720
+# What is seen around the floor of the tray, [m].
+_SURROUNDINGS = 1.5 * RIM
+_SCALES = 100.0, 1e6
+# Sensor noise is costly; at 20 one has to look for the loss.
+_QUALITY = '20'
+_TICKS = 1000
+# What does without PyAV.
+_OTHERWISE = 'name a .avi file'
+
+
+def check_video(path: Path) -> None:
+    """Refuse a video that nothing here can write.
+
+    Raises
+    ------
+    ConfigurationError
+        When PyAV, which writes H.264, is not installed.
+    """
+    if path.suffix == '.mp4':
+        pyav(str(path), _OTHERWISE)
+
+
+def close_up(settings: SimulationSettings, tray: Tray) -> SimulationSettings:
+    """The settings with the camera so near that the tray fills the picture."""
+    length, width = (side + 2.0 * _SURROUNDINGS for side in tray.dimensions[:2])
+    scale = min(max(min(_WIDTH_PX / length, _HEIGHT_PX / width), _SCALES[0]), _SCALES[1])
+    return replace(
+        settings,
+        pixels_per_metre=scale,
+        width_px=2 * math.ceil(0.5 * length * scale),
+        height_px=2 * math.ceil(0.5 * width * scale),
+    )
+
+
+def film_into_video(
+    path: Path,
+    settings: SimulationSettings,
+    tray: Tray,
+    *,
+    duration: float,
+    progress: Progress,
+) -> dict[str, Any]:
+    """Film a simulated tray into a video, in real time.
+
+    Parameters
+    ----------
+    path : Path
+        ``.mp4`` or ``.avi``.
+    settings : SimulationSettings
+    tray : Tray
+    duration : float, [s], > 0
+    progress : callable
+        Called with the frames done and the frames there will be.
+
+    Returns
+    -------
+    dict
+        What was filmed: frames, duration.
+
+    Raises
+    ------
+    ConfigurationError
+        For a duration that cannot be used, or where PyAV is needed and not installed.
+    SimulationError
+        When the beads do not fit into the tray, or the tray into the picture.
+    RecordingError
+        When the video cannot be written.
+    """
+    check_duration(duration)
+    frames = max(1, round(duration * settings.frame_rate))
+    images = (frame.image for frame, _ in film(settings, tray, frames))
+    images_into_video(path, settings, images, frames=frames, progress=progress)
+    return {'frames': frames, 'duration': duration}
+
+
+def images_into_video(
+    path: Path,
+    settings: SimulationSettings,
+    images: Iterable[Picture],
+    *,
+    frames: int,
+    progress: Progress,
+) -> None:
+    """Write pictures of the size and at the rate of the settings into a video.
+
+    Raises
+    ------
+    ConfigurationError
+        Where PyAV is needed and not installed.
+    RecordingError
+        When the video cannot be written.
+    """
+    kind = _h264 if path.suffix == '.mp4' else _motion_jpeg
+    with whole_file(path) as part, kind(part, settings) as write:
+        for done, image in enumerate(images, start=1):
+            write(image)
+            progress(done, frames)
+
+
+@contextmanager
+def _motion_jpeg(path: Path, settings: SimulationSettings) -> Iterator[Callable[[Picture], None]]:
+    """What OpenCV writes everywhere; of H.264 its wheels hold no encoder."""
+    code = cv2.VideoWriter.fourcc(*'MJPG')
+    size = settings.width_px, settings.height_px
+    count = 0
+
+    def write(image: Picture) -> None:
+        nonlocal count
+        writer.write(image)
+        count += 1
+
+    with _no_warnings():
+        writer = cv2.VideoWriter(str(path), code, settings.frame_rate, size)
+        try:
+            yield write
+        finally:
+            writer.release()
+        # OpenCV tells nobody else when the disk is full.
+        video = cv2.VideoCapture(str(path))
+        written = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
+        video.release()
+    if written != count:
+        raise OSError(f'{written} of {count} frames arrived')
+
+
+@contextmanager
+def _no_warnings() -> Iterator[None]:
+    earlier = _opencv_log.getLogLevel()
+    _opencv_log.setLogLevel(_SILENT)
+    try:
+        yield
+    finally:
+        _opencv_log.setLogLevel(earlier)
+
+
+@contextmanager
+def _h264(path: Path, settings: SimulationSettings) -> Iterator[Callable[[Picture], None]]:
+    av = pyav(str(path), _OTHERWISE)
+    # The index first, so that players of web pages start at once.
+    with av.open(str(path), 'w', options={'movflags': '+faststart'}) as container:
+        container.metadata['comment'] = f'nanorocks_ros {__version__}, seed {settings.seed}'
+        rate = Fraction(settings.frame_rate).limit_denominator(_TICKS)
+        stream = container.add_stream('libx264', rate=rate, options={'crf': _QUALITY})
+        # Players want two colours to four pixels, so sides are even.
+        stream.width, stream.height = settings.width_px // 2 * 2, settings.height_px // 2 * 2
+        stream.pix_fmt = 'yuv420p'
+
+        def write(image: Picture) -> None:
+            whole = np.ascontiguousarray(image[: stream.height, : stream.width])
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(whole, format='bgr24')))
+
+        yield write
+        container.mux(stream.encode())

@@ -1,0 +1,162 @@
+"""One shaking event of a tray, simulated several times: decay, beads and collisions."""
+
+from __future__ import annotations
+
+import math
+import time
+from contextlib import closing
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.experiment.trays import Species, Tray
+from nanorocks_ros.jobs.tasks import Workers, as_finished
+from nanorocks_ros.settings import SimulationSettings
+from nanorocks_ros.simulation.engine.gas import MOST_FOR_SCAN, EventCounts, HardSphereGas
+from nanorocks_ros.simulation.initial_state import resting_beads, rules_of
+from nanorocks_ros.simulation.shaken_tray import after_shaking
+from nanorocks_ros.studies.synthetic.simulated_plan import SimulationPlan
+from nanorocks_ros.studies.synthetic.simulated_result import SimulatedRun, SimulatedRuns
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from nanorocks_ros.simulation.engine.run_record import Course
+
+# Work that takes less is done before other processes are up [s].
+_WORTH_PROCESSES = 3.0
+# A first run of more beads takes long enough to be missed by the other cores.
+_MOST_FOR_TRIAL = 2000
+# Tasks for each process: enough that none of them waits long for the last one.
+_TASKS_EACH = 8
+
+
+def simulate(
+    plan: SimulationPlan,
+    workers: Workers,
+    progress: Callable[[float], None] | None = None,
+) -> SimulatedRuns:
+    """Let the tray cool after a shaking event, run by run.
+
+    The numbers do not depend on the workers: each run has random numbers of its own. Where that
+    is quicker all runs are made in this process.
+
+    Parameters
+    ----------
+    plan : SimulationPlan
+    workers : Workers
+    progress : callable, optional
+        Called with the part of the work that is done, 0 to 1.
+
+    Raises
+    ------
+    ConfigurationError
+        For more numbers than memory may hold.
+    SimulationError
+        When the beads do not fit, a run has events without end, or more than `MOST_EVENTS`
+        events were to be kept.
+    NanorocksError
+        When workers end again and again.
+    """
+    plan.check_size()
+    report = progress or (lambda done: None)
+    # Here first: where it is not on disk yet, each process would compile it.
+    load_compiled_code()
+    report(0.0)
+    found: list[SimulatedRun] = []
+    if plan.runs == 1 or plan.tray.count <= _MOST_FOR_TRIAL:
+        start = time.perf_counter()
+        found.append(_followed(plan, 0, lambda part: report(part / plan.runs)))
+        plan.check_events(len(found[0].events) * plan.runs)
+        if (time.perf_counter() - start) * (plan.runs - 1) < _WORTH_PROCESSES:
+            workers = replace(workers, processes=1)
+    with closing(as_finished(_work, _tasks(plan, len(found), workers), workers)) as results:
+        for _, some in results:
+            found.extend(some)
+            report(len(found) / plan.runs)
+            plan.check_events(sum(len(run.events) for run in found))
+    report(1.0)
+    return SimulatedRuns(plan=plan, runs=tuple(sorted(found, key=lambda run: run.number)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Task:
+    plan: SimulationPlan
+    first: int
+    last: int
+
+
+def _tasks(plan: SimulationPlan, done: int, workers: Workers) -> dict[str, _Task]:
+    """The runs that are left, in tasks."""
+    size = math.ceil((plan.runs - done) / (workers.count * _TASKS_EACH))
+    if workers.count == 1:
+        size = 1
+    return {
+        f'{first}': _Task(plan=plan, first=first, last=min(first + size, plan.runs))
+        for first in range(done, plan.runs, max(size, 1))
+    }
+
+
+def _work(task: _Task) -> tuple[SimulatedRun, ...]:
+    load_compiled_code()
+    return tuple(_followed(task.plan, run) for run in range(task.first, task.last))
+
+
+def _followed(
+    plan: SimulationPlan, run: int, progress: Callable[[float], None] | None = None
+) -> SimulatedRun:
+    """One run, from the shaking event on."""
+    start = time.thread_time()
+    rules = rules_of(plan.settings, plan.tray, run)
+    resting = resting_beads(plan.settings, plan.tray, run)
+    gas = HardSphereGas(after_shaking(plan.settings, rules, resting, run, 0), rules)
+
+    def look(now: float) -> None:
+        if plan.events:
+            plan.check_events(_total(gas.counts))
+        if progress is not None:
+            progress(now / plan.duration)
+
+    times = plan.times
+    kept = times[plan.bead_times(run)]
+    course = gas.follow(plan.duration, kept, times, log=plan.events, progress=look)
+    return _as_run(gas, course, run, time.thread_time() - start)
+
+
+def _as_run(gas: HardSphereGas, course: Course, run: int, seconds: float) -> SimulatedRun:
+    n_times, n = course.positions.shape[:2]
+    alone = np.broadcast_to(np.arange(n, dtype=np.int32), (n_times, n))
+    return SimulatedRun(
+        number=run,
+        mean_speed=course.observations.mean_speed,
+        mean_projected_speed=course.observations.mean_projected_speed,
+        bodies=course.observations.bodies,
+        counts=gas.counts,
+        cpu_seconds=seconds,
+        radii=gas.radii,
+        masses=gas.masses,
+        positions=course.positions,
+        velocities=course.velocities,
+        spins=course.spins,
+        body=alone if course.bodies is None else course.bodies,
+        events=course.events,
+    )
+
+
+def _total(counts: EventCounts) -> int:
+    return counts.pair + counts.wall + counts.merge + counts.fix
+
+
+@cache
+def load_compiled_code() -> None:
+    """Load the compiled code, which takes a second in each process and is no part of the work."""
+    settings = SimulationSettings()
+    for count in (2, MOST_FOR_SCAN + 1):
+        species = Species(
+            material='', diameter_low=1e-3, diameter_high=1e-3, density=1e3, count=count
+        )
+        tray = Tray(number=1, dimensions=(0.02, 0.02, 0.02), species=(species,), chalk=False)
+        plan = SimulationPlan(settings=settings, tray=tray, duration=0.1, samples=2, events=True)
+        _followed(plan, 0)

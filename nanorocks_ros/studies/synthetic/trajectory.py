@@ -1,0 +1,186 @@
+"""Beads and collisions of simulated runs as files: arrays in an NPZ file, or a Parquet table."""
+
+from __future__ import annotations
+
+import zipfile
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.parquet import Column, write_parquet
+from nanorocks_ros.simulation.initial_state import stock
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.studies.synthetic.simulated_result import SimulatedRun, SimulatedRuns
+
+TABLES = '.npz', '.parquet'
+"""Endings of the files below."""
+
+_AXES = 'xyz'
+_EVENT_COLUMNS = (
+    Column(name='run', kind='i4'),
+    Column(name='time', kind='f8', unit='s'),
+    Column(name='type', kind='text'),
+    Column(name='bead', kind='i4'),
+    Column(name='partner', kind='i4'),
+    Column(name='normal_speed', kind='f8', unit='m/s'),
+    Column(name='impulse', kind='f8', unit='kg m/s'),
+)
+# The engine's name for the type.
+_FIELDS = {'type': 'kind'}
+
+
+def write_trajectory(path: Path, found: SimulatedRuns) -> None:
+    """Write the beads of every run at every time.
+
+    Parameters
+    ----------
+    path : Path
+        ``.npz``: arrays `times` (samples,), `runs`, `box` (3,), and for each bead `ids`,
+        `species`, `materials`, `radii`, `masses`, `positions` and `velocities`
+        (samples, n, 3), `spins` of rough beads, `body` (samples, n), the smallest number of
+        a bead that moves with this one. With several runs, all that differs from run to run
+        has them as first axis. ``.parquet``: a row for each bead at each time of each run.
+        Either holds `provenance`, as JSON; units are SI.
+    found : SimulatedRuns
+        Of a plan that keeps the trajectory.
+
+    Raises
+    ------
+    ConfigurationError
+        When pyarrow, which writes Parquet, is not installed.
+    RecordingError
+        When the file cannot be written.
+    """
+    if path.suffix == '.parquet':
+        pieces = (_bead_rows(found, run) for run in found.runs)
+        write_parquet(path, _bead_columns(found), pieces, found.provenance())
+    else:
+        _write_arrays(path, _bead_arrays(found))
+
+
+def write_events(path: Path, found: SimulatedRuns) -> None:
+    """Write every collision of every run, in the order of runs and times.
+
+    Parameters
+    ----------
+    path : Path
+        ``.npz`` or ``.parquet``, with the columns `run`, `time`, `type` (pair, wall, merge,
+        fix), `bead`, `partner` (a bead, or the wall: 0 to 5 for low and high x, y, z),
+        `normal_speed` and `impulse`; units are SI.
+    found : SimulatedRuns
+        Of a plan that keeps events.
+
+    Raises
+    ------
+    ConfigurationError
+        When pyarrow, which writes Parquet, is not installed.
+    RecordingError
+        When the file cannot be written.
+    """
+    pieces = (_event_rows(run) for run in found.runs)
+    if path.suffix == '.parquet':
+        write_parquet(path, _EVENT_COLUMNS, pieces, found.provenance())
+        return
+    rows = list(pieces)
+
+    def joined(name: str) -> Callable[[], Any]:
+        return lambda: np.concatenate([one[name] for one in rows])
+
+    arrays = {column.name: joined(column.name) for column in _EVENT_COLUMNS}
+    _write_arrays(path, {**arrays, 'provenance': lambda: np.array(found.provenance())})
+
+
+def _event_rows(run: SimulatedRun) -> dict[str, NDArray[Any]]:
+    columns = {
+        column.name: run.events[_FIELDS.get(column.name, column.name)]
+        for column in _EVENT_COLUMNS[1:]
+    }
+    return {'run': np.full(len(run.events), run.number, dtype=np.int32), **columns}
+
+
+def _bead_arrays(found: SimulatedRuns) -> dict[str, Callable[[], Any]]:
+    """How to make each array: one at a time is in memory twice."""
+    drawn = stock(found.plan.tray)
+
+    def joined(name: str) -> Callable[[], Any]:
+        if len(found.runs) == 1:
+            return lambda: getattr(found.runs[0], name)
+        return lambda: np.stack([getattr(run, name) for run in found.runs])
+
+    names = ['radii', 'masses', 'positions', 'velocities', 'body']
+    if found.runs[0].spins is not None:
+        names.append('spins')
+    return {
+        'times': lambda: found.plan.times,
+        'runs': lambda: np.array([run.number for run in found.runs], dtype=np.int32),
+        'box': lambda: np.array(found.plan.tray.dimensions),
+        'ids': lambda: np.arange(drawn.species.size, dtype=np.int32),
+        'species': lambda: drawn.species,
+        'materials': lambda: np.array(drawn.materials),
+        **{name: joined(name) for name in names},
+        'provenance': lambda: np.array(found.provenance()),
+    }
+
+
+def _write_arrays(path: Path, arrays: dict[str, Callable[[], Any]]) -> None:
+    """Write an ``.npz`` file that ``numpy.load`` reads, the same bytes for the same arrays."""
+    with whole_file(path) as part, zipfile.ZipFile(part, 'w') as archive:
+        for name, make in arrays.items():
+            # A member made this way carries no date.
+            member = zipfile.ZipInfo(f'{name}.npy')
+            with archive.open(member, 'w', force_zip64=True) as stream:
+                np.lib.format.write_array(stream, np.asarray(make()), allow_pickle=False)
+
+
+def _bead_columns(found: SimulatedRuns) -> tuple[Column, ...]:
+    vectors = [('', 'm'), ('v', 'm/s')]
+    if found.runs[0].spins is not None:
+        vectors.append(('w', 'rad/s'))
+    return (
+        Column(name='run', kind='i4'),
+        Column(name='time', kind='f8', unit='s'),
+        Column(name='id', kind='i4'),
+        Column(name='body', kind='i4'),
+        Column(name='species', kind='i4'),
+        Column(name='material', kind='text'),
+        Column(name='radius', kind='f8', unit='m'),
+        Column(name='mass', kind='f8', unit='kg'),
+        *(
+            Column(name=f'{letter}{axis}', kind='f8', unit=unit)
+            for letter, unit in vectors
+            for axis in _AXES
+        ),
+    )
+
+
+def _bead_rows(found: SimulatedRuns, run: SimulatedRun) -> dict[str, NDArray[Any]]:
+    """A row for each bead at each time, times first."""
+    drawn = stock(found.plan.tray)
+    times = found.plan.times
+    n_times, n = run.body.shape
+
+    def of_beads(values: NDArray[Any]) -> NDArray[Any]:
+        return np.tile(values, n_times)
+
+    rows = {
+        'run': np.full(n_times * n, run.number, dtype=np.int32),
+        'time': np.repeat(times, n),
+        'id': of_beads(np.arange(n, dtype=np.int32)),
+        'body': run.body.ravel(),
+        'species': of_beads(drawn.species),
+        'material': of_beads(np.array(drawn.materials)),
+        'radius': of_beads(run.radii),
+        'mass': of_beads(run.masses),
+    }
+    for letter, vectors in (('', run.positions), ('v', run.velocities), ('w', run.spins)):
+        for k, axis in enumerate(_AXES):
+            if vectors is not None:
+                rows[f'{letter}{axis}'] = vectors[:, :, k].ravel()
+    return rows

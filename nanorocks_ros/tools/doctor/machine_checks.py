@@ -1,0 +1,128 @@
+"""The machine: disk, shared memory, socket buffers, compiled kernels, OpenCV."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+import nanorocks_ros
+from nanorocks_ros.tools.doctor.findings import Finding, Status
+
+_GB = 1e9
+# A minute of 1080p JPEGs at quality 85 has about half a gigabyte.
+_ROOM_FOR_A_MINUTE_GB = 0.5
+_ROOM_TO_WORK_GB = 5.0
+# The shared-memory segment of one node, and of a graph of six with some to spare.
+_SEGMENT_GB = 0.064
+_SEGMENTS_GB = 0.5
+_FRAME_BYTES = 1920 * 1080 * 3
+_SHARED_MEMORY = Path('/dev/shm')
+_RECEIVE_BUFFER = Path('/proc/sys/net/core/rmem_max')
+
+
+def disk() -> Finding:
+    """Room for recordings where the command was called."""
+    folder = Path.cwd()
+    free = shutil.disk_usage(folder).free / _GB
+    found = f'{free:.1f} GB free in {folder}'
+    if free >= _ROOM_TO_WORK_GB:
+        return Finding(name='disk', found=found)
+    little = free < _ROOM_FOR_A_MINUTE_GB
+    return Finding(
+        name='disk',
+        status=Status.PROBLEM if little else Status.WARNING,
+        found=f'{found}; a minute of the camera takes about {_ROOM_FOR_A_MINUTE_GB:g} GB',
+        remedy='make room, or work elsewhere',
+    )
+
+
+def shared_memory(folder: Path = _SHARED_MEMORY) -> Finding:
+    """Room for the segments through which frames go from node to node."""
+    name = 'shared memory'
+    if not folder.is_dir():
+        return Finding(
+            name=name,
+            status=Status.WARNING,
+            found=f'there is no {folder}',
+            remedy='frames of 1080p will be lost: mount a tmpfs there',
+        )
+    free = shutil.disk_usage(folder).free / _GB
+    found = f'{free:.2f} GB free in {folder}'
+    if free >= _SEGMENTS_GB and os.access(folder, os.W_OK):
+        return Finding(name=name, found=found)
+    blocked = free < _SEGMENT_GB or not os.access(folder, os.W_OK)
+    return Finding(
+        name=name,
+        status=Status.PROBLEM if blocked else Status.WARNING,
+        found=f'{found}; each node takes {_SEGMENT_GB:g} GB, which has to be writable',
+        remedy='in a container: docker run --shm-size=1g; elsewhere: delete old '
+        f'{folder}/fastrtps_* when no node runs',
+    )
+
+
+def receive_buffer(path: Path = _RECEIVE_BUFFER) -> Finding:
+    """What the kernel keeps of UDP for a subscriber that is busy, between machines."""
+    name = 'socket buffers'
+    try:
+        size = int(path.read_text(encoding='ascii'))
+    except (OSError, ValueError):
+        return Finding(name=name, found=f'{path} cannot be read')
+    found = f'net.core.rmem_max is {size} bytes'
+    if size >= _FRAME_BYTES or os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE') == 'LOCALHOST':
+        return Finding(name=name, found=found)
+    return Finding(
+        name=name,
+        status=Status.WARNING,
+        found=f'{found}; a frame of 1080p has {_FRAME_BYTES}',
+        remedy=f'between machines: sudo sysctl -w net.core.rmem_max={4 * _FRAME_BYTES}; on one: '
+        'export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST',
+    )
+
+
+def compiled_kernels() -> Finding:
+    """Whether what numba compiles is still there at the next start."""
+    name = 'compiled kernels'
+    package = Path(nanorocks_ros.__file__).parent
+    chosen = os.environ.get('NUMBA_CACHE_DIR')
+    places = [Path(chosen)] if chosen else [package, Path.home() / '.cache']
+    usable = [place for place in places if _writable(place)]
+    if usable:
+        return Finding(name=name, found=f'kept in {usable[0]}')
+    return Finding(
+        name=name,
+        status=Status.WARNING,
+        found=f'nowhere to keep them: {" and ".join(map(str, places))} cannot be written; every '
+        'start compiles for a minute',
+        remedy='export NUMBA_CACHE_DIR=/a/folder/of/yours',
+    )
+
+
+def _writable(folder: Path) -> bool:
+    """Whether a file can be made there, or the folder itself."""
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def opencv() -> Finding:
+    """The release of OpenCV and the threads it takes."""
+    try:
+        import cv2
+    except ImportError as error:
+        return Finding(
+            name='OpenCV',
+            status=Status.PROBLEM,
+            found=f'cannot be imported: {error}',
+            remedy='pip install opencv-python-headless',
+        )
+    cores = len(os.sched_getaffinity(0))
+    return Finding(
+        name='OpenCV',
+        found=f'{cv2.__version__}, {cv2.getNumThreads()} threads on {cores} cores',
+    )

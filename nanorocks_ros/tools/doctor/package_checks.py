@@ -1,0 +1,94 @@
+"""Python, and the libraries that the package asks for."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+import sys
+from typing import TYPE_CHECKING
+
+from nanorocks_ros.tools.doctor.findings import Finding, Status
+
+if TYPE_CHECKING:
+    from packaging.requirements import Requirement
+
+_PACKAGE = 'nanorocks_ros'
+_OLDEST_PYTHON = (3, 10)
+_FOR_DEVELOPERS = {'ros', 'test', 'dev'}
+_PURPOSES = {
+    'cluster': 'work handed to other machines (--scheduler)',
+    'dashboard': 'the live page (nanorocks dashboard)',
+    'parquet': 'tables as .parquet files',
+    'video': 'videos read (nanorocks import) and written as .mp4',
+}
+
+
+def python() -> Finding:
+    """The interpreter."""
+    found = f'{platform.python_version()} at {sys.executable}'
+    if sys.version_info < _OLDEST_PYTHON:
+        return Finding(
+            name='Python',
+            status=Status.PROBLEM,
+            found=found,
+            remedy='use Python 3.10 or newer',
+        )
+    return Finding(name='Python', found=found)
+
+
+def libraries() -> list[Finding]:
+    """What the package needs, and each of its extras."""
+    try:
+        requirements = _requirements()
+    except importlib.metadata.PackageNotFoundError:
+        return [
+            Finding(
+                name='libraries',
+                status=Status.WARNING,
+                found=f'{_PACKAGE} runs from its source tree and is not installed',
+                remedy='pip install --editable .',
+            )
+        ]
+    needed = [one for one in requirements if _applies(one, '')]
+    findings = [_library_finding('libraries', needed, Status.PROBLEM, 'everything')]
+    extras = importlib.metadata.metadata(_PACKAGE).get_all('Provides-Extra') or []
+    for extra in sorted(set(extras) - _FOR_DEVELOPERS):
+        wanted = [one for one in requirements if _applies(one, extra) and one not in needed]
+        purpose = _PURPOSES.get(extra, 'an extra')
+        findings.append(_library_finding(f'extra [{extra}]', wanted, Status.WARNING, purpose))
+    return findings
+
+
+def _requirements() -> list[Requirement]:
+    from packaging.requirements import Requirement
+
+    return [Requirement(line) for line in importlib.metadata.requires(_PACKAGE) or []]
+
+
+def _applies(requirement: Requirement, extra: str) -> bool:
+    return requirement.marker is None or requirement.marker.evaluate({'extra': extra})
+
+
+def _library_finding(
+    name: str, requirements: list[Requirement], status: Status, purpose: str
+) -> Finding:
+    found: dict[str, str] = {}
+    lacking = {}
+    for one in requirements:
+        try:
+            found[one.name] = importlib.metadata.version(one.name)
+        except importlib.metadata.PackageNotFoundError:
+            lacking[one.name] = f'{one.name} is not there'
+            continue
+        if not one.specifier.contains(found[one.name], prereleases=True):
+            lacking[one.name] = f'{one.name} {found[one.name]} is not {one.specifier}'
+    if not lacking:
+        versions = ', '.join(f'{key} {value}' for key, value in sorted(found.items()))
+        return Finding(name=name, found=versions)
+    asked = ' '.join(f"'{one.name}{one.specifier}'" for one in requirements if one.name in lacking)
+    return Finding(
+        name=name,
+        status=status,
+        found=f'{", ".join(lacking.values())}; for {purpose}',
+        remedy=f'pip install {asked}',
+    )

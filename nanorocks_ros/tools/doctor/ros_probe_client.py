@@ -1,0 +1,121 @@
+"""What only a process that imports ROS can tell: `nanorocks_ros.nodes.probe`, and its answers."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from typing import IO, Any
+
+from nanorocks_ros.errors import NanorocksError
+from nanorocks_ros.tools.doctor.findings import Finding, Status
+
+_PROBE = (sys.executable, '-m', 'nanorocks_ros.nodes.probe')
+_PATIENCE_S = 60.0
+_FRAMES = 5
+_LOCAL = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+
+
+def _started(*task: str, **variables: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [*_PROBE, *task],
+        env={**os.environ, **variables},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def _answer(process: subprocess.Popen[str]) -> dict[str, Any]:
+    """The last line that a child printed.
+
+    Raises
+    ------
+    NanorocksError
+        With its last words when it failed, or did not end.
+    """
+    try:
+        output, errors = process.communicate(timeout=_PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+        output, errors = '', f'no answer within {_PATIENCE_S:g} s'
+    if process.returncode == 0 and output.strip():
+        answer: dict[str, Any] = json.loads(output.strip().splitlines()[-1])
+        return answer
+    words = [line for line in errors.splitlines() if line.strip()]
+    raise NanorocksError(
+        'ROS 2',
+        words[-1].strip() if words else f'a node ended with code {process.returncode}',
+        'see what "ROS 2" and the variables above say',
+    )
+
+
+def imported() -> tuple[Finding, tuple[str, ...]]:
+    """Whether rclpy and the messages load, with which middleware; the nodes that there are."""
+    try:
+        answer = _answer(_started('import'))
+    except NanorocksError as error:
+        found = f'a process that loads it fails: {error.what}'
+        return Finding(name='rclpy', status=Status.PROBLEM, found=found, remedy=error.do), ()
+    found = f'loads from {answer["where"]}, with {answer["rmw"]}'
+    return Finding(name='rclpy', found=found), tuple(answer['executables'])
+
+
+def loopback() -> Finding:
+    """Whether frames of 1080p really arrive, all of them, from one process in another."""
+    name = 'frames over loopback'
+    # A name that no graph uses: others on this domain are left alone.
+    topic = f'/nanorocks_doctor_{os.getpid()}/image'
+    receiver = _started('receive', topic, str(_FRAMES), **_LOCAL)
+    sender = None
+    try:
+        _wait_for_line(receiver.stdout)
+        sender = _started('send', topic, str(_FRAMES), **_LOCAL)
+        sent, received = _answer(sender), _answer(receiver)
+    except NanorocksError as error:
+        return Finding(name=name, status=Status.PROBLEM, found=error.what, remedy=error.do)
+    finally:
+        for process in (receiver, sender):
+            if process is not None and process.poll() is None:
+                process.kill()
+                process.communicate()
+    return judged(name, sent, received)
+
+
+def _wait_for_line(stream: IO[str] | None) -> None:
+    """Until the child listens; an end of its output is reported by its answer."""
+    if stream is not None:
+        stream.readline()
+
+
+def judged(name: str, sent: dict[str, Any], received: dict[str, Any]) -> Finding:
+    """What became of the frames, by what the sender and the receiver say."""
+    size, arrived, seconds = sent['frame_bytes'], received['received'], received['seconds']
+    whole = arrived == _FRAMES and received['bytes'] == _FRAMES * size
+    if sent['sent'] == 0:
+        found = 'two processes of this machine did not find each other'
+        remedy = (
+            'allow UDP and multicast on lo (ip link set lo multicast on), look at firewall, '
+            'ROS_DOMAIN_ID and the Fast DDS profile'
+        )
+    elif not whole:
+        found = f'{arrived} of {_FRAMES} frames of {size} bytes arrived'
+        remedy = 'look at "shared memory" and "Fast DDS profile"'
+    else:
+        found = f'{arrived} of {_FRAMES} frames of {size} bytes arrived in {seconds:.2f} s'
+        return Finding(name=name, found=found)
+    return Finding(name=name, status=Status.PROBLEM, found=found, remedy=remedy)
+
+
+def graph(seconds: float) -> list[dict[str, Any]]:
+    """Every topic of the running graph: ``name, types, publishers, subscriptions, mismatches``.
+
+    Raises
+    ------
+    NanorocksError
+        Where ROS cannot be asked.
+    """
+    topics: list[dict[str, Any]] = _answer(_started('graph', f'{seconds:g}'))['topics']
+    return topics

@@ -1,0 +1,134 @@
+"""The truth about every bead, to an array and back; the layout is read from ``msg_defs``."""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import cache
+from importlib import resources
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from nanorocks_ros.errors import FrameError
+from nanorocks_ros.records import BeadsTruth
+from nanorocks_ros.wire.array_layouts import NS, LayoutField
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+_FIELD = re.compile(r'^float32(\[\])?\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
+
+
+class BeadsLayout(NamedTuple):
+    """What the elements of an array of beads are.
+
+    Parameters
+    ----------
+    doc : str
+    head : tuple of LayoutField
+        Once, at the beginning.
+    bead : tuple of LayoutField
+        Then for each bead.
+    """
+
+    doc: str
+    head: tuple[LayoutField, ...]
+    bead: tuple[LayoutField, ...]
+
+    def dimensions(self, beads: int) -> tuple[tuple[str, int, int], ...]:
+        """Label, size and stride of each ``layout.dim`` of an array with so many beads."""
+        head, bead = (
+            ','.join(field.name for field in fields) for fields in (self.head, self.bead)
+        )
+        row = len(self.bead)
+        return (
+            (head, len(self.head), len(self.head)),
+            ('bead', beads, beads * row),
+            (bead, row, row),
+        )
+
+
+@cache
+def beads_layout() -> BeadsLayout:
+    """The layout of `BeadsTruth`, from its message definition."""
+    text = resources.files(__package__).joinpath('msg', 'BeadsTruth.msg').read_text('utf-8')
+    lines = [line.strip() for line in text.splitlines()]
+    found = [match.groups() for line in lines if (match := _FIELD.match(line))]
+    return BeadsLayout(
+        lines[0].removeprefix('# '),
+        tuple(LayoutField(*field[1:]) for field in found if not field[0]),
+        tuple(LayoutField(*field[1:]) for field in found if field[0]),
+    )
+
+
+def beads_to_array(truth: BeadsTruth, epoch_ns: int) -> NDArray[np.float32]:
+    """The elements of the truth in the order of its layout.
+
+    Parameters
+    ----------
+    truth : BeadsTruth
+    epoch_ns : int, [ns]
+        What `time` counts from.
+
+    Returns
+    -------
+    ndarray of float32, (6 + 9 n,)
+    """
+    head = [
+        (truth.stamp_ns - epoch_ns) / NS,
+        float(truth.cycle),
+        *truth.displacement,
+        *truth.tray_velocity,
+    ]
+    columns = (truth.radii, truth.species, truth.bodies)
+    rows = np.column_stack([truth.positions, truth.velocities, *columns])
+    return np.concatenate([head, rows.ravel()]).astype(np.float32)
+
+
+def beads_from_array(
+    values: Sequence[float] | NDArray[np.float32], *, tray: int, epoch_ns: int, where: str
+) -> BeadsTruth:
+    """The truth behind an array.
+
+    Parameters
+    ----------
+    values : sequence of float
+    tray : int
+        From the topic name.
+    epoch_ns : int, [ns]
+    where : str
+        The topic, for the error.
+
+    Raises
+    ------
+    FrameError
+        When the elements are no whole beads, or a number that must be known is not finite.
+    """
+    layout = beads_layout()
+    first, row = len(layout.head), len(layout.bead)
+    elements = np.asarray(values, dtype=np.float64)
+    if elements.ndim != 1 or elements.size < first or (elements.size - first) % row:
+        raise FrameError(
+            where,
+            f'{elements.size} elements are not {first} and {row} for each bead',
+            'use the same release of nanorocks_ros on both sides',
+        )
+    if not np.isfinite(elements).all():
+        at = int(np.flatnonzero(~np.isfinite(elements))[0])
+        raise FrameError(where, f'element {at} is {elements[at]}', 'publish finite numbers')
+    head, beads = elements[:first], elements[first:].reshape(-1, row)
+    return BeadsTruth(
+        stamp_ns=epoch_ns + math.floor(head[0] * NS + 0.5),
+        tray=tray,
+        cycle=int(head[1]),
+        displacement=head[2:4].copy(),
+        tray_velocity=head[4:6].copy(),
+        positions=beads[:, :3].copy(),
+        velocities=beads[:, 3:6].copy(),
+        radii=beads[:, 6].copy(),
+        species=beads[:, 7].astype(np.int32),
+        bodies=beads[:, 8].astype(np.int32),
+    )

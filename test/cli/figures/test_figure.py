@@ -1,0 +1,122 @@
+"""The command ``nanorocks figure``."""
+
+from __future__ import annotations
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from decays import simulated_table, write_rows
+
+from nanorocks_ros.cli.main import main
+
+
+@pytest.fixture(scope='module')
+def table(tmp_path_factory):
+    return simulated_table(tmp_path_factory.mktemp('speeds') / 'tray_1_speed.csv', 18)
+
+
+def draw(kind, table, output, *more):
+    return main(['figure', kind, str(table), '-o', str(output), *more])
+
+
+def colours(path):
+    picture = cv2.imread(str(path))
+    assert min(picture.shape[:2]) > 400
+    return {tuple(one) for one in picture.reshape(-1, 3)[::3].tolist()}
+
+
+def test_the_decay_is_drawn_with_both_fits(table, tmp_path, capsys):
+    assert draw('decay', table, tmp_path / 'a.png', '--json') == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found['cycles'] == 18
+    assert found['confined'] == pytest.approx(0.89, abs=0.02)
+    assert found['confined_error'] < 0.02
+    # What the paper's closed form says of a gas whose restitution is 0.89.
+    assert 0.96 < found['paper'] < 0.99
+    # The two fits, in blue, green, red.
+    assert {(0x22, 0x3B, 0xC2), (0x3C, 0xB9, 0xE8)} <= colours(tmp_path / 'a.png')
+
+
+def test_the_restitution_is_drawn_against_speed_with_what_noise_makes_of_it(
+    table, tmp_path, capsys
+):
+    assert draw('instantaneous', table, tmp_path / 'a.png', '--json') == 0
+    found = json.loads(capsys.readouterr().out)
+    paper = np.array(found['paper_restitution'])
+    low, high = np.array(found['noise_and_gas_95'])
+    assert np.mean((paper > low) & (paper < high)) > 0.85
+    assert len(found['local_speed']) == 8
+    assert {(0x22, 0x3B, 0xC2), (0x6F, 0x50, 0x30)} <= colours(tmp_path / 'a.png')
+
+
+def test_a_folder_of_results_will_do(table, tmp_path, capsys):
+    assert draw('decay', table.parent, tmp_path / 'a.pdf') == 0
+    assert (tmp_path / 'a.pdf').read_bytes().startswith(b'%PDF')
+    assert '18 cycles of tray 1' in capsys.readouterr().err
+
+
+def test_a_single_cycle_can_be_drawn(tmp_path):
+    table = simulated_table(tmp_path / 'tray_1_speed.csv', 1)
+    for kind in ('decay', 'instantaneous'):
+        assert draw(kind, table, tmp_path / f'{kind}.png') == 0
+
+
+@pytest.mark.parametrize(
+    ('more', 'code', 'text'),
+    [
+        (('-o', 'a.txt'), 2, 'ends in none of'),
+        (('-o', 'a.png', '--first', '5', '--last', '2'), 2, 'two times, rising'),
+        (('-o', 'a.png', '--tray', '9'), 2, 'tray 9'),
+        (('-o', 'a.png', '--wall-restitution', '1.2'), 2, 'from 0 to 1'),
+        (('-o', 'a.png', '--first', '90', '--last', '99'), 1, 'in common'),
+    ],
+)
+def test_a_wrong_call_is_named_in_one_line(table, tmp_path, monkeypatch, capsys, more, code, text):
+    monkeypatch.chdir(tmp_path)
+    for kind in ('instantaneous', 'decay'):
+        if kind == 'decay' and '1.2' in more:
+            continue
+        assert main(['figure', kind, str(table), *more]) == code
+        error = capsys.readouterr().err
+        assert text in error
+        assert error.count('\n') == 1
+        assert not list(tmp_path.glob('a*'))
+
+
+def test_a_picture_that_exists_is_not_overwritten(table, tmp_path, capsys):
+    (tmp_path / 'a.png').write_text('mine')
+    assert draw('decay', table, tmp_path / 'a.png') == 1
+    assert 'add --force' in capsys.readouterr().err
+    assert (tmp_path / 'a.png').read_text() == 'mine'
+    assert draw('decay', table, tmp_path / 'a.png', '--force') == 0
+
+
+def test_a_table_whose_tray_is_not_known_asks_for_it(table, tmp_path, capsys):
+    other = tmp_path / 'speeds.csv'
+    other.write_bytes(table.read_bytes())
+    assert draw('decay', other, tmp_path / 'a.png') == 2
+    assert '--tray' in capsys.readouterr().err
+    assert draw('decay', other, tmp_path / 'a.png', '--tray', '1') == 0
+
+
+def test_speeds_that_rise_are_no_decay(tmp_path, capsys):
+    rows = [(0.1 * k, 1, 0.0, 1e-3 + 1e-5 * k, 1e-4, 0.3) for k in range(1, 200)]
+    table = write_rows(tmp_path / 'tray_1_speed.csv', rows)
+    for kind in ('decay', 'instantaneous'):
+        assert draw(kind, table, tmp_path / 'a.png') == 1
+        assert 'do not fall' in capsys.readouterr().err
+
+
+def test_a_tray_too_crowded_for_the_theory_says_what_to_use(tmp_path, capsys):
+    rows = [(0.1 * k, 1, 0.0, 0.01 / (1.0 + 0.05 * k), 1e-5, 0.3) for k in range(1, 220)]
+    table = write_rows(tmp_path / 'tray_1_speed.csv', rows)
+    trays = tmp_path / 'trays.yaml'
+    trays.write_text(
+        'densities_g_cm3: {acrylic: 1.18}\n'
+        'trays: {1: {dimensions_mm: [15, 15, 3], '
+        'species: [{material: acrylic, diameter_mm: 2, count: 60}]}}\n'
+    )
+    assert draw('instantaneous', table, tmp_path / 'a.png', '--trays', str(trays)) == 2
+    assert 'use the decay library' in capsys.readouterr().err

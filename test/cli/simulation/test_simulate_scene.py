@@ -1,0 +1,99 @@
+"""``nanorocks simulate --scene`` as people and programs call it."""
+
+from __future__ import annotations
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from nanorocks_ros.cli.main import main
+from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+
+SMALL = ('--width-px', '640', '--height-px', '480', '--scene-pixels-per-metre', '5600')
+QUICK = ('--scene', '--duration', '0.2', '--scene-trays', '1', *SMALL)
+
+
+def simulate(capsys, *arguments):
+    try:
+        code = main(['simulate', *arguments])
+    except SystemExit as end:
+        code = end.code
+    said = capsys.readouterr()
+    return code, said.out, [line for line in said.err.splitlines() if 'compiling' not in line]
+
+
+def test_a_scene_is_filmed_into_a_bag_a_video_and_a_picture(capsys, tmp_path):
+    paths = {name: str(tmp_path / name) for name in ('bag', 'scene.png', 'scene.avi')}
+    flags = ('--bag', paths['bag'], '--picture', paths['scene.png'], '--video', paths['scene.avi'])
+    code, out, err = simulate(capsys, *QUICK, *flags, '--seed', '3', '--json')
+    assert (code, err) == (0, [])
+    found = json.loads(out)
+    assert found['trays'] == [1]
+    assert (found['frames'], found['duration'], found['seed']) == (6, 0.2, 3)
+    assert found['bag'] == paths['bag']
+    assert set(found['files']) == {'bag', 'picture', 'video'}
+    assert found['settings']['scene']['pixels_per_metre'] == 5600
+    assert cv2.imread(paths['scene.png']).shape == (480, 640, 3)
+    frames = list(BagFrames(paths['bag']).frames())
+    assert len(frames) == 6
+    assert frames[0].image.shape == (480, 640, 3)
+
+
+def test_people_are_told_what_was_written(capsys, tmp_path):
+    path = str(tmp_path / 'scene.png')
+    code, out, err = simulate(capsys, *QUICK, '--picture', path)
+    assert (code, err) == (0, [])
+    assert out.splitlines()[-1].split(maxsplit=1) == ['written', path]
+
+
+def test_no_effects_is_a_quiet_picture_and_single_effects_can_be_added(capsys, tmp_path):
+    pictures = []
+    for name, flags in (('none', ()), ('noise', ('--scene-noise', '4'))):
+        path = tmp_path / f'{name}.png'
+        code, _, err = simulate(
+            capsys, *QUICK, '--effects', 'none', *flags, '--picture', str(path)
+        )
+        assert (code, err) == (0, [])
+        pictures.append(cv2.imread(str(path)).astype(float))
+    # Beside the plate it is dark, and even but for the noise.
+    noise = (pictures[1] - pictures[0])[200:280, :60]
+    assert np.std(noise) == pytest.approx(4.0, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'code', 'said'),
+    [
+        (['--scene'], 2, '--scene: makes nothing but films; name a --bag, --video or --picture'),
+        (
+            ['--scene', '--bag', 'b', '--tray', '3'],
+            2,
+            '--tray: is of one tray alone; use --scene-',
+        ),
+        (['--scene', '--bag', 'b', '--noise', '3'], 2, '--noise: is of one tray alone; use'),
+        (['--scene', '--bag', 'b', '--runs', '3'], 2, '--runs: is of one tray alone'),
+        (['--scene', '--bag', 'b', '--events', 'e.npz'], 2, '--events: is of one tray alone'),
+        (['--scene', '--bag', 'b', '--duration', '0'], 2, '--duration: 0'),
+        (['--scene', '--bag', 'b', '--quality', '0'], 2, '--quality: 0'),
+        (['--scene', '--bag', 'b', '--scene-glare', 'much'], 2, '--scene-glare: '),
+        (['--scene', '--bag', 'b', '--scene-glare', '9'], 2, 'scene.glare: 9 is outside [0, 5]'),
+        (['--scene', '--bag', 'b', '--scene-trays', '1', '9'], 2, 'scene.trays: 9 is outside'),
+        (['--scene', '--bag', 'b', '--scene-trays', '2', '2'], 2, 'name none, or one twice'),
+        (['--scene', '--bag', 'b', '--compression-codec', 'av1'], 2, 'is none of jpeg, jpeg_rate'),
+        (['--scene', '--picture', 'scene.pdf'], 2, 'scene.pdf ends in none of .png'),
+        (
+            ['--scene', '--bag', 'b', '--width-px', '300'],
+            2,
+            'lies outside a picture of 300 x 1080',
+        ),
+        (['--scene-noise', '3', '--bag', 'b'], 2, '--scene-noise: is of the whole plate; add'),
+    ],
+)
+def test_a_wrong_call_is_one_line(capsys, tmp_path, monkeypatch, arguments, code, said):
+    monkeypatch.chdir(tmp_path)
+    found, out, err = simulate(capsys, *arguments)
+    assert (found, out, len(err)) == (code, '', 1)
+    assert said in err[0]
+    assert err[0].startswith('nanorocks: ')
+    assert list(tmp_path.iterdir()) == []

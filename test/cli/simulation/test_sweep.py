@@ -1,0 +1,201 @@
+"""The command ``nanorocks sweep``."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sysconfig
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nanorocks_ros.cli.main import main
+from nanorocks_ros.studies.sweeps.sweep_result import CURVES, Sweep
+
+SMALL = ['--runs', '3', '--times', '0:2:3', '--workers', '1']
+GRID = ['--restitution', '0.6:0.9:3', '--wall-restitution', '0.9,0.99']
+
+
+def start(*arguments):
+    """The command as a shell starts it, in a process group of its own."""
+    return subprocess.Popen(
+        [Path(sysconfig.get_path('scripts')) / 'nanorocks', 'sweep', *arguments],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def test_a_sweep_prints_curves_and_writes_them(tmp_path, capsys):
+    output, table = tmp_path / 'a.npz', tmp_path / 'a.csv'
+    arguments = ['sweep', *SMALL, *GRID, '-o', str(output), '--csv', str(table), '--json']
+    assert main([*arguments, '--seed', '4', '--mean-speed', '0.01']) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed['axes'] == {'restitution': [0.6, 0.75, 0.9], 'wall_restitution': [0.9, 0.99]}
+    assert printed['runs'] == 3
+    assert printed['seed'] == 4
+    assert printed['time'] == [0.0, 1.0, 2.0]
+    found = Sweep.load(output)
+    for name in CURVES:
+        np.testing.assert_array_equal(printed[name], getattr(found, name))
+    total = int(found.pair_collisions.sum() + found.wall_collisions.sum())
+    assert printed['events'] == total > 0
+    assert json.loads(found.question)['settings']['mean_speed'] == 0.01
+    with table.open(newline='') as stream:
+        lines = list(csv.DictReader(stream))
+    assert len(lines) == 3 * 2 * 3
+    assert list(lines[0])[:4] == [
+        'restitution [1]',
+        'wall_restitution [1]',
+        'time [s]',
+        'mean_speed [m/s]',
+    ]
+    assert float(lines[-1]['mean_projected_speed [m/s]']) == found.mean_projected_speed[2, 1, 2]
+
+
+def test_what_is_not_known_is_null(tmp_path, capsys):
+    output = str(tmp_path / 'a.npz')
+    assert main(['sweep', '--runs', '1', '--times', '0,1', '-o', output, '--json']) == 0
+    printed = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert printed['mean_speed_error'] == [None, None]
+    assert printed['axes'] == {}
+
+
+def test_a_map_is_drawn_against_a_point_or_a_file(tmp_path, capsys):
+    grid, point = str(tmp_path / 'grid.npz'), str(tmp_path / 'point.npz')
+    assert main(['sweep', *SMALL, '-o', point, '--restitution', '0.75', '--seed', '2']) == 0
+    for k, reference in enumerate(('0.75,0.9', point)):
+        figure = tmp_path / f'{k}.png'
+        arguments = ['sweep', *SMALL, *GRID, '-o', grid, '--figure', str(figure)]
+        assert main([*arguments, '--reference', reference]) == 0
+        assert figure.stat().st_size > 10_000
+    assert 'Traceback' not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (['--restitution', '0.5:x:3'], "--restitution: '0.5:x:3' cannot be read; give low:high"),
+        (['--restitution', '0.5:0.9'], "--restitution: '0.5:0.9' cannot be read; give low:high"),
+        (['--restitution', '0.5:0.9:2.5'], "'0.5:0.9:2.5' cannot be read"),
+        (['--restitution', '0.9:0.5:3'], "'0.9:0.5:3' has no values"),
+        (['--restitution', '0.5:0.9:1'], "'0.5:0.9:1' has no values"),
+        (['--restitution', '0.5:0.9:100000'], "'0.5:0.9:100000' has no values"),
+        (['--restitution', 'nan:0.9:3'], "'nan:0.9:3' has no values"),
+        (['--restitution', '0:inf:3'], 'is not finite'),
+        (['--restitution', 'nan,0.9'], 'nan is not finite'),
+        (['--restitution', '0.5,'], "'0.5,' cannot be read"),
+        (['--restitution', '0.5,1.5'], '1.5 is outside [0, 1]'),
+        (['--restitution', '0.5,0.5'], 'holds a value twice'),
+        (['--restitution', 'a'], "--restitution: 'a' cannot be read"),
+        (['--tray', '1,9'], '9 is outside [1, 8]'),
+        (['--times', '2,1'], '--times: 2, 1 [s]; give one or more, rising'),
+        (['--times', 'soon'], "--times: 'soon' cannot be read"),
+        (['--runs', '0'], '--runs: 0; give a whole number'),
+        (['--workers', '0'], '--workers: 0; give 1 or more'),
+        (['--workers', '2', '--scheduler', 'tcp://127.0.0.1:1'], 'leave it out with --scheduler'),
+        (['--scheduler', 'nowhere'], "--scheduler: 'nowhere' is no address; give tcp://host:port"),
+        (['--task-seconds', 'nan'], '--task-seconds: nan; give a time above 0'),
+        (['--figure', 'a.png'], '--figure: goes with --reference; give both or neither'),
+        (['--figure', 'a.xyz', '--reference', '1'], "--figure: 'a.xyz' is no picture; end it in"),
+        (['--figure', 'a.png', '--reference', '1'], '--figure: the grid is a single point'),
+        ([*GRID, '--figure', 'a.png', '--reference', 'x'], "--reference: 'x' cannot be read"),
+        ([*GRID, '--figure', 'a.png', '--reference', '0.6,0.5'], 'choose one of 0.9, 0.99'),
+    ],
+)
+def test_a_wrong_call_is_told_in_one_line(tmp_path, capsys, arguments, message):
+    output = tmp_path / 'a.npz'
+    assert main(['sweep', '--runs', '2', '--times', '0,1', '-o', str(output), *arguments]) == 2
+    printed = capsys.readouterr()
+    assert message in printed.err
+    assert printed.err.startswith('nanorocks: ')
+    assert printed.err.count('\n') == 1
+    assert printed.out == ''
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize('option', ['--nothing', '--noise'])
+def test_flags_there_are_not_are_refused(option, capsys):
+    with pytest.raises(SystemExit) as ending:
+        main(['sweep', '-o', 'a.npz', option, '1'])
+    assert ending.value.code == 2
+    assert 'unrecognized arguments' in capsys.readouterr().err
+
+
+def test_files_that_cannot_be_used_are_told(tmp_path, capsys):
+    output = tmp_path / 'a.npz'
+    output.write_text('mine')
+    assert main(['sweep', *SMALL, '-o', str(output)]) == 1
+    assert 'a.npz: exists and is no sweep of ours; delete it' in capsys.readouterr().err
+    missing = ['--figure', 'a.png', '--reference', str(tmp_path / 'no.csv')]
+    assert main(['sweep', *SMALL, *GRID, '-o', str(tmp_path / 'b.npz'), *missing]) == 1
+    assert 'no.csv: cannot be read (No such file or directory)' in capsys.readouterr().err
+
+
+def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(tmp_path):
+    arguments = [
+        '--restitution',
+        '0.6:0.9:4',
+        '--runs',
+        '300',
+        '--times',
+        '0:20:5',
+        '--seed',
+        '3',
+    ]
+    quick = ['--workers', '2', '--task-seconds', '0.03']
+    output = tmp_path / 'a.npz'
+    folder = tmp_path / 'a.npz.parts'
+    process = start(*arguments, *quick, '-o', str(output))
+    while len(list(folder.glob('[0-9]*.npz'))) < 6:
+        assert process.poll() is None, process.communicate()[1]
+        time.sleep(0.005)
+    # As a terminal does: to the command and all its workers.
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate()
+    assert process.returncode == 130
+    kept = int(said.split('interrupted; ')[1].split(' of 1200')[0])
+    # The last line; another may tell that the simulation was compiled.
+    assert said.splitlines()[-1] == (
+        f'nanorocks: interrupted; {kept} of 1200 runs are kept in {folder}; '
+        'the same command goes on from there'
+    )
+    assert 0 < kept < 1200
+    assert not output.exists()
+
+    again = start(*arguments, *quick, '-o', str(output))
+    _, said = again.communicate()
+    assert again.returncode == 0, said
+    assert not folder.exists()
+    straight = tmp_path / 'straight.npz'
+    assert main(['sweep', *arguments, '-o', str(straight), '--workers', '1']) == 0
+    one, other = Sweep.load(output), Sweep.load(straight)
+    for name in (*CURVES, 'pair_collisions', 'wall_collisions'):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+def test_a_terminated_command_leaves_no_workers_and_can_go_on(tmp_path):
+    output = tmp_path / 'a.npz'
+    arguments = ['--runs', '20000', '--times', '0,20', '--task-seconds', '0.02', '--workers', '2']
+    process = start(*arguments, '-o', str(output))
+    folder = tmp_path / 'a.npz.parts'
+    while len(list(folder.glob('[0-9]*.npz'))) < 4:
+        assert process.poll() is None, process.communicate()[1]
+        time.sleep(0.005)
+    process.terminate()
+    process.communicate()
+    # The group is empty when the last of its processes has gone.
+    end = time.monotonic() + 60.0
+    while True:
+        try:
+            os.killpg(process.pid, 0)
+        except ProcessLookupError:
+            break
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    assert len(list(folder.glob('[0-9]*.npz'))) >= 4

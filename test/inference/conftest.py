@@ -1,6 +1,0 @@
-"""Draws of contacts that several tests take."""
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parent))

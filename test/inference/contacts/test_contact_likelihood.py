@@ -1,0 +1,137 @@
+"""Restitutions from contacts that are drawn as the likelihoods say they come about."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from contact_draws import drawn_collisions, drawn_rebound, drawn_rebounds
+
+from nanorocks_ros.errors import FitError
+from nanorocks_ros.inference.contacts.contact_estimate import contact_estimate
+from nanorocks_ros.inference.contacts.contact_likelihood import (
+    pair_log_likelihood,
+    rebound_log_likelihood,
+)
+
+WALLS = np.linspace(0.6, 1.0, 161)
+PAIRS = np.linspace(0.4, 1.0, 121)
+
+
+def _walls(rebounds):
+    return contact_estimate(WALLS, rebound_log_likelihood(list(rebounds), WALLS))
+
+
+def test_rebounds_give_the_restitution_of_the_wall_without_bias():
+    rng = np.random.default_rng(1)
+    found = [_walls(drawn_rebounds(rng, 30, 0.85)) for _ in range(60)]
+    values = np.array([one.restitution for one in found])
+    assert values.mean() == pytest.approx(0.85, abs=3.5 * values.std() / 60**0.5)
+    # Stated errors are not believed altogether.
+    stated = np.mean([one.restitution_error for one in found])
+    assert 1.0 < stated / values.std() < 1.8
+
+
+def test_rebounds_that_were_something_else_hardly_count():
+    rng = np.random.default_rng(2)
+    rebounds = list(drawn_rebounds(rng, 40, 0.9, 0.02))
+    clean = _walls(rebounds)
+    spoilt = _walls(
+        [*rebounds, drawn_rebound(3e-3, 0.5e-3, 6e-5), drawn_rebound(2e-3, 4e-3, 6e-5)]
+    )
+    assert spoilt.restitution == pytest.approx(
+        clean.restitution, abs=0.5 * clean.restitution_error
+    )
+
+
+def test_a_wall_whose_own_motion_is_uncertain_says_less():
+    still = _walls([drawn_rebound(3e-3, 2.7e-3, 3e-5)])
+    moving = _walls([drawn_rebound(3e-3, 2.7e-3, 3e-5, wall_error=1e-4)])
+    assert moving.restitution == pytest.approx(still.restitution, abs=0.01)
+    assert moving.restitution_error > 1.5 * still.restitution_error
+
+
+def test_two_cycles_add_up():
+    rng = np.random.default_rng(3)
+    cycles = [list(drawn_rebounds(rng, 20, 0.9)) for _ in range(2)]
+    logs = [rebound_log_likelihood(one, WALLS) for one in cycles]
+    both = contact_estimate(WALLS, sum(logs))
+    assert both.restitution_error < min(_walls(one).restitution_error for one in cycles)
+
+
+def _pairs(collisions, **values):
+    return contact_estimate(PAIRS, pair_log_likelihood(collisions, PAIRS, **values))
+
+
+@pytest.mark.parametrize('restitution', [0.6, 0.9])
+@pytest.mark.parametrize('ratio', [0.3, 1.0])
+def test_collisions_give_the_restitution_whatever_the_vertical_speeds(restitution, ratio):
+    found = _pairs(drawn_collisions(4, 250, restitution, ratio=ratio))
+    assert found.restitution_error < 0.02
+    assert found.restitution == pytest.approx(restitution, abs=3.0 * found.restitution_error)
+
+
+def test_collisions_cover_the_truth_as_often_as_they_say():
+    found = [_pairs(drawn_collisions(seed, 30, 0.8, ratio=0.6)) for seed in range(50)]
+    covered = np.mean([one.lower <= 0.8 <= one.upper for one in found])
+    assert 0.55 < covered < 0.9
+
+
+def test_many_collisions_are_as_likely_as_their_parts_together():
+    collisions = drawn_collisions(8, 150, 0.8)
+    values = {'vertical_ratios': (0.5,)}
+    parts = [
+        pair_log_likelihood(one, PAIRS, **values) for one in (collisions[:70], collisions[70:])
+    ]
+    assert pair_log_likelihood(collisions, PAIRS, **values) == pytest.approx(sum(parts))
+
+
+def test_vertical_speeds_that_are_known_tell_more():
+    collisions = drawn_collisions(5, 80, 0.8, ratio=0.6)
+    known = _pairs(collisions, vertical_ratios=(0.6,))
+    assert known.restitution_error <= _pairs(collisions).restitution_error * 1.05
+
+
+def test_radii_that_were_measured_too_large_do_no_harm():
+    collisions = drawn_collisions(6, 150, 0.8, radius_error=0.04)
+    believed = _pairs(collisions, radius_errors=(0.0,))
+    doubted = _pairs(collisions)
+    assert abs(doubted.restitution - 0.8) < 3.0 * doubted.restitution_error
+    assert abs(doubted.restitution - 0.8) < 0.5 * abs(believed.restitution - 0.8)
+
+
+def test_collisions_that_merged_are_missing_and_that_is_known():
+    collisions = drawn_collisions(7, 250, 0.8, ratio=1.0, sticking_speed=0.8e-3)
+    ignored = _pairs(collisions)
+    known = _pairs(collisions, sticking_speed=0.8e-3)
+    assert known.restitution == pytest.approx(0.8, abs=3.0 * known.restitution_error)
+    assert abs(known.restitution - 0.8) < abs(ignored.restitution - 0.8)
+
+
+@pytest.mark.parametrize('likelihood', [rebound_log_likelihood, pair_log_likelihood])
+def test_nothing_seen_prefers_nothing(likelihood):
+    assert likelihood([], WALLS).tolist() == [0.0] * WALLS.size
+    with pytest.raises(FitError, match='prefers no value'):
+        contact_estimate(WALLS, likelihood([], WALLS))
+
+
+@pytest.mark.parametrize('likelihood', [rebound_log_likelihood, pair_log_likelihood])
+@pytest.mark.parametrize('grid', [[0.5, 1.2], [-0.1], [], [math.nan], [[0.5]]])
+def test_a_grid_that_leaves_0_to_1_is_refused(likelihood, grid):
+    with pytest.raises(FitError, match='correct the grid'):
+        likelihood([], grid)
+
+
+@pytest.mark.parametrize('share', [0.0, 1.0, math.nan])
+def test_a_share_of_outliers_that_cannot_be_is_refused(share):
+    with pytest.raises(FitError, match='outliers'):
+        rebound_log_likelihood([], WALLS, outliers=share)
+
+
+def test_an_estimate_finds_a_peak_between_the_nodes():
+    logs = -0.5 * ((WALLS - 0.8013) / 0.004) ** 2
+    found = contact_estimate(WALLS, logs)
+    assert found.restitution == pytest.approx(0.8013, abs=2e-4)
+    assert found.restitution_error == pytest.approx(0.004, rel=0.02)
+    assert found.upper - found.lower == pytest.approx(2.0 * 0.004 * 0.9945, rel=0.02)

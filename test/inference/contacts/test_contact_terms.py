@@ -1,0 +1,69 @@
+"""What contacts say, added up."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from contact_draws import drawn_collisions, drawn_rebounds
+
+from nanorocks_ros.inference.contacts.contact_estimate import contact_estimate
+from nanorocks_ros.inference.contacts.contact_likelihood import (
+    pair_log_likelihood,
+    rebound_log_likelihood,
+)
+from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+from nanorocks_ros.records import PairCollision, Rebound
+
+FINE = np.linspace(0.5, 1.0, 1001)
+
+
+def contacts():
+    return [*drawn_rebounds(np.random.default_rng(1), 40, 0.9), *drawn_collisions(2, 40, 0.8)]
+
+
+def sum_of(first, *others):
+    total = ContactTerms.of(first)
+    for one in others:
+        total += ContactTerms.of(one)
+    return total
+
+
+def test_a_sum_says_what_all_contacts_together_say():
+    every = contacts()
+    whole = ContactTerms.of(every)
+    parts = sum_of(every[:15], every[15:60], every[60:])
+    assert (parts.rebounds, parts.collisions) == (whole.rebounds, whole.collisions) == (40, 40)
+    np.testing.assert_allclose(parts.walls, whole.walls, rtol=1e-9)
+    np.testing.assert_allclose(parts.beads, whole.beads, rtol=1e-9)
+
+
+def test_its_nodes_are_close_enough_to_give_what_a_fine_grid_gives():
+    every = contacts()
+    terms = ContactTerms.of(every)
+    pairs = [one for one in every if isinstance(one, PairCollision)]
+    walls = [one for one in every if isinstance(one, Rebound)]
+    for term, exact in (
+        (terms.of_beads(), pair_log_likelihood(pairs, FINE)),
+        (terms.of_walls(), rebound_log_likelihood(walls, FINE)),
+    ):
+        grid = FINE[term.restitution[0] <= FINE]
+        found, expected = contact_estimate(grid, term.at(grid)), contact_estimate(FINE, exact)
+        near = 0.02 * expected.restitution_error
+        assert found.restitution == pytest.approx(expected.restitution, abs=near)
+        assert found.restitution_error == pytest.approx(expected.restitution_error, rel=0.02)
+
+
+def test_without_contacts_nothing_is_said():
+    terms = ContactTerms.of(())
+    assert terms.of_beads() is None
+    assert terms.of_walls() is None
+
+
+def test_what_all_contacts_may_be_off_by_adds_to_the_error_in_squares():
+    terms = ContactTerms.of(contacts())
+    for term, bias, low in ((terms.of_beads, 0.02, 0.5), (terms.of_walls, 0.01, 0.8)):
+        grid = np.linspace(low, 1.0, 1001)
+        sure, unsure = (contact_estimate(grid, term(value).at(grid)) for value in (0.0, bias))
+        both = np.hypot(sure.restitution_error, bias)
+        assert unsure.restitution_error == pytest.approx(both, rel=0.1)
+        assert unsure.restitution == pytest.approx(sure.restitution, abs=0.3 * bias)

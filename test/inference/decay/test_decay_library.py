@@ -1,0 +1,117 @@
+"""Decay libraries: what they hold is what the gas does, and a wrong file is told."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.decay.decay_library import NUISANCES, library_of, load_library
+from nanorocks_ros.inference.decay.library_fit import node_of
+from nanorocks_ros.settings import SimulationSettings
+from nanorocks_ros.simulation.ensemble import cooling_runs
+from nanorocks_ros.studies.libraries.decay_simulations import LibraryPlan, cool_node
+
+TRAYS = load_trays()
+
+
+def at_node(library, number):
+    node = {name: np.array([value]) for name, value in node_of(number).items()}
+    return library.log_speed(
+        node['restitution'],
+        node['wall_restitution'],
+        node['floor_lid_restitution'],
+        np.column_stack([node[name] for name in NUISANCES]),
+    )[0]
+
+
+@pytest.mark.parametrize('tray', TRAYS.values(), ids=lambda tray: f'tray{tray.number}')
+def test_every_tray_has_a_library_and_a_node_made_anew_lies_on_it(tray):
+    library = library_of(tray)
+    made = json.loads(library.made_by)
+    plan = LibraryPlan(tray=tray, nodes=made['nodes'], runs=made['runs'], seed=made['seed'])
+    number = 5
+    runs = cool_node(plan, number)
+    error = runs.std(axis=0, ddof=1) / np.sqrt(made['runs'])
+    off = at_node(library, number) - runs.mean(axis=0)
+    assert np.abs(off).mean() < 2.0 * error.mean() + library.misfit
+    assert library.misfit < 0.08
+
+
+def test_the_mean_decay_of_a_gas_that_was_not_in_it_is_that_of_the_library():
+    tray = TRAYS[1]
+    library = library_of(tray)
+    x = library.distances[(library.distances > 0.01) & (library.distances < 0.3)]
+    settings = SimulationSettings(restitution=0.8, wall_restitution=0.95, seed=5)
+    runs = 400
+    speed = cooling_runs(settings, tray, np.concatenate(([0.0], x / 0.0055)), range(runs))
+    projected = speed.mean_projected_speed
+    along = np.log(speed.times[1:] * projected[:, :1])
+    found = np.mean(
+        [
+            np.interp(np.log(x), one, np.log(values[1:] / values[0]))
+            for one, values in zip(along, projected, strict=True)
+        ],
+        axis=0,
+    )
+    expected = np.interp(
+        np.log(x),
+        np.log(library.distances),
+        library.log_speed(
+            np.array([0.8]), np.array([0.95]), None, np.array([[0.0, 0.0, 0.0, 0.0, -1.0]])
+        )[0],
+    )
+    # Their ends are cut where a run was slow.
+    assert np.abs(found - expected)[3:-6].max() < 0.03
+
+
+def test_more_is_lost_with_less_restitution():
+    library = library_of(TRAYS[1])
+    beads = library.log_speed(np.array([0.6, 0.8, 0.9, 1.0]), np.full(4, 0.95))[:, 40]
+    walls = library.log_speed(np.full(4, 0.9), np.array([0.8, 0.9, 0.95, 1.0]))[:, 40]
+    assert (np.diff(beads) > 0.0).all()
+    assert (np.diff(walls) > 0.0).all()
+
+
+def test_a_covariance_is_one():
+    library = library_of(TRAYS[1])
+    for row in library.covariance:
+        for one in row:
+            np.testing.assert_allclose(one, one.T, atol=1e-7)
+            assert np.linalg.eigvalsh(one).min() > -1e-6
+
+
+def test_a_library_of_another_tray_is_refused_and_the_command_named(tmp_path):
+    tray = replace(TRAYS[1], dimensions=(0.015, 0.015, 0.004))
+    with pytest.raises(ConfigurationError, match=r'nanorocks library --tray 1 -o tray_1.npz'):
+        library_of(tray)
+
+
+def test_a_file_that_is_none_is_told_and_how_it_is_made(tmp_path):
+    path = tmp_path / 'mine.npz'
+    with pytest.raises(ConfigurationError, match=r'no such decay library.*nanorocks library'):
+        load_library(str(path), packaged=False)
+    path.write_bytes(b'PK\x03\x04 but no more')
+    with pytest.raises(ConfigurationError, match=r'damaged.*nanorocks library'):
+        load_library(str(path), packaged=False)
+    np.savez(path, tray=np.array('x'))
+    with pytest.raises(ConfigurationError, match='damaged, or no decay library'):
+        load_library(str(path), packaged=False)
+
+
+def test_a_byte_that_changed_is_seen(tmp_path):
+    path = tmp_path / 'mine.npz'
+    library = library_of(TRAYS[1])
+    library.save(lambda arrays: np.savez(path, **arrays))
+    again = load_library(str(path), packaged=False)
+    np.testing.assert_array_equal(again.coefficients, library.coefficients)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    other = tmp_path / 'other.npz'
+    other.write_bytes(content)
+    with pytest.raises(ConfigurationError, match='damaged'):
+        load_library(str(other), packaged=False)

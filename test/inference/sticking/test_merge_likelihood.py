@@ -1,0 +1,84 @@
+"""What a cycle says of sticking speeds: by the integral itself, and while the cycle grows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import trapezoid
+
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.sticking.merge_likelihood import MergeRates
+from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
+from nanorocks_ros.physics.sticking_rates import slow_contacts
+from nanorocks_ros.records import Merge
+
+BEADS = 15
+CONTACTS = slow_contacts(load_trays()[1])
+NS = 1_000_000_000
+STAMPS = np.arange(1, 900, dtype=np.int64) * NS // 15
+SPEEDS = 7e-3 / (1.0 + STAMPS / (5 * NS)) * np.exp(0.05 * np.sin(STAMPS / NS))
+
+
+def merges(*times):
+    return [
+        Merge(
+            stamp_ns=round(time * NS),
+            known_ns=round((time + 1.0) * NS),
+            tray=1,
+            cycle=1,
+            tracks=np.array([1, 2], dtype=np.int32),
+            joins=True,
+        )
+        for time in times
+    ]
+
+
+def cycle(until, *times):
+    used = until * NS >= STAMPS
+    return sticking_cycle(BEADS, merges(*times), STAMPS[used], SPEEDS[used], 0)
+
+
+def test_terms_are_the_integral_of_the_rates_and_the_logarithms_of_those_of_the_merges():
+    one = cycle(50.0, 20.0, 31.5)
+    terms = MergeRates(CONTACTS, BEADS).terms(one)
+    slower = CONTACTS.slower_between(terms.speeds[:, np.newaxis] / one.speeds)
+    rates = slower * one.speeds * 0.5 * one.bodies**2 / BEADS
+    np.testing.assert_allclose(terms.expected, trapezoid(rates, one.times), rtol=1e-12)
+    speeds = np.interp(one.merges, one.times, one.speeds)
+    slower = CONTACTS.slower_between(terms.speeds[:, np.newaxis] / speeds)
+    np.testing.assert_allclose(terms.logs, np.log(slower * speeds).sum(axis=1), rtol=1e-12)
+    assert terms.merges == 2
+
+
+@pytest.mark.parametrize(
+    'steps',
+    [
+        [(10.0,), (11.0,), (12.0, 11.9), (30.0, 11.9), (59.0, 11.9, 40.0)],
+        # A merge long ago that nobody knew of, and another cycle altogether.
+        [(30.0,), (31.0, 5.0), (8.0,), (32.0, 5.0, 31.0)],
+    ],
+)
+def test_a_cycle_that_has_grown_says_what_it_says_at_once(steps):
+    growing = MergeRates(CONTACTS, BEADS)
+    for until, *times in steps:
+        found, afresh = (
+            rates.terms(cycle(until, *times)) for rates in (growing, MergeRates(CONTACTS, BEADS))
+        )
+        np.testing.assert_allclose(found.expected, afresh.expected, rtol=1e-13)
+        np.testing.assert_array_equal(found.logs, afresh.logs)
+
+
+def test_cycles_add_up_and_one_of_a_single_body_says_nothing():
+    rates = MergeRates(CONTACTS, BEADS)
+    one, other = rates.terms(cycle(30.0, 20.0)), rates.terms(cycle(50.0))
+    stuck = StickingCycle(
+        times=np.array([0.0, 1.0]),
+        speeds=np.ones(2),
+        bodies=np.ones(2),
+        merges=np.empty(0),
+    )
+    alone = rates.terms(stuck)
+    assert not alone.exposed
+    both = one + other + alone
+    assert (both.merges, both.exposed) == (1, True)
+    np.testing.assert_array_equal(both.expected, one.expected + other.expected)

@@ -1,0 +1,135 @@
+"""Sticking speeds from merges that are drawn as the likelihood says they come about."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from nanorocks_ros.errors import FitError
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
+from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
+from nanorocks_ros.physics.sticking_rates import slow_contacts
+from nanorocks_ros.records import Merge, StickingStatus
+
+BEADS = 15
+CONTACTS = slow_contacts(load_trays()[1])
+TIMES = np.linspace(0.0, 58.0, 1161)
+SPEEDS = 7e-3 / (1.0 + TIMES / 5.0)
+START = 5_000_000_000
+
+
+def _cycle(rng, sticking_speed, measure='normal'):
+    bodies, merges = np.empty(TIMES.size), []
+    left = BEADS
+    rates = CONTACTS.slower(sticking_speed / SPEEDS, measure) * SPEEDS * 0.5 / BEADS
+    step = TIMES[1]
+    for k, rate in enumerate(rates):
+        bodies[k] = left
+        if left > 1 and rng.random() < rate * left**2 * step:
+            merges.append(TIMES[k])
+            left -= 1
+    return StickingCycle(times=TIMES, speeds=SPEEDS, bodies=bodies, merges=np.array(merges))
+
+
+@pytest.mark.parametrize('measure', ['normal', 'total'])
+def test_the_interval_holds_the_truth_as_often_as_it_says(measure):
+    rng = np.random.default_rng(1)
+    found = [
+        sticking_estimate(
+            [_cycle(rng, 3e-3, measure)],
+            CONTACTS,
+            BEADS,
+            measure=measure,
+            rate_error=1e-6,
+            probability=0.68,
+        )
+        for _ in range(40)
+    ]
+    held = np.mean([one.lower <= 3e-3 <= one.upper for one in found])
+    assert held == pytest.approx(0.68, abs=3.0 * math.sqrt(0.68 * 0.32 / 40))
+    assert np.mean([one.sticking_speed for one in found]) == pytest.approx(3e-3, rel=0.1)
+
+
+def test_many_cycles_tell_more_than_one_but_not_more_than_the_theory():
+    rng = np.random.default_rng(2)
+    cycles = [_cycle(rng, 3e-3) for _ in range(16)]
+    one, many, sure = (
+        sticking_estimate(part, CONTACTS, BEADS, rate_error=error)
+        for part, error in ((cycles[:1], 0.1), (cycles, 0.1), (cycles, 1e-6))
+    )
+    assert many.merges > 10 * one.merges
+    assert one.upper - one.lower > 2.0 * (many.upper - many.lower)
+    assert many.upper - many.lower > 1.2 * (sure.upper - sure.lower)
+    assert many.lower < 3e-3 < many.upper
+
+
+def test_without_a_merge_there_is_an_upper_limit_that_falls_with_more_cycles():
+    cycle = StickingCycle(
+        times=TIMES, speeds=SPEEDS, bodies=np.full(TIMES.size, 15.0), merges=np.empty(0)
+    )
+    one, many = (sticking_estimate([cycle] * n, CONTACTS, BEADS) for n in (1, 9))
+    assert one.status is many.status is StickingStatus.NO_MERGE
+    assert math.isnan(one.sticking_speed)
+    assert one.lower == many.lower == 0.0
+    # So few contacts are so slow: their number goes with the square of the speed.
+    assert many.upper == pytest.approx(one.upper / 3.0, rel=0.1)
+
+
+def test_everything_stuck_at_the_start_says_nothing():
+    cycle = StickingCycle(
+        times=TIMES, speeds=SPEEDS, bodies=np.ones(TIMES.size), merges=np.empty(0)
+    )
+    found = sticking_estimate([cycle], CONTACTS, BEADS, highest=0.02)
+    assert found.status is StickingStatus.STUCK_FROM_THE_START
+    assert (found.lower, found.upper) == (0.0, 0.02)
+    assert math.isnan(found.sticking_speed)
+
+
+def test_where_all_that_meet_stick_there_is_a_lower_limit_only():
+    found = sticking_estimate(
+        [_cycle(np.random.default_rng(3), 1.0)], CONTACTS, BEADS, highest=0.05
+    )
+    assert found.status is StickingStatus.NO_UPPER_LIMIT
+    assert found.upper == pytest.approx(0.05)
+    assert found.lower > 3e-3
+
+
+def _merge(seconds, joins=True):
+    stamp_ns = START + round(seconds * 1e9)
+    return Merge(
+        stamp_ns=stamp_ns,
+        known_ns=stamp_ns,
+        tray=1,
+        cycle=1,
+        tracks=np.array([1, 2], dtype=np.int32),
+        joins=joins,
+    )
+
+
+def test_a_cycle_is_made_of_merges_that_join_bodies_while_speeds_are_known():
+    stamps = START + np.arange(1, 11) * 1_000_000_000
+    merges = [_merge(2.5), _merge(2.6, joins=False), _merge(4.0), _merge(11.0)]
+    cycle = sticking_cycle(BEADS, merges, stamps, np.linspace(5e-3, 1e-3, 10), START)
+    assert cycle.merges.tolist() == [2.5, 4.0]
+    assert cycle.bodies[0] == 15.0
+    assert cycle.bodies[-1] == 13.0
+    assert cycle.bodies[np.searchsorted(cycle.times, 3.0)] == 14.0
+    assert cycle.speeds[0] == 5e-3
+
+
+@pytest.mark.parametrize(
+    ('changes', 'text'),
+    [
+        ({'speeds': np.zeros(TIMES.size)}, 'not positive'),
+        ({'speeds': SPEEDS[:-1]}, '1160 speeds'),
+        ({'times': TIMES[::-1]}, 'do not rise'),
+    ],
+)
+def test_what_cannot_be_used_is_refused(changes, text):
+    values = {'times': TIMES, 'speeds': SPEEDS, 'bodies': np.full(TIMES.size, 15.0)}
+    cycle = StickingCycle(**(values | changes), merges=np.empty(0))
+    with pytest.raises(FitError, match=text):
+        sticking_estimate([cycle], CONTACTS, BEADS)

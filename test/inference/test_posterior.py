@@ -1,0 +1,175 @@
+"""Posterior of the restitutions: near the truth, as wide as it says, and wide where it must be."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.likelihood_1d import SingleTerm
+from nanorocks_ros.inference.posterior import posterior_of, tables_of
+from nanorocks_ros.settings import PriorSettings, SimulationSettings
+from nanorocks_ros.simulation.ensemble import cooling_runs
+
+TRAY = load_trays()[1]
+NOTHING_ELSE = PriorSettings(
+    floor_lid_spread=0.0,
+    height_error=0.0,
+    diameter_error=0.0,
+    count_error=0.0,
+    anisotropy_spread=0.0,
+    start_spread=0.0,
+)
+TIMES = np.arange(1.75, 20.0, 0.25)
+NOISE = 0.02
+LEVELS = np.array([0.025, 0.16, 0.5, 0.84, 0.975])
+
+
+@pytest.fixture(scope='module')
+def exact():
+    return tables_of(library_of(TRAY), TRAY, NOTHING_ELSE)
+
+
+@pytest.fixture(scope='module')
+def uncertain():
+    return tables_of(library_of(TRAY), TRAY, PriorSettings())
+
+
+def decays(restitution, wall, runs, seed=3):
+    settings = SimulationSettings(restitution=restitution, wall_restitution=wall, seed=seed)
+    speed = cooling_runs(settings, TRAY, TIMES, range(runs)).mean_projected_speed
+    return speed * np.exp(NOISE * np.random.default_rng(seed).standard_normal(speed.shape))
+
+
+def likelihoods(tables, speeds, camera=(0.0, 0.0)):
+    return [decay_likelihood(tables, TIMES, one, NOISE * one, camera) for one in speeds]
+
+
+@pytest.mark.parametrize(('restitution', 'wall'), [(0.7, 0.95), (0.89, 0.99), (0.95, 0.9)])
+def test_intervals_cover_the_truth_as_often_as_they_say_when_the_walls_are_known(
+    exact, restitution, wall
+):
+    found = np.array(
+        [
+            posterior_of(exact, one.integrated(), (wall, wall)).quantiles(LEVELS)
+            for one in likelihoods(exact, decays(restitution, wall, 240))
+        ]
+    )
+    covered = [
+        np.mean((found[:, low] < restitution) & (restitution < found[:, high]))
+        for low, high in ((1, 3), (0, 4))
+    ]
+    # Of 240 runs, two standard errors are 0.06 and 0.03.
+    assert covered[0] == pytest.approx(0.68, abs=0.1)
+    assert covered[1] >= 0.89
+    assert abs(np.median(found[:, 2]) - restitution) < 0.4 * found[:, 2].std()
+
+
+def test_cycles_add_up(exact):
+    many = likelihoods(exact, decays(0.89, 0.97, 36))
+    total = many[0]
+    for one in many[1:]:
+        total = total + one
+    alone = posterior_of(exact, many[0].integrated(), (0.97, 0.97))
+    together = posterior_of(exact, total.integrated(), (0.97, 0.97))
+    assert together.covariance[0, 0] ** 0.5 < 0.25 * alone.covariance[0, 0] ** 0.5
+    assert together.mean[0] == pytest.approx(0.89, abs=0.012)
+
+
+def test_the_two_restitutions_lie_in_a_valley(exact):
+    (one,) = likelihoods(exact, decays(0.89, 0.95, 1))
+    found = posterior_of(exact, one.integrated(), (0.8, 1.0))
+    spread = found.covariance
+    assert spread[0, 1] / np.sqrt(spread[0, 0] * spread[1, 1]) < -0.7
+    known = posterior_of(exact, one.integrated(), (0.95, 0.95))
+    assert spread[0, 0] > 4.0 * known.covariance[0, 0]
+
+
+def test_what_else_is_known_of_one_restitution_tells_of_the_other(exact):
+    (one,) = likelihoods(exact, decays(0.89, 0.95, 1))
+    grid = np.linspace(0.0, 1.0, 2001)
+    of_walls = SingleTerm(restitution=grid, log_likelihood=-0.5 * ((grid - 0.95) / 0.002) ** 2)
+    free = posterior_of(exact, one.integrated(), (0.8, 1.0))
+    told = posterior_of(exact, one.integrated(), (0.8, 1.0), of_walls=of_walls)
+    known = posterior_of(exact, one.integrated(), (0.95, 0.95))
+    assert told.covariance[1, 1] ** 0.5 == pytest.approx(0.002, rel=0.1)
+    assert told.covariance[0, 0] < 0.25 * free.covariance[0, 0]
+    assert told.mean[0] == pytest.approx(known.mean[0], abs=0.005)
+    of_beads = SingleTerm(restitution=grid, log_likelihood=-0.5 * ((grid - 0.89) / 0.01) ** 2)
+    both = posterior_of(exact, one.integrated(), (0.8, 1.0), of_beads=of_beads, of_walls=of_walls)
+    assert both.covariance[0, 0] ** 0.5 < 0.01
+
+
+def test_what_is_not_known_of_the_tray_does_not_average_out(exact, uncertain):
+    speeds = decays(0.89, 0.97, 36)
+    widths = {}
+    for name, tables in (('exact', exact), ('uncertain', uncertain)):
+        for runs in (1, 36):
+            many = likelihoods(tables, speeds[:runs], (0.01, 0.01))
+            total = many[0]
+            for one in many[1:]:
+                total = total + one
+            found = posterior_of(tables, total.integrated(), (0.97, 0.97))
+            widths[name, runs] = float(found.covariance[0, 0]) ** 0.5
+    assert widths['uncertain', 36] > 1.5 * widths['exact', 36]
+    assert widths['uncertain', 36] < widths['uncertain', 1]
+
+
+def test_a_few_speeds_say_next_to_nothing(uncertain):
+    speed = decays(0.89, 0.97, 1)[0, :8]
+    one = decay_likelihood(uncertain, TIMES[:8], speed, 0.3 * speed, (0.01, 0.01))
+    found = posterior_of(uncertain, one.integrated(), (0.8, 1.0))
+    assert found.covariance[0, 0] ** 0.5 > 0.15
+
+
+def test_a_factor_on_all_speeds_and_times_changes_nothing(exact):
+    speed = decays(0.89, 0.97, 1)[0]
+    slow = decay_likelihood(exact, 2.0 * TIMES, 0.5 * speed, 0.5 * NOISE * speed, (0.0, 0.0))
+    fast = decay_likelihood(exact, TIMES, speed, NOISE * speed, (0.0, 0.0))
+    np.testing.assert_allclose(slow.log_likelihood, fast.log_likelihood, atol=1e-6)
+
+
+def test_the_posterior_is_a_probability_within_the_prior(uncertain):
+    (one,) = likelihoods(uncertain, decays(0.7, 0.9, 1))
+    found = posterior_of(uncertain, one.integrated(), (0.85, 0.95))
+    assert found.probability.sum() == pytest.approx(1.0)
+    assert (found.probability >= 0.0).all()
+    assert found.wall_restitution[0] >= 0.85
+    assert found.wall_restitution[-1] <= 0.95
+    assert 0.0 <= found.restitution[0] < found.restitution[-1] <= 1.0
+
+
+def test_walls_beyond_the_library_are_refused(uncertain):
+    (one,) = likelihoods(uncertain, decays(0.7, 0.9, 1))
+    with pytest.raises(ConfigurationError, match=r'0.5 to 0.9; give a range within 0.78 to 1'):
+        posterior_of(uncertain, one.integrated(), (0.5, 0.9))
+
+
+@pytest.mark.parametrize('number', [6, 7, 8])
+def test_a_gas_that_is_seen_late_is_not_read_wrong_with_confidence(number):
+    tray = load_trays()[number]
+    tables = tables_of(library_of(tray), tray, PriorSettings())
+    place = int(np.argmin(abs(tables.restitution - 0.89))) * tables.wall_restitution.size + int(
+        np.argmin(abs(tables.wall_restitution - 0.97))
+    )
+    truth = tables.restitution[place // tables.wall_restitution.size]
+    # 20 mm/s at first, and thirteen seconds of a tray that swings before the first speed.
+    time = np.arange(13.0, 30.0, 0.1)
+    distance = np.log(0.02 * time / tables.decays.distances[0]) / tables.decays.step
+    decay = np.interp(distance, np.arange(tables.mean.shape[1]), tables.mean[place])
+    rng = np.random.default_rng(number)
+    speed = 0.02 * np.exp(decay + 0.03 * rng.standard_normal(time.size))
+    camera = (math.hypot(PriorSettings().grain_scale_error, 0.03), 0.1)
+    for seen in range(15, time.size, 10):
+        likelihood = decay_likelihood(
+            tables, time[:seen], speed[:seen], 0.03 * speed[:seen], camera
+        )
+        posterior = posterior_of(tables, likelihood.integrated(), (0.8, 1.0))
+        low, high = posterior.quantiles(np.array([0.005, 0.995]))
+        assert low < truth < high
+        assert high - low > 0.05

@@ -1,0 +1,69 @@
+"""Compiled code that is kept is not used after something it is made of has changed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+
+CALLER = """
+from nanorocks_ros.numerics.compiled import compiled
+from tried.callee import FACTOR, called
+
+@compiled
+def caller(x):
+    return FACTOR * called(x)
+"""
+CALLEE = """
+from nanorocks_ros.numerics.compiled import compiled
+from tried.constants import TERM
+
+FACTOR = {factor}
+
+@compiled
+def called(x):
+    return x + TERM
+"""
+ASK = """
+from tried.caller import caller
+print(caller(10), sum(caller.stats.cache_hits.values()))
+"""
+
+
+def asked(folder):
+    """What the caller says, and how often it was found compiled."""
+    done = subprocess.run(
+        [sys.executable, '-c', ASK],
+        cwd=folder,
+        env={**os.environ, 'PYTHONPATH': str(folder), 'NUMBA_CACHE_DIR': str(folder / 'kept')},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return tuple(int(one) for one in done.stdout.split())
+
+
+def changed(path, text):
+    before = path.stat().st_mtime_ns
+    path.write_text(text)
+    while path.stat().st_mtime_ns == before:
+        time.sleep(0.01)
+        path.write_text(text)
+
+
+def test_what_a_kept_function_calls_and_the_constants_in_it_are_those_of_now(tmp_path):
+    package = tmp_path / 'tried'
+    package.mkdir()
+    (package / '__init__.py').touch()
+    (package / 'constants.py').write_text('TERM = 1\n')
+    (package / 'callee.py').write_text(CALLEE.format(factor=2))
+    (package / 'caller.py').write_text(CALLER)
+    assert asked(tmp_path) == (22, 0)
+    assert asked(tmp_path) == (22, 1)
+    changed(package / 'callee.py', CALLEE.format(factor=3))
+    assert asked(tmp_path) == (33, 0)
+    # Of the same size, and two imports away.
+    changed(package / 'constants.py', 'TERM = 5\n')
+    assert asked(tmp_path) == (45, 0)
+    assert asked(tmp_path) == (45, 1)

@@ -1,0 +1,75 @@
+"""Files a command is asked to write."""
+
+from __future__ import annotations
+
+import pytest
+
+from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.outputs.atomic_files import check_outputs, whole_file
+
+KINDS = {'--table': ('.npz', '.parquet'), '--other': ('.npz',)}
+
+
+def test_new_files_pass_and_leave_nothing(tmp_path):
+    check_outputs({'--table': tmp_path / 'a.npz', '--bag': tmp_path / 'deep' / 'bag'}, KINDS)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_ending_is_a_wrong_call(tmp_path):
+    with pytest.raises(ConfigurationError, match=r'--table: .*a\.txt ends in none of \.npz'):
+        check_outputs({'--table': tmp_path / 'a.txt'}, KINDS)
+
+
+def test_two_flags_may_not_name_one_file(tmp_path):
+    files = {'--table': tmp_path / 'a.npz', '--other': tmp_path / '.' / 'a.npz'}
+    with pytest.raises(ConfigurationError, match='--other: names the file of --table'):
+        check_outputs(files, KINDS)
+
+
+def test_what_exists_is_replaced_only_when_asked(tmp_path):
+    path = tmp_path / 'a.npz'
+    path.touch()
+    with pytest.raises(RecordingError, match=r'exists already .*; name another, or add --force'):
+        check_outputs({'--table': path}, KINDS)
+    check_outputs({'--table': path}, KINDS, force=True)
+    with pytest.raises(RecordingError, match='exists already'):
+        check_outputs({'--bag': tmp_path}, KINDS, force=True)
+    folder = tmp_path / 'b.npz'
+    folder.mkdir()
+    with pytest.raises(RecordingError, match='exists already'):
+        check_outputs({'--table': folder}, KINDS, force=True)
+
+
+def test_a_folder_that_is_missing_is_said_before_the_work(tmp_path):
+    with pytest.raises(RecordingError, match=r'there is no folder .*nowhere; make it'):
+        check_outputs({'--table': tmp_path / 'nowhere' / 'a.npz'}, KINDS)
+
+
+def write(path, content, end=None):
+    with whole_file(path) as part:
+        part.write_bytes(content)
+        if end is not None:
+            raise end
+
+
+def test_a_file_appears_when_it_is_whole(tmp_path):
+    path = tmp_path / 'a.npz'
+    with whole_file(path) as part:
+        part.write_bytes(b'new')
+        assert not path.exists()
+    assert path.read_bytes() == b'new'
+
+
+@pytest.mark.parametrize('end', [ValueError, KeyboardInterrupt, MemoryError])
+def test_half_a_file_never_takes_its_place(tmp_path, end):
+    path = tmp_path / 'a.npz'
+    write(path, b'old')
+    with pytest.raises(end):
+        write(path, b'half', end)
+    assert path.read_bytes() == b'old'
+    assert [one.name for one in tmp_path.iterdir()] == ['a.npz']
+
+
+def test_the_system_says_why_it_cannot_be_written(tmp_path):
+    with pytest.raises(RecordingError, match=r'a\.npz: cannot be written \(No such file'):
+        write(tmp_path / 'nowhere' / 'a.npz', b'new')

@@ -1,0 +1,84 @@
+"""Reports as one HTML file."""
+
+from __future__ import annotations
+
+import base64
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.outputs.html_report import (
+    Erratum,
+    Picture,
+    Section,
+    Table,
+    number,
+    write_report,
+)
+
+HOSTILE = '<script>alert("1")</script> & "more"'
+
+
+class Page(HTMLParser):
+    """Tags and texts of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.texts = [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+
+def page_of(tmp_path, sections, title='A title'):
+    path = tmp_path / 'report.html'
+    write_report(path, title, 'what it is', sections)
+    return Page(path.read_text('utf-8'))
+
+
+def test_pictures_are_inside_the_file(tmp_path):
+    content = bytes(np.arange(200, dtype=np.uint8))
+    (tmp_path / 'one.png').write_bytes(content)
+    picture = Picture(path=tmp_path / 'one.png', caption='what it shows')
+    page = page_of(tmp_path, [Section(title='one', parts=[picture])])
+    ((_, attributes),) = [one for one in page.tags if one[0] == 'img']
+    kind, _, data = attributes['src'].partition(',')
+    assert kind == 'data:image/png;base64'
+    assert base64.b64decode(data) == content
+    assert attributes['alt'] == 'what it shows'
+    assert not any(name in ('script', 'link') for name, _ in page.tags)
+
+
+def test_whatever_texts_hold_is_text(tmp_path):
+    table = Table(head=(HOSTILE,), rows=[(HOSTILE,)], caption=HOSTILE)
+    parts = [HOSTILE, table, Erratum(text=HOSTILE)]
+    page = page_of(tmp_path, [Section(title=HOSTILE, parts=parts)], title=HOSTILE)
+    assert not any(name == 'script' for name, _ in page.tags)
+    # In title, headline, contents, section, paragraph, head, cell, caption and erratum.
+    assert sum(HOSTILE in text for text in page.texts) == 9
+
+
+def test_the_contents_lead_to_every_section(tmp_path):
+    page = page_of(tmp_path, [Section(title=name) for name in ('one', 'two', 'three')])
+    links = [one['href'].removeprefix('#') for name, one in page.tags if name == 'a']
+    ids = [one['id'] for name, one in page.tags if name == 'section']
+    assert links == ids
+    assert len(ids) == 3
+
+
+def test_a_picture_that_is_missing_is_named(tmp_path):
+    missing = Picture(path=tmp_path / 'none.png', caption='')
+    with pytest.raises(RecordingError, match=r'none\.png'):
+        page_of(tmp_path, [Section(title='one', parts=[missing])])
+    assert not (tmp_path / 'report.html').exists()
+
+
+def test_numbers_that_are_not_known_are_dashes():
+    assert number(None) == number(float('nan')) == '–'
+    assert number(0.0012345, 3, 1e3) == '1.23'

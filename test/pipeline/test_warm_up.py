@@ -1,0 +1,70 @@
+"""What was compiled beforehand is all that the first cycle needs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sticking_records import cooling
+
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.decay.likelihood_kernels import evaluate
+from nanorocks_ros.inference.likelihood_1d import _smeared
+from nanorocks_ros.numerics.small_cholesky import integrate
+from nanorocks_ros.numerics.splines import spline_at, spline_basis, spline_slopes
+from nanorocks_ros.physics.sticking_rates import _sum_slower
+from nanorocks_ros.pipeline.warm_up import warm_up_clusters, warm_up_cooling
+from nanorocks_ros.records import Rebound, SpeedEstimate
+from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.stages.clusters.sticking_estimator import StickingMeter
+from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+
+NS = 1_000_000_000
+
+# What Python calls. What only other kernels call is compiled into them, and not once more when
+# those come from the cache on the disk.
+KERNELS = (evaluate, integrate, spline_at, spline_basis, spline_slopes, _smeared, _sum_slower)
+
+
+def compiled_for():
+    """For which types of arguments each kernel of the estimates is compiled."""
+    return [tuple(kernel.signatures) for kernel in KERNELS]
+
+
+def rebound(time):
+    return Rebound(
+        stamp_ns=round(time * NS),
+        tray=1,
+        track=0,
+        species=0,
+        wall=0,
+        incoming=2e-3,
+        incoming_error=1e-4,
+        outgoing=1.9e-3,
+        outgoing_error=1e-4,
+        tangential_incoming=0.0,
+        tangential_outgoing=0.0,
+        tangential_error=1e-4,
+        wall_velocity=0.0,
+        wall_velocity_error=0.0,
+        place=np.zeros(2),
+    )
+
+
+def test_the_estimates_of_a_first_cycle_compile_nothing_more():
+    warm_up_cooling()
+    warm_up_clusters()
+    before = compiled_for()
+    assert all(before)
+    tray = load_trays()[1]
+    fitter, meter = (kind(PipelineSettings(), tray) for kind in (HaffFitter, StickingMeter))
+    for time in (3.0, 4.0, 5.0):
+        fitter.push(rebound(time))
+    found = []
+    for record in cooling(until=24.0):
+        meter.push(record)
+        if isinstance(record, SpeedEstimate):
+            found += fitter.push(record)
+    assert found[-1].rebounds == 3
+    assert found[-1].restitution == pytest.approx(0.9, abs=0.2)
+    assert meter.of_cycle(1, 20 * NS) is not None
+    assert compiled_for() == before

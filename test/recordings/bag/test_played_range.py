@@ -1,0 +1,83 @@
+"""Which part is played, what latched topics held there, and that others can play it, too."""
+
+from __future__ import annotations
+
+import pytest
+import yaml
+from rosbags.rosbag2 import Reader
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.recordings.bag.played_range import latest, played_part
+from nanorocks_ros.recordings.bag.reader import open_bag
+from nanorocks_ros.recordings.bag.writer import BagWriter, OfferedQos, OfferedTopic
+from nanorocks_ros.recordings.messages.message_builders import float_array_message, time_message
+
+NS = 10**9
+LATCHED = OfferedQos(transient_local=True, depth=1)
+TOPICS = {
+    '/epoch': OfferedTopic(msgtype='builtin_interfaces/msg/Time', qos=LATCHED),
+    '/cor': OfferedTopic(msgtype='std_msgs/msg/Float32MultiArray', qos=LATCHED),
+    '/late': OfferedTopic(msgtype='builtin_interfaces/msg/Time', qos=OfferedQos(reliable=False)),
+}
+
+
+@pytest.fixture
+def bag(tmp_path):
+    """300 s; an epoch at the start, a COR every half second, something else at the end."""
+    with BagWriter(tmp_path / 'bag', TOPICS, metadata={'made': 'here'}) as writer:
+        writer.write('/epoch', 100 * NS, time_message(100 * NS))
+        for k in range(600):
+            message = float_array_message(['cor'], [float(k)])
+            writer.write('/cor', 100 * NS + k * NS // 2, message)
+        writer.write('/late', 400 * NS, time_message(0))
+    return open_bag(tmp_path / 'bag')
+
+
+def test_the_part_that_is_played_ends_before_its_duration_is_over(bag):
+    assert played_part(bag, 0.0, 0.0) == (100 * NS, 400 * NS)
+    assert played_part(bag, 10.0, 5.0) == (110 * NS, 115 * NS - 1)
+    assert played_part(bag, 299.0, 500.0) == (399 * NS, 400 * NS)
+
+
+def test_a_start_beyond_the_end_is_refused(bag):
+    with pytest.raises(ConfigurationError, match=r'start: 301 s, but .* has 300\.000 s'):
+        played_part(bag, 301.0, 0.0)
+
+
+@pytest.mark.parametrize(('seconds', 'value'), [(0.6, 1.0), (150.0, 299.0), (300.0, 599.0)])
+def test_latched_topics_held_the_last_message_before(bag, seconds, value):
+    found = latest(bag, list(TOPICS), 100 * NS + round(seconds * NS))
+    assert [one.topic for one in found] == ['/epoch', '/cor']
+    assert bag.deserialize(found[1]).data[0] == value
+
+
+def test_at_the_start_nothing_was_latched_yet(bag):
+    assert latest(bag, list(TOPICS), bag.start_ns) == []
+
+
+def test_the_metadata_are_what_ros2_bag_of_jazzy_reads(bag):
+    """Fields and types as `rosbag2_storage/yaml.hpp` decodes them for version 9 of the format."""
+    text = (bag.path / 'metadata.yaml').read_text()
+    found = yaml.safe_load(text)['rosbag2_bagfile_information']
+    assert (found['version'], found['storage_identifier']) == (9, 'mcap')
+    # Chunks are compressed by the storage; rosbag2 must not try to decompress anything itself.
+    assert (found['compression_format'], found['compression_mode']) == ('', '')
+    assert isinstance(found['duration']['nanoseconds'], int)
+    assert isinstance(found['starting_time']['nanoseconds_since_epoch'], int)
+    assert found['relative_file_paths'] == [one['path'] for one in found['files']]
+    assert set(found['files'][0]) == {'path', 'starting_time', 'duration', 'message_count'}
+    assert found['custom_data'] == {'made': 'here'}
+    assert isinstance(found['ros_distro'], str)
+    for entry in found['topics_with_message_count']:
+        topic = entry['topic_metadata']
+        assert topic['serialization_format'] == 'cdr'
+        assert topic['type_description_hash'].startswith('RIHS01_')
+        (profile,) = topic['offered_qos_profiles']
+        assert profile['history'] == 'keep_last'
+        assert profile['reliability'] in ('reliable', 'best_effort')
+        assert profile['durability'] in ('transient_local', 'volatile')
+        assert profile['liveliness'] == 'automatic'
+        assert set(profile['deadline']) == {'sec', 'nsec'}
+    with Reader(bag.path) as reader:
+        assert reader.message_count == found['message_count'] == 602
+        assert {one.topic for one in reader.connections} == set(TOPICS)

@@ -1,0 +1,90 @@
+"""Settings: ranges, coercion, and errors that list everything wrong at once."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from nanorocks_ros import settings as st
+from nanorocks_ros.errors import ConfigurationError
+
+ALL = (
+    st.PipelineSettings(),
+    st.SimulationSettings(),
+    st.CameraSettings(),
+    st.PacingSettings(),
+    st.BagSettings(),
+    st.SourceSettings(),
+)
+
+
+@pytest.mark.parametrize('settings', ALL, ids=lambda one: type(one).__name__)
+def test_every_default_lies_in_its_own_range_and_is_documented(settings):
+    for row in st.rows(settings):
+        assert st.problem(row, row.default) is None
+        assert row.doc
+
+
+@pytest.mark.parametrize('settings', ALL, ids=lambda one: type(one).__name__)
+def test_nan_and_negative_numbers_are_refused_wherever_a_number_is_wanted(settings):
+    numbers = [
+        row
+        for row in st.rows(settings)
+        if isinstance(row.default, int | float) and not isinstance(row.default, bool)
+    ]
+    for row in numbers:
+        # A tangential restitution is -1 for a smooth bead, and a difference may have either sign.
+        signed = 'tangential' in row.name or 'difference' in row.name
+        below = -1.5 if signed else -1.0
+        for value in (math.nan, math.inf, below):
+            with pytest.raises(ConfigurationError, match=row.name):
+                st.with_values(settings, {row.name: value}, 'test')
+
+
+def test_a_nested_value_is_replaced_and_nothing_else():
+    changed = st.with_values(st.PipelineSettings(), {'speed.interval': 0.2}, 'test')
+    assert changed.speed.interval == 0.2
+    assert changed.cooling == st.CoolingSettings()
+
+
+def test_a_whole_number_does_for_a_real_one_and_a_list_for_a_tuple():
+    values = {'preprocess.pixels_per_metre': 13500, 'trays': [1.0, 3.0]}
+    changed = st.with_values(st.PipelineSettings(), values, 'test')
+    assert isinstance(changed.preprocess.pixels_per_metre, float)
+    assert changed.trays == (1, 3)
+    assert all(isinstance(one, int) for one in changed.trays)
+
+
+def test_every_problem_is_listed_at_once():
+    values = {'speed.method': 'guess', 'cooling.probability': 2.0, 'sped.interval': 1.0}
+    with pytest.raises(ConfigurationError) as caught:
+        st.with_values(st.PipelineSettings(), values, 'mine.yaml')
+    text = str(caught.value)
+    assert text.startswith('mine.yaml: ')
+    assert "'guess' is none of auto, tracking, structure_function, binarised_area" in text
+    assert '2.0 is outside [0.5, 0.999]' in text
+    assert "no setting 'sped.interval'" in text
+
+
+@pytest.mark.parametrize(
+    ('name', 'value'),
+    [
+        ('trays', 'one'),
+        ('trays', [0]),
+        ('trays', [math.nan]),
+        ('trays_file', 3),
+        ('speed.longest_lag_frames', 2.5),
+        ('speed.interval', True),
+        ('speed.interval', 'fast'),
+    ],
+)
+def test_a_value_of_the_wrong_kind_is_refused(name, value):
+    with pytest.raises(ConfigurationError, match=name):
+        st.with_values(st.PipelineSettings(), {name: value}, 'test')
+
+
+def test_a_flag_is_true_or_false():
+    assert st.with_values(st.BagSettings(), {'loop': True}, 'test').loop
+    with pytest.raises(ConfigurationError, match='neither true nor false'):
+        st.with_values(st.BagSettings(), {'loop': 1}, 'test')

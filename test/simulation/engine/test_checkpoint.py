@@ -1,0 +1,227 @@
+"""A gas that was saved goes on bit by bit as it would have; no other file is taken for one."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+
+import numpy as np
+import pytest
+from gases import BOX, KERNELS, RULES, mixture
+
+from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas, Kernel
+
+HALF, END = 7.3, 20.0
+TIMES = np.linspace(HALF, END, 12)
+
+
+def gas_for(name, kernel=Kernel.SCAN, n=20):
+    box = tuple(1.4 * side for side in BOX)
+    rules = CollisionRules(box=box, **RULES[name])
+    return HardSphereGas(mixture(8, n, rules), rules, kernel)
+
+
+def rest_of(gas):
+    return gas.follow(END, TIMES, TIMES, log=True)
+
+
+def assert_identical(one, other):
+    """Every bit of two courses."""
+    for field in ('times', 'positions', 'velocities', 'spins', 'bodies', 'events'):
+        a, b = getattr(one, field), getattr(other, field)
+        assert (a is None) == (b is None), field
+        if a is not None:
+            np.testing.assert_array_equal(a, b)
+    for field in type(one.observations).__slots__:
+        np.testing.assert_array_equal(
+            getattr(one.observations, field), getattr(other.observations, field)
+        )
+
+
+@pytest.mark.parametrize('kernel', KERNELS)
+@pytest.mark.parametrize('name', RULES)
+def test_a_saved_gas_goes_on_bit_by_bit(tmp_path, name, kernel):
+    path = tmp_path / 'gas.npz'
+    straight = gas_for(name, kernel)
+    straight.run_until(HALF)
+    straight.save(path)
+    expected = rest_of(straight)
+    loaded = HardSphereGas.load(path)
+    assert loaded.now == HALF
+    assert loaded.kernel == kernel
+    assert_identical(rest_of(loaded), expected)
+    assert len(expected.events) > 30
+    assert loaded.counts == straight.counts
+    for field in ('books', 'bodies', 'stuck', 'radii', 'masses'):
+        np.testing.assert_array_equal(getattr(loaded, field), getattr(straight, field))
+
+
+@pytest.mark.parametrize('kernel', KERNELS)
+def test_saving_changes_nothing(tmp_path, kernel):
+    saved, unsaved = gas_for('rough and sticking', kernel), gas_for('rough and sticking', kernel)
+    for gas in (saved, unsaved):
+        gas.run_until(HALF)
+    saved.save(tmp_path / 'gas')
+    assert_identical(rest_of(saved), rest_of(unsaved))
+
+
+@pytest.mark.parametrize('kernel', KERNELS)
+def test_a_gas_can_be_saved_before_its_first_event_and_again_and_again(tmp_path, kernel):
+    expected = gas_for('random', kernel)
+    gas = gas_for('random', kernel)
+    for end in (0.0, 0.1, 3.0, HALF):
+        path = tmp_path / f'after {end}'
+        gas.run_until(end)
+        gas.save(path)
+        gas = HardSphereGas.load(path)
+    expected.run_until(HALF)
+    assert_identical(rest_of(gas), rest_of(expected))
+
+
+@pytest.mark.parametrize('kernel', KERNELS)
+def test_a_gas_stopped_in_the_middle_of_its_events_can_be_saved(tmp_path, kernel):
+    straight, stopped = gas_for('sticking', kernel), gas_for('sticking', kernel)
+    with pytest.raises(SimulationError, match='events taken'):
+        stopped.follow(HALF, most_events=50)
+    stopped.save(tmp_path / 'gas')
+    loaded = HardSphereGas.load(tmp_path / 'gas')
+    for gas in (straight, loaded):
+        gas.run_until(HALF)
+    assert_identical(rest_of(loaded), rest_of(straight))
+
+
+def test_a_loaded_gas_can_be_kicked_and_seen_by_species(tmp_path):
+    gas = gas_for('species')
+    gas.run_until(HALF)
+    gas.save(tmp_path / 'gas')
+    loaded = HardSphereGas.load(tmp_path / 'gas')
+    velocities = np.random.default_rng(1).normal(size=(20, 3))
+    courses = []
+    for each in (gas, loaded):
+        each.kick(velocities)
+        courses.append(rest_of(each))
+    assert_identical(*courses)
+    np.testing.assert_array_equal(loaded.beads().species, mixture(8, 20, SPECIES).species)
+
+
+SPECIES = CollisionRules(box=tuple(1.4 * side for side in BOX), **RULES['species'])
+
+
+@pytest.fixture
+def saved(tmp_path):
+    path = tmp_path / 'gas.npz'
+    gas = gas_for('rough and sticking', n=3)
+    gas.run_until(1.0)
+    gas.save(path)
+    return path
+
+
+def test_a_file_is_replaced_whole_and_leaves_no_other_behind(saved):
+    gas = gas_for('elastic', n=4)
+    gas.save(saved)
+    assert HardSphereGas.load(saved).radii.size == 4
+    assert [path.name for path in saved.parent.iterdir()] == [saved.name]
+
+
+def test_where_nothing_can_be_written_the_error_names_the_file(tmp_path):
+    gas = gas_for('elastic', n=3)
+    for path in (tmp_path / 'no folder' / 'gas', tmp_path):
+        with pytest.raises(SimulationError) as error:
+            gas.save(path)
+        assert str(path) in str(error.value)
+        assert 'write elsewhere' in str(error.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def refused(path):
+    with pytest.raises(SimulationError) as error:
+        HardSphereGas.load(path)
+    assert str(path) in str(error.value)
+    return str(error.value)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    assert 'No such file' in refused(tmp_path / 'nothing')
+    refused(tmp_path)
+
+
+def test_a_file_cut_short_anywhere_is_refused(saved):
+    whole = saved.read_bytes()
+    for length in range(0, len(whole), max(1, len(whole) // 60)):
+        saved.write_bytes(whole[:length])
+        refused(saved)
+
+
+def loaded_or_refused(path):
+    """None when the file is refused, and named."""
+    try:
+        return HardSphereGas.load(path)
+    except SimulationError as error:
+        return None if str(path) in str(error) else error
+
+
+def test_a_file_with_one_changed_bit_is_refused_or_the_same_gas(saved):
+    """Some bits of a zip archive are of no consequence: dates, versions."""
+    whole = saved.read_bytes()
+    expected = HardSphereGas.load(saved)
+    random = np.random.default_rng(1)
+    refusals = 0
+    for place in random.choice(len(whole), 150, replace=False):
+        changed = bytearray(whole)
+        changed[place] ^= 1 << random.integers(8)
+        saved.write_bytes(changed)
+        found = loaded_or_refused(saved)
+        if found is None:
+            refusals += 1
+        else:
+            for a, b in zip(found._state, expected._state, strict=True):
+                np.testing.assert_array_equal(a, b)
+    assert refusals > 75
+
+
+@pytest.mark.parametrize(('place', 'value'), [(8, 1), (10, 8), (10, 12), (10, 14), (10, 99)])
+def test_an_archive_said_to_be_encrypted_or_packed_otherwise_is_refused(saved, place, value):
+    """In the directory of the archive: flags, and deflate, bzip2, LZMA, and a method unknown."""
+    changed = bytearray(saved.read_bytes())
+    changed[changed.index(b'PK\x01\x02') + place] = value
+    saved.write_bytes(changed)
+    refused(saved)
+
+
+def foreign(kind):
+    """What else somebody may name."""
+    buffer = io.BytesIO()
+    if kind == 'other arrays':
+        np.savez(buffer, positions=np.zeros((3, 3)))
+    elif kind == 'one array':
+        np.save(buffer, np.zeros((3, 3)))
+    elif kind == 'pickled array':
+        np.save(buffer, np.array([{}], dtype=object), allow_pickle=True)
+    elif kind == 'text':
+        buffer.write(b'time,x,y,z\n0,1,2,3\n')
+    elif kind == 'other archive':
+        with zipfile.ZipFile(buffer, 'w') as archive:
+            archive.writestr('readme.txt', 'nothing of a gas')
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    'kind', ['other arrays', 'one array', 'pickled array', 'text', 'other archive', 'nothing']
+)
+def test_a_foreign_file_is_refused(tmp_path, kind):
+    path = tmp_path / 'other'
+    path.write_bytes(foreign(kind))
+    refused(path)
+
+
+def test_a_gas_of_another_release_is_refused(saved):
+    with np.load(saved) as file:
+        arrays = dict(file)
+    arrays['form'] = np.asarray([99, 1])
+    from nanorocks_ros.simulation.engine import checkpoint as module
+
+    digest = arrays.pop(module._DIGEST)
+    assert digest.size == 32
+    np.savez(saved.open('wb'), **arrays, **{module._DIGEST: module._digest(arrays)})
+    assert 'another release' in refused(saved)

@@ -1,0 +1,165 @@
+"""Laws of restitution: by species, drawn at random, falling with speed, above one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gases import BOX, KERNELS, energy, gas_of, mixture, near
+
+from nanorocks_ros.simulation.engine.collision_rules import (
+    UniformRestitution,
+    ViscoelasticRestitution,
+)
+from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+
+pytestmark = pytest.mark.parametrize('kernel', KERNELS)
+
+
+def restitutions(events, masses):
+    """What each pair collision of smooth beads left of the normal speed, from its impulse."""
+    pairs = events[events['kind'] == 'pair']
+    one, other = masses[pairs['bead']], masses[pairs['partner']]
+    reduced = one * other / (one + other)
+    return pairs['impulse'] / (reduced * pairs['normal_speed']) - 1.0
+
+
+def rebound(kernel, restitution, speed=2.0, **more):
+    """Part of the speed that is left of a head-on collision."""
+    gas = gas_of(
+        [(3, 5, 5), (7, 5, 5)],
+        [(speed / 2, 0, 0), (-speed / 2, 0, 0)],
+        restitution=restitution,
+        kernel=kernel,
+        **more,
+    )
+    v = gas.follow(3.0 / speed, [3.0 / speed]).velocities[0, :, 0]
+    assert gas.counts.pair == 1
+    return (v[1] - v[0]) / speed
+
+
+def test_each_pair_of_species_has_its_own(kernel):
+    table = [[0.1, 0.4, 0.3], [0.4, 0.9, 0.2], [0.3, 0.2, 0.7]]
+    for a in range(3):
+        for b in range(3):
+            species = np.array([a, b])
+            assert rebound(kernel, table, species=species) == near(table[a][b])
+
+
+def test_an_array_of_a_table_and_one_number_for_all_are_the_same(kernel):
+    rules = CollisionRules(box=BOX, restitution=0.7)
+    beads = replace(mixture(1, 8, rules), species=np.arange(8) % 3)
+    table = replace(rules, restitution=np.full((3, 3), 0.7))
+    one, other = (HardSphereGas(beads, it, kernel).follow(9.0, [9.0]) for it in (rules, table))
+    np.testing.assert_array_equal(one.positions, other.positions)
+
+
+def test_a_random_one_is_even_about_its_mean_and_within_its_range(kernel):
+    law = UniformRestitution(mean=0.95, width=0.1)
+    rules = CollisionRules(box=BOX, restitution=law, wall_restitution=1.02, allow_gain=True)
+    beads = mixture(1, 12, rules)
+    events = HardSphereGas(beads, rules, kernel).follow(800.0, log=True).events
+    drawn = restitutions(events, beads.masses)
+    n = drawn.size
+    assert n > 1500
+    assert drawn.min() >= 0.9 - 1e-9
+    assert drawn.max() <= 1.0 + 1e-9
+    assert drawn.mean() == pytest.approx(0.95, abs=4 * 0.1 / math.sqrt(12 * n))
+    assert drawn.std() == pytest.approx(0.1 / math.sqrt(12), rel=0.05)
+    counts, _ = np.histogram(drawn, 10, (0.9, 1.0))
+    # Chi squared of nine degrees of freedom: above 27.9 once in a thousand.
+    assert np.sum((counts - n / 10) ** 2 / (n / 10)) < 27.9
+    # Nothing of the one before is in the next.
+    assert abs(np.corrcoef(drawn[1:], drawn[:-1])[0, 1]) < 4 / math.sqrt(n)
+
+
+def test_a_random_one_of_no_width_is_its_mean(kernel):
+    assert rebound(kernel, UniformRestitution(mean=0.6, width=0.0)) == near(0.6)
+
+
+def test_random_ones_depend_on_the_seed_alone_and_not_on_the_kernel(kernel):
+    def first(seed, kernel):
+        rules = CollisionRules(
+            box=BOX, restitution=UniformRestitution(mean=0.7, width=0.6), seed=seed
+        )
+        beads = mixture(1, 12, rules)
+        events = HardSphereGas(beads, rules, kernel).follow(20.0, log=True).events
+        return restitutions(events, beads.masses)[:20]
+
+    here = first(1, kernel)
+    for other in KERNELS:
+        np.testing.assert_allclose(first(1, other), here, atol=1e-6)
+    assert np.abs(first(2, kernel) - here).max() > 0.1
+
+
+def test_a_kick_does_not_draw_the_same_ones_again(kernel):
+    law = UniformRestitution(mean=0.5, width=0.8)
+    gas = gas_of([(3, 5, 5), (7, 5, 5)], [(1, 0, 0), (-1, 0, 0)], restitution=law, kernel=kernel)
+    seen = []
+    for _ in range(4):
+        v = gas.follow(1.2, [1.2]).velocities[0, :, 0]
+        seen.append((v[1] - v[0]) / 2)
+        back = np.array([3, 7]) - gas.beads().positions[:, 0]
+        gas.kick([(back[0], 0, 0), (back[1], 0, 0)])
+        gas.run_until(1.0)
+        gas.kick([(1, 0, 0), (-1, 0, 0)])
+    assert len(set(np.round(seen, 6))) == 4
+
+
+def pade(z):
+    """Müller, Pöschel 2011, Phys. Rev. E 84, 021302, equation 15, digits as printed."""
+    over = 1.0 + 0.501086 * z
+    return over / (over + 1.15345 * z**2 + 0.577977 * z**3 + 0.532178 * z**4)
+
+
+@pytest.mark.parametrize('value', [0.2, 0.6, 0.9])
+def test_a_viscoelastic_one_is_the_published_function_of_speed(kernel, value):
+    law = ViscoelasticRestitution(value=value, at_speed=0.5)
+    assert rebound(kernel, law, speed=0.5) == near(value)
+    # The argument that has the value, by a plain search; it goes with speed^(1/10).
+    z = np.linspace(0.0, 20.0, 2_000_001)
+    at = np.interp(-value, -pade(z), z)
+    for speed in (1e-6, 1e-3, 0.1, 2.0, 50.0):
+        expected = pade(at * (speed / 0.5) ** 0.1)
+        assert rebound(kernel, law, speed=speed) == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_viscoelastic_one_falls_with_speed_and_is_elastic_in_the_limit_of_none(kernel):
+    law = ViscoelasticRestitution(value=0.8, at_speed=1.0)
+    speeds = [1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3]
+    found = [rebound(kernel, law, speed=speed) for speed in speeds]
+    assert np.all(np.diff(found) < 0.0)
+    # Leading orders of the theory: 1 - 1.15344 z² + ..., with z² going as speed^(1/5).
+    weak = ViscoelasticRestitution(value=0.9999, at_speed=1.0)
+    losses = [1.0 - rebound(kernel, weak, speed=speed) for speed in (1.0, 32.0)]
+    assert losses[1] / losses[0] == pytest.approx(2.0, rel=0.02)
+    assert 1.0 - found[0] < 0.01
+
+
+def test_a_gas_of_viscoelastic_beads_becomes_more_elastic_as_it_cools(kernel):
+    rules = CollisionRules(box=BOX, restitution=ViscoelasticRestitution(value=0.7, at_speed=2.0))
+    beads = mixture(1, 12, rules)
+    gas = HardSphereGas(beads, rules, kernel)
+    found = restitutions(gas.follow(200.0, log=True).events, beads.masses)
+    assert found[-50:].mean() > found[:50].mean() + 0.03
+
+
+@pytest.mark.parametrize('what', ['restitution', 'wall_restitution'])
+def test_above_one_heats_when_that_is_allowed(kernel, what):
+    rules = CollisionRules(box=BOX, allow_gain=True, **{what: 1.05})
+    gas = HardSphereGas(mixture(1, 8, rules), rules, kernel)
+    had = energy(gas.beads())
+    gas.run_until(10.0)
+    assert energy(gas.beads()) > 1.2 * had
+    assert gas.books[:3].sum() == pytest.approx(had - energy(gas.beads()), rel=1e-12)
+
+
+def test_walls_may_have_another_restitution_than_beads(kernel):
+    rules = CollisionRules(box=BOX, restitution=0.5, wall_restitution=1.0)
+    gas = HardSphereGas(mixture(1, 10, rules), rules, kernel)
+    gas.run_until(10.0)
+    assert gas.counts.wall > 20
+    assert gas.books[0] > 0.0
+    assert abs(gas.books[1]) < 1e-12

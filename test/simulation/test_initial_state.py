@@ -1,0 +1,107 @@
+"""Beads start in the tray, apart, of the right sizes and with the speeds of a shaken gas."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_gases import acrylic, smallest_gap, tray_of
+
+from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.numerics.counter_rng import Purpose, key_for
+from nanorocks_ros.settings import SimulationSettings
+from nanorocks_ros.simulation.initial_state import resting_beads, stock
+from nanorocks_ros.simulation.velocities import uniform_speeds
+
+SETTINGS = SimulationSettings()
+
+
+@pytest.mark.parametrize('number', range(1, 9))
+def test_every_tray_that_was_flown_can_be_filled(number):
+    tray = load_trays()[number]
+    beads = resting_beads(SETTINGS, tray)
+    assert beads.radii.size == tray.count
+    assert not beads.velocities.any()
+    i, j = np.triu_indices(tray.count, 1)
+    apart = np.linalg.norm(beads.positions[i] - beads.positions[j], axis=1)
+    assert np.all(apart >= beads.radii[i] + beads.radii[j])
+    r = beads.radii[:, np.newaxis]
+    assert np.all((beads.positions >= r) & (beads.positions <= np.array(tray.dimensions) - r))
+
+
+def test_diameters_are_even_over_the_range_and_masses_those_of_spheres():
+    tray = tray_of(acrylic(400, 0.0005, 0.001))
+    beads = resting_beads(SETTINGS, tray)
+    diameters = 2.0 * beads.radii
+    assert diameters.min() >= 0.0005
+    assert diameters.max() <= 0.001
+    assert diameters.mean() == pytest.approx(0.00075, abs=4 * 0.0005 / math.sqrt(12 * 400))
+    np.testing.assert_allclose(beads.masses, 1180.0 * math.pi / 6.0 * diameters**3, rtol=1e-14)
+
+
+def test_speeds_after_a_shake_are_even_from_zero_to_twice_the_mean():
+    key = key_for(1, 0, Purpose.VELOCITIES)
+    velocities = uniform_speeds(20_000, 0.007, key, 0)
+    speeds = np.linalg.norm(velocities, axis=1)
+    assert speeds.max() <= 0.014
+    assert speeds.mean() == pytest.approx(0.007, abs=4 * 0.014 / math.sqrt(12 * 20_000))
+    assert np.mean(speeds < 0.0035) == pytest.approx(0.25, abs=0.013)
+    assert np.abs(velocities.mean(axis=0)).max() < 4 * 0.0081 / math.sqrt(3 * 20_000)
+    assert not np.array_equal(velocities, uniform_speeds(20_000, 0.007, key, 1))
+
+
+def test_seeds_and_runs_give_different_beads_and_the_same_ones_again():
+    tray = tray_of(acrylic())
+    first = resting_beads(SETTINGS, tray).positions
+    np.testing.assert_array_equal(first, resting_beads(SETTINGS, tray).positions)
+    assert not np.array_equal(first, resting_beads(SETTINGS, tray, run=1).positions)
+    assert not np.array_equal(first, resting_beads(replace(SETTINGS, seed=2), tray).positions)
+
+
+def test_a_tray_too_full_for_random_places_is_refused_in_time():
+    # 80 fill 0.50 of the tray, a slit half as wide again as a bead.
+    with pytest.raises(SimulationError, match=r'found room for only \d+ of 80 beads'):
+        resting_beads(SETTINGS, tray_of(acrylic(80)))
+
+
+def test_a_tray_too_full_for_one_place_after_the_other_is_filled_all_the_same():
+    beads = resting_beads(SETTINGS, tray_of(acrylic(60)))
+    assert smallest_gap(beads.positions, beads.radii) > 0.0
+
+
+def test_more_beads_than_the_tray_has_volume_are_refused():
+    with pytest.raises(SimulationError, match=r'fill 1\.24 of the box'):
+        resting_beads(SETTINGS, tray_of(acrylic(200)))
+
+
+def test_beads_larger_than_the_tray_are_refused():
+    with pytest.raises(SimulationError, match=r'diameter 0\.004 m in a box 0\.003 m wide'):
+        resting_beads(SETTINGS, tray_of(acrylic(1, 0.004)))
+
+
+@pytest.mark.parametrize(
+    'species',
+    [
+        acrylic(1, -0.001),
+        acrylic(1, float('nan')),
+        acrylic(1, 0.002, 0.001),
+        acrylic(-1),
+        replace(acrylic(), density=0.0),
+    ],
+)
+def test_species_that_cannot_be_are_refused(species):
+    with pytest.raises(SimulationError, match='give positive sizes'):
+        stock(tray_of(species))
+
+
+def test_a_tray_without_beads_is_refused():
+    with pytest.raises(SimulationError, match='holds no bead'):
+        stock(tray_of(acrylic(0)))
+
+
+def test_resting_beads_keep_clear_of_walls_and_each_other():
+    beads = resting_beads(SETTINGS, tray_of(acrylic(15)))
+    assert smallest_gap(beads.positions, beads.radii) >= 0.0

@@ -1,0 +1,151 @@
+"""Pictures and tracks together: one estimate of the clusters at each instant."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sticking_records import NS, TRAY, cooling, ns
+
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.records import (
+    Autocorrelation,
+    BodyEstimate,
+    ClusterEstimate,
+    Merge,
+    Quality,
+    SpeedEstimate,
+    StickingStatus,
+    TrayImage,
+)
+from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.stages.clusters.cluster_estimator import ClusterEstimator
+
+
+def images(until, step=0.1):
+    """Of one and the same picture."""
+    gray = np.random.default_rng(1).integers(90, 140, (60, 60), dtype=np.uint8)
+    return [
+        TrayImage(stamp_ns=ns(t), tray=1, gray=gray, cycle=1, cycle_start_ns=0, noise_power=4.0)
+        for t in np.arange(step, until, step)
+    ]
+
+
+def estimates(records):
+    stage = ClusterEstimator(PipelineSettings(), TRAY)
+    found = [one for record in records for one in stage.push(record)]
+    return [one for one in (*found, *stage.flush()) if isinstance(one, ClusterEstimate)]
+
+
+def as_they_come(records, delays):
+    """In the order in which they are known, some kinds later by some seconds."""
+
+    def known_ns(one):
+        stamp_ns = one.known_ns if isinstance(one, Merge) else one.stamp_ns
+        return stamp_ns + ns(delays.get(type(one), 0.0))
+
+    return sorted(records, key=known_ns)
+
+
+def test_estimates_come_two_seconds_later_with_what_tracks_say_of_the_instant():
+    stage = ClusterEstimator(PipelineSettings(), TRAY)
+    records = as_they_come([*cooling(until=12.0), *images(12.0)], {BodyEstimate: 1.0})
+    true = {one.stamp_ns: one.bodies for one in records if isinstance(one, BodyEstimate)}
+    first = min(one.stamp_ns for one in records if isinstance(one, Merge)) / NS
+    seen = 0
+    for record in records:
+        for one in stage.push(record):
+            if isinstance(one, ClusterEstimate):
+                seen += 1
+                assert record.stamp_ns - one.stamp_ns >= 2 * NS
+                assert one.bodies == true[one.stamp_ns]
+                assert math.isnan(one.onset) == (one.stamp_ns < first * NS)
+    assert seen > 40
+    (*_, last) = stage.flush()
+    assert last.onset == pytest.approx(first)
+    assert last.sticking_status is StickingStatus.MEASURED
+    assert last.sticking_speed_lower < last.sticking_speed < last.sticking_speed_upper
+
+
+def test_they_do_not_depend_on_the_order_in_which_records_come_in():
+    records = [*cooling(until=12.0), *images(12.0)]
+    one = estimates(as_they_come(records, {BodyEstimate: 1.0}))
+    other = estimates(as_they_come(records, {BodyEstimate: 1.6, Merge: 0.9}))
+    assert [repr(each) for each in one] == [repr(each) for each in other]
+
+
+def test_without_tracks_the_autocorrelation_speaks_alone():
+    found = estimates(images(5.0))
+    assert len(found) > 20
+    for one in found:
+        assert math.isnan(one.bodies)
+        assert math.isnan(one.onset)
+        assert one.sticking_status is StickingStatus.UNKNOWN
+        assert one.level_area > 0.0
+
+
+def test_sizes_by_both_are_weighted_by_their_errors():
+    (body, *_) = (one for one in cooling() if isinstance(one, BodyEstimate))
+    by_tracks = [
+        replace(body, stamp_ns=one.stamp_ns, weighted_size=3.0, weighted_size_error=0.5)
+        for one in images(5.0)
+    ]
+    for one in estimates(as_they_come([*images(5.0), *by_tracks], {})):
+        known = math.isfinite(one.cluster_size)
+        weights = np.array([4.0, 1.0 / one.cluster_size_error**2 if known else 0.0])
+        sizes = np.array([3.0, one.cluster_size if known else 0.0])
+        assert one.combined_size == pytest.approx(weights @ sizes / weights.sum())
+        assert one.combined_size_error == pytest.approx(weights.sum() ** -0.5)
+
+
+def test_the_image_is_sent_at_once_while_somebody_looks():
+    stage = ClusterEstimator(PipelineSettings(), TRAY)
+    stage.emit_image = True
+    found = [(one, record) for record in images(3.0) for one in stage.push(record)]
+    pictures = [(one, record) for one, record in found if isinstance(one, Autocorrelation)]
+    assert pictures
+    assert all(one.stamp_ns == record.stamp_ns for one, record in pictures)
+
+
+def test_time_that_goes_back_gives_out_what_was_held():
+    stage = ClusterEstimator(PipelineSettings(), load_trays()[1])
+    once = [one for record in images(5.0) for one in stage.push(record)]
+    back = stage.push(images(0.3)[0])
+    held = [one for one in back if isinstance(one, ClusterEstimate)]
+    stamps = [one.stamp_ns for one in (*once, *held) if isinstance(one, ClusterEstimate)]
+    assert stamps == sorted(stamps)
+    assert stamps[-1] > ns(4.5)
+
+
+def test_where_the_scale_is_wrong_nothing_is_said_of_clusters_and_sticking():
+    records = as_they_come([*cooling(until=12.0), *images(12.0)], {})
+    assert math.isfinite(estimates(records)[-1].sticking_speed)
+    wrong = [
+        replace(one, quality=Quality.WRONG_SCALE)
+        if isinstance(one, TrayImage | SpeedEstimate)
+        else one
+        for one in records
+    ]
+    found = estimates(wrong)
+    assert len(found) > 40
+    for one in found:
+        assert math.isnan(one.cluster_size)
+        assert math.isnan(one.combined_size)
+        assert math.isnan(one.bodies)
+        assert math.isnan(one.onset)
+        assert one.sticking_status is StickingStatus.UNKNOWN
+        assert math.isnan(one.sticking_speed)
+
+
+def test_a_cycle_with_a_wrong_scale_tells_no_sticking_speed_even_once_it_is_right_again():
+    records = as_they_come([*cooling(until=12.0), *images(12.0)], {})
+    first = next(k for k, one in enumerate(records) if isinstance(one, SpeedEstimate))
+    records[first] = replace(records[first], quality=Quality.WRONG_SCALE)
+    stage = ClusterEstimator(PipelineSettings(), TRAY)
+    found = [one for record in records for one in stage.push(record)]
+    assert {one.sticking_status for one in found if isinstance(one, ClusterEstimate)} == {
+        StickingStatus.UNKNOWN
+    }
+    assert stage.cycles == ()

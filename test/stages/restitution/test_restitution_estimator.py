@@ -1,0 +1,436 @@
+"""Speeds in, restitutions out: provisional while cooling, final once per cycle."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.physics.haff_law import haff_speed
+from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
+from nanorocks_ros.records import (
+    CorRelation,
+    CorStatus,
+    Merge,
+    Quality,
+    Rebound,
+    SpeedEstimate,
+    SpeedMethod,
+)
+from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
+from nanorocks_ros.simulation.ensemble import cooling_runs
+from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+
+NS = 1_000_000_000
+TRAY = load_trays()[1]
+
+
+def fitter(**values):
+    return HaffFitter(with_values(PipelineSettings(), values, 'test'), TRAY)
+
+
+def speed(time, value, cycle=1, start=0.0):
+    return SpeedEstimate(
+        stamp_ns=round(time * NS),
+        tray=1,
+        cycle=cycle,
+        cycle_start_ns=round(start * NS) if cycle else None,
+        mean_projected_speed=value,
+        mean_projected_speed_error=0.02 * abs(value) + 1e-6,
+        window=0.1,
+        method=SpeedMethod.STRUCTURE_FUNCTION,
+    )
+
+
+def cooling_cycle(cycle=1, start=0.0, v0=6e-3, tau=5.0, until=25.0, noise=0.01):
+    rng = np.random.default_rng(cycle)
+    times = np.arange(0.1, until, 0.1)
+    values = haff_speed(times, v0, tau) * np.exp(rng.normal(0, noise, times.size))
+    return [speed(start + t, v, cycle, start) for t, v in zip(times, values, strict=True)]
+
+
+def rebounds(rng, n, first, last, wall=0.97):
+    """Of beads from a side wall, with errors of 3 % of a fast one."""
+    error = 1e-4
+    for time in np.sort(rng.uniform(first, last, n)):
+        incoming = rng.uniform(1e-3, 4e-3)
+        noise = rng.normal(0.0, error, 2)
+        yield Rebound(
+            stamp_ns=round(time * NS),
+            tray=1,
+            track=0,
+            species=0,
+            wall=0,
+            incoming=incoming + noise[0],
+            incoming_error=error,
+            outgoing=wall * incoming + noise[1],
+            outgoing_error=error,
+            tangential_incoming=0.0,
+            tangential_outgoing=0.0,
+            tangential_error=error,
+            wall_velocity=0.0,
+            wall_velocity_error=0.0,
+            place=np.zeros(2),
+        )
+
+
+def all_estimates(stage, speeds):
+    return [one for item in speeds for one in stage.push(item)]
+
+
+def simulated_cycle(cycle=1, start=0.0, restitution=0.89, wall=0.97):
+    settings = SimulationSettings(restitution=restitution, wall_restitution=wall, seed=9)
+    times = np.arange(0.1, 25.0, 0.1)
+    (values,) = cooling_runs(settings, TRAY, times, [cycle]).mean_projected_speed
+    return [speed(start + t, v, cycle, start) for t, v in zip(times, values, strict=True)]
+
+
+def test_a_decay_is_read_by_the_closed_form_of_the_paper_when_that_is_asked_for():
+    *_, final = all_estimates(fitter(**{'cooling.relation': 'paper'}), cooling_cycle())
+    expected = paper_restitution_of_decay(1 / (6e-3 * 5.0), TRAY.diameter, TRAY.number_density)
+    assert final.status is CorStatus.FINAL
+    assert final.relation is CorRelation.PAPER
+    assert final.restitution_lower < expected < final.restitution_upper
+    assert final.paper_restitution == final.restitution
+    assert final.initial_speed == pytest.approx(6e-3, rel=0.02)
+    assert final.haff_time == pytest.approx(5.0, rel=0.04)
+
+
+def test_both_restitutions_of_a_simulated_gas_lie_in_their_intervals():
+    *_, final = all_estimates(fitter(), simulated_cycle())
+    assert final.status is CorStatus.FINAL
+    assert final.relation is CorRelation.LIBRARY
+    assert final.restitution_lower < 0.89 < final.restitution_upper
+    assert final.wall_restitution_lower < 0.97 < final.wall_restitution_upper
+    assert final.correlation < -0.5
+    assert final.paper_restitution > 0.95
+    assert 0.3 < final.reduced_chi_square < 2.5
+    assert final.window_start == pytest.approx(1.8, abs=0.1)
+    assert final.window_end == pytest.approx(20.0, abs=0.11)
+    assert final.cooling_start == 0.0
+
+
+def test_the_window_begins_when_the_tray_has_come_to_rest():
+    speeds = [
+        replace(one, tray_speed=5e-3 * math.exp(-0.3 * one.stamp_ns / NS))
+        for one in simulated_cycle()
+    ]
+    *_, final = all_estimates(fitter(), speeds)
+    by_hand = next(one for one in speeds if one.tray_speed < 0.05 * one.mean_projected_speed)
+    assert final.window_start == pytest.approx(by_hand.stamp_ns / NS)
+    assert final.window_start > 8.0
+    assert final.cooling_start == pytest.approx(final.window_start - 1.75, abs=0.01)
+    # Afterwards a noisy reading does not end it.
+    jolted = [*speeds[:200], replace(speeds[200], tray_speed=1.0), *speeds[201:]]
+    *_, same = all_estimates(fitter(), jolted)
+    assert same.window_start == final.window_start
+
+
+def test_next_to_elastic_beads_have_a_restitution_though_no_haff_time():
+    speeds = [speed(t, 6e-3 * (1.0 - 1e-4 * t)) for t in np.arange(0.1, 25.0, 0.1)]
+    *_, final = all_estimates(fitter(), speeds)
+    assert final.status is CorStatus.FINAL
+    assert final.restitution_lower > 0.9
+    assert final.haff_time > 1000.0
+
+
+def test_a_window_from_the_shake_to_the_next_day_is_no_trouble():
+    speeds = [speed(t, 6e-3 / (1.0 + t / 5.0)) for t in np.geomspace(0.01, 900.0, 300)]
+    long = {'cooling.delay': 0.0, 'cooling.duration': 3600.0}
+    stage = fitter(**long)
+    all_estimates(stage, speeds)
+    (final,) = stage.flush()
+    assert final.status is CorStatus.FINAL
+    assert 0.0 < final.restitution_lower < final.restitution < final.restitution_upper <= 1.0
+
+
+def test_a_tray_that_swings_to_the_end_gives_no_estimate():
+    stage = fitter()
+    assert all_estimates(stage, [replace(one, tray_speed=0.01) for one in simulated_cycle()]) == []
+    assert stage.flush() == ()
+
+
+def test_walls_that_are_known_leave_the_beads_to_be_found():
+    known = {'prior.wall_low': 0.97, 'prior.wall_high': 0.97, 'prior.floor_lid_spread': 0.0}
+    *_, final = all_estimates(fitter(**known), simulated_cycle())
+    *_, free = all_estimates(fitter(), simulated_cycle())
+    assert final.wall_restitution == pytest.approx(0.97)
+    assert abs(final.restitution - 0.89) < 0.06
+    width = final.restitution_upper - final.restitution_lower
+    assert width < 0.7 * (free.restitution_upper - free.restitution_lower)
+
+
+def test_the_interval_tightens_as_the_gas_cools():
+    found = all_estimates(fitter(), simulated_cycle())
+    widths = [one.restitution_upper - one.restitution_lower for one in found]
+    assert len(found) > 20
+    assert [one.status for one in found].count(CorStatus.FINAL) == 1
+    assert widths[-1] < 0.7 * widths[0]
+
+
+def test_a_decay_that_tells_too_little_says_so():
+    vague = [
+        replace(one, mean_projected_speed_error=0.5 * one.mean_projected_speed)
+        for one in simulated_cycle()
+    ]
+    first, *_ = all_estimates(fitter(), vague)
+    assert first.status is CorStatus.UNDETERMINED
+    assert (first.restitution_lower, first.restitution_upper) == (0.0, 1.0)
+    assert math.isnan(first.restitution)
+    assert first.initial_speed > 0.0
+
+
+def test_what_was_wrong_with_the_pictures_goes_with_the_estimate():
+    speeds = simulated_cycle()
+    speeds[60] = replace(speeds[60], quality=Quality.GLARE)
+    *_, final = all_estimates(fitter(), speeds)
+    assert final.quality is Quality.GLARE
+
+
+def test_of_trays_that_are_not_where_the_settings_say_nothing_is_told():
+    stage = fitter()
+    wrong = [replace(one, quality=Quality.WRONG_SCALE) for one in simulated_cycle()]
+    found = all_estimates(stage, wrong)
+    assert {one.status for one in found} == {CorStatus.UNDETERMINED}
+    assert all((one.restitution_lower, one.restitution_upper) == (0.0, 1.0) for one in found)
+    assert found[-1].quality is Quality.WRONG_SCALE
+    assert stage.evidence is None
+
+
+def test_a_cycle_that_the_next_shake_cuts_short_is_final_then():
+    speeds = cooling_cycle(until=10.0) + cooling_cycle(cycle=2, start=10.0, until=3.0)
+    finals = [one for one in all_estimates(fitter(), speeds) if one.status is CorStatus.FINAL]
+    assert [one.cycle for one in finals] == [1]
+
+
+def test_the_end_of_the_recording_ends_the_cycle():
+    stage = fitter()
+    all_estimates(stage, cooling_cycle(until=10.0))
+    (final,) = stage.flush()
+    assert final.status is CorStatus.FINAL
+    assert stage.flush() == ()
+
+
+def test_the_mean_of_the_paper_is_over_the_final_estimates():
+    stage = fitter(**{'cooling.relation': 'paper'})
+    finals = []
+    for cycle in (1, 2, 3):
+        speeds = cooling_cycle(cycle, start=60.0 * (cycle - 1), noise=0.05)
+        finals += [one for one in all_estimates(stage, speeds) if one.status is CorStatus.FINAL]
+    values = [one.restitution for one in finals]
+    assert finals[-1].mean_restitution == pytest.approx(np.mean(values))
+    assert finals[-1].mean_restitution_error == pytest.approx(np.std(values, ddof=1) / 3**0.5)
+
+
+def test_many_cycles_together_say_more():
+    stage = fitter(**{'prior.wall_low': 0.97, 'prior.wall_high': 0.97})
+    finals = []
+    for cycle in range(1, 7):
+        speeds = simulated_cycle(cycle, start=60.0 * (cycle - 1))
+        finals += [one for one in all_estimates(stage, speeds) if one.status is CorStatus.FINAL]
+    assert finals[-1].mean_restitution_error < 0.8 * finals[0].mean_restitution_error
+    off = finals[-1].mean_restitution - 0.89
+    assert abs(off) < 3.0 * finals[-1].mean_restitution_error
+
+
+def test_another_tray_than_that_of_the_library_is_refused_at_once():
+    tray = replace(TRAY, dimensions=(0.02, 0.02, 0.003))
+    with pytest.raises(ConfigurationError, match='nanorocks library --tray 1'):
+        HaffFitter(PipelineSettings(), tray)
+
+
+def test_nothing_is_said_before_the_first_shake():
+    speeds = [speed(t, 5e-3, cycle=0) for t in np.arange(0.1, 20.0, 0.1)]
+    assert all_estimates(fitter(), speeds) == []
+
+
+def test_speeds_that_rise_are_no_decay_and_the_interval_says_so():
+    speeds = [speed(t, 1e-3 * (1 + t)) for t in np.arange(0.1, 25.0, 0.1)]
+    *_, final = all_estimates(fitter(), speeds)
+    assert final.status is CorStatus.NO_DECAY
+    assert (final.restitution_lower, final.restitution_upper) == (0.0, 1.0)
+    assert math.isnan(final.restitution)
+
+
+def test_too_few_speeds_give_no_estimate():
+    stage = fitter()
+    assert all_estimates(stage, cooling_cycle(until=1.0)) == []
+    assert stage.flush() == ()
+
+
+def test_unknown_speeds_are_left_out():
+    speeds = cooling_cycle()
+    broken = [*speeds[:50], speed(5.05, math.nan), speed(5.06, 0.0), *speeds[50:]]
+    *_, clean = all_estimates(fitter(), speeds)
+    *_, other = all_estimates(fitter(), broken)
+    assert other.restitution == clean.restitution
+
+
+def test_time_that_goes_back_starts_all_afresh():
+    stage = fitter()
+    first = all_estimates(stage, cooling_cycle())
+    again = all_estimates(stage, cooling_cycle())
+    assert repr(again) == repr(first)
+
+
+def test_the_asked_probability_widens_the_interval():
+    *_, narrow = all_estimates(fitter(**{'cooling.probability': 0.68}), cooling_cycle())
+    *_, wide = all_estimates(fitter(**{'cooling.probability': 0.95}), cooling_cycle())
+    assert narrow.restitution == pytest.approx(wide.restitution)
+    assert narrow.restitution_lower > wide.restitution_lower
+
+
+def test_walls_the_wrong_way_round_are_refused_at_once():
+    with pytest.raises(ConfigurationError, match=r'prior.wall_low, prior.wall_high: 0.95 to 0.9'):
+        fitter(**{'prior.wall_low': 0.95, 'prior.wall_high': 0.9})
+
+
+def half_width(estimate):
+    return 0.5 * (estimate.restitution_upper - estimate.restitution_lower)
+
+
+def test_rebounds_fix_the_walls_and_through_the_valley_the_beads():
+    speeds = simulated_cycle()
+    seen = list(rebounds(np.random.default_rng(1), 80, 2.0, 17.0))
+    *_, without = all_estimates(fitter(), speeds)
+    *_, final = all_estimates(fitter(), by_stamp([*speeds, *seen]))
+    assert (without.rebounds, final.rebounds) == (0, 80)
+    assert final.wall_restitution_lower < 0.97 < final.wall_restitution_upper
+    assert final.wall_restitution_upper - final.wall_restitution_lower < 0.03
+    assert final.restitution_lower < 0.89 < final.restitution_upper
+    assert half_width(final) < 0.7 * half_width(without)
+    assert final.tension < 2.5
+    assert not final.quality & Quality.INCONSISTENT
+    *_, off = all_estimates(fitter(**{'cooling.rebounds': False}), by_stamp([*speeds, *seen]))
+    assert off == without
+
+
+def by_stamp(records):
+    return sorted(records, key=lambda one: one.stamp_ns)
+
+
+def test_it_does_not_matter_when_in_two_seconds_a_contact_comes_in():
+    speeds = simulated_cycle()
+    seen = list(rebounds(np.random.default_rng(1), 40, 1.0, 22.0))
+    late = sorted(
+        [*speeds, *seen],
+        key=lambda one: one.stamp_ns + int(1.9 * NS) * isinstance(one, Rebound),
+    )
+    found = all_estimates(fitter(), by_stamp([*speeds, *seen]))
+    assert all_estimates(fitter(), late) == found
+    *_, final = found
+    first, last = 1.75 * NS, (final.window_end - 2.0) * NS
+    assert final.rebounds == sum(first <= one.stamp_ns <= last for one in seen) < 40
+
+
+def test_contacts_in_a_tray_that_swings_count_though_speeds_do_not():
+    swinging = [
+        replace(one, tray_speed=1.0 if one.stamp_ns < 8.0 * NS else 0.0)
+        for one in simulated_cycle()
+    ]
+    seen = list(rebounds(np.random.default_rng(1), 60, 0.5, 20.0))
+    *_, final = all_estimates(fitter(), by_stamp([*swinging, *seen]))
+    assert final.window_start == pytest.approx(8.0, abs=0.11)
+    last = (final.window_end - 2.0) * NS
+    expected = sum(1.75 * NS <= one.stamp_ns <= last for one in seen)
+    assert final.rebounds == expected > sum(one.stamp_ns > 8.0 * NS for one in seen)
+
+
+def test_rebounds_that_the_decay_cannot_go_with_are_flagged():
+    seen = rebounds(np.random.default_rng(1), 80, 2.0, 17.0, wall=0.8)
+    # With walls of 0.8 no gas could have cooled so slowly.
+    speeds = simulated_cycle(restitution=0.95, wall=1.0)
+    *_, final = all_estimates(fitter(), by_stamp([*speeds, *seen]))
+    assert final.tension > 3.0
+    assert final.quality & Quality.INCONSISTENT
+
+
+def test_contacts_of_all_cycles_count_in_the_mean():
+    rng = np.random.default_rng(3)
+    stage, finals = fitter(), []
+    for cycle in (1, 2, 3, 4):
+        start = 30.0 * cycle
+        records = [
+            *simulated_cycle(cycle, start),
+            *rebounds(rng, 30, start + 2.0, start + 17.0),
+        ]
+        found = all_estimates(stage, by_stamp(records))
+        finals += [one for one in found if one.status is CorStatus.FINAL]
+    assert [one.rebounds for one in finals] == [30] * 4
+    first, last = finals[0], finals[-1]
+    assert last.mean_wall_restitution == pytest.approx(
+        0.97, abs=3.0 * last.mean_wall_restitution_error
+    )
+    ratio = first.mean_wall_restitution_error / last.mean_wall_restitution_error
+    assert ratio == pytest.approx(2.0, abs=0.6)
+
+
+def merge(time, cycle=1, known=1.0):
+    return Merge(
+        stamp_ns=round(time * NS),
+        known_ns=round((time + known) * NS),
+        tray=1,
+        cycle=cycle,
+        tracks=np.array([1, 2], dtype=np.int32),
+        joins=True,
+    )
+
+
+def as_known(records):
+    return sorted(
+        records, key=lambda one: one.known_ns if isinstance(one, Merge) else one.stamp_ns
+    )
+
+
+def test_the_window_ends_with_the_first_merge():
+    speeds = simulated_cycle()
+    *_, cut = all_estimates(fitter(**{'cooling.duration': 12.0}), speeds)
+    found = all_estimates(fitter(), as_known([*speeds, merge(12.05), merge(14.0)]))
+    finals = [one for one in found if one.status is CorStatus.FINAL]
+    assert len(finals) == 1
+    assert finals[0] == cut
+    *_, later = all_estimates(fitter(**{'cooling.until_merge': False}), [*speeds, merge(12.05)])
+    assert later.window_end == pytest.approx(20.0, abs=0.11)
+
+
+def test_a_gas_whose_beads_stick_at_once_tells_nothing():
+    for time in (0.5, 2.0):
+        (only,) = all_estimates(fitter(), as_known([*simulated_cycle(), merge(time, known=0.4)]))
+        assert only.status is CorStatus.UNDETERMINED
+        assert (only.restitution_lower, only.restitution_upper) == (0.0, 1.0)
+        assert math.isnan(only.restitution)
+        assert only.cycle == 1
+
+
+def test_a_merge_of_another_cycle_ends_no_window():
+    stage = fitter()
+    records = [merge(0.1, cycle=0), *simulated_cycle(), merge(19.0, cycle=2)]
+    *_, final = all_estimates(stage, records)
+    assert final.status is CorStatus.FINAL
+    assert final.window_end == pytest.approx(20.0, abs=0.11)
+
+
+def test_speeds_of_grains_by_their_pictures_alone_say_nothing():
+    tray = load_trays()[8]
+    settings = SimulationSettings(tray=8, restitution=0.89, wall_restitution=0.97, seed=9)
+    times = np.arange(0.5, 12.0, 0.1)
+    (values,) = cooling_runs(settings, tray, times, [1]).mean_projected_speed
+    found = {}
+    for method in (SpeedMethod.STRUCTURE_FUNCTION, SpeedMethod.TRACKING):
+        speeds = [
+            replace(speed(t, v), tray=8, method=method) for t, v in zip(times, values, strict=True)
+        ]
+        stage = HaffFitter(PipelineSettings(), tray)
+        *_, found[method] = [*all_estimates(stage, speeds), *stage.flush()]
+    grains, beads = found.values()
+    assert grains.status is CorStatus.UNDETERMINED
+    assert (grains.restitution_lower, grains.restitution_upper) == (0.0, 1.0)
+    assert math.isnan(grains.restitution)
+    assert math.isnan(grains.mean_restitution)
+    assert math.isfinite(grains.haff_time)
+    assert beads.status is CorStatus.FINAL
+    assert beads.restitution_lower < 0.89 < beads.restitution_upper

@@ -1,0 +1,133 @@
+"""Each species of a mixture cools by a law of its own, and that is published once per cycle."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.physics.haff_law import haff_speed
+from nanorocks_ros.records import CorStatus, SpeedEstimate, SpeedMethod
+from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
+from nanorocks_ros.simulation.shaken_tray import ShakenTray
+from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.restitution.species_decays import species_decays
+
+NS = 1_000_000_000
+TRAY = load_trays()[5]
+TIMES = np.arange(0.2, 22.0, 0.2)
+# Initial speed and Haff time of each species.
+LAWS = ((9e-3, 2.5), (4e-3, 2.6))
+NAMES = [
+    f'{name}_species_{value}{error}'
+    for name in ('first', 'second')
+    for value in ('initial_speed', 'haff_time')
+    for error in ('', '_error')
+]
+
+
+def estimate(time, first, second, noise=0.02):
+    return SpeedEstimate(
+        stamp_ns=round(time * NS),
+        tray=TRAY.number,
+        cycle=1,
+        cycle_start_ns=0,
+        mean_projected_speed=0.5 * (first + second),
+        mean_projected_speed_error=noise * 0.5 * (first + second),
+        window=0.1,
+        method=SpeedMethod.TRACKING,
+        **SpeedEstimate.by_species(((first, noise * first), (second, noise * second))),
+    )
+
+
+def lawful(noise=0.02):
+    rng = np.random.default_rng(1)
+    speeds = [
+        haff_speed(TIMES, *law) * (1.0 + noise * rng.normal(size=TIMES.size)) for law in LAWS
+    ]
+    return [estimate(*one, noise) for one in zip(TIMES, *speeds, strict=True)]
+
+
+def final_of(speeds, tray=TRAY, **values):
+    stage = HaffFitter(with_values(PipelineSettings(), values, 'test'), tray)
+    found = [one for speed in speeds for one in stage.push(speed)] + list(stage.flush())
+    (final,) = [one for one in found if one.status in (CorStatus.FINAL, CorStatus.NO_DECAY)]
+    live = [one for one in found if one.status is CorStatus.COOLING]
+    return final, live
+
+
+def test_each_species_gets_its_own_law_in_the_final_estimate():
+    final, _ = final_of(lawful())
+    for name, (speed, time) in zip(('first', 'second'), LAWS, strict=True):
+        for value, truth in (('initial_speed', speed), ('haff_time', time)):
+            found = getattr(final, f'{name}_species_{value}')
+            error = getattr(final, f'{name}_species_{value}_error')
+            assert 0.0 < error < 0.2 * truth
+            assert abs(found - truth) < 3.0 * error
+
+
+def test_live_estimates_do_not_take_the_time_for_it():
+    _, live = final_of(lawful())
+    assert live
+    assert all(math.isnan(getattr(one, name)) for one in live for name in NAMES)
+
+
+def test_a_species_that_is_not_known_leaves_the_other_alone():
+    speeds = lawful()
+    blind = [replace(one, second_species_speed=math.nan) for one in speeds]
+    whole, part = final_of(speeds)[0], final_of(blind)[0]
+    assert part.first_species_haff_time == whole.first_species_haff_time
+    assert math.isnan(part.second_species_haff_time)
+    assert math.isnan(part.second_species_initial_speed_error)
+    assert part.restitution == whole.restitution
+
+
+def test_a_few_speeds_of_a_species_are_no_decay():
+    speeds = lawful()
+    few = [
+        replace(one, first_species_speed=math.nan) if k > 13 else one
+        for k, one in enumerate(speeds)
+    ]
+    assert math.isnan(final_of(few)[0].first_species_haff_time)
+    assert final_of(few, **{'cooling.fewest_samples': 4})[0].first_species_haff_time > 0.0
+
+
+def test_a_species_that_speeds_up_has_no_law():
+    time = TIMES[TIMES > 1.75]
+    rising = [estimate(one, 1e-3 * (1.0 + 0.1 * one), 4e-3 / (1.0 + one)) for one in time]
+    found = species_decays(TRAY, time, rising, 8)
+    assert sorted(found) == sorted(name for name in NAMES if name.startswith('second'))
+
+
+def test_a_tray_of_one_species_has_none():
+    assert species_decays(load_trays()[1], TIMES, lawful(), 8) == {}
+
+
+@pytest.mark.parametrize('number', [3, 5])
+def test_species_of_a_simulated_mixture_share_the_haff_time_but_not_the_speed(number):
+    tray = load_trays()[number]
+    settings = SimulationSettings(
+        tray=number, mean_speed=0.01, first_shake=0.0, frame_rate=5.0, seed=4
+    )
+    species = np.repeat(np.arange(2), [one.count for one in tray.species])
+    times = 0.2 * np.arange(1, 101)
+    speeds = np.zeros((2, times.size))
+    cycles = 12
+    for run in range(cycles):
+        for k, moment in enumerate(ShakenTray(settings, tray, run).moments(times.size + 1)):
+            each = np.hypot(*moment.velocities[:, :2].T)
+            if k:
+                speeds[:, k - 1] += [each[species == one].mean() / cycles for one in (0, 1)]
+    late = times >= 1.75
+    rows = [estimate(*one, noise=0.01) for one in zip(times[late], *speeds[:, late], strict=True)]
+    found = species_decays(tray, times[late], rows, 8)
+    ratio = found['first_species_haff_time'] / found['second_species_haff_time']
+    assert abs(math.log(ratio)) < 0.2
+    light = 0 if number == 5 else 1
+    fast, slow = (
+        found[f'{("first", "second")[k]}_species_initial_speed'] for k in (light, 1 - light)
+    )
+    assert fast > 1.5 * slow

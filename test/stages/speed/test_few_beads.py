@@ -1,0 +1,85 @@
+"""Trays with next to nothing in them, through all stages."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.pipeline.composition import TrayStages
+from nanorocks_ros.records import (
+    ClusterEstimate,
+    CorEstimate,
+    Merge,
+    SizeStatus,
+    SpeedEstimate,
+    StickingStatus,
+    TrayImage,
+)
+from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
+from nanorocks_ros.simulation.tray_camera.tray_film import film
+from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+
+FLOWN = load_trays()[1]
+# There is no library of simulated decays of such a tray.
+SETTINGS = with_values(PipelineSettings(), {'cooling.relation': 'paper'}, 'test')
+
+
+def records_of(stages, images):
+    return [*(one for image in images for one in stages.push(image)), *stages.flush()]
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('beads', [1, 2])
+def test_of_one_or_two_beads_there_is_a_speed_and_nothing_confident_else(beads):
+    tray = replace(FLOWN, species=(replace(FLOWN.species[0], count=beads),))
+    simulation = SimulationSettings(width_px=210, height_px=210, first_shake=0.5, seed=3)
+    stage = Preprocessor(SETTINGS, {1: tray}, 'test')
+    images = [
+        one
+        for frame, _ in film(simulation, tray, 150)
+        for one in stage.push(frame)
+        if isinstance(one, TrayImage)
+    ]
+    found = records_of(TrayStages(SETTINGS, tray), images)
+    assert any(isinstance(one, SpeedEstimate) for one in found)
+    assert not any(isinstance(one, Merge) for one in found)
+    for one in found:
+        if isinstance(one, CorEstimate) and not math.isnan(one.restitution):
+            assert one.restitution_lower <= one.restitution <= one.restitution_upper
+        if isinstance(one, ClusterEstimate):
+            assert not one.bodies > beads
+            assert one.sticking_status in (StickingStatus.UNKNOWN, StickingStatus.NO_MERGE)
+
+
+@pytest.mark.filterwarnings('error')
+def test_of_an_empty_tray_nothing_is_said():
+    rng = np.random.default_rng(1)
+    images = []
+    for k in range(200):
+        color = rng.integers(118, 122, (180, 180, 3), dtype=np.uint8)
+        shaken = k > 15
+        images.append(
+            TrayImage(
+                stamp_ns=round(k * 1e9 / 30),
+                tray=1,
+                gray=np.ascontiguousarray(color[:, :, 0]),
+                color=color,
+                cycle=int(shaken),
+                cycle_start_ns=500_000_000 if shaken else None,
+                noise_power=2.0,
+            )
+        )
+    found = records_of(TrayStages(PipelineSettings(), FLOWN), images)
+    clusters = [one for one in found if isinstance(one, ClusterEstimate)]
+    assert clusters
+    for one in clusters:
+        assert one.size_status is SizeStatus.NOTHING
+        assert math.isnan(one.combined_size)
+        assert math.isnan(one.bodies)
+        assert one.sticking_status is StickingStatus.UNKNOWN
+    assert not any(isinstance(one, Merge) for one in found)
+    assert all(math.isnan(one.restitution) for one in found if isinstance(one, CorEstimate))

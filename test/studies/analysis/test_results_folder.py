@@ -1,0 +1,166 @@
+"""Results of an analysis, as JSON and tables."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from nanorocks_ros.recordings.bag.reader import open_bag
+from nanorocks_ros.records import (
+    CorEstimate,
+    CorRelation,
+    CorStatus,
+    Merge,
+    SpeedEstimate,
+    SpeedMethod,
+)
+from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.studies.analysis.offline_analysis import _LISTS, Analysis, TrayResults
+from nanorocks_ros.studies.analysis.results_folder import FORMATS, write_results
+from nanorocks_ros.studies.analysis.results_json import as_json, last_of_each_cycle
+from nanorocks_ros.wire import topics
+from nanorocks_ros.wire.array_layouts import from_array, layout
+
+NS = 1_000_000_000
+SPEED = SpeedEstimate(
+    stamp_ns=20 * NS,
+    tray=5,
+    cycle=1,
+    cycle_start_ns=NS,
+    mean_projected_speed=1e-3,
+    mean_projected_speed_error=1e-5,
+    window=0.1,
+    method=SpeedMethod.TRACKING,
+)
+COR = CorEstimate(
+    stamp_ns=20 * NS,
+    tray=5,
+    cycle=1,
+    status=CorStatus.FINAL,
+    relation=CorRelation.LIBRARY,
+    first_species_initial_speed=9e-3,
+    first_species_initial_speed_error=2e-4,
+    first_species_haff_time=2.5,
+    first_species_haff_time_error=0.125,
+)
+
+
+def analysis():
+    return Analysis(epoch_ns=0, trays={5: TrayResults(speeds=[SPEED], cors=[COR])})
+
+
+def test_the_decay_of_each_species_is_among_the_numbers_of_a_cycle():
+    (cycle,) = json.loads(json.dumps(as_json(analysis()), allow_nan=False))['trays']['5']['cycles']
+    assert cycle['first_species_initial_speed'] == 9e-3
+    assert cycle['first_species_initial_speed_error'] == 2e-4
+    assert cycle['first_species_haff_time'] == 2.5
+    assert cycle['first_species_haff_time_error'] == 0.125
+    # What is not known is null.
+    assert cycle['second_species_initial_speed'] is None
+    assert cycle['second_species_haff_time_error'] is None
+
+
+def test_the_decay_of_each_species_is_in_the_table(tmp_path):
+    write_results(analysis(), tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
+    with (tmp_path / 'results' / 'tray_5_cor.csv').open(newline='') as stream:
+        (row,) = csv.DictReader(stream)
+    assert float(row['first_species_haff_time [s]']) == 2.5
+    assert row['second_species_haff_time [s]'] == 'nan'
+
+
+def test_tables_in_parquet_hold_the_numbers_of_the_csv(tmp_path):
+    pytest.importorskip('pyarrow')
+    from pyarrow import parquet
+
+    for form in FORMATS:
+        folder = tmp_path / form
+        write_results(analysis(), folder, tmp_path / 'bag', PipelineSettings(), form)
+    assert {one.stem for one in (tmp_path / 'parquet').glob('*.parquet')} == {
+        one.stem for one in (tmp_path / 'csv').glob('*.csv')
+    }
+    table = parquet.read_table(tmp_path / 'parquet' / 'tray_5_cor.parquet')
+    with (tmp_path / 'csv' / 'tray_5_cor.csv').open(newline='') as stream:
+        (row,) = csv.DictReader(stream)
+    for field in table.schema:
+        unit = field.metadata[b'unit'].decode()
+        np.testing.assert_equal(table[field.name][0].as_py(), float(row[f'{field.name} [{unit}]']))
+    assert json.loads(table.schema.metadata[b'provenance'])['source'] == 'bag'
+
+
+def test_every_kind_of_result_goes_into_the_bag_and_into_the_tables(tmp_path):
+    found = analysis()
+    for kind, name in _LISTS.items():
+        if not getattr(found.trays[5], name):
+            values = np.ones(len(layout(kind).fields))
+            record = from_array(kind, values, tray=5, epoch_ns=0, where='test')
+            getattr(found.trays[5], name).append(record)
+    # What cycles say together is kept beside the tables.
+    beside = {'truth', 'evidence', 'sticking'}
+    assert set(_LISTS.values()) == {one.name for one in fields(TrayResults)} - beside
+    write_results(found, tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
+    bag = open_bag(tmp_path / 'results' / 'results_bag')
+    assert bag.complete
+    tables = {one.stem.removeprefix('tray_5_') for one in (tmp_path / 'results').glob('*.csv')}
+    assert {one.rpartition('/')[2] for one in bag.topics} == {*tables, 'epoch'}
+    assert len(tables) == len(_LISTS)
+
+
+def test_records_that_came_in_another_order_stand_by_their_stamps_in_the_bag(tmp_path):
+    came = [3, 1, 2, 7, 5, 7, 4, 6, 9, 8]
+    merges = [
+        Merge(
+            stamp_ns=stamp * NS,
+            known_ns=10 * NS,
+            tray=5,
+            cycle=1,
+            tracks=np.array([number, 99], dtype=np.int32),
+            joins=True,
+        )
+        for number, stamp in enumerate(came)
+    ]
+    found = Analysis(epoch_ns=0, trays={5: TrayResults(merges=merges)})
+    write_results(found, tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
+    bag = open_bag(tmp_path / 'results' / 'results_bag')
+    topic = topics.MERGE.absolute(5)
+    stored = [
+        from_array(Merge, bag.deserialize(one).data, tray=5, epoch_ns=0, where=topic)
+        for one in bag.messages([topic])
+    ]
+    assert [one.stamp_ns // NS for one in stored] == sorted(came)
+    # Those of one stamp as they came in.
+    order = sorted(range(len(came)), key=came.__getitem__)
+    assert [one.tracks.tolist() for one in stored] == [[number, 99] for number in order]
+
+
+def test_tables_in_parquet_are_put_together_of_pieces(tmp_path):
+    pytest.importorskip('pyarrow')
+    from pyarrow import parquet
+
+    speeds = [replace(SPEED, stamp_ns=number * NS) for number in range(2500)]
+    found = Analysis(epoch_ns=0, trays={5: TrayResults(speeds=speeds)})
+    write_results(found, tmp_path / 'out', tmp_path / 'bag', PipelineSettings(), 'parquet')
+    table = parquet.read_table(tmp_path / 'out' / 'tray_5_speed.parquet')
+    assert table['time'].to_pylist() == list(range(2500))
+
+
+def test_a_cycle_that_a_merge_ended_in_hindsight_is_one_cycle_and_a_second_pass_is_another():
+    cooling, final = CorStatus.COOLING, CorStatus.FINAL
+    course = [
+        *((1, 5.0 + 0.5 * k, cooling) for k in range(5)),
+        (1, 5.6, final),
+        *((2, 65.0 + 0.5 * k, cooling) for k in range(3)),
+        (2, 65.2, CorStatus.UNDETERMINED),
+        (1, 5.0, cooling),
+        (1, 5.4, final),
+        (1, 5.0, cooling),
+    ]
+    cors = [
+        replace(COR, cycle=cycle, stamp_ns=round(time * NS), status=status)
+        for cycle, time, status in course
+    ]
+    found = [(one.cycle, one.stamp_ns / NS, one.status) for one in last_of_each_cycle(cors)]
+    assert found == [course[5], course[9], course[11], course[12]]

@@ -1,0 +1,27 @@
+"""The picture of a cooling cycle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.studies.analysis.offline_analysis import analyse
+from nanorocks_ros.studies.figures.demo_figure import cooling_figure
+
+SAMPLE = Path(__file__).parents[3] / 'bags' / 'tray_1_sample'
+
+
+def test_the_figure_of_a_cycle_is_drawn(tmp_path):
+    results = analyse(SAMPLE, PipelineSettings()).trays[1]
+    path = tmp_path / 'cooling.png'
+    speeds = [one for one in results.speeds if one.cycle == 1]
+    truth = [one for one in results.truth if one.cycle == 1]
+    cooling_figure(path, load_trays()[1], speeds, results.cors, truth)
+    picture = cv2.imread(str(path))
+    assert min(picture.shape[:2]) > 500
+    # Measured points, fit and truth each have a colour of their own.
+    colours = {tuple(one) for one in picture.reshape(-1, 3)[::7].tolist()}
+    assert {(0x6F, 0x50, 0x30), (0x22, 0x3B, 0xC2)} <= colours

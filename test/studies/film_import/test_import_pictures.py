@@ -1,0 +1,159 @@
+"""The pictures of a film that go into a bag are those of the film, in true proportions."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from fractions import Fraction
+
+import av
+import cv2
+import numpy as np
+import pytest
+from videos import (
+    HEIGHT,
+    START_NS,
+    STARTED,
+    WIDTH,
+    imported,
+    picture,
+    turn_video,
+    write_images,
+)
+
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
+from nanorocks_ros.studies.film_import.import_film import import_films
+
+TIMED = ImportSettings(start_ns=START_NS, rate=Fraction(25))
+
+
+# --- folders of images ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('ending', ['jpg', 'png', 'bmp'])
+@pytest.mark.parametrize('size', [(WIDTH // 2, HEIGHT // 2), (HEIGHT, WIDTH), (WIDTH, 2 * HEIGHT)])
+def test_images_of_another_size_are_left_out_and_counted(tmp_path, ending, size):
+    folder = write_images(tmp_path / 'images', [f'{k}.{ending}' for k in range(6)])
+    cv2.imwrite(str(folder / f'2.{ending}'), cv2.resize(picture(2), size))
+    found, numbers, times = imported(folder, tmp_path / 'bag', TIMED)
+    assert numbers == [0, 1, 3, 4, 5]
+    assert times == [0, 40, 120, 160, 200]
+    assert found.broken == 1
+    assert any('1 frames are damaged or of another size' in one for one in found.notices)
+
+
+def ramp(number, bits):
+    """An image of 16 bits with all levels that so many have, and its number."""
+    gray = picture(number)[..., 1].astype(np.uint16) << (bits - 8)
+    gray[HEIGHT // 2 :] = np.linspace(0, (1 << bits) - 1, WIDTH).astype(np.uint16)
+    return gray
+
+
+@pytest.mark.parametrize('ending', ['png', 'tif'])
+@pytest.mark.parametrize('bits', [8, 10, 12, 14, 16])
+def test_images_of_16_bits_keep_the_levels_that_the_camera_had(tmp_path, bits, ending):
+    folder = tmp_path / 'images'
+    folder.mkdir()
+    for number in range(4):
+        # The darker ones are not made brighter than the others.
+        cv2.imwrite(str(folder / f'{number}.{ending}'), ramp(number, bits) >> (number == 0))
+    found, numbers, _ = imported(folder, tmp_path / 'bag', TIMED)
+    assert numbers[1:] == [1, 2, 3]
+    levels = [one.image[-1].astype(int) for one in BagFrames(tmp_path / 'bag').frames()]
+    expected = np.linspace(0, 255, WIDTH)
+    np.testing.assert_allclose(levels[0], expected / 2, atol=4)
+    np.testing.assert_allclose(levels[1], expected, atol=4)
+    said = f'its images use {bits} of their 16 bits'
+    assert any(said in one for one in found.notices) == (bits < 16)
+    as_stored = bits == 16 and ending == 'png'
+    assert (found.provenance['pictures'] == 'as stored') == as_stored
+
+
+# --- pixels that are not square -------------------------------------------------------------
+
+
+def stretch_video(path, ratio, codec='libx264'):
+    """A video of one still disc whose pixels are so wide, to their height."""
+    image = np.full((HEIGHT, WIDTH, 3), 30, np.uint8)
+    axes = (10, round(10 * ratio))
+    cv2.ellipse(image, (WIDTH // 2, HEIGHT // 2), axes, 0, 0, 360, (230, 230, 230), -1)
+    with av.open(str(path), 'w') as container:
+        stream = container.add_stream(codec, rate=25)
+        stream.width, stream.height = WIDTH, HEIGHT
+        stream.pix_fmt = 'yuvj420p' if codec == 'mjpeg' else 'yuv420p'
+        stream.codec_context.sample_aspect_ratio = ratio
+        for _ in range(3):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format='bgr24')))
+        container.mux(stream.encode())
+    return path
+
+
+@pytest.mark.parametrize('codec', ['libx264', 'mjpeg'])
+@pytest.mark.parametrize(('name', 'ratio', 'size'), [
+    ('a.mp4', Fraction(4, 3), (128, 64)),
+    ('a.mkv', Fraction(4, 3), (128, 64)),
+    ('a.mkv', Fraction(2, 3), (96, 96)),
+    ('turned.mp4', Fraction(4, 3), (64, 128)),
+    ('a.mkv', Fraction(500, 501), (96, 64)),
+])  # fmt: skip
+def test_lengths_along_both_axes_are_the_same(tmp_path, name, codec, ratio, size):
+    film = stretch_video(tmp_path / name, ratio, codec)
+    if name == 'turned.mp4':
+        turn_video(film, 0, 1, -1, 0)
+    found = import_films([film], tmp_path / 'bag', STARTED, lambda _: None)
+    first = next(BagFrames(tmp_path / 'bag').frames()).image
+    assert first.shape[1::-1] == size
+    seen = first.max(axis=2) > 128
+    across, down = (np.count_nonzero(seen.any(axis=axis)) for axis in (0, 1))
+    assert abs(across - down) <= 2
+    assert any('its pixels are not square; stretched from 96x64 px to' in one
+               for one in found.notices) == (size != (WIDTH, HEIGHT))  # fmt: skip
+    as_stored = codec == 'mjpeg' and size == (WIDTH, HEIGHT)
+    assert (found.provenance['pictures'] == 'as stored') == as_stored
+
+
+def test_pixels_that_no_camera_has_are_refused(tmp_path):
+    film = stretch_video(tmp_path / 'a.mp4', Fraction(9))
+    with pytest.raises(RecordingError, match=r'says that its pixels are 9:1, wide to high; '):
+        import_films([film], tmp_path / 'bag', STARTED, lambda _: None)
+
+
+# --- several streams ------------------------------------------------------------------------
+
+
+def write_streams(path, *streams):
+    """A video of several streams: codec, numbers of the pictures, whether it goes with another."""
+    with av.open(str(path), 'w') as container:
+        added = []
+        for codec, numbers, cover in streams:
+            stream = container.add_stream(codec, rate=25)
+            stream.width, stream.height = WIDTH, HEIGHT
+            stream.pix_fmt = 'yuvj420p' if codec == 'mjpeg' else 'yuv420p'
+            if cover:
+                # Old versions of the library cannot say it; then it is told by its one picture.
+                with suppress(AttributeError):
+                    stream.disposition = av.stream.Disposition.attached_pic
+            added.append((stream, numbers))
+        for stream, numbers in added:
+            for number in numbers:
+                frame = av.VideoFrame.from_ndarray(picture(number), format='bgr24')
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode())
+    return path
+
+
+COVER, FILM, OTHER = ('mjpeg', [99], True), ('mpeg4', range(12), False), ('mpeg4', [50], False)
+
+
+@pytest.mark.parametrize('streams', [
+    (COVER, FILM), (FILM, COVER), (OTHER, FILM), (FILM, OTHER),
+    (FILM, ('mpeg4', range(40, 53), False)),
+])  # fmt: skip
+@pytest.mark.parametrize('name', ['a.mkv', 'a.mp4'])
+def test_the_film_is_taken_not_the_picture_beside_it(tmp_path, name, streams):
+    film = write_streams(tmp_path / name, *streams)
+    found, numbers, times = imported(film, tmp_path / 'bag')
+    assert numbers == list(range(12))
+    np.testing.assert_allclose(times, [40 * k for k in range(12)], atol=0.6)
+    assert any('holds 2 video streams; number ' in one for one in found.notices)

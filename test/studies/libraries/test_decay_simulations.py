@@ -1,0 +1,69 @@
+"""Building a decay library: resumed after an interruption, refused when it cannot be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.decay.decay_library import load_library, tray_key
+from nanorocks_ros.jobs.tasks import Workers
+from nanorocks_ros.studies.libraries.decay_simulations import LibraryPlan, build_library
+
+TRAY = load_trays()[1]
+# Few beads in few runs: quick, and of no use but to see how it is made.
+PLAN = LibraryPlan(
+    tray=replace(TRAY, species=(replace(TRAY.species[0], count=3),)), nodes=256, runs=2
+)
+HERE = Workers(processes=1)
+
+
+class Enough(KeyboardInterrupt):
+    """Ctrl-C at a certain moment."""
+
+
+def test_an_interrupted_build_goes_on_and_ends_in_the_same_library(tmp_path):
+    whole, path = tmp_path / 'whole.npz', tmp_path / 'mine.npz'
+    build_library(PLAN, whole, HERE)
+    seen = []
+
+    def stop(done, total):
+        seen.append(done)
+        if done == 10:
+            raise Enough
+
+    with pytest.raises(KeyboardInterrupt, match=r'10 of \d+ parts are kept in .*mine.npz.parts'):
+        build_library(PLAN, path, HERE, stop)
+    assert not path.exists()
+    resumed = []
+    build_library(PLAN, path, HERE, lambda done, total: resumed.append((done, total)))
+    assert resumed[0] == (10, 64)
+    assert resumed[-1] == (64, 64)
+    one, other = (load_library(str(name), packaged=False) for name in (whole, path))
+    np.testing.assert_array_equal(one.coefficients, other.coefficients)
+    np.testing.assert_array_equal(one.covariance, other.covariance)
+    assert one.tray == tray_key(PLAN.tray)
+    assert not path.with_name('mine.npz.parts').exists()
+
+
+def test_parts_of_another_library_are_not_mixed_in(tmp_path):
+    path = tmp_path / 'mine.npz'
+
+    def stop(done, total):
+        if done == 1:
+            raise Enough
+
+    with pytest.raises(KeyboardInterrupt):
+        build_library(PLAN, path, HERE, stop)
+    with pytest.raises(RecordingError, match='belongs to another job'):
+        build_library(replace(PLAN, seed=2), path, HERE)
+
+
+def test_too_few_nodes_are_refused_before_any_work(tmp_path):
+    for plan in (replace(PLAN, nodes=253), replace(PLAN, runs=1)):
+        with pytest.raises(ConfigurationError, match='give 254 and 2 or more'):
+            build_library(plan, tmp_path / 'mine.npz', HERE)
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,48 @@
+"""Small scenes for the tests: the plate as flown, in a picture as small as shows what is meant."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from nanorocks_ros.experiment.trays import Species, load_trays
+from nanorocks_ros.settings import SceneSettings, SimulationSettings
+from nanorocks_ros.simulation.plate_scene.plate_camera import SceneCamera
+from nanorocks_ros.simulation.plate_scene.plate_film import without_effects
+
+SIMULATION = SimulationSettings(width_px=960, height_px=760)
+# A scale at which the plate fits into that.
+SCALE = 9000.0
+PLAIN = replace(without_effects(SceneSettings()), pixels_per_metre=SCALE)
+TRAYS = load_trays()
+
+
+def with_one(number, material='acrylic', diameter=0.002, chalk=None):
+    """The plate with a single bead in one tray, and none elsewhere."""
+    one = Species(
+        material=material,
+        diameter_low=diameter,
+        diameter_high=diameter,
+        density=1180.0,
+        count=1,
+    )
+    tray = TRAYS[number]
+    dusty = tray.chalk if chalk is None else chalk
+    return {**TRAYS, number: replace(tray, species=(one,), chalk=dusty)}
+
+
+# A picture depends on nothing that was drawn before, so cameras can be shared.
+@lru_cache(maxsize=4)
+def camera_with_one(number, scene=PLAIN, simulation=SIMULATION, **bead):
+    """A camera over the plate with a single bead in one tray."""
+    cells = with_one(number, **bead)
+    radius = 0.5 * cells[number].species[0].diameter_high
+    return SceneCamera(simulation, scene, cells, {number: np.array([radius])})
+
+
+@lru_cache(maxsize=4)
+def empty_camera(scene=PLAIN, simulation=SIMULATION):
+    """A camera over the plate without beads."""
+    return SceneCamera(simulation, scene, TRAYS, {})

@@ -1,0 +1,78 @@
+"""Speeds, counts of bodies and merges of a cycle, as kinetic theory has them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.physics.haff_law import haff_speed
+from nanorocks_ros.physics.sticking_rates import slow_contacts
+from nanorocks_ros.records import BodyEstimate, Merge, SpeedEstimate, SpeedMethod
+
+NS = 1_000_000_000
+TRAY = load_trays()[1]
+STICKING = 1.5e-3
+
+
+def ns(time):
+    return round(time * NS)
+
+
+def speed(time, value, cycle, start):
+    return SpeedEstimate(
+        stamp_ns=round(time * NS),
+        tray=1,
+        cycle=cycle,
+        cycle_start_ns=round(start * NS),
+        mean_projected_speed=value,
+        mean_projected_speed_error=0.02 * value,
+        window=0.1,
+        method=SpeedMethod.TRACKING,
+    )
+
+
+def count(time, bodies, cycle):
+    return BodyEstimate(
+        stamp_ns=round(time * NS),
+        tray=1,
+        cycle=cycle,
+        beads=TRAY.count,
+        followed=TRAY.count,
+        bodies=bodies,
+        bodies_error=0.1,
+        mean_size=TRAY.count / bodies,
+        mean_size_error=0.1,
+        weighted_size=TRAY.count / bodies,
+        weighted_size_error=0.1,
+        clustered_share=0.0,
+        clustered_share_error=0.0,
+        clusters=0.0,
+        clusters_error=0.0,
+        sizes=np.zeros(5),
+    )
+
+
+def cooling(cycle=1, start=0.0, seed=0, sticking=STICKING, until=40.0):
+    """Records of a cycle in which bodies merge as often as kinetic theory says."""
+    rng = np.random.default_rng([seed, cycle])
+    contacts = slow_contacts(TRAY)
+    bodies, found, step = float(TRAY.count), [], 0.1
+    for time in np.arange(step, until, step):
+        value = float(haff_speed(time, 8e-3, 4.0))
+        rate = 0.5 * bodies**2 / TRAY.count * value * float(contacts.slower(sticking / value))
+        if bodies > 1.0 and rng.uniform() < rate * step:
+            bodies -= 1.0
+            found.append(merge(start + time, cycle))
+        found += [speed(start + time, value, cycle, start), count(start + time, bodies, cycle)]
+    return found
+
+
+def merge(time, cycle, known=0.6):
+    return Merge(
+        stamp_ns=round(time * NS),
+        known_ns=round((time + known) * NS),
+        tray=1,
+        cycle=cycle,
+        tracks=np.array([1, 2], dtype=np.int32),
+        joins=True,
+    )

@@ -1,0 +1,282 @@
+"""Records and arrays: one layout, read from the message definitions."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from enum import Enum
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.typesys import get_types_from_msg
+
+from nanorocks_ros.errors import FrameError
+from nanorocks_ros.records import (
+    BodyEstimate,
+    ClusterEstimate,
+    CorEstimate,
+    CorRelation,
+    CorStatus,
+    GroundTruth,
+    Merge,
+    PairCollision,
+    Quality,
+    Rebound,
+    SizeStatus,
+    SpeedEstimate,
+    SpeedMethod,
+    StickingStatus,
+    TrayState,
+)
+from nanorocks_ros.wire.array_layouts import from_array, layout, to_array
+
+DEFINITIONS = Path(__file__).parents[2] / 'msg_defs' / 'nanorocks_msgs' / 'msg'
+EPOCH = 1_700_000_000_000_000_000
+
+# Elements that are part of an array in the record.
+WHOLE = {
+    **{f'{one}_{axis}': one for one in ('place', 'separation') for axis in 'xy'},
+    **{f'{one}_{k}_{axis}': one for one in ('before', 'after') for k in '12' for axis in 'xy'},
+    **{f'{one}_{k}_error': f'{one}_errors' for one in ('before', 'after', 'radius') for k in '12'},
+    **{f'track_{k}': 'tracks' for k in '12'},
+    **{f'species_{k}': 'species' for k in '12'},
+    **{f'radius_{k}': 'radii' for k in '12'},
+    **{f'mass_{k}': 'masses' for k in '12'},
+    **{f'temperature_{k}': 'temperatures' for k in '12'},
+    **{f'bodies_of_{size}': 'sizes' for size in ('1', '2', '3', '4_to_6', '7_or_more')},
+}
+
+RECORDS = (
+    SpeedEstimate(
+        stamp_ns=EPOCH + 2_500_000_000,
+        tray=3,
+        cycle=2,
+        cycle_start_ns=EPOCH + 1_000_000_000,
+        mean_projected_speed=4.5e-3,
+        mean_projected_speed_error=1e-4,
+        window=0.2,
+        method=SpeedMethod.BINARISED_AREA,
+        quality=Quality.GLARE | Quality.FEW_BEADS,
+        first_species_speed=4e-3,
+    ),
+    TrayState(
+        stamp_ns=EPOCH + 10**9,
+        tray=2,
+        cycle=1,
+        cycle_start_ns=None,
+        noise_power=8.0,
+        displacement_x=1e-4,
+        displacement_y=-2e-5,
+        displacement_error=1e-6,
+        velocity_x=math.nan,
+        velocity_y=math.nan,
+        velocity_error=math.nan,
+        quality=Quality.SATURATED,
+        glare=0.1,
+        color=1,
+    ),
+    Rebound(
+        stamp_ns=EPOCH + 3 * 10**9,
+        tray=1,
+        cycle=2,
+        track=7,
+        species=1,
+        wall=3,
+        incoming=4e-3,
+        incoming_error=1e-4,
+        outgoing=3.8e-3,
+        outgoing_error=1.1e-4,
+        tangential_incoming=-1e-3,
+        tangential_outgoing=-1.1e-3,
+        tangential_error=1e-4,
+        wall_velocity=2e-4,
+        wall_velocity_error=1e-5,
+        place=np.array([1e-3, 2e-3]),
+    ),
+    PairCollision(
+        stamp_ns=EPOCH + 4 * 10**9,
+        tray=3,
+        cycle=1,
+        tracks=np.array([3, 9], dtype=np.int32),
+        species=np.array([0, 1], dtype=np.int32),
+        radii=np.array([1e-3, 1.1e-3]),
+        radius_errors=np.array([0.0, 1e-5]),
+        masses=np.array([5e-6, 1e-5]),
+        before=np.array([[1e-3, 2e-3], [-3e-3, 4e-3]]),
+        after=np.array([[-5e-3, 6e-3], [7e-3, -8e-3]]),
+        before_errors=np.array([1e-5, 2e-5]),
+        after_errors=np.array([3e-5, 4e-5]),
+        separation=np.array([1.5e-3, 1.6e-3]),
+        separation_error=1e-5,
+        temperatures=np.array([9e-6, 8e-6]),
+        height=3e-3,
+        place=np.array([4e-3, 5e-3]),
+    ),
+    BodyEstimate(
+        stamp_ns=EPOCH + 5 * 10**9,
+        tray=1,
+        cycle=2,
+        beads=15,
+        followed=14,
+        bodies=11.5,
+        bodies_error=0.3,
+        mean_size=1.3,
+        mean_size_error=0.03,
+        weighted_size=1.9,
+        weighted_size_error=0.1,
+        clustered_share=0.4,
+        clustered_share_error=0.05,
+        clusters=2.0,
+        clusters_error=0.2,
+        sizes=np.array([9.0, 1.0, 0.0, 1.0, 0.5]),
+        first_merge_ns=EPOCH + 2 * 10**9,
+    ),
+    Merge(
+        stamp_ns=EPOCH + 2 * 10**9,
+        known_ns=EPOCH + 3 * 10**9,
+        tray=1,
+        cycle=2,
+        tracks=np.array([3, 11], dtype=np.int32),
+        joins=True,
+    ),
+    ClusterEstimate(stamp_ns=EPOCH + 1, tray=1, cycle=0, level_area=2e-6, correlation_length=8e-4),
+    ClusterEstimate(
+        stamp_ns=EPOCH + 1,
+        tray=3,
+        cycle=2,
+        level_area=2e-6,
+        correlation_length=8e-4,
+        axes_ratio=1.25,
+        direction=-0.5,
+        breadth=2.75,
+        cluster_size=3.5,
+        cluster_size_error=0.75,
+        cluster_size_lower=2.5,
+        cluster_size_upper=4.5,
+        size_status=SizeStatus.MEASURED,
+    ),
+    CorEstimate(
+        stamp_ns=EPOCH,
+        tray=1,
+        cycle=1,
+        status=CorStatus.FINAL,
+        relation=CorRelation.PAPER,
+        restitution=0.9,
+        samples=120,
+    ),
+    GroundTruth(
+        stamp_ns=EPOCH + 10**9,
+        tray=8,
+        cycle=1,
+        mean_projected_speed=1e-3,
+        mean_speed=1.2e-3,
+        bodies=15,
+        restitution=0.89,
+        wall_restitution=0.99,
+        sticking_speed=0.0,
+    ),
+)
+
+
+@pytest.mark.parametrize('record', RECORDS, ids=lambda one: type(one).__name__)
+def test_a_record_comes_back_from_its_array_to_float32_rounding(record):
+    values = to_array(record, EPOCH)
+    assert values.dtype == np.float32
+    back = from_array(type(record), values, tray=record.tray, epoch_ns=EPOCH, where='test')
+    for field in dataclasses.fields(record):
+        before, after = getattr(record, field.name), getattr(back, field.name)
+        assert type(after) is type(before)
+        if isinstance(before, np.ndarray):
+            assert after.dtype == before.dtype
+            np.testing.assert_allclose(after, before, rtol=2**-23)
+        elif isinstance(before, float):
+            assert after == pytest.approx(before, rel=2**-23, nan_ok=True)
+        elif isinstance(before, Enum):
+            assert after == before
+        else:
+            assert after == pytest.approx(before, abs=200)
+
+
+@pytest.mark.parametrize('record', RECORDS, ids=lambda one: type(one).__name__)
+def test_the_layout_is_the_message_definition_as_an_independent_parser_reads_it(record):
+    name = type(record).__name__
+    text = (DEFINITIONS / f'{name}.msg').read_text()
+    parsed = get_types_from_msg(text, f'nanorocks_msgs/msg/{name}')
+    constants, fields = parsed[f'nanorocks_msgs/msg/{name}']
+    one = layout(type(record))
+    assert [field.name for field in one.fields] == [field for field, _ in fields]
+    assert one.label == ','.join(field for field, _ in fields)
+    assert one.constants == {key: int(value) for key, _, value in constants}
+    assert all(field.unit and field.doc for field in one.fields)
+
+
+@pytest.mark.parametrize('record', RECORDS, ids=lambda one: type(one).__name__)
+def test_every_array_starts_with_time_and_cycle_and_holds_the_whole_record(record):
+    names = [field.name for field in layout(type(record)).fields]
+    assert names[:2] == ['time', 'cycle']
+    expected = {field.name for field in dataclasses.fields(record)} - {'tray'}
+    renamed = {
+        'stamp_ns': 'time',
+        'cycle_start_ns': 'cycle_start',
+        'known_ns': 'known',
+        'first_merge_ns': 'first_merge',
+    }
+    parts = [
+        name if name in expected or name in renamed.values() else WHOLE[name] for name in names
+    ]
+    assert set(parts) == {renamed.get(name, name) for name in expected}
+    shapes = {
+        name: np.size(value)
+        for name in expected
+        if isinstance(value := getattr(record, name), np.ndarray)
+    }
+    assert {name: parts.count(name) for name in shapes} == shapes
+
+
+@pytest.mark.parametrize(
+    ('record_type', 'enumerations'),
+    [(SpeedEstimate, (SpeedMethod,)), (CorEstimate, (CorStatus, CorRelation))],
+)
+def test_the_constants_are_those_of_the_code(record_type, enumerations):
+    expected = {one.name: one.value for kind in enumerations for one in kind}
+    assert layout(record_type).constants == expected
+
+
+def test_the_constants_of_clusters_are_those_of_the_code():
+    expected = {one.name: one.value for one in SizeStatus}
+    expected |= {f'STICKING_{one.name}': one.value for one in StickingStatus}
+    assert layout(ClusterEstimate).constants == expected
+
+
+def test_not_known_is_nan_and_never_zero():
+    values = to_array(next(one for one in RECORDS if isinstance(one, CorEstimate)), EPOCH)
+    names = [field.name for field in layout(CorEstimate).fields]
+    assert math.isnan(values[names.index('haff_time')])
+    before_the_first = dataclasses.replace(RECORDS[0], cycle_start_ns=None)
+    assert math.isnan(to_array(before_the_first, EPOCH)[2])
+
+
+def test_an_array_of_another_release_is_refused():
+    with pytest.raises(
+        FrameError, match=r'/speed: 3 elements where SpeedEstimate has 13; use the'
+    ):
+        from_array(SpeedEstimate, [1.0, 2.0, 3.0], tray=1, epoch_ns=0, where='/speed')
+
+
+def test_an_array_without_a_time_is_refused():
+    values = to_array(RECORDS[0], EPOCH)
+    values[0] = math.nan
+    with pytest.raises(FrameError, match='time is nan'):
+        from_array(SpeedEstimate, values, tray=1, epoch_ns=EPOCH, where='/speed')
+
+
+@pytest.mark.parametrize(
+    ('element', 'value'), [(1, math.nan), (1, math.inf), (6, 9.0), (6, math.nan)]
+)
+def test_an_element_that_means_nothing_is_refused(element, value):
+    values = to_array(RECORDS[0], EPOCH)
+    values[element] = value
+    name = layout(SpeedEstimate).fields[element].name
+    with pytest.raises(FrameError, match=f'/speed: {name} is '):
+        from_array(SpeedEstimate, values, tray=1, epoch_ns=EPOCH, where='/speed')
