@@ -47,8 +47,8 @@ def table(bag: Path) -> list[str]:
     marks = _marks(bag)
     fits: dict[_Case, AreaFit] = {}
     for name, reading in _READINGS.items():
-        found = calibrate_area(bag, marks, settings(_TRAYS, **reading))
-        fits |= {(number, name): fit for number, fit in found.fits.items()}
+        calibration = calibrate_area(bag, marks, settings(_TRAYS, **reading))
+        fits |= {(number, name): fit for number, fit in calibration.fits.items()}
     raw = {(number, name): reading for number in _TRAYS for name, reading in _READINGS.items()}
     calibrated = {
         case: {**raw[case], 'area_factor': fit.factor, 'area_offset': fit.offset}
@@ -88,7 +88,9 @@ def _ratios(path: Path, cases: dict[_Case, dict[str, float]]) -> dict[_Case, str
             for case in cases:
                 if case[0] == image.tray:
                     records = estimators[case].push(image)
-                    speeds[case] += [one for one in records if isinstance(one, SpeedEstimate)]
+                    speeds[case] += [
+                        record for record in records if isinstance(record, SpeedEstimate)
+                    ]
     return {
         case: _cell(
             ComparedSpeeds(tray=images.trays[case[0]], speeds={'': found}, truth=truth[case[0]])
@@ -99,7 +101,7 @@ def _ratios(path: Path, cases: dict[_Case, dict[str, float]]) -> dict[_Case, str
 
 def _cell(compared: ComparedSpeeds) -> str:
     ratios = compared.ratios('', 1)
-    share = ratios.size / sum(one.cycle == 1 for one in compared.speeds[''])
+    share = ratios.size / sum(estimate.cycle == 1 for estimate in compared.speeds[''])
     known = '' if share > _NEARLY_ALL else f', {share:.0%} known'
     return f'{ratios.mean():.2f} ({ratios.std():.2f}){known}' if ratios.size else 'unknown'
 

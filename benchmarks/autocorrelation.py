@@ -118,9 +118,9 @@ def _measured(image: np.ndarray, scale: float) -> None:
 
 def _cost() -> None:
     shots, _ = filmed(5e-3, effects=True, frames=25, trays=_ALL)
-    images = [one.gray for one in shots[-1].images.values()]
-    fine = [tray_contrast(one, halve=False) for one in images]
-    half = [tray_contrast(one, halve=True) for one in images]
+    images = [image.gray for image in shots[-1].images.values()]
+    fine = [tray_contrast(image, halve=False) for image in images]
+    half = [tray_contrast(image, halve=True) for image in images]
     scipy_fine = _milliseconds(_by_scipy, [one.astype(np.float64) for one in fine])
     rows = {
         'scipy.signal.fftconvolve, float64': scipy_fine,
@@ -193,7 +193,7 @@ def _sizes(found: dict[str, np.ndarray]) -> None:
             if limited.any():
                 inside = (lower <= true * 1.001) & (true <= upper * 1.001)
                 covered = f'{inside[limited].mean():.2f}'
-            first, last = (np.mean([one[k, 3] for one in runs]) for k in (0, -1))
+            first, last = (np.mean([run[k, 3] for run in runs]) for k in (0, -1))
             beyond = np.mean(status == SizeStatus.BEYOND)
             print(
                 f'| {tray} | {1e3 * speed:g} | {first:.1f} to {last:.1f} | {told.mean():.2f} | '
@@ -208,7 +208,7 @@ def _sizes(found: dict[str, np.ndarray]) -> None:
 
 def _by_paper(runs: list[np.ndarray]) -> np.ndarray:
     """Sizes by the paper's straight line, counted at the end of the same runs."""
-    ends = np.array([one[-1] for one in runs])
+    ends = np.array([run[-1] for run in runs])
     line = paper_calibration(ends[:, 4], float(ends[:, 3].mean()))
     return line.size(np.concatenate(runs)[:, 4])
 
@@ -256,8 +256,8 @@ def _effects() -> None:
         drawn = [drawn_run(plan, run) for run in range(plan.runs)]
         strengths = np.array(
             [
-                [one.strengths[name] for name in EFFECTS] + [20.0 * one.counts[tray]]
-                for one in drawn
+                [run.strengths[name] for name in EFFECTS] + [20.0 * run.counts[tray]]
+                for run in drawn
             ]
         )
         area = np.log(rows[:, 3])
@@ -291,7 +291,7 @@ def _controls(found: dict[str, np.ndarray]) -> None:
     )
     for tray in _TRAYS:
         runs = _of(found, 'control', tray)
-        onsets = np.array([paper_onset(one[:, 2], one[:, 4]) for one in runs])
+        onsets = np.array([paper_onset(run[:, 2], run[:, 4]) for run in runs])
         _, lower, _, _ = _read(curve_of(flown[tray]), np.concatenate(runs))
         fired = np.isfinite(onsets)
         print(

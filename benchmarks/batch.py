@@ -81,7 +81,7 @@ class _Quiet:
                 except OSError:
                     continue
                 peaks = [line for line in status.splitlines() if line.startswith('VmHWM')]
-                self.peak = max([self.peak, *(float(one.split()[1]) / 1e3 for one in peaks)])
+                self.peak = max([self.peak, *(float(peak.split()[1]) / 1e3 for peak in peaks)])
 
     def stop(self) -> None:
         self._over.set()
@@ -146,7 +146,7 @@ def _cores(folder: Path, film: Path) -> None:
             for count in best:
                 os.sched_setaffinity(0, cores[:count])
                 batch, seconds, _ = _run(folder / f'{turn}_{count}', bags)
-                frames = sum(one.summary['frames'] for one in batch.results)
+                frames = sum(result.summary['frames'] for result in batch.results)
                 best[count] = min(best[count], seconds)
     finally:
         os.sched_setaffinity(0, cores)
@@ -164,8 +164,8 @@ def _decoding(film: str, barrier, found) -> None:
     """Decode the film for some seconds, beginning with the others; frames a second."""
     cv2.setNumThreads(1)
     bag = open_bag(film)
-    jpegs = [bytes(bag.deserialize(one).data) for one in bag.messages([_CAMERA])]
-    frames = [np.frombuffer(one, np.uint8) for one in jpegs]
+    jpegs = [bytes(bag.deserialize(message).data) for message in bag.messages([_CAMERA])]
+    frames = [np.frombuffer(jpeg, np.uint8) for jpeg in jpegs]
     barrier.wait()
     start, done = time.perf_counter(), 0
     while time.perf_counter() - start < _DECODE_S:
@@ -180,11 +180,11 @@ def _decoded_by(count: int, film: Path) -> float:
     barrier, found = context.Barrier(count), context.Queue()
     arguments = (str(film), barrier, found)
     processes = [context.Process(target=_decoding, args=arguments) for _ in range(count)]
-    for one in processes:
-        one.start()
+    for process in processes:
+        process.start()
     total = sum(found.get() for _ in processes)
-    for one in processes:
-        one.join()
+    for process in processes:
+        process.join()
     return total
 
 
@@ -209,7 +209,7 @@ def _memory(folder: Path, film: Path) -> None:
     recorder.into_bag(plate / 'bags' / 'run', CompressionSettings(), 85, lambda *_: None)
     batch, _, peak = _run(plate / 'results', plate / 'bags', plate_settings(), workers=1)
     summary = batch.results[0].summary
-    cycles = max(len(one['cycles']) for one in summary['trays'].values())
+    cycles = max(len(tray['cycles']) for tray in summary['trays'].values())
     print(f'| plate, 1080p | 8 | {summary["seconds"]:.0f} | {cycles} | {peak:.0f} |\n')
     print(f'content hashed at {rate / 1e6:.0f} MB/s', flush=True)
 
@@ -237,23 +237,23 @@ def _campaign(folder: Path) -> None:
     settings = PipelineSettings()
     batch, seconds, peak = _run(folder / 'results', bags)
     # Copies count here as if they were recordings of their own.
-    batch.results = [replace(one, twin='') for one in batch.results]
+    batch.results = [replace(result, twin='') for result in batch.results]
     start = time.perf_counter()
     together = combined(batch.counted, settings)
     write_batch(folder / 'results', batch, together, settings, 'csv')
     report = time.perf_counter() - start
     _, again, _ = _run(folder / 'results', bags)
-    frames = sum(one.summary['frames'] for one in batch.results)
+    frames = sum(result.summary['frames'] for result in batch.results)
     print(f'\n{_CAMPAIGN} bags, 5 of them broken: {len(batch.results)} analysed, {frames} frames')
     print(f'on all cores: {seconds:.0f} s, at most {peak:.0f} MB a worker')
     print(f'means, tables and report of {len(together.cycles)} cycles: {report:.1f} s')
     print(f'the same again, with what failed: {again:.1f} s\n')
     for one in batch.failed:
         print(f'failed: {Path(one.name).name}: {one.reason.partition(": ")[2].partition(";")[0]}')
-    for one in batch.results:
-        if not one.summary['complete']:
-            print(f'in part: {Path(one.name).name}: {one.summary["frames"]} frames')
-    size = sum(one.stat().st_size for one in (folder / 'results').rglob('*') if one.is_file())
+    for result in batch.results:
+        if not result.summary['complete']:
+            print(f'in part: {Path(result.name).name}: {result.summary["frames"]} frames')
+    size = sum(path.stat().st_size for path in (folder / 'results').rglob('*') if path.is_file())
     print(f'results: {size / 1e6 / len(batch.results):.1f} MB a bag')
 
 

@@ -150,7 +150,7 @@ def _report_temperatures(trays):
 
 
 def _shown(values):
-    return ', '.join(f'{one:.2f}' for one in values)
+    return ', '.join(f'{value:.2f}' for value in values)
 
 
 class _Forms:

@@ -122,12 +122,12 @@ def _likelihoods(found: Contacts) -> tuple[np.ndarray, np.ndarray]:
 
 def _row(name: str, truth: float, grid: np.ndarray, cycles: Sequence[np.ndarray]) -> float:
     """Print a row; returns how many cycles covered the truth."""
-    each = [contact_estimate(grid, one) for one in cycles]
-    values = np.array([one.restitution for one in each])
-    covered = sum(one.lower <= truth <= one.upper for one in each)
+    each = [contact_estimate(grid, cycle) for cycle in cycles]
+    values = np.array([estimate.restitution for estimate in each])
+    covered = sum(estimate.lower <= truth <= estimate.upper for estimate in each)
     all_of_them = contact_estimate(grid, np.sum(cycles, axis=0))
     together = f'{all_of_them.restitution - truth:+.4f} ± {all_of_them.restitution_error:.4f}'
-    stated = np.median([one.restitution_error for one in each])
+    stated = np.median([estimate.restitution_error for estimate in each])
     scatter = f'{values.std(ddof=1):.4f}' if values.size > 1 else ''
     print(
         f'| {name} | {values.mean() - truth:+.4f} | {scatter} | {stated:.4f} | '
@@ -196,7 +196,7 @@ def filmed_tracks(
     stage = Preprocessor(settings, trays, 'film', View(camera=scene.camera.geometry.camera))
     trackers = {number: Tracker(settings, tray) for number, tray in trays.items()}
     for moment in scene.moments(round(seconds * _RATE)):
-        truth = {one.tray: one for one in moment.beads}
+        truth = {bead.tray: bead for bead in moment.beads}
         jpeg = cv2.imencode('.jpg', moment.frame.image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
         image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR)
         frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)

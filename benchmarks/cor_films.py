@@ -139,7 +139,7 @@ def print_tables(films: dict[str, list[Film]]) -> None:
 def _said(tray: Tray, cycle: Cycle) -> _Said | None:
     names = {'cooling.update_interval': 60.0, **_ALONE}
     fitter = HaffFitter(with_values(PipelineSettings(), names, 'benchmark'), tray)
-    made = [one for speed in cycle.speeds for one in fitter.push(speed)]
+    made = [estimate for speed in cycle.speeds for estimate in fitter.push(speed)]
     # An estimate that is not yet known is not marked as cooling, so the last one it is.
     *_, final = (None, *made, *fitter.flush())
     if final is None or final.status is CorStatus.COOLING:
@@ -149,11 +149,13 @@ def _said(tray: Tray, cycle: Cycle) -> _Said | None:
         shake_ns + round(one * _NS) for one in (final.window_start, final.window_end)
     )
     used = [one for one in cycle.speeds if first_ns - 1000 <= one.stamp_ns <= last_ns + 1000]
-    time = np.array([(one.stamp_ns - shake_ns) / _NS - final.cooling_start for one in used])
-    speed = np.array([one.mean_projected_speed for one in used])
-    error = np.array([one.mean_projected_speed_error for one in used])
-    true = np.array([_truth(cycle, one.stamp_ns / _NS, one.window) for one in used])
-    ripe = [one for one in cycle.contacts if one.stamp_ns <= last_ns - LATEST_NS]
+    time = np.array(
+        [(estimate.stamp_ns - shake_ns) / _NS - final.cooling_start for estimate in used]
+    )
+    speed = np.array([estimate.mean_projected_speed for estimate in used])
+    error = np.array([estimate.mean_projected_speed_error for estimate in used])
+    true = np.array([_truth(cycle, estimate.stamp_ns / _NS, estimate.window) for estimate in used])
+    ripe = [contact for contact in cycle.contacts if contact.stamp_ns <= last_ns - LATEST_NS]
     return _Said(
         cycle=cycle,
         final=final,
@@ -179,11 +181,11 @@ def _posterior(cycles: list[_Said], how: _From) -> Posterior:
     prior = _TRAY_KNOWN if how.tray_known else _PRIOR
     tables = tables_of(library, tray, prior)
     camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
-    decays = [one.true_decay if how.true_speeds else one.decay for one in cycles]
+    decays = [cycle.true_decay if how.true_speeds else cycle.decay for cycle in cycles]
     likelihoods = (
-        decay_likelihood(tables, one.time, one.speed, one.error, camera) for one in decays
+        decay_likelihood(tables, decay.time, decay.speed, decay.error, camera) for decay in decays
     )
-    contacts = reduce(add, (one.contacts[how.contacts] for one in cycles))
+    contacts = reduce(add, (cycle.contacts[how.contacts] for cycle in cycles))
     walls = cycles[0].cycle.walls
     return posterior_of(
         tables,
@@ -201,17 +203,18 @@ def _print_speeds(said: _All) -> None:
     print(f'| tray, beads / walls | window begins | contacts: of it | all | {titles} |')
     print('| --- ' * (4 + len(_PARTS)) + '|')
     for (number, truth), cycles in said.items():
-        start = np.median([one.final.window_start for one in cycles])
+        start = np.median([cycle.final.window_start for cycle in cycles])
         row = f'| {number}, {truth} | {start:.1f} s '
         for kind in ('window', 'all'):
             counts = [
-                (one.contacts[kind].rebounds, one.contacts[kind].collisions) for one in cycles
+                (cycle.contacts[kind].rebounds, cycle.contacts[kind].collisions)
+                for cycle in cycles
             ]
             rebounds, collisions = np.mean(counts, axis=0)
             row += f'| {rebounds:.0f} + {collisions:.0f} '
-        age = np.concatenate([one.decay.time - one.decay.time[0] for one in cycles])
-        ratio = np.concatenate([one.decay.speed / one.true_decay.speed for one in cycles])
-        error = np.concatenate([one.decay.error / one.true_decay.speed for one in cycles])
+        age = np.concatenate([cycle.decay.time - cycle.decay.time[0] for cycle in cycles])
+        ratio = np.concatenate([cycle.decay.speed / cycle.true_decay.speed for cycle in cycles])
+        error = np.concatenate([cycle.decay.error / cycle.true_decay.speed for cycle in cycles])
         for low, high in _PARTS:
             part = (low <= age) & (age < high)
             spread = np.sqrt(np.mean(((ratio[part] - 1.0) / error[part]) ** 2))
@@ -227,16 +230,17 @@ def _print_single(said: _All) -> None:
     for (number, truth), cycles in said.items():
         begin = f'| {number}, {truth} '
         for how in _ROWS:
-            found = [_posterior([one], how) for one in cycles]
+            posteriors = [_posterior([cycle], how) for cycle in cycles]
             row = f'{begin}| {how.name} | {len(cycles)} '
             row += _judged(
-                [one.quantiles(_LEVELS) for one in found], [one.cycle.pairs for one in cycles]
+                [posterior.quantiles(_LEVELS) for posterior in posteriors],
+                [one.cycle.pairs for one in cycles],
             )
             if how.walls_known:
                 row += '| | | | | '
             else:
                 row += _judged(
-                    [one.wall_quantiles(_LEVELS) for one in found],
+                    [posterior.wall_quantiles(_LEVELS) for posterior in posteriors],
                     [one.cycle.walls for one in cycles],
                 )
             print(row + '|', flush=True)
@@ -266,15 +270,16 @@ def _print_together(said: _All) -> None:
             groups = [
                 cycles[k : k + _TOGETHER] for k in range(0, len(cycles) - _TOGETHER + 1, _TOGETHER)
             ]
-            found = [_posterior(one, how) for one in groups]
+            posteriors = [_posterior(one, how) for one in groups]
             beads, walls = (
                 ', '.join(
-                    f'{one.mean[k] - true:+.4f} ± {math.sqrt(one.covariance[k, k]):.4f}'
-                    for one in found
+                    f'{posterior.mean[k] - true:+.4f}'
+                    f' ± {math.sqrt(posterior.covariance[k, k]):.4f}'
+                    for posterior in posteriors
                 )
                 for k, true in enumerate((cycles[0].cycle.pairs, cycles[0].cycle.walls))
             )
-            if found:
+            if posteriors:
                 known = '' if how.walls_known else walls
                 print(f'| {number}, {truth} | {how.name} | {beads} | {known} |', flush=True)
 

@@ -107,7 +107,7 @@ def report() -> None:
     _print('Walls known, nothing else uncertain', _known_walls, cases + more)
     _print(f'{_ALL_CYCLES} cycles together, walls known', _many_cycles, large)
     _print('Nothing known but the priors', _drawn_from_priors, ranges)
-    law = [_Case(tray=1, restitution=one, wall=0.99) for one in _RESTITUTIONS]
+    law = [_Case(tray=1, restitution=restitution, wall=0.99) for restitution in _RESTITUTIONS]
     _print('The law itself', _by_the_law, law)
     print_costs()
 
@@ -143,8 +143,8 @@ def _known_walls(case: _Case) -> tuple[str, str]:
         one = decay_likelihood(tables, _TIMES, speed, _ERROR * speed, (library.misfit, 0.0))
         total = one if total is None else total + one
         if number % _TOGETHER == _TOGETHER - 1:
-            found = posterior_of(tables, total.integrated(), walls)
-            together.append(found.quantiles(_LEVELS))
+            posterior = posterior_of(tables, total.integrated(), walls)
+            together.append(posterior.quantiles(_LEVELS))
             total = None
         paper.append(_paper(tray, speed))
     head = '| tray | beads | walls | 1 cycle: bias | sd | covered 68 % | 95 % | '
@@ -168,8 +168,8 @@ def _many_cycles(case: _Case) -> tuple[str, str]:
             one = decay_likelihood(tables, _TIMES, speed, _ERROR * speed, (library.misfit, 0.0))
             total = one if total is None else total + one
         assert total is not None
-        found = posterior_of(tables, total.integrated(), (case.wall, case.wall))
-        low, middle, high = found.quantiles(_LEVELS[1:4])
+        posterior = posterior_of(tables, total.integrated(), (case.wall, case.wall))
+        low, middle, high = posterior.quantiles(_LEVELS[1:4])
         means.append(middle)
         halves.append(0.5 * (high - low))
         covered.append(low <= case.restitution <= high)
@@ -186,9 +186,9 @@ def _by_the_law(case: _Case) -> tuple[str, str]:
     mean = speeds.mean(axis=0)
     whole = fit_haff(_TIMES, mean, _ERROR * mean, tray.count * _RUNS)
     fits = [fit_haff(_TIMES, speed, _ERROR * speed, tray.count) for speed in speeds]
-    logs = np.log([one.decay_rate for one in fits])
-    errors = np.array([one.log_decay_rate_error for one in fits])
-    freedom = np.array([one.degrees_of_freedom for one in fits])
+    logs = np.log([fit.decay_rate for fit in fits])
+    errors = np.array([fit.log_decay_rate_error for fit in fits])
+    freedom = np.array([fit.degrees_of_freedom for fit in fits])
     pulls = np.abs(logs - math.log(whole.decay_rate)) / errors
     shares = [float(np.mean(pulls < special.stdtrit(freedom, p))) for p in (0.84, 0.975)]
     head = '| tray | beads | walls | covered 68 % | 95 % | sd of ln(rate): runs | fits |'
@@ -219,7 +219,7 @@ def _drawn_from_priors(case: _Range) -> tuple[str, str]:
         walls.append(posterior.wall_quantiles(_LEVELS) - drawn.wall)
     head = '| tray | beads | beads: bias | sd | covered 68 % | 95 % | half of a 68 % interval '
     head += '| walls: bias | sd | covered 68 % | 95 % |'
-    width = np.mean([0.5 * (one[3] - one[1]) for one in beads])
+    width = np.mean([0.5 * (bead[3] - bead[1]) for bead in beads])
     row = f'| {case.tray} | {case.low:g} to {case.high:g} ' + _judged(np.array(beads), 0.0)
     return head, row + f'| {width:.3f} ' + _judged(np.array(walls), 0.0) + '|'
 

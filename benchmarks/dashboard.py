@@ -175,16 +175,16 @@ def _last(executor, frames, pipeline, page) -> _Stage:
 
 
 def _print(stages: dict[str, _Stage]) -> None:
-    per_frame = {name: 1e3 * one.cpu / one.frames for name, one in stages.items()}
+    per_frame = {name: 1e3 * stage.cpu / stage.frames for name, stage in stages.items()}
     alone = 0.5 * (per_frame['no page'] + per_frame['no page again'])
     print(
         '| stage | frames/s | latency, median [ms] | p99 [ms] | CPU of the pipeline per frame '
         '[ms] | ratio | CPU of the page [cores] | memory of the page [MB] | steps/s | pictures/s |'
     )
     print('|' + ' --- |' * 10)
-    for name, one in stages.items():
+    for name, stage in stages.items():
         print(
-            f'| {name} | {one.frames:.1f} | {one.median_ms:.1f} | {one.late_ms:.1f} '
-            f'| {per_frame[name]:.1f} | {per_frame[name] / alone:.2f} | {one.page_cpu:.2f} '
-            f'| {one.page_mb:.0f} | {one.steps:.1f} | {one.pictures:.1f} |'
+            f'| {name} | {stage.frames:.1f} | {stage.median_ms:.1f} | {stage.late_ms:.1f} '
+            f'| {per_frame[name]:.1f} | {per_frame[name] / alone:.2f} | {stage.page_cpu:.2f} '
+            f'| {stage.page_mb:.0f} | {stage.steps:.1f} | {stage.pictures:.1f} |'
         )

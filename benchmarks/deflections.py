@@ -84,7 +84,7 @@ def _shots() -> dict[int, list[tuple[BeadsTruth, Tracks]]]:
     found: dict[int, list[tuple[BeadsTruth, Tracks]]] = {number: [] for number in _TRAYS}
     for count, moment in enumerate(film.moments(_FRAMES)):
         frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=moment.frame.image)
-        truth = {one.tray: one for one in moment.beads}
+        truth = {bead.tray: bead for bead in moment.beads}
         for image in stage.push(frame):
             if isinstance(image, TrayImage):
                 for tracks in trackers[image.tray].push(image):

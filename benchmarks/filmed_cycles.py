@@ -113,14 +113,14 @@ class Cycle:
 def folder() -> Path:
     """Where films are kept."""
     default = Path(tempfile.gettempdir()) / 'nanorocks_films'
-    found = Path(os.environ.get(FOLDER, default))
-    found.mkdir(parents=True, exist_ok=True)
-    return found
+    path = Path(os.environ.get(FOLDER, default))
+    path.mkdir(parents=True, exist_ok=True)
+    return path
 
 
 def make(films: list[Film], workers: Workers) -> None:
     """Make the films that are missing."""
-    missing = {one.name: one for one in films if not (folder() / one.name).exists()}
+    missing = {film.name: film for film in films if not (folder() / film.name).exists()}
     run_tasks(_make, missing, workers)
 
 
@@ -195,7 +195,7 @@ def _make(film: Film) -> None:
         for record in stage.push(frame):
             if isinstance(record, TrayImage):
                 follow[record.tray].push(record)
-    cycles = [one.cycle(like[number], gases[number]) for number, one in follow.items()]
+    cycles = [follower.cycle(like[number], gases[number]) for number, follower in follow.items()]
     path = folder() / film.name
     unfinished = path.with_suffix('.part')
     unfinished.write_bytes(pickle.dumps(cycles))

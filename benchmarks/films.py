@@ -75,8 +75,10 @@ def filmed(
         jpeg = cv2.imencode('.jpg', moment.frame.image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
         image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR) if effects else moment.frame.image
         frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
-        found = [one for one in stage.push(frame) if isinstance(one, TrayImage)]
+        images = [one for one in stage.push(frame) if isinstance(one, TrayImage)]
         shots.append(
-            Shot(jpeg, {one.tray: one for one in found}, {one.tray: one for one in moment.beads})
+            Shot(
+                jpeg, {one.tray: one for one in images}, {bead.tray: bead for bead in moment.beads}
+            )
         )
     return shots, film

@@ -52,7 +52,7 @@ def over_runs(measure, seeds):
 
 def lattice(cells, sides):
     """Places of a face-centred cubic lattice, (n, 3), in a box."""
-    corners = np.stack(np.meshgrid(*(np.arange(one) for one in cells), indexing='ij'), axis=-1)
+    corners = np.stack(np.meshgrid(*(np.arange(cell) for cell in cells), indexing='ij'), axis=-1)
     places = (corners.reshape(-1, 1, 3) + _FCC).reshape(-1, 3)
     return places / np.array(cells) * np.array(sides)
 

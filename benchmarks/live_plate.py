@@ -244,7 +244,7 @@ def _when(seconds: list[float]) -> str:
         return ''
     gaps = np.flatnonzero(np.diff(seconds) > 1.0) + 1
     spans = np.split(np.array(seconds), gaps)
-    return ', at ' + ', '.join(f'{one[0]:.1f} to {one[-1]:.1f} s' for one in spans)
+    return ', at ' + ', '.join(f'{span[0]:.1f} to {span[-1]:.1f} s' for span in spans)
 
 
 def report() -> None:

@@ -62,7 +62,7 @@ def _from_tracks(number: int, speed: float) -> None:
         for tracks in true_tracks(tray, settings, run, _PICTURES):
             moment = next(moments)
             merges = [one for one in counter.push(tracks, 1) if isinstance(one, Merge)]
-            pairs += [tuple(one.tracks.tolist()) for one in merges]
+            pairs += [tuple(merge.tracks.tolist()) for merge in merges]
         height = tray.dimensions[2]
         truth = packing_of_clusters(moment.positions[:, :2], gas.radii, gas.bodies, height)
         seen = packing_of_clusters(
@@ -93,15 +93,15 @@ def report() -> None:
         tray = load_trays()[number]
         for speed in _SPEEDS:
             curves = simulated_packing(tray, _settings(speed), _CYCLES)
-            ends = [compaction(one) for one in curves]
+            ends = [compaction(curve) for curve in curves]
             print(
                 f'| {number} | {1e3 * speed:g} | {_mean([c.beads[-1] for c in curves], 1)} | '
                 f'{_mean([c.filling[-1] for c in curves])} | '
                 f'{_mean([c.in_space[-1] for c in curves])} | '
                 f'{_mean([c.paper[-1] for c in curves])} | '
-                f'{_mean([one.apparent for one in ends], 1, True)} | '
-                f'{_mean([one.settled for one in ends], 1, True)} | '
-                f'{_mean([one.true for one in ends], 1, True)} | {100 * printed:.1f} |',
+                f'{_mean([end.apparent for end in ends], 1, True)} | '
+                f'{_mean([end.settled for end in ends], 1, True)} | '
+                f'{_mean([end.true for end in ends], 1, True)} | {100 * printed:.1f} |',
                 flush=True,
             )
     print(

@@ -43,7 +43,7 @@ class _Clock:
 
 def _push(pipeline: Pipeline, clock: _Clock, frame: Frame) -> list[TrayImage]:
     records = clock.timed('preprocessing', pipeline.preprocessor.push, frame)
-    images = [one for one in records if isinstance(one, TrayImage)]
+    images = [record for record in records if isinstance(record, TrayImage)]
     for image in images:
         tray = pipeline.trays[image.tray]
         for speed in clock.timed('speeds', tray.speed.push, image):
@@ -66,7 +66,7 @@ def report() -> None:
     settings = with_values(PipelineSettings(), names, 'benchmark')
     pipeline = Pipeline(settings, 'film', View(camera=film.camera.geometry.camera))
     trackers = {number: Tracker(settings, load_trays()[number]) for number in _TRAYS}
-    trackers = {number: one for number, one in trackers.items() if not one.crowded}
+    trackers = {number: tracker for number, tracker in trackers.items() if not tracker.crowded}
     finders = {number: ContactFinder(load_trays()[number]) for number in trackers}
     counters = {number: BodyCounter(settings, load_trays()[number]) for number in trackers}
     clock = _Clock()

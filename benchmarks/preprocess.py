@@ -95,11 +95,11 @@ def _stages(camera, frames):
     regions = regions_on_plate(load_trays().values(), (1080, 1920), _SCENE.pixels_per_metre)
     mix = np.array(settings.gray_mix)
     wall = settings.wall_width * settings.pixels_per_metre
-    followers = [TrayFollower(one, view, wall, mix) for one in regions.values()]
-    nodes = [nodes_of(one, view) for one in regions.values()]
+    followers = [TrayFollower(region, view, wall, mix) for region in regions.values()]
+    nodes = [nodes_of(region, view) for region in regions.values()]
     crops = [
-        (np.empty((one.height, one.width, 3), np.uint8), np.empty(one[:1:-1], np.uint8))
-        for one in regions.values()
+        (np.empty((region.height, region.width, 3), np.uint8), np.empty(region[:1:-1], np.uint8))
+        for region in regions.values()
     ]
     meters = [MotionMeter(2.0) for _ in regions]
     weights = mix_weights(settings.gray_mix)
@@ -108,8 +108,8 @@ def _stages(camera, frames):
 
     def follow(frame):
         hint = None
-        for one in followers:
-            hint = one.push(frame.image, hint) or hint
+        for follower in followers:
+            hint = follower.push(frame.image, hint) or hint
 
     def crop(frame):
         for node, (color, gray) in zip(nodes, crops, strict=True):
@@ -126,7 +126,7 @@ def _stages(camera, frames):
     def check(frame):
         checks.push(replace(frame, stamp_ns=next(stamps) * 33_000_000))
 
-    pixels = sum(one.width * one.height for one in regions.values())
+    pixels = sum(region.width * region.height for region in regions.values())
     return {
         'frame checks': _milliseconds(check, frames),
         'following 8 trays': _milliseconds(follow, frames),
@@ -162,7 +162,7 @@ def _stabilisation(camera, frames, moments) -> None:
 
 
 def _calibration(camera, frames) -> None:
-    grays = [cv2.cvtColor(one.image, cv2.COLOR_BGR2GRAY) for one in frames[::3]]
+    grays = [cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY) for frame in frames[::3]]
     picture = np.median(np.stack(grays), axis=0).astype(np.uint8)
     trays = list(load_trays().values())
     guess = guess_plate(picture, trays)

@@ -166,12 +166,12 @@ def _opening(folder: Path) -> None:
                 _timed(lambda: Reader(path).open()) for _ in stamps
             ]),
             'seek, opened': (
-                [_timed(lambda one=one: seek(one)) for one in stamps],
-                [_timed(lambda one=one: next(theirs.messages(start=one))) for one in stamps],
+                [_timed(lambda one=stamp: seek(one)) for stamp in stamps],
+                [_timed(lambda one=stamp: next(theirs.messages(start=one))) for stamp in stamps],
             ),
             'open and seek': (
-                [_timed(lambda one=one: _first_of_ours(path, one)) for one in stamps],
-                [_timed(lambda one=one: _first_of_rosbags(path, one)) for one in stamps],
+                [_timed(lambda one=stamp: _first_of_ours(path, one)) for stamp in stamps],
+                [_timed(lambda one=stamp: _first_of_rosbags(path, one)) for stamp in stamps],
             ),
         }  # fmt: skip
     for what, columns in rows.items():

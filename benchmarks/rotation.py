@@ -62,7 +62,7 @@ def _table(title, *head):
 
 
 def _row(*cells):
-    print('| ' + ' | '.join(str(one) for one in cells) + ' |', flush=True)
+    print('| ' + ' | '.join(str(cell) for cell in cells) + ' |', flush=True)
 
 
 def _bulk():
@@ -87,7 +87,7 @@ def _sharing():
     rows = []
     _table(
         'The same in trays 1 and 3, from no rotation; last: after a really shaken start',
-        'tray, beads', 'species', *(f'{one:g} s' for one in SHARING_TIMES[1:]), 'shaken, at 0 s',
+        'tray, beads', 'species', *(f'{time:g} s' for time in SHARING_TIMES[1:]), 'shaken, at 0 s',
     )  # fmt: skip
     for number, runs in SHARING.items():
         for rough in gas.ROUGH:
@@ -103,7 +103,7 @@ def _sharing():
     _table(
         'Mean square of velocity along z over that along x and y, and part of the rotation that '
         'is about z',
-        'tray, beads', 'species', *(f'{one:g} s' for one in SHARING_TIMES[1:]),
+        'tray, beads', 'species', *(f'{time:g} s' for time in SHARING_TIMES[1:]),
     )  # fmt: skip
     for row in rows:
         _row(*row)
@@ -184,7 +184,7 @@ def _local():
                 for a, b in zip(means, slopes.std(axis=0, ddof=1), strict=True)
             ]
             at = [f'{2e3 * one:.2g}' for one in speed]
-            read = [_restitution(theory, one) for one in means]
+            read = [_restitution(theory, mean) for mean in means]
             label = '0.1 mm/s' if noise else 'none'
             _row(rough.name, label, ', '.join(at), ', '.join(shown), ', '.join(read))
 
@@ -244,7 +244,10 @@ def _friction():
         f'{1e3 * PAPER_SPEED:g} mm/s, Haff fitted from 0.5 to 20 s',
         'μ', 'decay rate [1/m], walls as rough as beads', 'smooth walls',
     )  # fmt: skip
-    rates = {walls: [friction_rate(one, walls) for one in FRICTIONS] for walls in (True, False)}
+    rates = {
+        walls: [friction_rate(friction, walls) for friction in FRICTIONS]
+        for walls in (True, False)
+    }
     for k, friction in enumerate(FRICTIONS):
         _row(friction, f'{rates[True][k]:.0f}', f'{rates[False][k]:.0f}')
     same = np.interp(PAPER_RATE, rates[True], FRICTIONS)

@@ -192,7 +192,7 @@ def read_cycles(number, roughness, cycles):
     prior = PriorSettings()
     camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
     tables = tables_of(library, tray, prior)
-    decays = [decay_likelihood(tables, times, one, _ERROR * one, camera) for one in speeds]
+    decays = [decay_likelihood(tables, times, speed, _ERROR * speed, camera) for speed in speeds]
     contacts = [_contacts(tray, settings, run) for run in range(cycles)]
     together, walls = reduce(add, decays).integrated(), (prior.wall_low, prior.wall_high)
 

@@ -82,12 +82,12 @@ def _row(tray: Tray, restitution: float, number: int, found: Mixture) -> None:
     cells += [f'{1e3 * whole.initial_speed:.2f}', f'{whole.haff_time:.2f}']
     for logs, errors in (
         (
-            np.log([one.haff_time / whole.haff_time for one in fits]),
-            np.array([one.haff_time_error / one.haff_time for one in fits]),
+            np.log([fit.haff_time / whole.haff_time for fit in fits]),
+            np.array([fit.haff_time_error / fit.haff_time for fit in fits]),
         ),
         (
-            np.log([one.decay_rate / whole.decay_rate for one in fits]),
-            np.array([one.log_decay_rate_error for one in fits]),
+            np.log([fit.decay_rate / whole.decay_rate for fit in fits]),
+            np.array([fit.log_decay_rate_error for fit in fits]),
         ),
     ):
         cells += [f'{np.median(logs):+.2f}', f'{logs.std(ddof=1):.2f}']
@@ -102,13 +102,13 @@ def report() -> None:
     for number in (3, 5):
         tray = load_trays()[number]
         for restitution in (0.7, 0.89):
-            found = cooled(tray, restitution)
+            mixture = cooled(tray, restitution)
             for one in (0, 1):
-                _row(tray, restitution, one, found)
-            shares = found.energies.mean(axis=0)
+                _row(tray, restitution, one, mixture)
+            shares = mixture.energies.mean(axis=0)
             ratio = shares[:, 0] / shares[:, 1]
             masses = [one.bead_mass for one in tray.species]
-            squares = found.speeds.mean(axis=0) ** 2 * masses
+            squares = mixture.speeds.mean(axis=0) ** 2 * masses
             names = '/'.join(one.material for one in tray.species)
             lines.append(
                 f'| {number}, beads {restitution:g} | {names} | {ratio[0]:.2f} '

@@ -47,12 +47,12 @@ _OWN_ERROR = 'its own error / truth'
 
 
 def _estimators() -> dict[str, SpeedEstimator]:
-    found = {}
+    estimators = {}
     for name, values in _METHODS.items():
         recipe = {'speed.method': 'binarised_area', **values}
         settings = with_values(PipelineSettings(), recipe, 'benchmark')
-        found[name] = SpeedEstimator(settings, load_trays()[1])
-    return found
+        estimators[name] = SpeedEstimator(settings, load_trays()[1])
+    return estimators
 
 
 def _recompressed(frame: Frame) -> Frame:
@@ -75,18 +75,20 @@ def _ratios(seed: int, mean_speed: float, found: dict) -> None:
                 continue
             for name, estimator in estimators.items():
                 found_now = estimator.push(image)
-                speeds[name] += [one for one in found_now if isinstance(one, SpeedEstimate)]
+                speeds[name] += [
+                    record for record in found_now if isinstance(record, SpeedEstimate)
+                ]
     time, value = np.array(truth).T
     for name, estimates in speeds.items():
-        for one in estimates:
-            if one.cycle == 0:
+        for estimate in estimates:
+            if estimate.cycle == 0:
                 continue
-            inside = np.abs(time - one.stamp_ns / _NS) <= 0.5 * one.window + 1e-6
+            inside = np.abs(time - estimate.stamp_ns / _NS) <= 0.5 * estimate.window + 1e-6
             true = value[inside].mean()
             column = int(np.digitize(true, _BINS))
-            found[name, column].append(one.mean_projected_speed / true)
+            found[name, column].append(estimate.mean_projected_speed / true)
             if name == _DEFAULT:
-                found[_OWN_ERROR, column].append(one.mean_projected_speed_error / true)
+                found[_OWN_ERROR, column].append(estimate.mean_projected_speed_error / true)
 
 
 def report() -> None:

@@ -92,10 +92,10 @@ def report() -> None:
     ]
     # The longest first, so that no process is left with one at the end.
     longest_first = sorted(tasks, key=lambda one: -one.seconds * (1 + one.effects))
-    named = {str(one): one for one in longest_first}
+    named = {str(task): task for task in longest_first}
     found = dict(finished_in_processes(_compared, named, _PROCESSES))
     for effects in (False, True):
-        _print(effects, [found[str(one)] for one in tasks if one.effects is effects])
+        _print(effects, [found[str(task)] for task in tasks if task.effects is effects])
 
 
 def _print(effects: bool, columns: list[_Found]) -> None:
@@ -132,15 +132,15 @@ def _compared(task: _Task) -> _Found:
     estimates: dict[tuple[int, str], list[SpeedEstimate]] = {key: [] for key in estimators}
     truth: dict[int, list[np.ndarray]] = {tray: [] for tray in _TRAYS}
     for frame, beads in _pictures(film, round(task.seconds * _RATE), task.effects):
-        for one in beads:
-            truth[one.tray].append(_true_speeds(one))
+        for bead in beads:
+            truth[bead.tray].append(_true_speeds(bead))
         for image in stage.push(frame):
             if not isinstance(image, TrayImage):
                 continue
             for method in _METHODS:
                 records = estimators[image.tray, method].push(image)
                 estimates[image.tray, method] += [
-                    one for one in records if isinstance(one, SpeedEstimate)
+                    record for record in records if isinstance(record, SpeedEstimate)
                 ]
     return {key: _ratios(found, np.array(truth[key[0]]).T) for key, found in estimates.items()}
 
@@ -196,21 +196,21 @@ def _true_speeds(beads: BeadsTruth) -> np.ndarray:
 def _ratios(found: list[SpeedEstimate], truth: np.ndarray) -> list[_Compared]:
     time, *speeds = truth
     compared = []
-    for one in found:
-        middle = one.stamp_ns / _NS
+    for estimate in found:
+        middle = estimate.stamp_ns / _NS
         if middle < _SHAKE + 0.2:
             continue
-        inside = np.abs(time - middle) <= 0.5 * one.window + 1e-6
+        inside = np.abs(time - middle) <= 0.5 * estimate.window + 1e-6
         true, *species = (float(speed[inside].mean()) for speed in speeds)
-        each = (one.first_species_speed, one.second_species_speed)
+        each = (estimate.first_species_speed, estimate.second_species_speed)
         compared.append(
             _Compared(
-                ratio=one.mean_projected_speed / true,
-                error=one.mean_projected_speed_error / true,
+                ratio=estimate.mean_projected_speed / true,
+                error=estimate.mean_projected_speed_error / true,
                 species=tuple(a / b for a, b in zip(each, species, strict=False)),
-                trusted=not one.quality,
-                quality=one.quality,
-                method=one.method,
+                trusted=not estimate.quality,
+                quality=estimate.quality,
+                method=estimate.method,
             )
         )
     return compared

@@ -62,7 +62,7 @@ class Course:
     @property
     def first(self) -> float:
         """The same as found."""
-        return min((one.stamp_ns / _NS for one in self.merges), default=np.nan)
+        return min((merge.stamp_ns / _NS for merge in self.merges), default=np.nan)
 
 
 def course(tray: Tray, pictures: Iterable[tuple[Tracks, np.ndarray, float]]) -> Course:
@@ -104,7 +104,8 @@ def simulated(
     rng = np.random.default_rng([seed, run])
     pictures = tracks_of(gas, tray, rng, round(seconds * _RATE))
     return course(
-        tray, ((one, gas.bodies, np.hypot(*one.velocities.T).mean()) for one in pictures)
+        tray,
+        ((picture, gas.bodies, np.hypot(*picture.velocities.T).mean()) for picture in pictures),
     )
 
 
@@ -140,17 +141,17 @@ def size_row(cycles: list[Course]) -> str:
     columns = [np.concatenate(part) for part in zip(*map(compared, cycles), strict=True)]
     _, bodies, error, true, size, size_error, true_size = columns
     ratio = size / true_size - 1.0
-    onset = np.array([one.first - one.first_true for one in cycles])
+    onset = np.array([cycle.first - cycle.first_true for cycle in cycles])
     known = onset[np.isfinite(onset)]
-    delays = [(m.known_ns - m.stamp_ns) / _NS for one in cycles for m in one.merges]
+    delays = [(m.known_ns - m.stamp_ns) / _NS for cycle in cycles for m in cycle.merges]
     covered = np.mean(np.abs(bodies - true) <= np.maximum(2.0 * error, 0.5))
     covered_size = np.mean(np.abs(size - true_size) <= np.maximum(2.0 * size_error, 0.1))
     lines = [
-        f'{np.mean([one.bodies[-1] for one in cycles]):.1f}',
+        f'{np.mean([cycle.bodies[-1] for cycle in cycles]):.1f}',
         f'{np.mean(bodies - true):+.2f} ({np.sqrt(np.mean((bodies - true) ** 2)):.2f})',
         f'{ratio.mean():+.1%} ({np.sqrt(np.mean(ratio**2)):.1%})',
         f'{covered:.0%}, {covered_size:.0%}',
-        f'{np.mean([one.first_true for one in cycles]):.2f}',
+        f'{np.mean([cycle.first_true for cycle in cycles]):.2f}',
         f'{known.mean():+.2f} ({np.abs(known).max():.2f}), {len(known)}/{len(cycles)}'
         if known.size
         else 'none found',
@@ -191,11 +192,12 @@ def threshold_row(number: int, speed: float, cycles: list[Course], measure: str)
     """Cells of the table of sticking speeds."""
     tray = load_trays()[number]
     contacts = slow_contacts(tray)
-    given = [_cycle(one, tray.count, one.merges) for one in cycles]
+    given = [_cycle(cycle, tray.count, cycle.merges) for cycle in cycles]
     true = [
-        _cycle(one, tray.count, true_merges(one.times, one.bodies, tray.count)) for one in cycles
+        _cycle(cycle, tray.count, true_merges(cycle.times, cycle.bodies, tray.count))
+        for cycle in cycles
     ]
-    each = [sticking_estimate([one], contacts, tray.count, measure=measure) for one in given]
+    each = [sticking_estimate([cycle], contacts, tray.count, measure=measure) for cycle in given]
     ratios = np.array([one.sticking_speed for one in each]) / speed
     covered = sum(one.lower <= speed <= one.upper for one in each)
     cells = [
@@ -203,10 +205,10 @@ def threshold_row(number: int, speed: float, cycles: list[Course], measure: str)
         f'{covered}/{len(each)}',
     ]
     for known in (given, true):
-        found = sticking_estimate(known, contacts, tray.count, measure=measure)
+        estimate = sticking_estimate(known, contacts, tray.count, measure=measure)
         cells.append(
-            f'{found.sticking_speed / speed:.2f} '
-            f'[{found.lower / speed:.2f}, {found.upper / speed:.2f}]'
+            f'{estimate.sticking_speed / speed:.2f} '
+            f'[{estimate.lower / speed:.2f}, {estimate.upper / speed:.2f}]'
         )
     return ' | '.join(cells)
 

@@ -111,11 +111,11 @@ def report() -> None:
     """Print the tables."""
     films = {_name(k, sticks=True): (k, True) for k in range(_FILMS)}
     films |= {_name(k, sticks=False): (k, False) for k in range(_CONTROLS)}
-    missing = {name: one for name, one in films.items() if not (folder() / name).exists()}
+    missing = {name: film for name, film in films.items() if not (folder() / name).exists()}
     run_tasks(_make, missing, Workers())
     counted = run_tasks(_counted, {name: name for name in films}, Workers())
     cells = [one for film in counted for one in film]
-    _report_controls([one for one in cells if one.film.sticking == 0.0])
+    _report_controls([cell for cell in cells if cell.film.sticking == 0.0])
     print(
         '\n| tray, sticking speed | cells | error of bodies: mean (rms) | of size: mean (rms) '
         '| first merge found later by: mean (largest) [s] | paper: onset [s], true '
@@ -125,7 +125,7 @@ def report() -> None:
     print('| --- ' * 10 + '|')
     for tray in (1, 3, 5):
         for speed in _STICKING:
-            own = [one for one in cells if (one.film.like, one.film.sticking) == (tray, speed)]
+            own = [cell for cell in cells if (cell.film.like, cell.film.sticking) == (tray, speed)]
             if own:
                 print(_row(tray, speed, own), flush=True)
 
@@ -158,7 +158,7 @@ def _report_controls(cells: list[Counted]) -> None:
         + '|'
     )
     for tray in (1, 3, 5):
-        own = [one for one in cells if one.film.like == tray]
+        own = [cell for cell in cells if cell.film.like == tray]
         onsets = np.array([_paper_onset(one.film) for one in own])
         print(
             f'| {tray} | {len(own)} | {sum(bool(one.merges) for one in own)} '
@@ -173,22 +173,22 @@ def _paper_onset(one: Filmed) -> float:
 def _row(tray: int, speed: float, cells: list[Counted]) -> str:
     bodies, sizes = (np.concatenate(part) for part in zip(*map(_errors, cells), strict=True))
     late = [
-        min(each.stamp_ns for each in one.merges) / _NS - one.film.first
-        for one in cells
-        if one.merges
+        min(merge.stamp_ns for merge in cell.merges) / _NS - cell.film.first
+        for cell in cells
+        if cell.merges
     ]
-    onset = np.nanmean([_paper_onset(one.film) for one in cells])
-    true = np.nanmean([one.film.first - _SHAKE for one in cells])
+    onset = np.nanmean([_paper_onset(cell.film) for cell in cells])
+    true = np.nanmean([cell.film.first - _SHAKE for cell in cells])
     beads = load_trays()[tray].count
     contacts = slow_contacts(load_trays()[tray])
-    cycles = [_cycle(one.film, one.merges, beads) for one in cells]
+    cycles = [_cycle(cell.film, cell.merges, beads) for cell in cells]
     actual = [
-        _cycle(one.film, true_merges(one.film.time, one.film.bodies, beads), beads)
-        for one in cells
+        _cycle(cell.film, true_merges(cell.film.time, cell.film.bodies, beads), beads)
+        for cell in cells
     ]
-    each = [sticking_estimate([one], contacts, beads) for one in cycles]
-    ratio = np.array([one.sticking_speed for one in each]) / speed
-    held = sum(one.lower <= speed <= one.upper for one in each)
+    each = [sticking_estimate([cycle], contacts, beads) for cycle in cycles]
+    ratio = np.array([estimate.sticking_speed for estimate in each]) / speed
+    held = sum(estimate.lower <= speed <= estimate.upper for estimate in each)
     both, of_true = (sticking_estimate(some, contacts, beads) for some in (cycles, actual))
     return (
         f'| {tray}, {1e3 * speed:g} mm/s | {len(cells)} '
@@ -203,22 +203,22 @@ def _row(tray: int, speed: float, cells: list[Counted]) -> str:
 
 def _errors(one: Counted) -> tuple[np.ndarray, np.ndarray]:
     """Of the number of bodies, and of the size over the true one, where they are told."""
-    known = [each for each in one.counts if math.isfinite(each.bodies)]
+    known = [count for count in one.counts if math.isfinite(count.bodies)]
     film = one.film
-    times = np.array([each.stamp_ns / _NS for each in known])
+    times = np.array([estimate.stamp_ns / _NS for estimate in known])
     at = np.searchsorted(film.time, times - 0.5 / _RATE)
-    bodies = np.array([each.bodies for each in known]) - film.bodies[at]
-    size = np.array([each.weighted_size for each in known]) / film.weighted_size[at] - 1.0
+    bodies = np.array([estimate.bodies for estimate in known]) - film.bodies[at]
+    size = np.array([estimate.weighted_size for estimate in known]) / film.weighted_size[at] - 1.0
     return bodies, size
 
 
 def _cycle(one: Filmed, merges: Sequence[Merge], beads: int) -> StickingCycle:
-    speeds = [each for each in one.speeds if each.cycle == 1]
+    speeds = [speed for speed in one.speeds if speed.cycle == 1]
     return sticking_cycle(
         beads,
         merges,
-        np.array([each.stamp_ns for each in speeds], dtype=np.int64),
-        np.array([each.mean_projected_speed for each in speeds]),
+        np.array([speed.stamp_ns for speed in speeds], dtype=np.int64),
+        np.array([speed.mean_projected_speed for speed in speeds]),
         round(_SHAKE * _NS),
     )
 
@@ -299,7 +299,9 @@ def _film(cells: dict[int, Tray], gases: dict[int, SimulationSettings]) -> dict[
         kept[cell] = {
             'tracks': tuple(tracks[cell]),
             'speeds': tuple(one for one in own if isinstance(one, SpeedEstimate)),
-            'areas': np.array([(one.stamp_ns / _NS, one.level_area) for one in clusters]),
+            'areas': np.array(
+                [(cluster.stamp_ns / _NS, cluster.level_area) for cluster in clusters]
+            ),
             'time': time,
             'bodies': bodies,
             'weighted_size': weighted,

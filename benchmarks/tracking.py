@@ -256,7 +256,7 @@ def _judge(
 
 def _report_speeds() -> None:
     print('\nMean projected speed / truth (sd of one estimate); "!": says it is not reliable\n')
-    heads = [f'{1e3 * one:g} mm/s' for one in _SPEEDS]
+    heads = [f'{1e3 * speed:g} mm/s' for speed in _SPEEDS]
     print('| tray, species, effects | ' + ' | '.join(heads) + ' |')
     print('| --- |' + ' --- |' * len(heads))
     for effects in (False, True):
@@ -277,7 +277,9 @@ def _report_speeds() -> None:
 def _speed_cell(shots: list[Shot], number: int, index: int) -> str:
     records = list(_tracked(shots, number))[12:]
     stamps = np.array([one.stamp_ns for one, _ in records])
-    true = np.array([one.projected_speeds[one.species == index].mean() for _, one in records])
+    true = np.array(
+        [truth.projected_speeds[truth.species == index].mean() for _, truth in records]
+    )
     ratios, reliable = [], []
     for end in range(40, len(records), 5):
         tracks = [one for one, _ in records[:end]]

@@ -106,9 +106,9 @@ def _beads(bag: Path, number: int, epoch_ns: int) -> list[BeadsTruth]:
     topic = f'/nanorocks/tray_{number}/beads'
     return [
         beads_from_array(
-            frames.reader.deserialize(one).data, tray=number, epoch_ns=epoch_ns, where=topic
+            frames.reader.deserialize(message).data, tray=number, epoch_ns=epoch_ns, where=topic
         )
-        for one in frames.reader.messages([topic])
+        for message in frames.reader.messages([topic])
     ]
 
 
@@ -181,13 +181,13 @@ def _missed(share: float) -> str:
 
 
 def _speeds(bag: Path) -> list[str]:
-    found = compare_speeds(bag, settings(_TRAYS))
+    speeds = compare_speeds(bag, settings(_TRAYS))
     lines = [
         '| tray | tracking | structure function | binarised area | chosen from the data | '
         'goal | missed by | off by over 20 % and not flagged |',
         '| --- |' + ' --- |' * 7,
     ]
-    for number, tray in found.trays.items():
+    for number, tray in speeds.trays.items():
         cells = [_ratio(tray, method) for method in (*METHODS, AUTO)]
         shares = tray.chosen(1).items()
         taken = ', '.join(f'{100 * share:.0f} % {name[0]}' for name, share in shares if share)
@@ -207,9 +207,11 @@ def _ratio(tray: ComparedSpeeds, method: str) -> str:
 
 def _silent(tray: ComparedSpeeds) -> float:
     """Share of the speeds chosen from the data that are far off, and do not say so."""
-    found = [one for one in tray.speeds[AUTO] if one.cycle == 1]
-    ratios = np.array([one.mean_projected_speed for one in found]) / tray.true_speeds(found)
-    flagged = np.array([bool(one.quality) for one in found])
+    estimates = [speed for speed in tray.speeds[AUTO] if speed.cycle == 1]
+    ratios = np.array(
+        [estimate.mean_projected_speed for estimate in estimates]
+    ) / tray.true_speeds(estimates)
+    flagged = np.array([bool(estimate.quality) for estimate in estimates])
     return float(np.mean((np.abs(ratios - 1.0) > _FAR_OFF) & ~flagged))
 
 

@@ -49,7 +49,7 @@ def report() -> None:
             ('all', True, True),
         ):
             judge = partial(_posterior, tray, beads=beads, walls=walls)
-            each = [judge([one]) for one in cycles]
+            each = [judge([cycle]) for cycle in cycles]
             print(f'| {tray} | {name} ' + _row(each, judge(cycles)), flush=True)
 
 
@@ -75,9 +75,9 @@ def _cycle(task: tuple[int, int]) -> _Cycle:
     tables = tables_of(library, tray, prior)
     decay = decay_likelihood(tables, times, speed, _ERROR * speed, camera)
     found = [
-        one
-        for one in contacts_of(tray, true_tracks(tray, settings, run, round(_LAST * _RATE)))
-        if one.stamp_ns > _FIRST * _NS
+        contact
+        for contact in contacts_of(tray, true_tracks(tray, settings, run, round(_LAST * _RATE)))
+        if contact.stamp_ns > _FIRST * _NS
     ]
     return decay, ContactTerms.of(found)
 
@@ -99,9 +99,9 @@ def _posterior(tray: int, cycles: list[_Cycle], *, beads: bool, walls: bool) -> 
 def _row(each: list[Posterior], together: Posterior) -> str:
     row = ''
     for index, truth in ((0, _PAIRS), (1, _WALLS)):
-        errors = [one.mean[index] - truth for one in each]
+        errors = [posterior.mean[index] - truth for posterior in each]
         row += f'| {np.sqrt(np.mean(np.square(errors))):.3f} '
-        row += f'| {np.mean([_half(one, index) for one in each]):.3f} '
+        row += f'| {np.mean([_half(posterior, index) for posterior in each]):.3f} '
         row += f'| {together.mean[index] - truth:+.4f} | {_half(together, index):.4f} '
     return row + '|'
 

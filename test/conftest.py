@@ -88,6 +88,6 @@ def look(browser):
         return page
 
     yield open_page
-    for one in contexts:
-        one.close()
+    for context in contexts:
+        context.close()
     assert complaints == []

@@ -48,7 +48,7 @@ def anchors(page):
     """What a heading is called in a link."""
     lines = page.read_text(encoding='utf-8').splitlines()
     headings = [line.lstrip('#').strip().lower() for line in lines if line.startswith('#')]
-    return {re.sub(r'[^\w\- ]', '', one).replace(' ', '-') for one in headings}
+    return {re.sub(r'[^\w\- ]', '', heading).replace(' ', '-') for heading in headings}
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))

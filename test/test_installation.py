@@ -124,6 +124,6 @@ def test_a_plain_installation_holds_its_package_data(source_copy, tmp_path):
     assert Path(module).is_relative_to(packages)
     assert data == '8 time'
     source = ROOT / 'nanorocks_ros' / 'dashboard' / 'page'
-    assert page.split() == sorted(one.name for one in source.iterdir())
+    assert page.split() == sorted(path.name for path in source.iterdir())
     for name in EXECUTABLES:
         assert os.access(tmp_path / 'lib' / 'nanorocks_ros' / name, os.X_OK)

@@ -137,11 +137,12 @@ def _print_cycles(results: TrayResults) -> None:
     cycles = last_of_each_cycle(results.cors)
     if not cycles:
         print('  no COR: no shaking event with a decay after it was found')
-    for one in cycles:
-        print(f'  cycle {one.cycle}: {_cor_text(one)}')
+    for estimate in cycles:
+        print(f'  cycle {estimate.cycle}: {_cor_text(estimate)}')
         for name in ('first', 'second'):
             speed, time = (
-                getattr(one, f'{name}_species_{what}') for what in ('initial_speed', 'haff_time')
+                getattr(estimate, f'{name}_species_{what}')
+                for what in ('initial_speed', 'haff_time')
             )
             if math.isfinite(time):
                 print(f'    {name} species: v0 {speed * 1e3:.2f} mm/s, tau {time:.2f} s')

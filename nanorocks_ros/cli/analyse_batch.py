@@ -66,7 +66,7 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
     if not found.bags:
         raise (
             ConfigurationError(
-                ', '.join(shown(one) for one in options.bags), 'name no recording', 'correct them'
+                ', '.join(shown(bag) for bag in options.bags), 'name no recording', 'correct them'
             )
             if not found.missing
             else next(iter(found.missing.values()))
@@ -89,10 +89,10 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
 def _end(batch: Batch) -> int:
     if not batch.failed:
         return 0
-    for one in batch.failed:
-        part = ' (what could be analysed is among the results)' if one.analysed else ''
-        _notice(f'failed: {one.reason}{part}')
-    whole = len(batch.results) + sum(not one.analysed for one in batch.failed)
+    for failure in batch.failed:
+        part = ' (what could be analysed is among the results)' if failure.analysed else ''
+        _notice(f'failed: {failure.reason}{part}')
+    whole = len(batch.results) + sum(not failure.analysed for failure in batch.failed)
     _notice(
         f'{len(batch.failed)} of {whole} recordings failed, as listed; mend or remove them, and '
         'run the same command again: what is done is kept'
@@ -107,21 +107,21 @@ def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> di
     return {
         'bags': [
             {
-                'bag': one.name,
-                'results': shown(one.folder),
-                'same_as': one.twin or None,
-                **{key: one.summary[key] for key in shown_keys},
+                'bag': result.name,
+                'results': shown(result.folder),
+                'same_as': result.twin or None,
+                **{key: result.summary[key] for key in shown_keys},
                 'trays': {
                     number: {'cycles': tray['cycles'], 'truth': tray['truth']}
-                    for number, tray in one.summary['trays'].items()
+                    for number, tray in result.summary['trays'].items()
                 },
             }
-            for one in batch.results
+            for result in batch.results
         ],
-        'trays': {str(number): means_as_json(one) for number, one in together.trays.items()},
+        'trays': {str(number): means_as_json(tray) for number, tray in together.trays.items()},
         'failed': [
-            {'bag': one.name, 'reason': one.reason, 'analysed': one.analysed}
-            for one in batch.failed
+            {'bag': failure.name, 'reason': failure.reason, 'analysed': failure.analysed}
+            for failure in batch.failed
         ],
         'results': shown(folder),
         'report': shown(report),
@@ -131,8 +131,8 @@ def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> di
 def _print(batch: Batch, together: Combined) -> None:
     from nanorocks_ros.studies.batch.batch_analysis import told
 
-    frames = sum(one.summary['frames'] for one in batch.results)
-    seconds = sum(one.summary['seconds'] for one in batch.results)
+    frames = sum(result.summary['frames'] for result in batch.results)
+    seconds = sum(result.summary['seconds'] for result in batch.results)
     print(f'{counted(len(batch.results), "recording")}, {frames} frames, {seconds:.0f} s')
     for text in told(batch.results):
         print(text)
@@ -176,7 +176,7 @@ def _tray_lines(tray: TrayMeans) -> list[str]:
 
 def _interval(values: tuple[float | None, ...], factor: float, digits: int) -> str:
     middle, low, high = (
-        'unknown' if one is None else f'{factor * one:.{digits}f}' for one in values
+        'unknown' if value is None else f'{factor * value:.{digits}f}' for value in values
     )
     return f'{middle} [{low}, {high}]'
 
@@ -200,7 +200,7 @@ class _Watch:
         """So many bytes of each recording are left to do."""
         from tqdm import tqdm
 
-        self._store, self._left = store, {name: max(one, 1) for name, one in sizes.items()}
+        self._store, self._left = store, {name: max(size, 1) for name, size in sizes.items()}
         self._bytes, self._frames, self._failed = sum(self._left.values()), 0, 0
         self._done, self._all = done, done + len(sizes)
         self._start = time.monotonic()

@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     check_outputs(files, kinds, force=options.force)
     try:
         with Progress('measuring') as progress:
-            found = cycle_clusters(
+            clusters = cycle_clusters(
                 Path(options.bag),
                 settings,
                 cycle=options.cycle,
@@ -54,17 +54,17 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
-    for notice in found.notices:
+    for notice in clusters.notices:
         print(f'nanorocks: {notice}', file=sys.stderr)
     if '--table' in files:
-        write_clusters(files['--table'], found)
+        write_clusters(files['--table'], clusters)
     if '--output' in files:
         from nanorocks_ros.studies.inspection.autocorrelation_figure import autocorrelation_figure
 
-        autocorrelation_figure(files['--output'], found, settings.preprocess.pixels_per_metre)
+        autocorrelation_figure(files['--output'], clusters, settings.preprocess.pixels_per_metre)
     for flag, path in files.items():
         print(f'nanorocks: {flag[2:]} in {path}', file=sys.stderr)
-    _print(found, as_json=options.json)
+    _print(clusters, as_json=options.json)
     return 0
 
 

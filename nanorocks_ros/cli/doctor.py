@@ -40,16 +40,16 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         checks = [
             {
-                'name': one.name,
-                'status': one.status.value,
-                'found': one.found,
-                'remedy': one.remedy or None,
+                'name': finding.name,
+                'status': finding.status.value,
+                'found': finding.found,
+                'remedy': finding.remedy or None,
             }
-            for one in findings
+            for finding in findings
         ]
         print(json.dumps({'status': verdict.value, 'checks': checks}))
     else:
-        counts = [sum(one.status is status for one in findings) for status in Status]
+        counts = [sum(finding.status is status for finding in findings) for status in Status]
         print(f'{counts[0]} ok, {counts[1]} warnings, {counts[2]} problems')
     return _CODE_OF_A_PROBLEM if verdict is Status.PROBLEM else 0
 
@@ -58,10 +58,10 @@ def _of_machine(options: argparse.Namespace) -> list[Finding]:
     from nanorocks_ros.tools.doctor.examination import examine
 
     findings = []
-    for one in examine(_announce):
-        findings.append(one)
+    for finding in examine(_announce):
+        findings.append(finding)
         if not options.json:
-            _print(one)
+            _print(finding)
     return findings
 
 
@@ -75,8 +75,8 @@ def _of_graph(options: argparse.Namespace) -> list[Finding]:
     _announce('listening')
     findings = examine_graph(graph(options.seconds))
     if not options.json:
-        for one in findings:
-            _print(one)
+        for finding in findings:
+            _print(finding)
     return findings
 
 

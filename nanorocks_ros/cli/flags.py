@@ -86,7 +86,7 @@ def _parsed(row: SettingRow, text: Any) -> Any:
     try:
         if isinstance(row.default, bool):
             return yaml.safe_load(text)
-        numbers = [_number(one) for one in _words(text)]
+        numbers = [_number(word) for word in _words(text)]
         return numbers if isinstance(row.default, tuple) else numbers[0]
     except (yaml.YAMLError, ValueError) as error:
         raise ConfigurationError(

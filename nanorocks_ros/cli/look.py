@@ -88,7 +88,7 @@ def _as_json(steps: FrameSteps) -> dict[str, Any]:
     return {
         'frame': steps.number,
         'time': steps.time,
-        'trays': {str(number): _tray_as_json(one) for number, one in steps.trays.items()},
+        'trays': {str(number): _tray_as_json(tray) for number, tray in steps.trays.items()},
     }
 
 

@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     check_outputs(files, {'--output': ('.png',), '--table': ('.csv',)}, force=options.force)
     try:
         with Progress('measuring') as progress:
-            found = compare_speeds(
+            speeds = compare_speeds(
                 Path(options.bag),
                 settings,
                 image_topic=options.image_topic,
@@ -54,21 +54,21 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
-    for notice in found.notices:
+    for notice in speeds.notices:
         print(f'nanorocks: {notice}', file=sys.stderr)
-    cycle = _cycle(found, options.cycle)
+    cycle = _cycle(speeds, options.cycle)
     if options.json:
-        print(json.dumps(_as_json(found), allow_nan=False))
+        print(json.dumps(_as_json(speeds), allow_nan=False))
     else:
-        _print(found, cycle)
-    _write(files, found, cycle)
+        _print(speeds, cycle)
+    _write(files, speeds, cycle)
     return 0
 
 
 def _cycle(found: BagSpeeds, wanted: int | None) -> int:
     if wanted is None:
         return found.first_cycle()
-    known = sorted({cycle for one in found.trays.values() for cycle in one.cycles})
+    known = sorted({cycle for tray in found.trays.values() for cycle in tray.cycles})
     if wanted not in known:
         listed = ', '.join(str(one) for one in known) or 'none'
         raise ConfigurationError(
@@ -95,11 +95,11 @@ def _as_json(found: BagSpeeds) -> dict[str, Any]:
         'frames': found.frames,
         'trays': {
             str(number): {
-                'methods': {name: _method_as_json(found, one, name) for name in one.speeds},
-                'chosen': one.chosen(),
-                'cycles': one.cycles,
+                'methods': {name: _method_as_json(found, tray, name) for name in tray.speeds},
+                'chosen': tray.chosen(),
+                'cycles': tray.cycles,
             }
-            for number, one in found.trays.items()
+            for number, tray in found.trays.items()
         },
     }
 
@@ -107,13 +107,13 @@ def _as_json(found: BagSpeeds) -> dict[str, Any]:
 def _method_as_json(found: BagSpeeds, tray: ComparedSpeeds, method: str) -> dict[str, Any]:
     speeds, ratios = tray.speeds[method], tray.ratios(method)
     return {
-        'time': [(one.stamp_ns - found.epoch_ns) / 1e9 for one in speeds],
-        'cycle': [one.cycle for one in speeds],
-        'mean_projected_speed': _known(one.mean_projected_speed for one in speeds),
-        'mean_projected_speed_error': _known(one.mean_projected_speed_error for one in speeds),
-        'window': [one.window for one in speeds],
-        'method': [one.method.name.lower() for one in speeds],
-        'quality': [one.quality.names() for one in speeds],
+        'time': [(speed.stamp_ns - found.epoch_ns) / 1e9 for speed in speeds],
+        'cycle': [speed.cycle for speed in speeds],
+        'mean_projected_speed': _known(speed.mean_projected_speed for speed in speeds),
+        'mean_projected_speed_error': _known(speed.mean_projected_speed_error for speed in speeds),
+        'window': [speed.window for speed in speeds],
+        'method': [speed.method.name.lower() for speed in speeds],
+        'quality': [speed.quality.names() for speed in speeds],
         'true_mean_projected_speed': _known(tray.true_speeds(speeds).tolist()),
         'ratio_to_truth': float(ratios.mean()) if ratios.size else None,
         'ratio_to_truth_scatter': float(ratios.std()) if ratios.size else None,
@@ -129,7 +129,7 @@ def _print(found: BagSpeeds, cycle: int) -> None:
     for number, tray in found.trays.items():
         print(f'tray {number}, cycle {cycle}:')
         for method, speeds in tray.speeds.items():
-            count = sum(one.cycle == cycle for one in speeds)
+            count = sum(speed.cycle == cycle for speed in speeds)
             ratios = tray.ratios(method, cycle)
             told = (
                 f', estimate / truth {ratios.mean():.3f} (sd {ratios.std():.3f})'

@@ -51,17 +51,17 @@ def run(options: argparse.Namespace) -> int:
     _check_outputs(options)
     manual = read_manual_tracks(options.compare) if options.compare else None
     with Progress('tracking') as progress:
-        found = track_bag(
+        bag = track_bag(
             Path(options.bag), settings, image_topic=options.image_topic, progress=progress.count
         )
-    for notice in found.notices:
+    for notice in bag.notices:
         print(f'nanorocks: {notice}', file=sys.stderr)
-    compared = {} if manual is None else _compared(found, manual, options.first_frame)
+    compared = {} if manual is None else _compared(bag, manual, options.first_frame)
     if options.json:
-        print(json.dumps(_as_json(found, compared), allow_nan=False))
+        print(json.dumps(_as_json(bag, compared), allow_nan=False))
     else:
-        _print(found, compared)
-    _write(options, found)
+        _print(bag, compared)
+    _write(options, bag)
     return 0
 
 
@@ -174,8 +174,8 @@ def _comparison_as_json(found: TrackComparison | None) -> dict[str, Any] | None:
     }
     values['offset'] = list(found.offset)
     known = {
-        name: None if isinstance(one, float) and math.isnan(one) else one
-        for name, one in values.items()
+        name: None if isinstance(value, float) and math.isnan(value) else value
+        for name, value in values.items()
     }
     if math.isnan(found.offset[0]):
         known['offset'] = None

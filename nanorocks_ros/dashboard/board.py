@@ -75,7 +75,9 @@ class Board:
                 'heard_s': now_s,
             }
         self._nodes = {
-            name: one for name, one in self._nodes.items() if now_s - one['heard_s'] < _FORGOTTEN_S
+            name: node
+            for name, node in self._nodes.items()
+            if now_s - node['heard_s'] < _FORGOTTEN_S
         }
         self._nodes_version += 1
 
@@ -83,9 +85,9 @@ class Board:
         """What the cursor does not know yet, empty when there is nothing."""
         told: dict[str, Any] = {}
         trays = {
-            str(number): one.news(number, cursor, now_s)
-            for number, one in sorted(self._trays.items())
-            if cursor.trays.get(number) != (one.serial, one.version)
+            str(number): tray.news(number, cursor, now_s)
+            for number, tray in sorted(self._trays.items())
+            if cursor.trays.get(number) != (tray.serial, tray.version)
         }
         if trays:
             told['trays'] = trays
@@ -94,10 +96,10 @@ class Board:
             told['nodes'] = [
                 {
                     'name': name,
-                    **{key: value for key, value in one.items() if key != 'heard_s'},
-                    'age': round(now_s - one['heard_s'], 1),
+                    **{key: value for key, value in node.items() if key != 'heard_s'},
+                    'age': round(now_s - node['heard_s'], 1),
                 }
-                for name, one in sorted(self._nodes.items())
+                for name, node in sorted(self._nodes.items())
             ]
         return told
 

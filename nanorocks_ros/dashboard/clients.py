@@ -132,6 +132,6 @@ def _looks(said: Any) -> frozenset[Look]:
     tray, layers = said['tray'], said['layers']
     if type(tray) is not int or not 0 < tray <= _MOST_TRAYS or not isinstance(layers, list):
         raise ValueError('no tray with its layers')
-    if any(one not in LAYERS for one in layers):
+    if any(layer not in LAYERS for layer in layers):
         raise ValueError('no such layer')
-    return frozenset((tray, one) for one in layers)
+    return frozenset((tray, layer) for layer in layers)

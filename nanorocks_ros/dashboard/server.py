@@ -182,7 +182,7 @@ class PageServer:
         self._port = self._runner.addresses[0][1]
 
     async def _close(self) -> None:
-        await asyncio.gather(*(one.close() for one in self._clients), return_exceptions=True)
+        await asyncio.gather(*(client.close() for client in self._clients), return_exceptions=True)
         if self._runner is not None:
             await self._runner.cleanup()
 
@@ -221,5 +221,5 @@ class PageServer:
             self._note_looks()
 
     def _note_looks(self) -> None:
-        self.wanted = frozenset[Look]().union(*(one.looks for one in self._clients))
+        self.wanted = frozenset[Look]().union(*(client.looks for client in self._clients))
         self._pictures.keep(self.wanted)

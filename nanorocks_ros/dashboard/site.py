@@ -70,9 +70,9 @@ def make_site(access: Access, port: int, live: Handler) -> web.Application:
 def _files() -> list[tuple[str, bytes, str]]:
     folder = resources.files(__package__).joinpath('page')
     return [
-        (one.name, one.read_bytes(), _TYPES[f'.{one.name.rpartition(".")[2]}'])
-        for one in folder.iterdir()
-        if f'.{one.name.rpartition(".")[2]}' in _TYPES
+        (path.name, path.read_bytes(), _TYPES[f'.{path.name.rpartition(".")[2]}'])
+        for path in folder.iterdir()
+        if f'.{path.name.rpartition(".")[2]}' in _TYPES
     ]
 
 

@@ -171,7 +171,7 @@ class TrayBoard:
         name, columns = _COLUMNS[type(record)]
         self._stamps[name] = record.stamp_ns
         self.latest[name] = as_fields(record)
-        values = (_number(getattr(record, one)) for one in columns)
+        values = (_number(getattr(record, column)) for column in columns)
         self.series[name].append([_number(record.stamp_ns / NS), *values])
 
     def _start_again(self, record: Measured, last_ns: int) -> None:

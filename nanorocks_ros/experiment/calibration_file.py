@@ -90,14 +90,14 @@ class _File(YamlLines):
             if isinstance(key, bool) or not isinstance(key, int) or key < 1:
                 raise self.error(value, f'tray {key!r}', 'number the trays 1, 2, ...')
             numbers = self._numbers(value, 4)
-            whole = all(one.is_integer() for one in numbers)
+            whole = all(number.is_integer() for number in numbers)
             if not whole or min(numbers) < 0 or min(numbers[2:]) < 8:
                 raise self.error(
                     value,
-                    f'a region of {[f"{one:g}" for one in numbers]}',
+                    f'a region of {[f"{number:g}" for number in numbers]}',
                     'give x, y, width, height in whole pixels, the sides 8 or more',
                 )
-            regions[key] = Region(*(int(one) for one in numbers))
+            regions[key] = Region(*(int(number) for number in numbers))
         if not regions:
             raise self.error(node, 'lists no tray', 'add at least one')
         return regions
@@ -157,7 +157,7 @@ def calibrated(settings: PipelineSettings) -> PipelineSettings:
     if not path:
         return settings
     calibration = load_calibration(path)
-    missing = [str(one) for one in settings.trays if one not in calibration.regions]
+    missing = [str(tray) for tray in settings.trays if tray not in calibration.regions]
     if missing:
         raise ConfigurationError(
             path,

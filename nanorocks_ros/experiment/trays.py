@@ -134,7 +134,7 @@ def tray_by_number(trays: Mapping[int, Tray], number: int) -> Tray:
         When there is no tray of that number.
     """
     if number not in trays:
-        known = ', '.join(str(one) for one in sorted(trays))
+        known = ', '.join(str(tray) for tray in sorted(trays))
         raise ConfigurationError(f'tray {number}', 'does not exist', f'choose one of {known}')
     return trays[number]
 

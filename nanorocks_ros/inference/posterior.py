@@ -267,7 +267,7 @@ def posterior_of(
         box = _likely(fine, beads, wall)
     weight = np.exp(fine) * _halves(beads.size)[:, np.newaxis] * _halves(wall.size)
     # By itself each of the terms could be as good as its own best.
-    apart = sum(float(one.log_likelihood.max()) for one in (of_beads, of_walls) if one)
+    apart = sum(float(term.log_likelihood.max()) for term in (of_beads, of_walls) if term)
     return Posterior(
         restitution=beads,
         wall_restitution=wall,

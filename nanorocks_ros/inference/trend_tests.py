@@ -152,7 +152,7 @@ def quiet_periods(
     places = np.flatnonzero(np.isfinite(series))
     pieces = [places] if places.size else []
     rng = np.random.default_rng(seed)
-    found: list[QuietPeriod] = []
+    periods: list[QuietPeriod] = []
     while pieces:
         values = [series[piece] for piece in pieces]
         best = _clearest(values, shortest)
@@ -160,14 +160,14 @@ def quiet_periods(
             break
         clear, which, first, last = best
         every = np.concatenate(values)
-        chance = _chance(clear, every, [one.size for one in values], shortest, (orders, rng))
+        chance = _chance(clear, every, [value.size for value in values], shortest, (orders, rng))
         if chance > false_alarms:
             break
         piece = pieces.pop(which)
         own = piece[first : last + 1]
-        found.append(QuietPeriod(int(own[0]), int(own[-1]), float(np.mean(series[own])), chance))
+        periods.append(QuietPeriod(int(own[0]), int(own[-1]), float(np.mean(series[own])), chance))
         pieces += [part for part in (piece[:first], piece[last + 1 :]) if part.size]
-    return tuple(sorted(found))
+    return tuple(sorted(periods))
 
 
 def combined_series(sizes: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -202,9 +202,9 @@ def _clearest(
 ) -> tuple[float, int, int, int] | None:
     """How clear the clearest run is, the number of its piece, and its ends there."""
     best: tuple[float, int, int, int] | None = None
-    for which, one in enumerate(values):
-        sums = np.concatenate(([0.0], np.cumsum(one)))
-        for length in range(shortest, _longest(one.size) + 1):
+    for which, value in enumerate(values):
+        sums = np.concatenate(([0.0], np.cumsum(value)))
+        for length in range(shortest, _longest(value.size) + 1):
             runs = (sums[length:] - sums[:-length]) / math.sqrt(length)
             first = int(np.argmax(runs))
             if runs[first] < _LEAST_EXCESS * math.sqrt(length):

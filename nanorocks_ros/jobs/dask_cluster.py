@@ -97,14 +97,14 @@ def _checked(scheduler: str) -> Iterator[Any]:
 def _quiet_logs() -> Iterator[None]:
     """No tracebacks of Dask's own; what goes wrong is raised, as one line."""
     loggers = [logging.getLogger(name) for name in _LOGGERS]
-    levels = [one.level for one in loggers]
+    levels = [logger.level for logger in loggers]
     try:
-        for one in loggers:
-            one.setLevel(logging.CRITICAL + 1)
+        for logger in loggers:
+            logger.setLevel(logging.CRITICAL + 1)
         yield
     finally:
-        for one, level in zip(loggers, levels, strict=True):
-            one.setLevel(level)
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 @contextmanager

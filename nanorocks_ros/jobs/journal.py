@@ -75,8 +75,8 @@ class Journal:
             )
 
     def _paths(self) -> list[Path]:
-        found = self.folder.glob('*.npz')
-        return sorted(path for path in found if _KEY.fullmatch(path.name))
+        paths = self.folder.glob('*.npz')
+        return sorted(path for path in paths if _KEY.fullmatch(path.name))
 
     def keys(self) -> list[str]:
         """Keys of the parts there are, unread."""

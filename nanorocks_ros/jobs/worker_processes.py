@@ -80,7 +80,7 @@ def _one_pool(
     broken = None
     with _pool(processes) as pool:
         with _born_quiet():
-            keys = {pool.submit(_work, function, one): key for key, one in tasks.items()}
+            keys = {pool.submit(_work, function, task): key for key, task in tasks.items()}
         for future in as_completed(keys):
             try:
                 result = future.result()

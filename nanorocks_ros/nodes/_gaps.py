@@ -61,5 +61,5 @@ class Gaps:
         if len(self._intervals) < _FEWEST:
             return None
         middle = median(self._intervals)
-        near = sum(abs(one - middle) < _DIFFERENCE * middle for one in self._intervals)
+        near = sum(abs(interval - middle) < _DIFFERENCE * middle for interval in self._intervals)
         return middle if near >= _STEADY * len(self._intervals) else None

@@ -60,35 +60,35 @@ class TrayJoiner:
             self._colors = _until(self._colors, latest_ns, lambda one: one.stamp_ns)
 
     def _complete(self):
-        found = []
+        images = []
         while self._states:
             state, tolerance = self._states[0]
             parts = [self._grays] + [self._colors] * bool(state.color)
-            near = [_nearest(one, state.stamp_ns, tolerance) for one in parts]
+            near = [_nearest(part, state.stamp_ns, tolerance) for part in parts]
             if any(one is None for one in near):
-                if not all(_passed(one, state.stamp_ns, tolerance) for one in parts):
+                if not all(_passed(part, state.stamp_ns, tolerance) for part in parts):
                     break
                 # A part was lost on the way, and with it the image.
                 self._states.popleft()
                 continue
             self._states.popleft()
             gray, *color = near
-            found.append(
+            images.append(
                 TrayImage.of_state(
                     state, gray.stamp_ns, gray.image, color[0].image if color else None
                 )
             )
-        return found
+        return images
 
 
 def _until(parts, latest_ns, stamp_of):
-    return deque((one for one in parts if stamp_of(one) <= latest_ns), maxlen=_KEPT)
+    return deque((part for part in parts if stamp_of(part) <= latest_ns), maxlen=_KEPT)
 
 
 def _nearest(frames, stamp_ns, tolerance):
-    return next((one for one in frames if abs(one.stamp_ns - stamp_ns) <= tolerance), None)
+    return next((frame for frame in frames if abs(frame.stamp_ns - stamp_ns) <= tolerance), None)
 
 
 def _passed(frames, stamp_ns, tolerance):
     """Whether the image is there, or a later one is."""
-    return any(one.stamp_ns >= stamp_ns - tolerance for one in frames)
+    return any(frame.stamp_ns >= stamp_ns - tolerance for frame in frames)

@@ -51,9 +51,9 @@ def _of_all_nodes():
     groups = [one for _, one in inspect.getmembers(settings, inspect.isclass)]
     names = {
         row.name
-        for one in groups
-        if one.__module__.startswith(settings.__name__) and one.__name__.endswith('Settings')
-        for row in settings.rows(one())
+        for group in groups
+        if group.__module__.startswith(settings.__name__) and group.__name__.endswith('Settings')
+        for row in settings.rows(group())
     }
     return {prefix + name for prefix in _PREFIXES for name in names} | {'use_sim_time'}
 

@@ -175,7 +175,7 @@ class NanorocksNode(Node):
             With the topic that comes nearest.
         """
         known = topics.TOPICS if self.hears_much else (topics.EPOCH, topics.TAKEN)
-        late = {self.resolve_topic_name(one.of(k)) for one in known for k in range(1, 9)}
+        late = {self.resolve_topic_name(topic.of(k)) for topic in known for k in range(1, 9)}
         given = on_the_command_line().keys() & self._parameter_overrides.keys()
         refuse_unheard_overrides(given, self._parameters, {*late, '/clock'})
 
@@ -215,7 +215,7 @@ class NanorocksNode(Node):
         proposal = []
 
         def check(parameters):
-            ours = [one for one in parameters if one.name in self._declared]
+            ours = [parameter for parameter in parameters if parameter.name in self._declared]
             try:
                 values = {row.name: self.get_parameter(row.name).value for row in rows(settings)}
                 values.update({one.name: one.value for one in ours})
@@ -228,7 +228,7 @@ class NanorocksNode(Node):
 
         def changed(parameters):
             # A new publisher declares its quality of service as parameters: not our business.
-            if any(one.name in self._declared for one in parameters):
+            if any(parameter.name in self._declared for parameter in parameters):
                 adopt(*proposal[0])
                 self.get_logger().info('the parameters changed; starting afresh')
 

@@ -82,7 +82,7 @@ def _wrong(name, value):
         if not whole or not 1 <= value <= _DEEPEST:
             return f'{value!r} is not a whole number from 1 to {_DEEPEST}'
         return None
-    choices = [one for one in _CHOICES[policy].short_keys() if one != 'unknown']
+    choices = [key for key in _CHOICES[policy].short_keys() if key != 'unknown']
     if not isinstance(value, str) or value.lower() not in choices:
         return f'{value!r} is none of {", ".join(choices)}'
     return None

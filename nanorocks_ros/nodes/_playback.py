@@ -16,10 +16,13 @@ NS = 1_000_000_000
 _DEEPEST = 1000
 _TRAYS = range(1, 9)
 _OURS = {
-    one.absolute(tray): one for one in topics.TOPICS if one is not topics.TAKEN for tray in _TRAYS
+    topic.absolute(tray): topic
+    for topic in topics.TOPICS
+    if topic is not topics.TAKEN
+    for tray in _TRAYS
 }
-_WORKED_OUT = tuple(one for one in RESULT_TOPICS if one is not topics.TRUTH)
-_RESULTS = {one.absolute(tray) for one in _WORKED_OUT for tray in _TRAYS}
+_WORKED_OUT = tuple(topic for topic in RESULT_TOPICS if topic is not topics.TRUTH)
+_RESULTS = {topic.absolute(tray) for topic in _WORKED_OUT for tray in _TRAYS}
 # Of a message that begins with a header: after 4 bytes that tell the order of bytes.
 _STAMP = '{}iI'
 

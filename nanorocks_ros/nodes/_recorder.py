@@ -49,7 +49,7 @@ class GraphRecorder:
         self._dropped = 0
         self._failed = False
         self._path = settings.record
-        per_tray = {one.absolute(k): offered(one) for one in topics.TOPICS for k in trays}
+        per_tray = {topic.absolute(k): offered(topic) for topic in topics.TOPICS for k in trays}
         self._recorder = Recorder(self._path, per_tray, metadata=provenance)
         node.create_timer(_LOOK_S, self._look, clock=node.steady_clock)
 

@@ -44,8 +44,8 @@ class SimulatedScene:
         stamp_ns = frame.stamp_ns + self._start_ns
         return (
             replace(frame, stamp_ns=stamp_ns),
-            tuple(replace(one, stamp_ns=stamp_ns) for one in trays),
-            tuple(replace(one, stamp_ns=stamp_ns) for one in beads),
+            tuple(replace(tray, stamp_ns=stamp_ns) for tray in trays),
+            tuple(replace(bead, stamp_ns=stamp_ns) for bead in beads),
         )
 
     def publish(self, moment, epoch_ns):
@@ -55,8 +55,8 @@ class SimulatedScene:
         if node.wanted(topics.RAW):
             message = image_message(frame.stamp_ns, 'camera', frame.image, frame.encoding)
             node.send(topics.RAW, message)
-        for one in trays:
-            node.publish_result(one, epoch_ns)
-        for one in beads:
-            if node.wanted(topics.BEADS, one.tray):
-                node.send(topics.BEADS, beads_message(one, epoch_ns), one.tray)
+        for tray in trays:
+            node.publish_result(tray, epoch_ns)
+        for bead in beads:
+            if node.wanted(topics.BEADS, bead.tray):
+                node.send(topics.BEADS, beads_message(bead, epoch_ns), bead.tray)

@@ -57,8 +57,10 @@ class Takers:
         if now - self._counted >= _LOOK_S:
             self._counted = now
             cameras = (topics.RAW, topics.RAW_COMPRESSED)
-            listening = sum(self._node.output(one).get_subscription_count() for one in cameras)
-            names = [self._node.resolve_topic_name(one.name) for one in cameras]
+            listening = sum(
+                self._node.output(camera).get_subscription_count() for camera in cameras
+            )
+            names = [self._node.resolve_topic_name(camera.name) for camera in cameras]
             direct = {
                 _name(info)
                 for name in names
@@ -109,7 +111,7 @@ class Takers:
     def _names(self):
         name = self._node.resolve_topic_name(topics.TAKEN.name)
         infos = self._node.get_publishers_info_by_topic(name)
-        return {_name(one) for one in infos} - {self._node.get_fully_qualified_name()}
+        return {_name(info) for info in infos} - {self._node.get_fully_qualified_name()}
 
     def _heard(self, message):
         stamp_ns = stamp_of(message.stamp)

@@ -62,7 +62,7 @@ class TrayStageNode(NanorocksNode):
 
     def _build(self, settings):
         settings = calibrated(settings)
-        return {number: self._make(settings, one) for number, one in trays_of(settings).items()}
+        return {number: self._make(settings, tray) for number, tray in trays_of(settings).items()}
 
     def _adopt(self, settings, stages):
         self._settings, self._stages = settings, stages

@@ -64,11 +64,11 @@ class Watch:
             if self._node.count_publishers(full) < 2:
                 continue
             infos = self._node.get_publishers_info_by_topic(full)
-            if any(one.node_name == _NOT_YET for one in infos) and self._unnamed[name] < _LOOKS:
+            if any(info.node_name == _NOT_YET for info in infos) and self._unnamed[name] < _LOOKS:
                 self._unnamed[name] += 1
                 continue
             del self._alone[name]
-            nodes = sorted(f'{one.node_namespace.rstrip("/")}/{one.node_name}' for one in infos)
+            nodes = sorted(f'{info.node_namespace.rstrip("/")}/{info.node_name}' for info in infos)
             self._say(
                 f'{full}: {" and ".join(nodes)} publish it, and what they send is mixed; {remedy}'
             )

@@ -208,15 +208,23 @@ class BagPlayerNode(NanorocksNode):
         return self._answer(response, found)
 
     def _check(self, parameters):
-        known = {one.name: one for one in (*rows(PlayerSettings()), *rows(PacingSettings()))}
-        for one in parameters:
-            text = wrong_with(known[one.name], one.value) if one.name in known else None
-            if text is None and one.name == 'position':
-                text = self._wrong_with_position(one.value)
-            if text is None and one.name in known and one.name not in ('rate', 'position'):
+        known = {row.name: row for row in (*rows(PlayerSettings()), *rows(PacingSettings()))}
+        for parameter in parameters:
+            text = (
+                wrong_with(known[parameter.name], parameter.value)
+                if parameter.name in known
+                else None
+            )
+            if text is None and parameter.name == 'position':
+                text = self._wrong_with_position(parameter.value)
+            if (
+                text is None
+                and parameter.name in known
+                and parameter.name not in ('rate', 'position')
+            ):
                 text = 'takes effect at the start only'
             if text is not None:
-                return SetParametersResult(successful=False, reason=f'{one.name}: {text}')
+                return SetParametersResult(successful=False, reason=f'{parameter.name}: {text}')
         return SetParametersResult(successful=True)
 
     def _wrong_with_position(self, seconds):
@@ -225,11 +233,11 @@ class BagPlayerNode(NanorocksNode):
         return None
 
     def _changed(self, parameters):
-        for one in parameters:
-            if one.name == 'rate':
-                self._pacer.set_rate(float(one.value))
-            if one.name == 'position':
-                self._seek(self._part.stamp_at(one.value))
+        for parameter in parameters:
+            if parameter.name == 'rate':
+                self._pacer.set_rate(float(parameter.value))
+            if parameter.name == 'position':
+                self._seek(self._part.stamp_at(parameter.value))
 
     def _seek(self, stamp_ns):
         self._pacer.restart(self._moments(stamp_ns), stamp_ns)

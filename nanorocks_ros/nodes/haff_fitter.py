@@ -42,7 +42,7 @@ class HaffFitterNode(NanorocksNode):
                 self.listen(topic, take, tray, required=record is SpeedEstimate)
 
     def _build(self, settings):
-        return {number: HaffFitter(settings, one) for number, one in trays_of(settings).items()}
+        return {number: HaffFitter(settings, tray) for number, tray in trays_of(settings).items()}
 
     def _adopt(self, settings, stages):
         self._settings, self._stages = settings, stages

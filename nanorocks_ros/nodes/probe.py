@@ -103,8 +103,8 @@ def _graph(seconds):
                 {
                     'name': name,
                     'types': types,
-                    'publishers': [_endpoint(one) for one in publishers],
-                    'subscriptions': [_endpoint(one) for one in subscriptions],
+                    'publishers': [_endpoint(publisher) for publisher in publishers],
+                    'subscriptions': [_endpoint(subscription) for subscription in subscriptions],
                     'mismatches': _mismatches(publishers, subscriptions),
                 }
             )
@@ -112,7 +112,7 @@ def _graph(seconds):
 
 
 def _others(node, endpoints):
-    return [one for one in endpoints if one.node_name != node.get_name()]
+    return [endpoint for endpoint in endpoints if endpoint.node_name != node.get_name()]
 
 
 def _endpoint(info):

@@ -71,7 +71,7 @@ class _Asked(NamedTuple):
 def _ask(kind):
     import rclpy
 
-    arguments = [word for one in kind.parameters for word in ('-p', one)]
+    arguments = [word for parameter in kind.parameters for word in ('-p', parameter)]
     rclpy.init(args=['--ros-args', *arguments] if arguments else [])
     try:
         module = import_module(f'nanorocks_ros.nodes.{kind.name}')
@@ -98,7 +98,9 @@ def _said(node, doc):
             for name, types in sorted(services)
             if not any(one.startswith(('rcl_interfaces', 'type_description')) for one in types)
         ),
-        parameters=_groups(one for one in parameters if not one.startswith(_PARAMETERS_OF_ALL)),
+        parameters=_groups(
+            parameter for parameter in parameters if not parameter.startswith(_PARAMETERS_OF_ALL)
+        ),
     )
 
 

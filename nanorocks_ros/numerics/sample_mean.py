@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def mean_of(values: Sequence[float | None]) -> tuple[float, float, int]:
     """Mean, its scatter (NaN of one) and number of those that are known."""
-    known = np.array([one for one in values if one is not None and math.isfinite(one)])
+    known = np.array([value for value in values if value is not None and math.isfinite(value)])
     if not known.size:
         return math.nan, math.nan, 0
     scatter = float(known.std(ddof=1)) if known.size > 1 else math.nan

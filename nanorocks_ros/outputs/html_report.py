@@ -103,14 +103,14 @@ def write_report(path: Path, title: str, summary: str, sections: Sequence[Sectio
         When a picture cannot be read or the report not be written.
     """
     contents = ''.join(
-        f'<li><a href="#s{number}">{html.escape(one.title)}</a></li>'
-        for number, one in enumerate(sections, start=1)
+        f'<li><a href="#s{number}">{html.escape(section.title)}</a></li>'
+        for number, section in enumerate(sections, start=1)
     )
     body = ''.join(
-        f'<section id="s{number}"><h2>{number}. {html.escape(one.title)}</h2>'
-        + ''.join(_part(part) for part in one.parts)
+        f'<section id="s{number}"><h2>{number}. {html.escape(section.title)}</h2>'
+        + ''.join(_part(part) for part in section.parts)
         + '</section>\n'
-        for number, one in enumerate(sections, start=1)
+        for number, section in enumerate(sections, start=1)
     )
     page = (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'

@@ -80,12 +80,15 @@ def write_parquet(
     text = arrow.dictionary(arrow.int32(), arrow.string())
     kinds = {'i4': arrow.int32(), 'f8': arrow.float64(), 'text': text}
     schema = arrow.schema(
-        [arrow.field(one.name, kinds[one.kind], metadata={'unit': one.unit}) for one in columns],
+        [
+            arrow.field(column.name, kinds[column.kind], metadata={'unit': column.unit})
+            for column in columns
+        ],
         metadata={'provenance': provenance},
     )
     with whole_file(path) as part, writer_of(part, schema, compression='zstd') as writer:
         for piece in _groups(columns, pieces):
-            arrays = [_array(arrow, piece[one.name], kinds[one.kind]) for one in columns]
+            arrays = [_array(arrow, piece[column.name], kinds[column.kind]) for column in columns]
             writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
 
 
@@ -108,7 +111,9 @@ def _groups(
 def _joined(
     columns: Sequence[Column], pieces: Sequence[Mapping[str, NDArray[Any]]]
 ) -> dict[str, NDArray[Any]]:
-    return {one.name: np.concatenate([piece[one.name] for piece in pieces]) for one in columns}
+    return {
+        column.name: np.concatenate([piece[column.name] for piece in pieces]) for column in columns
+    }
 
 
 def _array(arrow: Any, values: NDArray[Any], kind: Any) -> Any:

@@ -205,8 +205,8 @@ def paper_wall_ellipse_as_printed(
     side: float,
 ) -> PaperEllipse:
     """The same with a and b exchanged, as the paper prints their values (0.95 and 2.8)."""
-    found = paper_wall_ellipse(initial_energy, haff_time, mass, diameter, number_density, side)
-    return PaperEllipse(wall_axis=found.bead_axis, bead_axis=found.wall_axis)
+    ellipse = paper_wall_ellipse(initial_energy, haff_time, mass, diameter, number_density, side)
+    return PaperEllipse(wall_axis=ellipse.bead_axis, bead_axis=ellipse.wall_axis)
 
 
 def paper_wall_ellipse_of_decay(

@@ -89,15 +89,15 @@ class TrayStages:
 
     def push(self, image: TrayImage) -> tuple[Result, ...]:
         """Everything that follows from the next image of the tray."""
-        found: list[Result] = []
+        records: list[Result] = []
         for record in self.speed.push(image):
-            found.append(record)
+            records.append(record)
             if isinstance(record, SpeedEstimate | Rebound | PairCollision | Merge):
-                found += self.cooling.push(record)
+                records += self.cooling.push(record)
             if isinstance(record, SpeedEstimate | BodyEstimate | Merge):
                 self.clusters.push(record)
-        found += self.clusters.push(image)
-        return tuple(found)
+        records += self.clusters.push(image)
+        return tuple(records)
 
     def flush(self) -> tuple[CorEstimate | ClusterEstimate, ...]:
         """What was held back when the images ended."""
@@ -162,4 +162,4 @@ class Pipeline:
 
     def flush(self) -> tuple[CorEstimate | ClusterEstimate, ...]:
         """What was held back when the frames ended: final estimates, and the last of clusters."""
-        return tuple(one for tray in self.trays.values() for one in tray.flush())
+        return tuple(estimate for tray in self.trays.values() for estimate in tray.flush())

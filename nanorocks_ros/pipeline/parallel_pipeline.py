@@ -94,7 +94,7 @@ class SharedPipeline(Pipeline):
         self, records: Sequence[TrayImage | Notice], wanted: Mapping[int, Wanted] | None = None
     ) -> tuple[Result, ...]:
         """See `Pipeline.follow`; raises NanorocksError when a process has ended."""
-        images = [one for one in records if isinstance(one, TrayImage)]
+        images = [record for record in records if isinstance(record, TrayImage)]
         found = self._ask(images, wanted) if images else {}
         results: list[Result] = []
         for record in records:
@@ -108,7 +108,7 @@ class SharedPipeline(Pipeline):
         if not self._begun:
             return super().flush()
         found = self._ask((), None, flush=True)
-        return tuple(one for number in self.trays for one in found[number])  # type: ignore[misc]
+        return tuple(record for number in self.trays for record in found[number])  # type: ignore[misc]
 
     def _ask(
         self,
@@ -120,9 +120,9 @@ class SharedPipeline(Pipeline):
         begin, self._begun = not self._begun, True
         busy = []
         for worker, share in zip(self._workers, self._shares, strict=True):
-            numbers = {one.number for one in share}
+            numbers = {tray.number for tray in share}
             worker.send(
-                [one for one in images if one.tray in numbers],
+                [image for image in images if image.tray in numbers],
                 {number: one for number, one in (wanted or {}).items() if number in numbers},
                 begin=(self._settings, share) if begin else None,
                 flush=flush,

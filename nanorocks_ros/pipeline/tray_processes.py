@@ -169,7 +169,7 @@ class TrayProcess:
         pictures = [
             one for image in images for one in (image.gray, image.color) if one is not None
         ]
-        self._make_room(sum(one.nbytes for one in pictures))
+        self._make_room(sum(picture.nbytes for picture in pictures))
         offset, packed = 0, []
         for image in images:
             gray, offset = self._written(image.gray, offset)
@@ -247,7 +247,7 @@ class _Worker:
             return {}
         if job.begin is not None:
             settings, trays = job.begin
-            self._trays = {one.number: TrayStages(settings, one) for one in trays}
+            self._trays = {tray.number: TrayStages(settings, tray) for tray in trays}
         for number, wanted in job.wanted.items():
             self._trays[number].emit(wanted)
         found: Found = {}

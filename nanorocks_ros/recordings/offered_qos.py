@@ -74,9 +74,9 @@ def recorded_qos(text: str) -> OfferedQos | None:
     try:
         profiles: Any = yaml.safe_load(text) or []
         return OfferedQos(
-            reliable=any(one['reliability'] in _RELIABLE for one in profiles),
-            transient_local=any(one['durability'] in _TRANSIENT_LOCAL for one in profiles),
-            depth=max(max(1, int(one['depth'])) for one in profiles),
+            reliable=any(profile['reliability'] in _RELIABLE for profile in profiles),
+            transient_local=any(profile['durability'] in _TRANSIENT_LOCAL for profile in profiles),
+            depth=max(max(1, int(profile['depth'])) for profile in profiles),
         )
     except (yaml.YAMLError, TypeError, KeyError, ValueError, RecursionError):
         return None

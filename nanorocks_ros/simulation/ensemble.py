@@ -141,7 +141,7 @@ def _small_run(
     rules = rules._replace(restitution=for_species(rules.restitution, n_species))
     check_room(0.5 * drawn.diameter_high, rules)
     purposes = (Purpose.DIAMETERS, Purpose.POSITIONS, Purpose.VELOCITIES)
-    keys = np.array([key_for(settings.seed, run, one) for one in purposes])
+    keys = np.array([key_for(settings.seed, run, purpose) for purpose in purposes])
     ranges = np.stack((drawn.diameter_low, drawn.diameter_high, drawn.density))
     rows = np.zeros((instants.size + 1, columns.columns(n_species)))
     ends = instants[-1:] if instants.size else np.zeros(1)

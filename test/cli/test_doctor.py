@@ -31,7 +31,7 @@ def test_without_ros_it_examines_the_rest_and_says_so():
     finished = doctor('--json')
     assert finished.returncode == 1, finished.stderr
     answer = json.loads(finished.stdout)
-    checks = {one['name']: one for one in answer['checks']}
+    checks = {check['name']: check for check in answer['checks']}
     assert answer['status'] == 'problem'
     assert checks['libraries']['status'] == 'ok'
     assert checks['ROS 2']['status'] == 'problem'

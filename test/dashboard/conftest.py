@@ -48,5 +48,5 @@ def serve():
         return server
 
     yield start
-    for one in started:
-        one.stop()
+    for server in started:
+        server.stop()

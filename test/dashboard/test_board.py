@@ -259,7 +259,7 @@ def test_a_tray_is_shown_before_anything_is_measured(board):
 def test_nodes_that_are_gone_are_forgotten_and_too_many_are_not_kept(board):
     board.diagnose([(f'/n{k}', 0, '', []) for k in range(1000)], 0.0)
     cursor = Cursor()
-    kept = [one['name'] for one in board.news(cursor, 5.0)['nodes']]
+    kept = [node['name'] for node in board.news(cursor, 5.0)['nodes']]
     assert len(kept) == 64
     board.diagnose([('/n0', 3, 'hm', [('k', 'v')])], 100.0)
     (only,) = board.news(cursor, 101.0)['nodes']

@@ -112,7 +112,7 @@ def test_the_estimate_tightens_while_one_looks(look, serve, results):
     for record in results.speeds:
         server.take(record)
     text_is(page, '#cor', 'no estimate yet')
-    told = [one for one in results.cors if one.status.name == 'COOLING']
+    told = [cor for cor in results.cors if cor.status.name == 'COOLING']
     for record in (told[0], told[len(told) // 2], told[-1]):
         server.take(record)
         text_is(page, '#cor', shown(record)[0])

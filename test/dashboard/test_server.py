@@ -190,7 +190,7 @@ def test_whoever_comes_late_gets_the_whole_cycle_at_once(serve, results):
             said, _ = await step(connection)
             tray = said['trays']['1']
             assert len(tray['cor']['rows']) == len(results.cors)
-            of_cycle = [one for one in results.speeds if one.cycle == tray['cycle']]
+            of_cycle = [speed for speed in results.speeds if speed.cycle == tray['cycle']]
             assert len(tray['speed']['rows']) == len(of_cycle)
             assert tray['latest']['cor']['restitution'] == pytest.approx(
                 results.cors[-1].restitution

@@ -50,9 +50,9 @@ def test_an_unknown_residual_stays_unknown(tmp_path):
 
 def test_the_settings_take_scale_and_regions_from_the_file_in_the_order_of_the_trays(path):
     values = {'trays': [3, 1], 'preprocess.calibration': str(path)}
-    found = calibrated(with_values(PipelineSettings(), values, 'test')).preprocess
-    assert found.pixels_per_metre == 12503.25
-    assert found.regions_px == (*REGIONS[3], *REGIONS[1])
+    settings = calibrated(with_values(PipelineSettings(), values, 'test')).preprocess
+    assert settings.pixels_per_metre == 12503.25
+    assert settings.regions_px == (*REGIONS[3], *REGIONS[1])
     assert calibrated(PipelineSettings()) == PipelineSettings()
 
 

@@ -23,11 +23,11 @@ def test_every_tray_that_was_flown_has_a_place_of_its_own():
         down = max(first.y - second.y - second.height, second.y - first.y - first.height)
         assert max(across, down) >= wall
     left, top = (0.5 * (1920 - PLATE[0] * 12500.0), 0.5 * (1080 - PLATE[1] * 12500.0))
-    for one in regions.values():
-        assert one.x >= left + wall
-        assert one.y >= top + wall
-        assert one.x + one.width <= 1920 - left - wall
-        assert one.y + one.height <= 1080 - top - wall
+    for region in regions.values():
+        assert region.x >= left + wall
+        assert region.y >= top + wall
+        assert region.x + region.width <= 1920 - left - wall
+        assert region.y + region.height <= 1080 - top - wall
 
 
 def test_sizes_are_those_of_the_floors():

@@ -16,9 +16,9 @@ NODES = np.linspace(0.78, 1.0, 221)
 @pytest.mark.parametrize('spread', [0.0005, 0.01])
 def test_smearing_leaves_out_nothing_that_counts(width, spread):
     logs = -0.5 * ((NODES - 0.91) / width) ** 2 + 0.3 * np.sin(40.0 * NODES)
-    found = SingleTerm(restitution=NODES, log_likelihood=logs).off_by(spread)
+    term = SingleTerm(restitution=NODES, log_likelihood=logs).off_by(spread)
     step = min(0.25 * spread, 0.22 / 1000)
     fine = np.arange(0.78, 1.0 + step, step)
     apart = (fine - NODES[:, np.newaxis]) / spread
     whole = logsumexp(CubicSpline(NODES, logs)(fine) - 0.5 * apart**2, axis=1)
-    np.testing.assert_allclose(found.log_likelihood, whole, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(term.log_likelihood, whole, rtol=1e-12, atol=1e-12)

@@ -47,7 +47,7 @@ def decays(restitution, wall, runs, seed=3):
 
 
 def likelihoods(tables, speeds, camera=(0.0, 0.0)):
-    return [decay_likelihood(tables, TIMES, one, NOISE * one, camera) for one in speeds]
+    return [decay_likelihood(tables, TIMES, speed, NOISE * speed, camera) for speed in speeds]
 
 
 @pytest.mark.parametrize(('restitution', 'wall'), [(0.7, 0.95), (0.89, 0.99), (0.95, 0.9)])
@@ -56,8 +56,8 @@ def test_intervals_cover_the_truth_as_often_as_they_say_when_the_walls_are_known
 ):
     found = np.array(
         [
-            posterior_of(exact, one.integrated(), (wall, wall)).quantiles(LEVELS)
-            for one in likelihoods(exact, decays(restitution, wall, 240))
+            posterior_of(exact, likelihood.integrated(), (wall, wall)).quantiles(LEVELS)
+            for likelihood in likelihoods(exact, decays(restitution, wall, 240))
         ]
     )
     covered = [
@@ -83,8 +83,8 @@ def test_cycles_add_up(exact):
 
 def test_the_two_restitutions_lie_in_a_valley(exact):
     (one,) = likelihoods(exact, decays(0.89, 0.95, 1))
-    found = posterior_of(exact, one.integrated(), (0.8, 1.0))
-    spread = found.covariance
+    posterior = posterior_of(exact, one.integrated(), (0.8, 1.0))
+    spread = posterior.covariance
     assert spread[0, 1] / np.sqrt(spread[0, 0] * spread[1, 1]) < -0.7
     known = posterior_of(exact, one.integrated(), (0.95, 0.95))
     assert spread[0, 0] > 4.0 * known.covariance[0, 0]
@@ -114,8 +114,8 @@ def test_what_is_not_known_of_the_tray_does_not_average_out(exact, uncertain):
             total = many[0]
             for one in many[1:]:
                 total = total + one
-            found = posterior_of(tables, total.integrated(), (0.97, 0.97))
-            widths[name, runs] = float(found.covariance[0, 0]) ** 0.5
+            posterior = posterior_of(tables, total.integrated(), (0.97, 0.97))
+            widths[name, runs] = float(posterior.covariance[0, 0]) ** 0.5
     assert widths['uncertain', 36] > 1.5 * widths['exact', 36]
     assert widths['uncertain', 36] < widths['uncertain', 1]
 
@@ -123,8 +123,8 @@ def test_what_is_not_known_of_the_tray_does_not_average_out(exact, uncertain):
 def test_a_few_speeds_say_next_to_nothing(uncertain):
     speed = decays(0.89, 0.97, 1)[0, :8]
     one = decay_likelihood(uncertain, TIMES[:8], speed, 0.3 * speed, (0.01, 0.01))
-    found = posterior_of(uncertain, one.integrated(), (0.8, 1.0))
-    assert found.covariance[0, 0] ** 0.5 > 0.15
+    posterior = posterior_of(uncertain, one.integrated(), (0.8, 1.0))
+    assert posterior.covariance[0, 0] ** 0.5 > 0.15
 
 
 def test_a_factor_on_all_speeds_and_times_changes_nothing(exact):
@@ -136,12 +136,12 @@ def test_a_factor_on_all_speeds_and_times_changes_nothing(exact):
 
 def test_the_posterior_is_a_probability_within_the_prior(uncertain):
     (one,) = likelihoods(uncertain, decays(0.7, 0.9, 1))
-    found = posterior_of(uncertain, one.integrated(), (0.85, 0.95))
-    assert found.probability.sum() == pytest.approx(1.0)
-    assert (found.probability >= 0.0).all()
-    assert found.wall_restitution[0] >= 0.85
-    assert found.wall_restitution[-1] <= 0.95
-    assert 0.0 <= found.restitution[0] < found.restitution[-1] <= 1.0
+    posterior = posterior_of(uncertain, one.integrated(), (0.85, 0.95))
+    assert posterior.probability.sum() == pytest.approx(1.0)
+    assert (posterior.probability >= 0.0).all()
+    assert posterior.wall_restitution[0] >= 0.85
+    assert posterior.wall_restitution[-1] <= 0.95
+    assert 0.0 <= posterior.restitution[0] < posterior.restitution[-1] <= 1.0
 
 
 def test_walls_beyond_the_library_are_refused(uncertain):

@@ -20,15 +20,15 @@ def noise(seed, trays=3, cycles=60):
 def test_a_line_is_found_whatever_a_quarter_of_the_values_does():
     values = 3.0 + 0.02 * CYCLES + 0.01 * np.random.default_rng(1).normal(size=60)
     values[::4] = 40.0
-    found = robust_trend(CYCLES, values)
-    assert found.slope == pytest.approx(0.02, abs=0.002)
-    assert found.samples == 60
+    trend = robust_trend(CYCLES, values)
+    assert trend.slope == pytest.approx(0.02, abs=0.002)
+    assert trend.samples == 60
 
 
 def test_the_error_of_a_slope_is_what_slopes_scatter_by():
-    found = [robust_trend(CYCLES, row) for row in noise(2, trays=300)]
-    slopes = np.array([one.slope for one in found])
-    errors = np.array([one.slope_error for one in found])
+    trends = [robust_trend(CYCLES, row) for row in noise(2, trays=300)]
+    slopes = np.array([trend.slope for trend in trends])
+    errors = np.array([trend.slope_error for trend in trends])
     assert errors.mean() == pytest.approx(slopes.std(), rel=0.15)
     assert np.mean(np.abs(slopes) < errors) == pytest.approx(0.68, abs=0.09)
 
@@ -36,17 +36,17 @@ def test_the_error_of_a_slope_is_what_slopes_scatter_by():
 def test_values_that_are_not_known_are_left_out():
     values = 1.0 + 0.5 * CYCLES
     values[10:20] = math.nan
-    found = robust_trend(CYCLES, values)
-    assert found.slope == pytest.approx(0.5)
-    assert found.samples == 50
-    assert found.at(CYCLES)[:10] == pytest.approx(values[:10])
+    trend = robust_trend(CYCLES, values)
+    assert trend.slope == pytest.approx(0.5)
+    assert trend.samples == 50
+    assert trend.at(CYCLES)[:10] == pytest.approx(values[:10])
 
 
 @pytest.mark.parametrize('count', [0, 1, 4])
 def test_too_few_values_have_no_slope(count):
-    found = robust_trend(CYCLES[:count], np.ones(count))
-    assert math.isnan(found.slope)
-    assert math.isnan(found.slope_error)
+    trend = robust_trend(CYCLES[:count], np.ones(count))
+    assert math.isnan(trend.slope)
+    assert math.isnan(trend.slope_error)
 
 
 def test_three_periods_are_found_where_they_are():
@@ -54,13 +54,13 @@ def test_three_periods_are_found_where_they_are():
     wanted = [(20, 29), (80, 95), (150, 156)]
     for first, last in wanted:
         sizes[:, first : last + 1] += 2.0
-    found = quiet_periods(sizes)
-    assert len(found) == 3
-    for (first, last), one in zip(wanted, found, strict=True):
-        assert abs(one.first - first) <= 1
-        assert abs(one.last - last) <= 1
-        assert one.excess > 1.0
-        assert one.chance <= 0.01
+    periods = quiet_periods(sizes)
+    assert len(periods) == 3
+    for (first, last), period in zip(wanted, periods, strict=True):
+        assert abs(period.first - first) <= 1
+        assert abs(period.last - last) <= 1
+        assert period.excess > 1.0
+        assert period.chance <= 0.01
 
 
 def test_periods_are_of_large_clusters_only():

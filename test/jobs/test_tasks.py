@@ -20,7 +20,7 @@ from nanorocks_ros.jobs.tasks import Workers, as_finished, as_finished_apart, ru
 # Prints the number of the worker that runs it.
 WHO = 'sleep 0.05; echo $PPID'
 NUMBERS = {f'number {k}': float(k) for k in range(12)}
-ROOTS = [math.sqrt(one) for one in NUMBERS.values()]
+ROOTS = [math.sqrt(number) for number in NUMBERS.values()]
 
 
 def alive(pid):

@@ -81,8 +81,8 @@ class Graph:
         """Start a node; parameters as ``name:=value``."""
         path = os.path.join(self.folder, f'{name}_{len(self._running)}.log')
         command = [sys.executable, '-m', 'nanorocks_ros.nodes', name, '--ros-args', *arguments]
-        for one in parameters:
-            command += ['-p', one]
+        for parameter in parameters:
+            command += ['-p', parameter]
         environment = dict(
             os.environ,
             ROS_DOMAIN_ID=str(self.domain),

@@ -57,7 +57,7 @@ class FilmedTray:
         self._graph.until(came_true)
 
     def crops(self):
-        return [np.frombuffer(one.data, np.uint8).reshape(one.height, -1) for one in self.trays]
+        return [np.frombuffer(tray.data, np.uint8).reshape(tray.height, -1) for tray in self.trays]
 
 
 def straight(gray):

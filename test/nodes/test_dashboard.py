@@ -52,11 +52,11 @@ def text_of(page, selector):
 
 
 def test_the_page_shows_what_the_topic_says(graph, look):
-    found = []
+    estimates = []
     graph.node.create_subscription(
         Float32MultiArray,
         topics.COR.of(1),
-        lambda message: found.append(
+        lambda message: estimates.append(
             from_array(CorEstimate, message.data, tray=1, epoch_ns=0, where='test')
         ),
         qos_of(topics.COR),
@@ -68,10 +68,10 @@ def test_the_page_shows_what_the_topic_says(graph, look):
     url = address(graph, pipeline)
     page = look(url)
     graph.until(lambda: text_of(page, '#link') == 'live')
-    graph.until(lambda: page.locator('#canvas').is_visible() and len(found) > 3)
+    graph.until(lambda: page.locator('#canvas').is_visible() and len(estimates) > 3)
 
     def agrees():
-        cor = found[-1]
+        cor = estimates[-1]
         interval = f'[{cor.restitution_lower:.3f}, {cor.restitution_upper:.3f}]'
         shown = text_of(page, '#cor')
         return f'{cor.restitution:.3f} {interval}' in shown and cor.status is CorStatus.COOLING

@@ -28,7 +28,7 @@ def doctor(graph, *arguments, **variables):
         timeout=120,
     )
     checks = json.loads(finished.stdout)['checks']
-    return finished.returncode, {one['name']: one for one in checks}
+    return finished.returncode, {check['name']: check for check in checks}
 
 
 def test_frames_are_sent_and_counted(graph):
@@ -56,7 +56,7 @@ def test_who_cannot_hear_whom_is_told(graph):
     assert fine['status'] == 'ok'
     assert alone['status'] == 'warning'
     assert 'nobody -> /nanorocks/listener' in alone['found']
-    assert not any('doctor' in one['found'] for one in checks.values())
+    assert not any('doctor' in check['found'] for check in checks.values())
 
 
 def test_a_ros_that_does_not_load_is_a_problem_told_in_one_line(graph, tmp_path):

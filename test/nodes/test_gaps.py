@@ -12,7 +12,7 @@ NS = 10**9
 
 def counted(stamps):
     gaps = Gaps()
-    found = [gaps.push(round(one * NS)) for one in stamps]
+    found = [gaps.push(round(stamp * NS)) for stamp in stamps]
     assert gaps.missing == sum(found)
     return found
 

@@ -68,7 +68,7 @@ class Arrays:
         ]
 
     def finals(self):
-        return [one for one in self.records(CorEstimate) if one.status is CorStatus.FINAL]
+        return [record for record in self.records(CorEstimate) if record.status is CorStatus.FINAL]
 
 
 def offline_arrays():
@@ -82,7 +82,7 @@ def offline_arrays():
         PairCollision: results.collisions,
     }
     return {
-        kind: np.array([to_array(one, analysis.epoch_ns) for one in records])
+        kind: np.array([to_array(record, analysis.epoch_ns) for record in records])
         for kind, records in by_kind.items()
     }
 
@@ -124,11 +124,11 @@ def test_ctrl_c_ends_the_pipeline_and_its_processes(graph):
                           'preprocess.layout:=plate')  # fmt: skip
     graph.until(lambda: graph.node.count_subscribers('/nanorocks/camera/image_raw') > 0)
     with open(f'/proc/{process.pid}/task/{process.pid}/children', encoding='utf-8') as listed:
-        children = [int(one) for one in listed.read().split()]
+        children = [int(word) for word in listed.read().split()]
     assert len(children) >= 2
     # As a terminal does.
-    for one in children:
-        os.kill(one, signal.SIGINT)
+    for child in children:
+        os.kill(child, signal.SIGINT)
     finished = graph.interrupt(process)
     assert finished.code == 0, finished.output
     assert 'Traceback' not in finished.output

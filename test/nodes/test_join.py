@@ -88,7 +88,7 @@ def test_states_far_ahead_of_their_pixels_find_them():
     assert [one for image in images for one in pushed(joiner, image, 'state')] == []
     assert [one for image in images for one in pushed(joiner, image, 'color')] == []
     found = [one for image in images for one in pushed(joiner, image, 'gray')]
-    assert [one.stamp_ns for one in found] == [one.stamp_ns for one in images]
+    assert [one.stamp_ns for one in found] == [image.stamp_ns for image in images]
 
 
 @pytest.mark.parametrize('order', list(permutations(['state', 'gray', 'color'])))

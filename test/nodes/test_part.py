@@ -52,8 +52,8 @@ def damaged(path):
     with file.open('rb') as stream:
         chunks = make_reader(stream).get_summary().chunk_indexes
     content = bytearray(file.read_bytes())
-    for one in chunks:
-        content[one.chunk_start_offset + one.chunk_length // 2] ^= 0x10
+    for chunk in chunks:
+        content[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 0x10
     file.write_bytes(content)
     return path
 

@@ -29,7 +29,7 @@ SMALL = (
 
 
 def held(bag, topic, tray=1):
-    return [bag.deserialize(one) for one in bag.messages([topic.absolute(tray)])]
+    return [bag.deserialize(message) for message in bag.messages([topic.absolute(tray)])]
 
 
 def pictures(bag):
@@ -51,9 +51,9 @@ def test_a_recording_of_the_simulator_gives_the_same_speeds_again(graph, tmp_pat
     (epoch,) = held(bag, topics.EPOCH)
     again = analyse(path, PipelineSettings())
     assert again.epoch_ns == epoch.sec * 10**9 + epoch.nanosec
-    times = [(one.stamp_ns - again.epoch_ns) / 1e9 for one in again.trays[1].speeds]
+    times = [(speed.stamp_ns - again.epoch_ns) / 1e9 for speed in again.trays[1].speeds]
     assert times == pytest.approx(live[:, 0].tolist(), abs=1e-3)
-    speeds = [one.mean_projected_speed for one in again.trays[1].speeds]
+    speeds = [speed.mean_projected_speed for speed in again.trays[1].speeds]
     # The recording holds JPEGs, the pipeline saw the frames before.
     moving = live[:, 0] > 2.0
     assert np.mean(np.array(speeds)[moving]) == pytest.approx(np.mean(live[moving, 3]), rel=0.03)
@@ -100,12 +100,12 @@ def test_a_player_without_pace_loses_nothing_on_its_way_into_a_recording(graph, 
     source, bag = open_bag(SAMPLE), open_bag(path)
     first_ns = source.start_ns + 10**9
     played = source.messages([CAMERA], first_ns, first_ns + 6 * 10**9 - 1)
-    assert pictures(bag) == [bytes(source.deserialize(one).data) for one in played]
+    assert pictures(bag) == [bytes(source.deserialize(message).data) for message in played]
     (epoch,) = held(bag, topics.EPOCH)
     assert epoch.sec * 10**9 + epoch.nanosec == source.start_ns
     live = np.array([one.data for one in held(bag, topics.SPEED)])
     again = np.array(
-        [one.mean_projected_speed for one in analyse(path, PipelineSettings()).trays[1].speeds]
+        [speed.mean_projected_speed for speed in analyse(path, PipelineSettings()).trays[1].speeds]
     )
     np.testing.assert_array_equal(live[:, 3], again[: len(live)].astype(np.float32))
     assert len(again) - len(live) <= 1

@@ -80,7 +80,7 @@ class Remote:
 def test_a_player_pauses_steps_seeks_and_goes_on_and_its_clock_says_so(graph):
     bag = open_bag(SAMPLE)
     played = bag.messages([topics.RAW_COMPRESSED.absolute()])
-    stamps = [stamp_of(bag.deserialize(one).header.stamp) for one in played]
+    stamps = [stamp_of(bag.deserialize(message).header.stamp) for message in played]
     start_ns = bag.start_ns
     remote = Remote(graph)
     part = ('start:=1.0', 'duration:=15.0', 'position:=2.0')
@@ -134,10 +134,10 @@ def test_a_seek_back_starts_the_stages_afresh_and_sim_time_is_that_of_the_bag(gr
     graph.until(lambda: 'time went back by' in graph.output(stage))
     assert 'starting afresh' in graph.output(stage)
     names = '/nanorocks/preprocessor'
-    times = [stamp_of(one.header.stamp) for one in reports if one.status[0].name == names]
+    times = [stamp_of(report.header.stamp) for report in reports if report.status[0].name == names]
     assert times
     start_ns = open_bag(SAMPLE).start_ns
-    assert all(one == 0 or start_ns < one < start_ns + 60 * NS for one in times)
+    assert all(time == 0 or start_ns < time < start_ns + 60 * NS for time in times)
     assert any(times)
     ended = graph.interrupt(stage)
     assert ended.code == 0
@@ -217,10 +217,10 @@ def test_of_a_raw_recording_jpegs_are_made_for_who_asks_for_them(graph, tmp_path
     player = graph.start('bag_player', f'bag:={tmp_path / "raw"}', 'listeners:=1')
     assert graph.wait(player).code == 0
     frames = [frame_from_compressed(one, 'jpeg') for one in found]
-    assert [one.stamp_ns for one in frames] == stamps
-    for one in frames:
-        assert one.image.shape == picture.shape
-        assert np.abs(one.image.astype(int) - picture[:, :, ::-1]).max() <= 3
+    assert [frame.stamp_ns for frame in frames] == stamps
+    for frame in frames:
+        assert frame.image.shape == picture.shape
+        assert np.abs(frame.image.astype(int) - picture[:, :, ::-1]).max() <= 3
 
 
 def test_messages_that_are_none_and_names_that_ros_does_not_know_cost_themselves_alone(
@@ -228,7 +228,7 @@ def test_messages_that_are_none_and_names_that_ros_does_not_know_cost_themselves
 ):
     name = topics.RAW_COMPRESSED.absolute()
     frames = list(itertools.islice(open_bag(SAMPLE).messages([name]), 6))
-    contents = [one.cdr for one in frames]
+    contents = [frame.cdr for frame in frames]
     contents[2:5] = contents[2][:6], b'', contents[4][: len(contents[4]) // 2]
     table = {
         name: OfferedTopic(msgtype=topics.COMPRESSED, qos=OfferedQos()),
@@ -237,8 +237,8 @@ def test_messages_that_are_none_and_names_that_ros_does_not_know_cost_themselves
     path = tmp_path / 'bag'
     with BagWriter(path, table, metadata={}) as bag:
         bag.write_raw('/1st name', frames[0].log_time_ns, b'')
-        for one, cdr in zip(frames, contents, strict=True):
-            bag.write_raw(name, one.log_time_ns, cdr)
+        for frame, cdr in zip(frames, contents, strict=True):
+            bag.write_raw(name, frame.log_time_ns, cdr)
     found = []
     graph.node.create_subscription(Image, topics.RAW.name, found.append, qos_of(topics.RAW))
     ended = graph.wait(graph.start('bag_player', f'bag:={path}', 'listeners:=1'))

@@ -41,7 +41,7 @@ def asked(folder):
         text=True,
         check=True,
     )
-    return tuple(int(one) for one in done.stdout.split())
+    return tuple(int(word) for word in done.stdout.split())
 
 
 def changed(path, text):

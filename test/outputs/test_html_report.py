@@ -47,7 +47,7 @@ def test_pictures_are_inside_the_file(tmp_path):
     (tmp_path / 'one.png').write_bytes(content)
     picture = Picture(path=tmp_path / 'one.png', caption='what it shows')
     page = page_of(tmp_path, [Section(title='one', parts=[picture])])
-    ((_, attributes),) = [one for one in page.tags if one[0] == 'img']
+    ((_, attributes),) = [tag for tag in page.tags if tag[0] == 'img']
     kind, _, data = attributes['src'].partition(',')
     assert kind == 'data:image/png;base64'
     assert base64.b64decode(data) == content

@@ -194,8 +194,8 @@ def test_simulated_decays_give_the_restitution_within_a_hundredth(
 ):
     # One temperature for all directions misses by 0.08 in the first of these.
     rate = simulated_rate(number, restitution, walls, runs)
-    found = confined_restitution(TRAYS[number], rate, walls)
-    assert found.value == pytest.approx(restitution, abs=0.01)
+    estimate = confined_restitution(TRAYS[number], rate, walls)
+    assert estimate.value == pytest.approx(restitution, abs=0.01)
 
 
 def test_a_width_of_the_restitution_counts_by_its_mean_square():

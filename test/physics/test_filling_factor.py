@@ -132,7 +132,7 @@ def test_no_flat_cluster_fills_more_than_hexagonal_order_or_has_less_than_groeme
         angle = rng.uniform(0.0, 2.0 * math.pi)
         start = places[rng.integers(len(places))]
         new = start + 2 * R * np.array([math.cos(angle), math.sin(angle)])
-        if min(np.linalg.norm(new - one) for one in places) > 2 * R * (1 - 1e-9):
+        if min(np.linalg.norm(new - place) for place in places) > 2 * R * (1 - 1e-9):
             places.append(new)
     places = np.array(places)
     area = hull_area(places, np.full(n, R))

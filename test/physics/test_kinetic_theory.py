@@ -65,8 +65,8 @@ def test_the_restitution_undoes_the_decay(restitution):
 def test_errors_are_those_of_the_formula():
     # e^2 = 1 - beta/k, so de = dbeta / (2 k e).
     rate = kinetic_decay_rate(0.9, DIAMETER, DENSITY)
-    found = kinetic_restitution(Estimate(value=rate, error=0.05 * rate), DIAMETER, DENSITY)
-    assert found.error == pytest.approx(0.05 * (1.0 - 0.81) / (2.0 * 0.9), rel=1e-4)
+    estimate = kinetic_restitution(Estimate(value=rate, error=0.05 * rate), DIAMETER, DENSITY)
+    assert estimate.error == pytest.approx(0.05 * (1.0 - 0.81) / (2.0 * 0.9), rel=1e-4)
 
 
 def test_an_elastic_gas_does_not_cool():

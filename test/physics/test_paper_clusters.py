@@ -31,11 +31,13 @@ def test_where_all_beads_are_seen_its_columns_agree_with_each_other(tray):
 
 
 def test_the_calibration_returns_what_was_counted_for_the_mean_area():
-    found = paper_calibration(np.array([1e-6, 2e-6, 3e-6, np.nan]), 5.52)
-    assert found.size(np.array([2e-6])) == pytest.approx([5.52])
-    assert found.beads_per_area_error / found.beads_per_area == pytest.approx(0.5 / math.sqrt(3.0))
+    calibration = paper_calibration(np.array([1e-6, 2e-6, 3e-6, np.nan]), 5.52)
+    assert calibration.size(np.array([2e-6])) == pytest.approx([5.52])
+    assert calibration.beads_per_area_error / calibration.beads_per_area == pytest.approx(
+        0.5 / math.sqrt(3.0)
+    )
     # It knows no saturation: twice the area, twice the size.
-    assert found.size(np.array([8e-6])) == pytest.approx([4 * 5.52])
+    assert calibration.size(np.array([8e-6])) == pytest.approx([4 * 5.52])
 
 
 @pytest.mark.parametrize(('areas', 'size'), [([np.nan], 5.0), ([], 5.0), ([1e-6], 0.0)])

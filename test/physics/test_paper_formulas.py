@@ -113,43 +113,43 @@ def test_errors_of_the_worked_example_are_those_of_the_formula():
         name: Estimate(value=value, error=errors.get(name, 0.0) * value)
         for name, value in DECAY.items()
     }
-    found = paper_restitution_estimate(**inputs)
-    assert round(found.value, 2) == EXAMPLE['eps']
-    loss = 1.0 - found.value**2
-    assert found.error == pytest.approx(0.05 * loss / (2.0 * found.value), rel=1e-3)
+    estimate = paper_restitution_estimate(**inputs)
+    assert round(estimate.value, 2) == EXAMPLE['eps']
+    loss = 1.0 - estimate.value**2
+    assert estimate.error == pytest.approx(0.05 * loss / (2.0 * estimate.value), rel=1e-3)
 
 
 def test_the_ellipse_has_the_axes_of_its_formula():
-    found = paper_wall_ellipse(**DECAY, side=SIDE)
-    assert found.wall_axis == pytest.approx(ELLIPSE['recomputed_L_15mm']['a'], rel=1e-9)
-    assert found.bead_axis == pytest.approx(ELLIPSE['recomputed_L_15mm']['b'], rel=1e-9)
+    ellipse = paper_wall_ellipse(**DECAY, side=SIDE)
+    assert ellipse.wall_axis == pytest.approx(ELLIPSE['recomputed_L_15mm']['a'], rel=1e-9)
+    assert ellipse.bead_axis == pytest.approx(ELLIPSE['recomputed_L_15mm']['b'], rel=1e-9)
 
 
 def test_the_printed_axes_are_exchanged():
-    found = paper_wall_ellipse_as_printed(**DECAY, side=SIDE)
-    assert found.wall_axis == pytest.approx(ELLIPSE['printed']['a'], abs=0.01)
-    assert found.bead_axis == pytest.approx(ELLIPSE['printed']['b'], abs=0.05)
+    ellipse = paper_wall_ellipse_as_printed(**DECAY, side=SIDE)
+    assert ellipse.wall_axis == pytest.approx(ELLIPSE['printed']['a'], abs=0.01)
+    assert ellipse.bead_axis == pytest.approx(ELLIPSE['printed']['b'], abs=0.05)
 
 
 def test_the_ellipse_passes_where_the_paper_says():
-    found = paper_wall_ellipse(**DECAY, side=SIDE)
+    ellipse = paper_wall_ellipse(**DECAY, side=SIDE)
     check = ELLIPSE['check_point']
-    assert found.restitution(0.99) == pytest.approx(check['eps_p_on_ellipse_for_eps_w_0.99'])
-    assert found.restitution(1.0) == pytest.approx(check['eps_p_on_ellipse_for_eps_w_1'])
-    lhs = (check['eps_w'] / found.wall_axis) ** 2 + (check['eps_p'] / found.bead_axis) ** 2
+    assert ellipse.restitution(0.99) == pytest.approx(check['eps_p_on_ellipse_for_eps_w_0.99'])
+    assert ellipse.restitution(1.0) == pytest.approx(check['eps_p_on_ellipse_for_eps_w_1'])
+    lhs = (check['eps_w'] / ellipse.wall_axis) ** 2 + (check['eps_p'] / ellipse.bead_axis) ** 2
     assert lhs == pytest.approx(check['lhs'])
 
 
 def test_the_ellipse_of_a_decay_rate_is_that_of_the_energies():
     v_relative = math.sqrt(2.0 * EXAMPLE['T0_J'] / (1e-6 * EXAMPLE['m_mg']))
     rate = 1.0 / (0.5 * v_relative * EXAMPLE['tau0_s'])
-    found = paper_wall_ellipse_of_decay(rate, TRAY.diameter, TRAY.number_density, SIDE)
-    assert found.bead_axis == pytest.approx(ELLIPSE['recomputed_L_15mm']['b'], rel=1e-9)
+    ellipse = paper_wall_ellipse_of_decay(rate, TRAY.diameter, TRAY.number_density, SIDE)
+    assert ellipse.bead_axis == pytest.approx(ELLIPSE['recomputed_L_15mm']['b'], rel=1e-9)
 
 
 def test_elastic_walls_on_the_ellipse_give_the_form_without_walls():
-    found = paper_wall_ellipse(**DECAY, side=SIDE)
-    assert found.restitution(1.0) == pytest.approx(paper_restitution(**DECAY))
+    ellipse = paper_wall_ellipse(**DECAY, side=SIDE)
+    assert ellipse.restitution(1.0) == pytest.approx(paper_restitution(**DECAY))
 
 
 def test_a_decay_too_slow_for_lossy_walls_has_no_point_on_the_ellipse():

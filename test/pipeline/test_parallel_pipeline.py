@@ -82,14 +82,14 @@ def test_records_are_those_of_one_process_in_the_same_order(workers):
         look = Wanted(mask=number > 20, tracks=number > 30, autocorrelation=number > 10)
         wanted = dict.fromkeys(TRAYS, look)
         expected = alone.follow(_frame(number), wanted)
-        found = shared.follow(_frame(number), wanted)
-        assert len(found) == len(expected)
-        for one, other in zip(found, expected, strict=True):
-            _same(one, other)
-        kinds |= {type(one) for one in found}
+        records = shared.follow(_frame(number), wanted)
+        assert len(records) == len(expected)
+        for record, other in zip(records, expected, strict=True):
+            _same(record, other)
+        kinds |= {type(record) for record in records}
     assert {MotionMask, Autocorrelation, Notice} < kinds
-    for one, other in zip(shared.flush(), alone.flush(), strict=True):
-        _same(one, other)
+    for record, other in zip(shared.flush(), alone.flush(), strict=True):
+        _same(record, other)
 
 
 def test_other_settings_begin_afresh(workers):
@@ -99,7 +99,7 @@ def test_other_settings_begin_afresh(workers):
     second = SharedPipeline(other, 'test', None, workers)
     alone = Pipeline(other, 'test')
     for number in range(5):
-        counts = [len(one.follow(_frame(number))) for one in (second, alone)]
+        counts = [len(pipeline.follow(_frame(number))) for pipeline in (second, alone)]
         assert counts[0] == counts[1]
 
 
@@ -166,9 +166,9 @@ def _runs(pid):
 def test_trays_are_shared_out_by_their_beads():
     trays = tuple(load_trays().values())
     shares = shares_of(trays, 3)
-    assert sorted(one.number for share in shares for one in share) == [*range(1, 9)]
-    loads = [sum(one.count for one in share) for share in shares]
-    largest = max(one.count for one in trays)
+    assert sorted(tray.number for share in shares for tray in share) == [*range(1, 9)]
+    loads = [sum(tray.count for tray in share) for share in shares]
+    largest = max(tray.count for tray in trays)
     assert max(loads) <= max(largest, 0.5 * sum(loads))
 
 

@@ -53,7 +53,7 @@ def test_a_whole_number_does_for_a_real_one_and_a_list_for_a_tuple():
     changed = st.with_values(st.PipelineSettings(), values, 'test')
     assert isinstance(changed.preprocess.pixels_per_metre, float)
     assert changed.trays == (1, 3)
-    assert all(isinstance(one, int) for one in changed.trays)
+    assert all(isinstance(tray, int) for tray in changed.trays)
 
 
 def test_every_problem_is_listed_at_once():

@@ -26,6 +26,6 @@ def write_results(folder, areas, starts=(2.0, 62.0), period=60.0):
         folder / 'tray_1_speed.csv',
         ['time', 'cycle', 'cycle_start'],
         ['s', '1', 's'],
-        [(0.0, 0.0, math.nan), *((one, n + 1, one) for n, one in enumerate(starts))],
+        [(0.0, 0.0, math.nan), *((start, n + 1, start) for n, start in enumerate(starts))],
     )
     return folder

@@ -111,5 +111,5 @@ def imported(paths, bag, settings=STARTED):
     assert shares[-1] <= 1.0
     frames = list(BagFrames(bag).frames())
     assert len(frames) == found.frames
-    times = [(one.stamp_ns - START_NS) / 1e6 for one in frames]
-    return found, [number_of(one.image) for one in frames], times
+    times = [(frame.stamp_ns - START_NS) / 1e6 for frame in frames]
+    return found, [number_of(frame.image) for frame in frames], times

@@ -250,7 +250,7 @@ def test_the_constants_of_clusters_are_those_of_the_code():
 
 
 def test_not_known_is_nan_and_never_zero():
-    values = to_array(next(one for one in RECORDS if isinstance(one, CorEstimate)), EPOCH)
+    values = to_array(next(record for record in RECORDS if isinstance(record, CorEstimate)), EPOCH)
     names = [field.name for field in layout(CorEstimate).fields]
     assert math.isnan(values[names.index('haff_time')])
     before_the_first = dataclasses.replace(RECORDS[0], cycle_start_ns=None)

@@ -119,11 +119,11 @@ def as_json(calibration: Calibration, fit: PlateFit | None) -> dict[str, Any]:
         'pixels_per_metre': calibration.pixels_per_metre,
         'residual_px': None if math.isnan(residual) else residual,
         'largest_bend_px': largest_bend(calibration),
-        'trays': {str(number): list(one) for number, one in calibration.regions.items()},
+        'trays': {str(number): list(region) for number, region in calibration.regions.items()},
     }
     if fit is not None:
         found['edges'] = len(fit.residuals)
-        found['camera_pixels_per_metre'] = {str(k): one for k, one in fit.tray_scales.items()}
+        found['camera_pixels_per_metre'] = {str(k): scale for k, scale in fit.tray_scales.items()}
     return found
 
 

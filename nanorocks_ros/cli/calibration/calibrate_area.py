@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     manual = read_manual_tracks(options.tracks)
     try:
         with Progress('measuring') as progress:
-            found = calibrate_area(
+            calibration = calibrate_area(
                 Path(options.bag),
                 manual,
                 settings,
@@ -67,13 +67,13 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
-    for notice in (*found.notices, *(str(one) for one in found.refused.values())):
+    for notice in (*calibration.notices, *(str(error) for error in calibration.refused.values())):
         print(f'nanorocks: {notice}', file=sys.stderr)
     if options.json:
-        print(json.dumps(_as_json(found), allow_nan=False))
+        print(json.dumps(_as_json(calibration), allow_nan=False))
     else:
-        _print(found)
-    _write(options, found, settings)
+        _print(calibration)
+    _write(options, calibration, settings)
     return 0
 
 

@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
     )
     workers = Workers(processes=options.workers, scheduler=options.scheduler)
     with Progress(f'decays of tray {options.tray}') as progress:
-        found = build_library(
+        library = build_library(
             plan,
             output,
             workers,
@@ -55,8 +55,8 @@ def run(options: argparse.Namespace) -> int:
             lambda text: print(f'nanorocks: {text}', file=sys.stderr),
         )
     if options.json:
-        made = {'output': str(output), 'misfit': found.misfit, **json.loads(found.made_by)}
+        made = {'output': str(output), 'misfit': library.misfit, **json.loads(library.made_by)}
         print(json.dumps(made))
     else:
-        print(f'{output}: off by {100.0 * found.misfit:.1f} % beyond the noise of its runs')
+        print(f'{output}: off by {100.0 * library.misfit:.1f} % beyond the noise of its runs')
     return 0

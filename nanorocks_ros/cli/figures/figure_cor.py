@@ -113,7 +113,7 @@ def _search(options: argparse.Namespace) -> Search:
     from nanorocks_ros.studies.figures.cor_figures import Search
 
     def values(text: str, flag: str) -> tuple[float, ...]:
-        return tuple(float(one) for one in values_of(text, flag))
+        return tuple(float(value) for value in values_of(text, flag))
 
     return Search(
         beads=values(options.beads, '--beads'),

@@ -77,7 +77,7 @@ def _threshold(text: str, trays: Mapping[int, Tray]) -> MeasuredThreshold:
 
     words = text.split(':')
     try:
-        number, (speed, *interval) = int(words[0]), [float(one) for one in words[1:]]
+        number, (speed, *interval) = int(words[0]), [float(word) for word in words[1:]]
     except ValueError as error:
         raise ConfigurationError('--measured', f'{text!r} cannot be read', _FORM) from error
     if len(interval) not in (0, 2):
@@ -87,12 +87,12 @@ def _threshold(text: str, trays: Mapping[int, Tray]) -> MeasuredThreshold:
 
 
 def _print(found: dict[str, Any]) -> None:
-    for one in found['points']:
-        mark = '' if one['all_bounce_above_verified'] else ' (unverified)'
+    for point in found['points']:
+        mark = '' if point['all_bounce_above_verified'] else ' (unverified)'
         print(
-            f'tray {one["tray"]}: {1e3 * one["sticking_speed"]:.1f} mm/s at '
-            f'{1e6 * one["mass"]:.2f} mg ({one["source"]}); published: all bounce above '
-            f'{1e3 * one["all_bounce_above"]:.1f} mm/s{mark}'
+            f'tray {point["tray"]}: {1e3 * point["sticking_speed"]:.1f} mm/s at '
+            f'{1e6 * point["mass"]:.2f} mg ({point["source"]}); published: all bounce above '
+            f'{1e3 * point["all_bounce_above"]:.1f} mm/s{mark}'
         )
     factor = found['collapse_time_factor']
     cloud = f'a cloud of particles of restitution {found["restitution"]:g}'

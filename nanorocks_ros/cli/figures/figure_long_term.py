@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
     from nanorocks_ros.studies.analysis.long_term import read_campaign, write_campaign
     from nanorocks_ros.studies.figures.long_term_figure import campaign_values, long_term_figure
 
-    campaign = read_campaign([Path(one) for one in options.results], options.false_alarms)
+    campaign = read_campaign([Path(result) for result in options.results], options.false_alarms)
     long_term_figure(files['--output'], campaign)
     if options.table:
         write_campaign(campaign, files['--table'])
@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(campaign_values(campaign), allow_nan=False))
     else:
         _print(campaign)
-    names = ' and '.join(str(one) for one in files.values())
+    names = ' and '.join(str(file) for file in files.values())
     print(f'nanorocks: {campaign.places} cycles in {names}', file=sys.stderr)
     return 0
 
@@ -78,10 +78,10 @@ def _print(campaign: Campaign) -> None:
             change = f'{slope:+.3g} ± {error:.2g} {unit}'.rstrip()
             print(f'{what}: {change} a cycle, {trend.samples} cycles')
     print(f'cluster size: {campaign.measure.text} ({campaign.measure.column})')
-    for one in campaign.periods:
+    for period in campaign.periods:
         print(
-            f'quiet period: cycles {one.first + 1} to {one.last + 1}, clusters larger by '
-            f'{one.excess:.1f} standard deviations, by chance in {100 * one.chance:.1f} %'
+            f'quiet period: cycles {period.first + 1} to {period.last + 1}, clusters larger by '
+            f'{period.excess:.1f} standard deviations, by chance in {100 * period.chance:.1f} %'
         )
     if not campaign.periods:
         print('no quiet period')

@@ -79,10 +79,10 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _numbers(text: str | None) -> tuple[int, ...]:
-    words = [one.strip() for one in (text or '').split(',') if one.strip()]
-    if not all(one.isdigit() for one in words):
+    words = [part.strip() for part in (text or '').split(',') if part.strip()]
+    if not all(word.isdigit() for word in words):
         raise ConfigurationError('--trays', f'{text!r}', 'give numbers such as 1,3,5')
-    return tuple(dict.fromkeys(int(one) for one in words))
+    return tuple(dict.fromkeys(int(word) for word in words))
 
 
 def _measured(

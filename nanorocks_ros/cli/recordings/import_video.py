@@ -59,7 +59,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Import, print; the exit code."""
     settings = _settings(options)
-    paths, output = [Path(one) for one in options.videos], Path(options.output)
+    paths, output = [Path(video) for video in options.videos], Path(options.output)
     return (_run_each if options.each else _run_one)(options, settings, paths, output)
 
 
@@ -142,7 +142,7 @@ def _tell_left_out(files: list[Path]) -> None:
         return
     from nanorocks_ros.outputs.safe_text import shown
 
-    named = [*(shown(one.name) for one in files[:_NAMED]), *['...'] * (len(files) > _NAMED)]
+    named = [*(shown(file.name) for file in files[:_NAMED]), *['...'] * (len(files) > _NAMED)]
     names = ', '.join(named)
     print(
         f'nanorocks: left out {len(files)} files that may be films or pictures of one, but not by '
@@ -187,8 +187,8 @@ def _each_as_json(found: ImportedEach, left_out: list[Path]) -> dict[str, Any]:
         'duration': sum(one.duration for one in found.imported),
         'bag': str(found.folder),
         'imported': [as_json(one) for one in found.imported],
-        'skipped': [str(one) for one in found.skipped],
-        'left_out': [str(one) for one in left_out],
+        'skipped': [str(path) for path in found.skipped],
+        'left_out': [str(path) for path in left_out],
         'failed': [
             {'video': str(film), 'reason': str(error)} for film, error in found.failed.items()
         ],

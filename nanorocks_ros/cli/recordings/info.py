@@ -28,18 +28,18 @@ def run(options: argparse.Namespace) -> int:
     from nanorocks_ros.studies.inspection.bag_info import bag_info
 
     with Progress('reading') as progress:
-        found = bag_info(Path(options.bag), progress.count)
+        info = bag_info(Path(options.bag), progress.count)
     if options.json:
-        print(json.dumps(_as_json(found), allow_nan=False))
+        print(json.dumps(_as_json(info), allow_nan=False))
     else:
-        _print(found)
+        _print(info)
     return 0
 
 
 def _as_json(found: BagInfo) -> dict[str, Any]:
     lens = found.calibration
     return {
-        'topics': [_topic_as_json(one) for one in found.topics.values()],
+        'topics': [_topic_as_json(report) for report in found.topics.values()],
         'duration': found.duration,
         'complete': found.complete,
         'start': found.start_ns / NS,
@@ -59,7 +59,7 @@ def _as_json(found: BagInfo) -> dict[str, Any]:
             'k': list(lens.k),
         },
         'metadata': found.metadata,
-        'health': [{'what': one.what, 'remedy': one.remedy} for one in found.health],
+        'health': [{'what': ailment.what, 'remedy': ailment.remedy} for ailment in found.health],
     }
 
 
@@ -84,15 +84,15 @@ def _print(found: BagInfo) -> None:
     print(f'{_shown(str(found.path))}: {found.duration:.3f} s, {found.size / _MB:.1f} MB, {state}')
     if found.topics:
         print(f'from {instant_text(found.start_ns)} to {instant_text(found.end_ns)}')
-    for one in found.topics.values():
-        rate = f', {one.rate:.4g} Hz' if one.rate else ''
-        gaps = f', {one.gaps} gaps of up to {one.longest_gap:.2f} s' if one.gaps else ''
-        name, kind = _shown(one.info.name), _shown(one.info.type)
-        print(f'  {name} [{kind}]: {len(one.stamps_ns)}{rate}{gaps}')
+    for report in found.topics.values():
+        rate = f', {report.rate:.4g} Hz' if report.rate else ''
+        gaps = f', {report.gaps} gaps of up to {report.longest_gap:.2f} s' if report.gaps else ''
+        name, kind = _shown(report.info.name), _shown(report.info.type)
+        print(f'  {name} [{kind}]: {len(report.stamps_ns)}{rate}{gaps}')
     if found.pictures:
         print(f'pictures: {_shown(found.pictures)}')
     if found.trays:
-        print(f'trays: {", ".join(str(one) for one in found.trays)}')
+        print(f'trays: {", ".join(str(tray) for tray in found.trays)}')
     if found.calibration is not None:
         lens = found.calibration
         print(f'calibration: {lens.distortion_model}, {lens.width}x{lens.height} px')

@@ -133,8 +133,8 @@ def _run_tray(options: argparse.Namespace) -> int:
     filmed: dict[str, Any] = {}
     try:
         with Progress('simulating') as bar:
-            found = simulate(plan, workers, bar.part)
-        for path in files.write(found):
+            runs = simulate(plan, workers, bar.part)
+        for path in files.write(runs):
             written.append(str(path))  # noqa: PERF401
         if files.video is not None:
             with Progress('filming the video') as bar:
@@ -146,7 +146,7 @@ def _run_tray(options: argparse.Namespace) -> int:
             written.append(str(files.bag))
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt(_left(files, written)) from interruption
-    _print(options, files, found, filmed)
+    _print(options, files, runs, filmed)
     return 0
 
 

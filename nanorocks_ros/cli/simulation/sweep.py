@@ -121,7 +121,7 @@ def _plan(options: argparse.Namespace) -> SweepPlan:
     return sweep_plan(
         settings_from(options, SimulationSettings()),
         axes,
-        [float(one) for one in values_of(options.times, '--times')],
+        [float(value) for value in values_of(options.times, '--times')],
         options.runs,
         common_random_numbers=options.common_random_numbers,
         keep_runs=options.keep_runs,
@@ -149,8 +149,8 @@ def values_of(text: str, flag: str, row: SettingRow | None = None) -> list[Scala
     try:
         if ':' not in text:
             if row is not None and isinstance(row.default, str):
-                return [one.strip() for one in text.split(',')]
-            return [_number(one) for one in text.split(',')]
+                return [part.strip() for part in text.split(',')]
+            return [_number(part) for part in text.split(',')]
         low, high, count = text.split(':')
         number, start, end = int(count), float(low), float(high)
     except ValueError as error:
@@ -194,7 +194,7 @@ def _reference(options: argparse.Namespace, plan: SweepPlan) -> SpeedCurve | lis
 
 def _point(text: str) -> list[Scalar]:
     try:
-        return [_number(one) for one in text.split(',')]
+        return [_number(part) for part in text.split(',')]
     except ValueError as error:
         raise ConfigurationError(
             '--reference', f'{text!r} cannot be read', 'give a point A,B or a .csv or .npz file'

@@ -58,15 +58,15 @@ def curve_of(tray: Tray, path: str | Path = '') -> ClusterCurve:
     """
     name = str(path) or PACKAGED
     curves = load_curves(name, packaged=not path)
-    found = curves.get(curve_key(tray))
-    if found is None:
+    curve = curves.get(curve_key(tray))
+    if curve is None:
         raise ConfigurationError(
             name,
             f'there is no calibration of cluster sizes for the beads and sides of tray '
             f'{tray.number}',
             f'make one: {build_command(tray)}, and pass it as clusters.curve',
         )
-    return found
+    return curve
 
 
 @lru_cache(maxsize=16)

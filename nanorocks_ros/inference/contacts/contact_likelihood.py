@@ -94,9 +94,9 @@ def rebound_table(
         return np.zeros((len(_ERROR_SCALES), grid.size))
     columns = np.array(
         [
-            (one.incoming, one.outgoing, one.incoming_error, one.outgoing_error,
-             one.wall_velocity_error)
-            for one in rebounds
+            (rebound.incoming, rebound.outgoing, rebound.incoming_error, rebound.outgoing_error,
+             rebound.wall_velocity_error)
+            for rebound in rebounds
         ]
     )  # fmt: skip
     incoming, outgoing, before, after, wall = columns.T[:, :, None]
@@ -182,7 +182,7 @@ def pair_table(
     errors = radius_errors if seen.measured.any() else (0.0,)
     ratios = np.array(vertical_ratios, dtype=np.float64)
     by_error = [
-        np.sum([pairs_given(one, grid, ratios, error, limits) for one in parts], axis=0)
+        np.sum([pairs_given(part, grid, ratios, error, limits) for part in parts], axis=0)
         for error in errors
     ]
     table = np.stack(by_error, axis=1).reshape(-1, grid.size)

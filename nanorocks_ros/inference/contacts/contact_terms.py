@@ -45,8 +45,8 @@ class ContactTerms:
     def of(cls, contacts: Iterable[Rebound | PairCollision]) -> ContactTerms:
         """Those of some contacts; of none they say nothing."""
         contacts = list(contacts)
-        rebounds = [one for one in contacts if isinstance(one, Rebound)]
-        collisions = [one for one in contacts if isinstance(one, PairCollision)]
+        rebounds = [contact for contact in contacts if isinstance(contact, Rebound)]
+        collisions = [contact for contact in contacts if isinstance(contact, PairCollision)]
         return cls(
             rebounds=len(rebounds),
             collisions=len(collisions),

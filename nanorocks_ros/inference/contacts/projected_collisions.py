@@ -65,20 +65,20 @@ class SeenCollisions(NamedTuple):
     @classmethod
     def of(cls, collisions: Sequence[PairCollision]) -> SeenCollisions:
         """What is seen of some collisions."""
-        separation = np.array([one.separation for one in collisions])
+        separation = np.array([collision.separation for collision in collisions])
         distance = np.hypot(*separation.T)
         normal = separation / distance[:, None]
-        before = np.array([one.before[1] - one.before[0] for one in collisions])
-        after = np.array([one.after[1] - one.after[0] for one in collisions])
-        error = np.array([one.separation_error for one in collisions])
-        radii = np.array([one.radii for one in collisions])
-        radius_errors = np.array([one.radius_errors for one in collisions])
+        before = np.array([collision.before[1] - collision.before[0] for collision in collisions])
+        after = np.array([collision.after[1] - collision.after[0] for collision in collisions])
+        error = np.array([collision.separation_error for collision in collisions])
+        radii = np.array([collision.radii for collision in collisions])
+        radius_errors = np.array([collision.radius_errors for collision in collisions])
         across = np.column_stack([-normal[:, 1], normal[:, 0]])
         # A line of centres that is turned by its error mixes in the speed across it.
         turned = error / distance
         slip = [np.sum(one * across, axis=1) * turned for one in (before, after)]
         noise = [
-            np.array([np.sum(getattr(one, name) ** 2) for one in collisions])
+            np.array([np.sum(getattr(collision, name) ** 2) for collision in collisions])
             for name in ('before_errors', 'after_errors')
         ]
         return cls(
@@ -91,9 +91,9 @@ class SeenCollisions(NamedTuple):
             distance_error=np.hypot(error, np.hypot(*radius_errors.T)),
             reach=radii.sum(axis=1),
             measured=np.where(radius_errors > 0.0, radii, 0.0).sum(axis=1),
-            height=np.array([one.height for one in collisions]),
+            height=np.array([collision.height for collision in collisions]),
             radii=radii,
-            temperature=np.array([one.temperatures.sum() for one in collisions]),
+            temperature=np.array([collision.temperatures.sum() for collision in collisions]),
         )
 
     def with_errors(self, scale: float) -> SeenCollisions:

@@ -77,7 +77,7 @@ def confined_restitution(
             f'a restitution of the walls of {walls:g} is outside its range',
             f'use the decay library below {LOWEST_WALL_RESTITUTION}',
         )
-    found = propagated(
+    estimate = propagated(
         relation,
         decay_rate=decay_rate,
         wall_restitution=wall_restitution,
@@ -90,13 +90,13 @@ def confined_restitution(
             f'at {rate:.3g} /m tray {tray.number} forms clusters, and the theory reads too much',
             f'use the decay library above {MOST_DECAY / max(tray.dimensions):.3g} /m',
         )
-    if found.value < LOWEST_RESTITUTION:
+    if estimate.value < LOWEST_RESTITUTION:
         raise FitError(
             'confined theory',
-            f'reads a restitution of {found.value:.2f}, outside its range',
+            f'reads a restitution of {estimate.value:.2f}, outside its range',
             f'use the decay library below {LOWEST_RESTITUTION}',
         )
-    return found
+    return estimate
 
 
 def windowed_decay_rate(

@@ -240,8 +240,8 @@ def library_of(tray: Tray, path: str | Path = '') -> DecayLibrary:
     ConfigurationError
         When it cannot be read, or was made for another tray.
     """
-    found = load_library(str(path) or f'tray_{tray.number}.npz', packaged=not path)
-    if found.tray != tray_key(tray):
+    library = load_library(str(path) or f'tray_{tray.number}.npz', packaged=not path)
+    if library.tray != tray_key(tray):
         where = str(path) or f'tray {tray.number}'
         raise ConfigurationError(
             where,
@@ -249,7 +249,7 @@ def library_of(tray: Tray, path: str | Path = '') -> DecayLibrary:
             f'make one: {build_command(tray)}, and pass it as cooling.decay_library; or choose '
             'cooling.relation paper',
         )
-    return found
+    return library
 
 
 @lru_cache(maxsize=16)

@@ -173,7 +173,7 @@ def decay_likelihood(
     ]
     return DecayLikelihood(
         **{
-            name: np.stack([getattr(one, name) for one in each])
+            name: np.stack([getattr(likelihood, name) for likelihood in each])
             for name in ('log_likelihood', 'gradient', 'information', 'deviation')
         },
         samples=cells.size,

@@ -177,16 +177,16 @@ def _degrees_of_freedom(data: Decay, best: NDArray[np.float64]) -> float:
     """
     shifts = 0.2 * np.eye(best.size)[1:]
     centre = data.cost(best)
-    up = np.array([data.cost(best + one) for one in shifts])
-    down = np.array([data.cost(best - one) for one in shifts])
+    up = np.array([data.cost(best + shift) for shift in shifts])
+    down = np.array([data.cost(best - shift) for shift in shifts])
     hessian = np.diag(up - 2.0 * centre + down)
     for i, j in itertools.combinations(range(len(shifts)), 2):
         both = data.cost(best + shifts[i] + shifts[j]) - up[i] - up[j] + centre
         hessian[i, j] = hessian[j, i] = both
     slope = np.array(
         [
-            0.5 * math.log(data.rate_variance(best + one) / data.rate_variance(best - one))
-            for one in shifts
+            0.5 * math.log(data.rate_variance(best + shift) / data.rate_variance(best - shift))
+            for shift in shifts
         ]
     )
     # The cost is -2 ln L, so its curvature is twice the information on the logarithms (in

@@ -60,7 +60,7 @@ def sticking_cycle(
         The shaking event: until the first speed they are taken to be that.
     """
     end = (int(stamps_ns[-1]) - start_ns) / _NS
-    found = sorted((one.stamp_ns - start_ns) / _NS for one in merges if one.joins)
+    found = sorted((merge.stamp_ns - start_ns) / _NS for merge in merges if merge.joins)
     inside = np.array([max(one, 0.0) for one in found if one <= end])
     known = np.concatenate([[0.0], (stamps_ns - start_ns) / _NS])
     # Bodies are constant between merges: both values of each are nodes of the integral.

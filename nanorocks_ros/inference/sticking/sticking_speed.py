@@ -84,7 +84,7 @@ def sticking_estimate(
         For speeds or times that cannot be used.
     """
     rates = MergeRates(contacts, beads, measure, highest=highest, least_share=least_share)
-    terms = reduce(add, [rates.terms(one) for one in cycles], rates.nothing)
+    terms = reduce(add, [rates.terms(cycle) for cycle in cycles], rates.nothing)
     return estimate_by(terms, rate_error=rate_error, probability=probability)
 
 

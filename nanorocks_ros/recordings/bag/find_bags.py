@@ -135,9 +135,9 @@ def _is_bag(folder: Path) -> bool:
     if (folder / _METADATA).exists():
         return True
     inside = list(folder.iterdir())
-    stems = {_SPLIT.sub('', one.stem) for one in inside if one.suffix in STORAGE_SUFFIXES}
+    stems = {_SPLIT.sub('', path.stem) for path in inside if path.suffix in STORAGE_SUFFIXES}
     # Beside recordings in folders, a file is a recording of its own.
-    return len(stems) == 1 and not any((one / _METADATA).exists() for one in inside)
+    return len(stems) == 1 and not any((path / _METADATA).exists() for path in inside)
 
 
 def _is_storage(path: Path) -> bool:

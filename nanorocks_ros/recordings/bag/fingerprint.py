@@ -28,7 +28,7 @@ def file_states(path: Path) -> tuple[FileState, ...]:
     OSError
         When it cannot be looked at.
     """
-    return tuple(_state(one) for one in _files(path))
+    return tuple(_state(file) for file in _files(path))
 
 
 def content_hash(path: Path) -> str:
@@ -41,9 +41,9 @@ def content_hash(path: Path) -> str:
     """
     digest = hashlib.blake2b(digest_size=16)
     block = memoryview(bytearray(_BLOCK))
-    for one in _files(path):
-        digest.update(one.stat().st_size.to_bytes(8, 'little'))
-        with one.open('rb', buffering=0) as stream:
+    for file in _files(path):
+        digest.update(file.stat().st_size.to_bytes(8, 'little'))
+        with file.open('rb', buffering=0) as stream:
             while count := stream.readinto(block):
                 digest.update(block[:count])
     return digest.hexdigest()
@@ -51,7 +51,7 @@ def content_hash(path: Path) -> str:
 
 def total_size(states: tuple[FileState, ...]) -> int:
     """Bytes of a recording."""
-    return sum(one[1] for one in states)
+    return sum(state[1] for state in states)
 
 
 def _files(path: Path) -> list[Path]:

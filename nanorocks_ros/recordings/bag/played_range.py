@@ -62,12 +62,14 @@ def latest(reader: BagReader, topics: Collection[str], stamp_ns: int) -> list[Ba
     list of BagMessage
         In order of log time; topics without a message before are left out.
     """
-    found: dict[str, BagMessage] = {}
+    messages: dict[str, BagMessage] = {}
     wanted = set(topics)
     end_ns, step_ns = stamp_ns - 1, _LOOK_BACK_NS
     while wanted and end_ns >= reader.start_ns:
         start_ns = max(end_ns - step_ns, reader.start_ns)
-        found.update({one.topic: one for one in reader.messages(wanted, start_ns, end_ns)})
-        wanted -= found.keys()
+        messages.update(
+            {message.topic: message for message in reader.messages(wanted, start_ns, end_ns)}
+        )
+        wanted -= messages.keys()
         end_ns, step_ns = start_ns - 1, 4 * step_ns
-    return sorted(found.values(), key=lambda one: one.log_time_ns)
+    return sorted(messages.values(), key=lambda one: one.log_time_ns)

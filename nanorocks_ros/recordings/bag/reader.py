@@ -144,8 +144,8 @@ class BagReader:
         """
         files = self._contents.files
         streams = [file.messages(topics, start_ns, end_ns) for file in files]
-        found = _in_turn(files, streams)
-        return self._decompressed(found) if self._contents.compressed_messages else found
+        messages = _in_turn(files, streams)
+        return self._decompressed(messages) if self._contents.compressed_messages else messages
 
     def _decompressed(self, messages: Iterator[BagMessage]) -> Iterator[BagMessage]:
         self._undone = 0

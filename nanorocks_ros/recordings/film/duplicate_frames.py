@@ -91,27 +91,29 @@ class Repeats:
         """
         previous: Stamped[Shot] | None = None
         since_ns = kept_ns = 0
-        for one in shots:
+        for shot in shots:
             change = (
-                None if previous is None else self._change(previous.item.picture, one.item.picture)
+                None
+                if previous is None
+                else self._change(previous.item.picture, shot.item.picture)
             )
             if change == _NONE:
-                self.still_ns = max(self.still_ns, one.stamp_ns - since_ns)
-                if one.stamp_ns - kept_ns < _STILL_NS:
+                self.still_ns = max(self.still_ns, shot.stamp_ns - since_ns)
+                if shot.stamp_ns - kept_ns < _STILL_NS:
                     self.dropped += 1
                     continue
                 yield from self._release()
-                yield one
+                yield shot
             elif change is None:
                 yield from self._release()
-                yield one
+                yield shot
             else:
-                since_ns = one.stamp_ns
-                yield from self._judged(one, change)
-            kept_ns = one.stamp_ns
+                since_ns = shot.stamp_ns
+                yield from self._judged(shot, change)
+            kept_ns = shot.stamp_ns
             if previous is None:
-                since_ns = one.stamp_ns
-            previous = one
+                since_ns = shot.stamp_ns
+            previous = shot
         yield from self._end()
 
     def _change(

@@ -45,8 +45,10 @@ _UNREADABLE = (OSError, SyntaxError, ValueError, Image.DecompressionBombError)
 
 def images_in(folder: Path) -> list[Path]:
     """The images in a folder, sorted naturally."""
-    found = (one for one in folder.iterdir() if one.suffix.lower() in IMAGES and not _hidden(one))
-    return sorted((one for one in found if one.is_file()), key=lambda one: natural(one.name))
+    paths = (
+        path for path in folder.iterdir() if path.suffix.lower() in IMAGES and not _hidden(path)
+    )
+    return sorted((path for path in paths if path.is_file()), key=lambda one: natural(one.name))
 
 
 def _hidden(path: Path) -> bool:
@@ -105,7 +107,7 @@ class ImageFolder:
             height=first.shape[0],
             step_ns=int(np.median(steps)) if steps.size else 0,
             start_ns=None if rate else self._times[0],
-            as_stored=self._bits == FULL and all(_is_stored(one) for one in files),
+            as_stored=self._bits == FULL and all(_is_stored(file) for file in files),
             expected=len(files),
             remarks=remarks,
         )
@@ -186,10 +188,10 @@ def _times(
         remarks = (f'{path}: {said}',) if said else ()
         return [round(place * NS / rate) for place in places], remarks
     for how, times in (
-        ('their names', [_time_in_name(one.stem) for one in files]),
-        ('their EXIF notes', [_time_in_exif(one) for one in files]),
+        ('their names', [_time_in_name(file.stem) for file in files]),
+        ('their EXIF notes', [_time_in_exif(file) for file in files]),
     ):
-        known = [one for one in times if one is not None]
+        known = [time for time in times if time is not None]
         rising = all(one < other for one, other in itertools.pairwise(known))
         if len(known) == len(files) and rising and len(files) > 1:
             return known, (f'{path}: the images were taken when {how} say',)
@@ -203,14 +205,14 @@ def _times(
 def _places(files: Sequence[Path]) -> tuple[Sequence[int], str]:
     """Where each image stands in a row that goes on where numbers are missing, and what to say."""
     row = range(len(files))
-    numbers = numbers_of([one.stem for one in files])
+    numbers = numbers_of([file.stem for file in files])
     if numbers is None:
         return row, ''
     steps = [other - one for one, other in itertools.pairwise(numbers)]
     usual = statistics.median_low(steps)
-    if usual < 1 or 2 * steps.count(usual) < len(steps) or any(one % usual for one in steps):
+    if usual < 1 or 2 * steps.count(usual) < len(steps) or any(step % usual for step in steps):
         return row, 'the numbers of its images do not rise evenly; they are stamped one by one'
-    places = [(one - numbers[0]) // usual for one in numbers]
+    places = [(number - numbers[0]) // usual for number in numbers]
     lost = places[-1] - row[-1]
     said = f'{lost} images are missing by their numbers; the time that they took is kept'
     return places, said if lost else ''

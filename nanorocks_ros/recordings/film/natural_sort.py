@@ -27,7 +27,7 @@ def numbers_of(names: Sequence[str]) -> list[int] | None:
         At least one.
     """
     parts = [re.split(r'(\d+)', name) for name in names]
-    if any(len(one) != len(parts[0]) for one in parts):
+    if any(len(part) != len(parts[0]) for part in parts):
         return None
     differing = [column for column in zip(*parts, strict=True) if len(set(column)) > 1]
     if len(differing) != 1 or not all(part.isdecimal() for part in differing[0]):

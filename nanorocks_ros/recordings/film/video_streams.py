@@ -90,7 +90,7 @@ def film_among(path: Path, container: Any) -> tuple[int, tuple[str, ...]]:
         When there are but pictures that go with sound.
     """
     streams = container.streams.video
-    places = [place for place, one in enumerate(streams) if not _is_cover(one)]
+    places = [place for place, stream in enumerate(streams) if not _is_cover(stream)]
     if not places:
         raise RecordingError(str(path), 'holds no film, only a picture', 'pass a video')
     counts = _pictures_in(path, container, [streams[place] for place in places])
@@ -120,7 +120,7 @@ def _pictures_in(path: Path, container: Any, streams: Sequence[Any]) -> list[int
     with suppress(pyav(str(path)).FFmpegError, EOFError):
         for packet in itertools.islice(container.demux(*streams), _LOOKED_AT):
             counts[packet.stream.index] += packet.size > 0
-    return [counts[one.index] for one in streams]
+    return [counts[stream.index] for stream in streams]
 
 
 def rate_told(path: Path, container: Any, stream: Any) -> Fraction | None:

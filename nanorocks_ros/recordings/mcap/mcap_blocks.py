@@ -224,18 +224,18 @@ def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMes
     """
     stream.seek(block.offset)
     raw = memoryview(stream.read(block.length))
-    found: list[StoredMessage] = []
+    messages: list[StoredMessage] = []
     try:
         if block.cut:
             chunk = Chunk.read(stream_of(raw[RECORD.size :]))
             data = _decompressed_so_far(chunk.data, chunk.compression)
-            _gather(memoryview(data), catalogue, found, cut=True)
+            _gather(memoryview(data), catalogue, messages, cut=True)
         else:
-            _gather(raw, catalogue, found, cut=False)
+            _gather(raw, catalogue, messages, cut=False)
     except UNREADABLE as error:
         _gather_names(bytes(raw), catalogue)
         raise DamagedError(str(error)) from error
-    return found
+    return messages
 
 
 def gather_names(stream: BinaryIO, start: int, end: int, catalogue: Catalogue) -> None:

@@ -79,4 +79,4 @@ def view_from_message(message: Any, where: str) -> View:
 
 
 def _floats(numbers: Iterable[float]) -> tuple[float, ...]:
-    return tuple(float(one) for one in numbers)
+    return tuple(float(number) for number in numbers)

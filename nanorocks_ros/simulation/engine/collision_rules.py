@@ -354,7 +354,7 @@ def for_species(table: NDArray[np.float64], n_species: int) -> NDArray[np.float6
 
 
 def _three(numbers: Sequence[float]) -> tuple[float, float, float]:
-    x, y, z = (float(one) for one in numbers)
+    x, y, z = (float(number) for number in numbers)
     return x, y, z
 
 
@@ -420,7 +420,7 @@ def _check_motion(motion: WallMotion) -> None:
     numbers = (*motion.amplitude, motion.damping, motion.start)
     usable = (
         len(motion.amplitude) == _SIDES
-        and all(math.isfinite(one) for one in numbers)
+        and all(math.isfinite(number) for number in numbers)
         and math.isfinite(motion.angular_frequency)
         and motion.angular_frequency > 0.0
         and motion.damping >= 0.0

@@ -159,8 +159,8 @@ class BodyCounter:
 
         Once others are known to stick it is rather one that was hidden by its cluster.
         """
-        sure = [one for one in bonds if not self._births.one_bead(one.ids)]
-        self._doubted += [one for one in bonds if self._births.one_bead(one.ids)]
+        sure = [bond for bond in bonds if not self._births.one_bead(bond.ids)]
+        self._doubted += [bond for bond in bonds if self._births.one_bead(bond.ids)]
         if not sure and self._first_merge is None:
             return []
         believed, self._doubted = [*sure, *self._doubted], []
@@ -169,7 +169,7 @@ class BodyCounter:
     def flush(self) -> tuple[BodyEstimate, ...]:
         """Counts of the instants for which nothing more will be known."""
         left, self._waiting = list(self._waiting), deque()
-        return () if self._unclear() else tuple(self._count(one) for one in left)
+        return () if self._unclear() else tuple(self._count(picture) for picture in left)
 
     def _unclear(self) -> bool:
         """Whether tracks break off so often that nobody can tell who stays beside whom.
@@ -286,14 +286,14 @@ class BodyCounter:
         return start
 
     def _due(self, stamp_ns: int) -> tuple[BodyEstimate, ...]:
-        found = []
+        estimates = []
         delay_ns = round(self._settings.delay * _NS)
         while self._waiting and stamp_ns - self._waiting[0].stamp_ns >= delay_ns:
-            found.append(self._count(self._waiting.popleft()))
-        return tuple(found)
+            estimates.append(self._count(self._waiting.popleft()))
+        return tuple(estimates)
 
     def _count(self, picture: _Picture) -> BodyEstimate:
-        bonds = [ids for ids, one in self._bonds.items() if one.start <= picture.time]
+        bonds = [ids for ids, bond in self._bonds.items() if bond.start <= picture.time]
         body = bodies_of(picture.known, [*bonds, *picture.clinging])
         sizes = Counter(body.values())
         first = self._first_merge

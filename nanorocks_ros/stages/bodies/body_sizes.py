@@ -26,7 +26,7 @@ def bodies_of(beads: Iterable[int], bonds: Iterable[tuple[int, int]]) -> dict[in
     bonds : iterable of (int, int)
         Beads that stick together; those not among `beads` may join others.
     """
-    root = {one: one for one in beads}
+    root = {bead: bead for bead in beads}
     wanted = list(root)
 
     def find(one: int) -> int:
@@ -77,7 +77,7 @@ def size_fields(
 
 
 _VALUES = ('bodies', 'mean_size', 'weighted_size', 'clustered_share', 'clusters')
-_NUMBERS = (*_VALUES, *(f'{one}_error' for one in _VALUES))
+_NUMBERS = (*_VALUES, *(f'{value}_error' for value in _VALUES))
 
 
 def _errors(

@@ -101,7 +101,7 @@ class Pairs:
     def adopt(self, time: float, beads: Beads, bonds: list[Bond]) -> None:
         """Follow pairs that are bodies for other reasons, until they come apart."""
         if bonds:
-            pairs = np.array([one.ids for one in bonds], dtype=np.int64)
+            pairs = np.array([bond.ids for bond in bonds], dtype=np.int64)
             self._table = adopted(self._table, time, beads, pairs)
 
     def pending(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -116,7 +116,7 @@ class Companions:
         self, body: Mapping[int, int], nearest: Mapping[tuple[int, int], tuple[int, int]]
     ) -> dict[tuple[int, int], _Row]:
         """Rows under the names that bodies have now; of several the oldest."""
-        found: dict[tuple[int, int], _Row] = {}
+        rows: dict[tuple[int, int], _Row] = {}
         for row in self._rows.values():
             roots = [{body[one] for one in part if one in body} for part in row.beads]
             if len(roots[0]) != 1 or len(roots[1]) != 1 or roots[0] == roots[1]:
@@ -126,9 +126,9 @@ class Companions:
                 a, b = b, a
                 row.beads = row.beads[1], row.beads[0]
                 row.low, row.high = -row.high, -row.low
-            if (a, b) in nearest and ((a, b) not in found or row.way > found[a, b].way):
-                found[a, b] = row
-        return found
+            if (a, b) in nearest and ((a, b) not in rows or row.way > rows[a, b].way):
+                rows[a, b] = row
+        return rows
 
     def _follows(
         self,

@@ -53,9 +53,11 @@ class Clinging:
         self._last = ids
         numbers = ids.tolist()
         rows = {number: row for row, number in enumerate(numbers)}
-        asked = [one for one in numbers if one in self._over or one not in self._known]
+        asked = [number for number in numbers if number in self._over or number not in self._known]
         self._known.update(numbers)
-        bodies = np.array([row for row, one in enumerate(numbers) if one in members], dtype=int)
+        bodies = np.array(
+            [row for row, number in enumerate(numbers) if number in members], dtype=int
+        )
         over: dict[int, int] = {}
         for one in asked:
             row = rows[one]

@@ -85,8 +85,8 @@ def packing_of_clusters(
     members = [np.flatnonzero(bodies == one) for one in labels[counts > 1]]
     if not members:
         return None
-    areas = np.array([hull_area(places[one], radii[one]) for one in members])
-    covered = np.array([np.sum(radii[one] ** 2) for one in members])
+    areas = np.array([hull_area(places[member], radii[member]) for member in members])
+    covered = np.array([np.sum(radii[member] ** 2) for member in members])
     own = radii[np.concatenate(members)]
     beads, area = own.size / len(members), float(areas.mean())
     return Packing(

@@ -123,7 +123,7 @@ class StickingMeter:
     def onset(self, cycle: int, stamp_ns: int) -> float | None:
         """Time of the first merge since the shaking event, [s], as of an instant; None before."""
         own = self._cycles.get(cycle)
-        known = [one.stamp_ns for one in self._known(own, stamp_ns)] if own else []
+        known = [merge.stamp_ns for merge in self._known(own, stamp_ns)] if own else []
         if not known or own is None or own.start_ns is None:
             return None
         return (min(known) - own.start_ns) / NS
@@ -139,11 +139,11 @@ class StickingMeter:
         own = self._cycles[last]
         if own.stamps_ns:
             self.of_all(last, own.stamps_ns[-1])
-        found = dict(self._finished)
+        cycles = dict(self._finished)
         under_way = self._seen(last, own.stamps_ns[-1]) if own.stamps_ns else None
         if under_way is not None:
-            found[last] = under_way
-        return tuple(found[number] for number in sorted(found))
+            cycles[last] = under_way
+        return tuple(cycles[number] for number in sorted(cycles))
 
     def together(self, cycles: Sequence[StickingCycle]) -> StickingEstimate | None:
         """What some cycles of this tray say together, also such of other recordings."""
@@ -151,7 +151,7 @@ class StickingMeter:
             return None
         # Rates of their own, lest the cycle under way has to be worked out afresh.
         rates = self._make_rates()
-        return self._estimate([self._terms_of(one, rates) for one in cycles])
+        return self._estimate([self._terms_of(cycle, rates) for cycle in cycles])
 
     def of_all(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
         """The same of all cycles that were over by then."""
@@ -167,9 +167,9 @@ class StickingMeter:
     def _known(self, cycle: _Cycle, stamp_ns: int) -> list[Merge]:
         last_ns = stamp_ns + _ROUNDING_NS
         return [
-            one
-            for one in cycle.merges
-            if one.stamp_ns <= last_ns and one.known_ns <= last_ns + _KNOWN_NS
+            merge
+            for merge in cycle.merges
+            if merge.stamp_ns <= last_ns and merge.known_ns <= last_ns + _KNOWN_NS
         ]
 
     def _seen(self, cycle: int, stamp_ns: int) -> StickingCycle | None:
@@ -199,7 +199,7 @@ class StickingMeter:
 
     def _estimate(self, terms: Sequence[MergeTerms | None]) -> StickingEstimate | None:
         """By all of some cycles; None where one of them cannot be used."""
-        known = [one for one in terms if one is not None]
+        known = [term for term in terms if term is not None]
         if len(known) < len(terms):
             return None
         return estimate_by(

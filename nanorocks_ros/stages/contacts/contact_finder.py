@@ -129,7 +129,7 @@ class ContactFinder:
         motion, motion_error = self._around.motion(when.time)
         incoming_error, outgoing_error = _errors(kink)
         before, after = kink.before.velocity, kink.after.velocity
-        found = Rebound(
+        rebound = Rebound(
             stamp_ns=self._stamp_ns(when.time),
             tray=self._tray.number,
             track=kink.track,
@@ -147,20 +147,20 @@ class ContactFinder:
             place=place,
         )
         signal = LEAST_SIGNAL * math.hypot(incoming_error, motion_error)
-        return found if found.incoming > signal and found.outgoing > 0.0 else None
+        return rebound if rebound.incoming > signal and rebound.outgoing > 0.0 else None
 
     def _alone(self, when: Meeting, kinks: list[Kink]) -> bool:
         beads = np.empty((len(kinks), 4))
-        for bead, one in zip(beads, kinks, strict=True):
-            speed = max(math.hypot(*line[3:5]) for line in one.lines.tolist())
-            bead[:] = *_place(one.lines, when.time)[:2], one.radius, speed
-        return self._around.alone(when.time, [one.track for one in kinks], beads)
+        for bead, kink in zip(beads, kinks, strict=True):
+            speed = max(math.hypot(*line[3:5]) for line in kink.lines.tolist())
+            bead[:] = *_place(kink.lines, when.time)[:2], kink.radius, speed
+        return self._around.alone(when.time, [kink.track for kink in kinks], beads)
 
     def _pair(self, kinks: tuple[Kink, Kink]) -> PairCollision | None:
-        when = Meeting(*when_met(np.array([one.lines for one in kinks])))
-        if not all(self._between(one, when) for one in kinks):
+        when = Meeting(*when_met(np.array([kink.lines for kink in kinks])))
+        if not all(self._between(kink, when) for kink in kinks):
             return None
-        (x, y, _), (its_x, its_y, _) = (_place(one.lines, when.time) for one in kinks)
+        (x, y, _), (its_x, its_y, _) = (_place(kink.lines, when.time) for kink in kinks)
         distance = math.hypot(its_x - x, its_y - y)
         reach = kinks[0].radius + kinks[1].radius
         if (
@@ -169,32 +169,32 @@ class ContactFinder:
             or not self._alone(when, list(kinks))
         ):
             return None
-        found = self._collision(kinks, when)
-        return found if only_these_two(found) else None
+        collision = self._collision(kinks, when)
+        return collision if only_these_two(collision) else None
 
     def _collision(self, kinks: tuple[Kink, Kink], when: Meeting) -> PairCollision:
-        places = [_place(one.lines, when.time) for one in kinks]
-        here, there = (np.array(one[:2]) for one in places)
-        before = np.array([one.before.velocity for one in kinks])
+        places = [_place(kink.lines, when.time) for kink in kinks]
+        here, there = (np.array(place[:2]) for place in places)
+        before = np.array([kink.before.velocity for kink in kinks])
         approach = before[1] - before[0]
-        shared = sum(one.shared_error**2 for one in kinks)
+        shared = sum(kink.shared_error**2 for kink in kinks)
         mistimed = when.error**2 * float(approach @ approach)
-        temperatures = [self._around.temperature(when.time, one.species) for one in kinks]
-        errors = np.array([_errors(one) for one in kinks])
+        temperatures = [self._around.temperature(when.time, kink.species) for kink in kinks]
+        errors = np.array([_errors(kink) for kink in kinks])
         return PairCollision(
             stamp_ns=self._stamp_ns(when.time),
             tray=self._tray.number,
-            tracks=np.array([one.track for one in kinks], dtype=np.int32),
-            species=np.array([one.species for one in kinks], dtype=np.int32),
-            radii=np.array([one.radius for one in kinks]),
-            radius_errors=np.array([one.radius_error for one in kinks]),
-            masses=np.array([self._mass(one) for one in kinks]),
+            tracks=np.array([kink.track for kink in kinks], dtype=np.int32),
+            species=np.array([kink.species for kink in kinks], dtype=np.int32),
+            radii=np.array([kink.radius for kink in kinks]),
+            radius_errors=np.array([kink.radius_error for kink in kinks]),
+            masses=np.array([self._mass(kink) for kink in kinks]),
             before=before,
-            after=np.array([one.after.velocity for one in kinks]),
+            after=np.array([kink.after.velocity for kink in kinks]),
             before_errors=errors[:, 0],
             after_errors=errors[:, 1],
             separation=there - here,
-            separation_error=math.sqrt(sum(one[2] for one in places) + shared + mistimed),
+            separation_error=math.sqrt(sum(place[2] for place in places) + shared + mistimed),
             temperatures=np.array(temperatures),
             height=self._tray.dimensions[2],
             place=here - np.array(self._around.displacement(when.time)),

@@ -131,8 +131,8 @@ class Histories:
             self._sizes,
             lines,
         )
-        found = [self._kink(int(tracks.ids[k]), lines[k].copy()) for k in turned.tolist()]
-        return found + self._finished(gone)
+        kinks = [self._kink(int(tracks.ids[k]), lines[k].copy()) for k in turned.tolist()]
+        return kinks + self._finished(gone)
 
     def flush(self) -> list[Kink]:
         """The kinks whose flights afterwards end with the recording."""
@@ -146,7 +146,9 @@ class Histories:
         self._named = named
         numbers = tracks.ids.tolist()
         rounds = self._round[tracks.species].tolist()
-        rows = [self._slot(one) if fit else -1 for one, fit in zip(numbers, rounds, strict=True)]
+        rows = [
+            self._slot(number) if fit else -1 for number, fit in zip(numbers, rounds, strict=True)
+        ]
         self._rows = np.array(rows, dtype=np.int64)
         used = self._rows >= 0
         self._species[self._rows[used]] = tracks.species[used]
@@ -180,11 +182,11 @@ class Histories:
 
     def _finished(self, numbers: list[int]) -> list[Kink]:
         """The last kinks of tracks that have ended."""
-        found = []
+        kinks = []
         for number in numbers:
             slot, row = self._slots[number], np.empty(KINK)
             variance = float(self._scatter.variances[self._species[slot]])
             if finish(self._ways, slot, variance, float(self._sizes[slot, 0]), row):
-                found.append(self._kink(number, row))
+                kinks.append(self._kink(number, row))
             self._free.append(self._slots.pop(number))
-        return found
+        return kinks

@@ -113,7 +113,7 @@ def guess_plate(
     PlateGuess or None
         None when the trays do not fit into the picture at any scale.
     """
-    boxes = np.array([[*(one.place or (0.0, 0.0)), *one.dimensions[:2]] for one in trays])
+    boxes = np.array([[*(tray.place or (0.0, 0.0)), *tray.dimensions[:2]] for tray in trays])
     extent = (boxes[:, :2] + boxes[:, 2:]).max(axis=0) - boxes[:, :2].min(axis=0)
     largest = min(gray.shape[1] / extent[0], gray.shape[0] / extent[1]) * 0.995
     low, high = scale or (largest / 3.0, largest)
@@ -125,10 +125,10 @@ def guess_plate(
     small = np.asarray(cv2.GaussianBlur(reduced, (0, 0), 1.2), dtype=np.float32)
     slopes = [np.abs(cv2.Sobel(small, cv2.CV_32F, 1 - k, k)) for k in (0, 1)]
     usual = []
-    for k, one in enumerate(slopes):
-        np.minimum(one, np.quantile(one, _STEEPEST), out=one)
-        usual.append(float(one.mean()))
-        slopes[k] = np.pad(np.cumsum(one, axis=k, dtype=np.float64), _FRONT[k])
+    for k, slope in enumerate(slopes):
+        np.minimum(slope, np.quantile(slope, _STEEPEST), out=slope)
+        usual.append(float(slope.mean()))
+        slopes[k] = np.pad(np.cumsum(slope, axis=k, dtype=np.float64), _FRONT[k])
     count = max(1, math.ceil(math.log(high / low) / math.log(_SCALE_STEP)) + 1)
     scales = np.geomspace(low, high, count)
     found = np.full((count, 4), -1.0)
@@ -149,12 +149,12 @@ _FRONT = (((1, 0), (0, 0)), ((0, 0), (1, 0)))
 def plate_places(trays: Sequence[Tray]) -> dict[int, NDArray[np.float64]]:
     """x, y, width, height of the floors from the middle of the plate, by tray, [m]."""
     return {
-        one.number: np.array(
+        tray.number: np.array(
             [
-                (one.place or (0.0, 0.0))[0] - 0.5 * PLATE[0],
-                (one.place or (0.0, 0.0))[1] - 0.5 * PLATE[1],
-                *one.dimensions[:2],
+                (tray.place or (0.0, 0.0))[0] - 0.5 * PLATE[0],
+                (tray.place or (0.0, 0.0))[1] - 0.5 * PLATE[1],
+                *tray.dimensions[:2],
             ]
         )
-        for one in trays
+        for tray in trays
     }

@@ -83,7 +83,9 @@ class Preprocessor:
     @property
     def regions(self) -> dict[int, Region]:
         """Where the trays are in the rectified frame, by number; empty before the first frame."""
-        return {tray.number: one for tray, one in zip(self._trays, self._regions, strict=False)}
+        return {
+            tray.number: region for tray, region in zip(self._trays, self._regions, strict=False)
+        }
 
     @property
     def duplicates(self) -> int:
@@ -187,11 +189,11 @@ class Preprocessor:
 
     def _plate_speed(self) -> tuple[float, float]:
         """Speed of the plate and its error, [m/s]; NaN when no tray knows."""
-        known = [one for one in self._crops if math.isfinite(one.velocity_error)]
+        known = [crop for crop in self._crops if math.isfinite(crop.velocity_error)]
         if not known:
             return math.nan, math.nan
-        across, down = (middle([one.velocity[axis] for one in known]) for axis in (0, 1))
-        return math.hypot(across, down), middle([one.velocity_error for one in known])
+        across, down = (middle([crop.velocity[axis] for crop in known]) for axis in (0, 1))
+        return math.hypot(across, down), middle([crop.velocity_error for crop in known])
 
     def _tray_image(
         self,

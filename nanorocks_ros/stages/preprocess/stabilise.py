@@ -66,9 +66,9 @@ def shift_of_plate(shifts: Sequence[Shift]) -> Shift | None:
     if len(shifts) < _FEWEST_TRAYS:
         return None
     return Shift(
-        middle([one.x for one in shifts]),
-        middle([one.y for one in shifts]),
-        middle([one.error for one in shifts]),
+        middle([shift.x for shift in shifts]),
+        middle([shift.y for shift in shifts]),
+        middle([shift.error for shift in shifts]),
     )
 
 
@@ -118,8 +118,8 @@ class TrayFollower:
         if self._reference.size == 0:
             return None
         first = self._last if hint is None else hint
-        found = self._registered(image, (first.x, first.y))
-        if found is None:
+        shift = self._registered(image, (first.x, first.y))
+        if shift is None:
             reach = _REACH if hint is None else _NARROW_REACH
             few = slice(None, None, 4)
             start = search(
@@ -130,14 +130,14 @@ class TrayFollower:
                 (first.x, first.y),
                 reach,
             )
-            found = self._registered(image, start)
-        if found is None:
+            shift = self._registered(image, start)
+        if shift is None:
             return None
-        self._last = found
+        self._last = shift
         # The average is sharper than any one picture is free of noise.
         self._seen = min(self._seen + 1, _MEMORY)
         learn(self._values, self._seen, self._reference, self._powers, self._trust)
-        return found
+        return shift
 
     @property
     def sighted(self) -> bool:

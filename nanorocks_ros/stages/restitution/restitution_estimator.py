@@ -114,39 +114,41 @@ class HaffFitter:
         if not self._settings.until_merge or merge.cycle != self._cycle:
             return ()
         if not self._finished:
-            self._samples = [one for one in self._samples if one.stamp_ns < merge.stamp_ns]
+            self._samples = [
+                sample for sample in self._samples if sample.stamp_ns < merge.stamp_ns
+            ]
             self._merged = True
         return self.flush()
 
     def _push_speed(self, speed: SpeedEstimate) -> tuple[CorEstimate, ...]:
-        found: tuple[CorEstimate, ...] = ()
+        estimates: tuple[CorEstimate, ...] = ()
         if self._last_stamp_ns is not None and speed.stamp_ns <= self._last_stamp_ns:
-            found = self.flush()
+            estimates = self.flush()
             self._restart()
             self._contacts.restart(speed.stamp_ns)
         self._last_stamp_ns = speed.stamp_ns
         if speed.cycle != self._cycle:
-            found = (*found, *self.flush())
+            estimates = (*estimates, *self.flush())
             self._cycle, self._samples, self._finished = speed.cycle, [], False
             self._last_update_ns = None
             self._merged = False
             self._contacts.next_cycle()
         if speed.cycle_start_ns is None or self._finished:
-            return found
+            return estimates
         age = (speed.stamp_ns - speed.cycle_start_ns) / NS
         if not self._samples and self._driven(speed):
             # A tray that swings drives the gas, but does nothing to a single contact.
             self._count_contacts(speed)
-            return found
+            return estimates
         first = self._samples[0] if self._samples else speed
         if speed.stamp_ns - self._start_ns(first) > self._settings.duration * NS:
-            return (*found, *self.flush())
+            return (*estimates, *self.flush())
         if age > 0.0 and age >= self._settings.delay and _usable(speed):
             self._samples.append(speed)
             self._count_contacts(speed)
             if self._update_due(speed.stamp_ns):
-                found = (*found, *self._estimate(CorStatus.COOLING))
-        return found
+                estimates = (*estimates, *self._estimate(CorStatus.COOLING))
+        return estimates
 
     def _count_contacts(self, speed: SpeedEstimate) -> None:
         """Count those since the shaking was over, up to shortly before a speed."""
@@ -206,15 +208,15 @@ class HaffFitter:
         last = self._samples[-1]
         shake_ns, start_ns = last.cycle_start_ns or 0, self._start_ns(self._samples[0])
         decay = Decay(
-            time=np.array([(one.stamp_ns - start_ns) / NS for one in self._samples]),
-            speed=np.array([one.mean_projected_speed for one in self._samples]),
-            error=np.array([one.mean_projected_speed_error for one in self._samples]),
+            time=np.array([(sample.stamp_ns - start_ns) / NS for sample in self._samples]),
+            speed=np.array([sample.mean_projected_speed for sample in self._samples]),
+            error=np.array([sample.mean_projected_speed_error for sample in self._samples]),
             of_grains=self._grains
-            and any(one.method is SpeedMethod.STRUCTURE_FUNCTION for one in self._samples),
+            and any(sample.method is SpeedMethod.STRUCTURE_FUNCTION for sample in self._samples),
         )
         fields: dict[str, Any] = {'status': status}
         final = status is CorStatus.FINAL
-        quality = reduce(or_, {one.quality for one in self._samples})
+        quality = reduce(or_, {sample.quality for sample in self._samples})
         try:
             if quality & Quality.WRONG_SCALE:
                 # Speeds and places are wrong by nobody knows how much.

@@ -287,8 +287,8 @@ class LibraryReading:
 
 
 def _known(posterior: Posterior, ends: NDArray[np.float64]) -> dict[str, float]:
-    lower, value, upper = (float(one) for one in posterior.quantiles(ends))
-    wall_lower, wall, wall_upper = (float(one) for one in posterior.wall_quantiles(ends))
+    lower, value, upper = (float(quantile) for quantile in posterior.quantiles(ends))
+    wall_lower, wall, wall_upper = (float(quantile) for quantile in posterior.wall_quantiles(ends))
     spread = posterior.covariance
     product = math.sqrt(spread[0, 0] * spread[1, 1])
     return {

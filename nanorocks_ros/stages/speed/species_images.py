@@ -63,8 +63,8 @@ class SpeciesImages:
     @property
     def possible(self) -> bool:
         """Whether there are several species, all of a colour that is known."""
-        known = all(one in COLOURS for one in self._materials)
-        grays = sum(hue_of(one) == 0 for one in self._materials)
+        known = all(material in COLOURS for material in self._materials)
+        grays = sum(hue_of(material) == 0 for material in self._materials)
         return known and len(self._materials) > 1 and grays < 2
 
     @property

@@ -122,21 +122,23 @@ class MeanMotions:
         if not all(part.ready for part in self._parts):
             return ()
         held, self._held = self._held, []
-        found = []
-        for one in map(self._motion, held):
-            if self._last_emitted_ns is None or one.stamp_ns > self._last_emitted_ns:
-                self._last_emitted_ns = one.stamp_ns
-                found.append(one)
-        return tuple(found)
+        motions = []
+        for motion in map(self._motion, held):
+            if self._last_emitted_ns is None or motion.stamp_ns > self._last_emitted_ns:
+                self._last_emitted_ns = motion.stamp_ns
+                motions.append(motion)
+        return tuple(motions)
 
     def _motion(self, samples: tuple[Sample, ...]) -> MeanMotion:
-        lags = [part.longest_lag(one) for part, one in zip(self._parts, samples, strict=True)]
-        windows = [int(one.windows_ns[lag]) for one, lag in zip(samples, lags, strict=True)]
+        lags = [
+            part.longest_lag(sample) for part, sample in zip(self._parts, samples, strict=True)
+        ]
+        windows = [int(sample.windows_ns[lag]) for sample, lag in zip(samples, lags, strict=True)]
         species = []
-        for part, one, lag, window, factor in zip(
+        for part, sample, lag, window, factor in zip(
             self._parts, samples, lags, windows, self._factors, strict=True
         ):
-            path, error = part.displacement(one, lag)
+            path, error = part.displacement(sample, lag)
             speed = path * NS / window
             error = math.hypot(factor[0] * error * NS / window, factor[1] * speed)
             species.append((factor[0] * speed, error))
@@ -153,7 +155,7 @@ class MeanMotions:
             ),
             species=tuple(species),
             in_range=all(
-                part.in_range(one, lag)
-                for part, one, lag in zip(self._parts, samples, lags, strict=True)
+                part.in_range(sample, lag)
+                for part, sample, lag in zip(self._parts, samples, lags, strict=True)
             ),
         )

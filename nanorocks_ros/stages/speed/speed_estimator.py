@@ -96,10 +96,14 @@ class SpeedEstimator:
         of_use = method == 'tracking' or (method == 'auto' and not self._tracks.hopeless)
         if of_use or self.emit_tracks:
             records = self._tracks.push(image, self._shakes, shaken)
-            found += [one for one in records if isinstance(one, Tracks) and self.emit_tracks]
-            found += self._by_tracks([one for one in records if isinstance(one, SpeedEstimate)])
+            found += [
+                record for record in records if isinstance(record, Tracks) and self.emit_tracks
+            ]
+            found += self._by_tracks(
+                [record for record in records if isinstance(record, SpeedEstimate)]
+            )
             if of_use and (method == 'tracking' or self._tracks.reliable):
-                found += [one for one in records if isinstance(one, Seen)]
+                found += [record for record in records if isinstance(record, Seen)]
         if method == 'structure_function' or (method == 'auto' and not self._tracks.reliable):
             # Who looks at the tracks must not change what is said of a forced method.
             if self._tracks.judged and method == 'auto':
@@ -115,7 +119,7 @@ class SpeedEstimator:
             if not self._idle:
                 self._structure.rest()
             self._idle = True
-        return tuple(self._finished(one) for one in found if self._in_order(one))
+        return tuple(self._finished(record) for record in found if self._in_order(record))
 
     def _finished(self, record: Measured) -> Measured:
         if not isinstance(record, SpeedEstimate):

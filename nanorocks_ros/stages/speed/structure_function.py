@@ -145,18 +145,18 @@ class StructureFunction:
         self._shifts.append(shift_px)
         if self._next_sample_ns is None:
             self._next_sample_ns = stamp_ns
-        found = None
+        sample = None
         if stamp_ns >= self._next_sample_ns and len(self._images) > 1:
             self._next_sample_ns += round(self._settings.interval * NS)
             self._next_sample_ns = max(self._next_sample_ns, stamp_ns + 1)
-            found = self._sample(cycle, noise_power, self._centred)
+            sample = self._sample(cycle, noise_power, self._centred)
         if self._response.pairs >= _PAIRS_KEPT:
             # All is learnt.
             self._keys.clear()
         elif not self._keys or stamp_ns - self._keys[-1][0] >= self._key_interval_ns:
             self._learn(stamp_ns, gray, noise_power)
             self._keep(stamp_ns, gray)
-        return found
+        return sample
 
     @property
     def ready(self) -> bool:

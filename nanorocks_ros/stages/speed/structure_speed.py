@@ -69,10 +69,10 @@ class StructureSpeed:
         )
         shift = (across, down)
         noise = [meter.push(one) for meter, one in zip(self._noise, shown, strict=True)]
-        found = self._motions.push(image.stamp_ns, shown, cycle, noise, shift)
-        if not found:
+        motions = self._motions.push(image.stamp_ns, shown, cycle, noise, shift)
+        if not motions:
             return ()
-        estimates = tuple(self._estimate(one) for one in found)
+        estimates = tuple(self._estimate(motion) for motion in motions)
         self._flags = Quality(0)
         return estimates
 

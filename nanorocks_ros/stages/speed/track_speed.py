@@ -110,7 +110,7 @@ class TrackSpeed:
         self, image: TrayImage, shakes: CycleFollower, shaken: bool
     ) -> tuple[SpeedEstimate | Tracks | Rebound | PairCollision | BodyEstimate | Merge, ...]:
         """Take the next image: tracks, what beads do in them, and a speed when one is due."""
-        found: list[SpeedEstimate | Tracks | Rebound | PairCollision | BodyEstimate | Merge] = []
+        records: list[SpeedEstimate | Tracks | Rebound | PairCollision | BodyEstimate | Merge] = []
         if shaken:
             self._recent.clear()
             self._next_ns = None
@@ -119,15 +119,15 @@ class TrackSpeed:
             # Nothing can be tracked, and that is known at once.
             self.judged, self.reliable = True, False
         for tracks in self._tracker.push(image):
-            found.append(tracks)
+            records.append(tracks)
             self._recent.push(tracks, tracks.stamp_ns - _LOOK_BACK_NS)
             self._judge(tracks)
-            found += self._contacts_in(tracks, shakes)
-            found += self._bodies.push(tracks, shakes.cycle)
+            records += self._contacts_in(tracks, shakes)
+            records += self._bodies.push(tracks, shakes.cycle)
             if self._next_ns is None or tracks.stamp_ns >= self._next_ns:
                 self._next_ns = tracks.stamp_ns + self._interval_ns
-                found += self._speeds(shakes, tracks.expected)
-        return tuple(found)
+                records += self._speeds(shakes, tracks.expected)
+        return tuple(records)
 
     def _contacts_in(self, tracks: Tracks, shakes: CycleFollower) -> list[Rebound | PairCollision]:
         if self._contacts is None:

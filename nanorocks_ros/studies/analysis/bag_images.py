@@ -121,8 +121,8 @@ class BagImages:
             except FrameError as error:
                 self.refused = self.refused or error
             else:
-                self._notices += [one.text for one in records if isinstance(one, Notice)]
-                images = tuple(one for one in records if isinstance(one, TrayImage))
+                self._notices += [record.text for record in records if isinstance(record, Notice)]
+                images = tuple(record for record in records if isinstance(record, TrayImage))
                 self._any = self._any or bool(images)
                 yield Shot(number, frame, images)
             if progress is not None:

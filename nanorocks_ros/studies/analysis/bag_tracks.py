@@ -88,7 +88,7 @@ def track_bag(
     images = BagImages(path, settings, image_topic)
     settings = images.settings
     trackers = {number: Tracker(settings, tray) for number, tray in images.trays.items()}
-    found = TrackedBag(
+    bag = TrackedBag(
         epoch_ns=images.epoch_ns,
         pixels_per_metre=settings.preprocess.pixels_per_metre,
         trays=images.trays,
@@ -98,16 +98,16 @@ def track_bag(
     )
     for shot in images.shots(progress):
         for image in shot.images:
-            found.pictures[image.tray] = image
+            bag.pictures[image.tray] = image
             for tracks in trackers[image.tray].push(image):
-                found.tracks[image.tray].append(tracks)
-                found.numbers[image.tray].append(shot.number)
-    found.frames = images.frames
-    found.regions = images.stage.regions
-    found.notices = images.notices
-    if not any(found.tracks.values()):
+                bag.tracks[image.tray].append(tracks)
+                bag.numbers[image.tray].append(shot.number)
+    bag.frames = images.frames
+    bag.regions = images.stage.regions
+    bag.notices = images.notices
+    if not any(bag.tracks.values()):
         raise _without_colour(images.bag.where)
-    return found
+    return bag
 
 
 def _without_colour(where: str) -> FrameError:

@@ -179,7 +179,7 @@ def measured_packing(folder: Path, tray: int) -> tuple[PackingCurve, ...]:
     speeds = read_columns(folder / f'tray_{tray}_speed.csv', ('cycle', 'cycle_start'))
     known = np.isfinite(speeds['cycle_start'])
     starts = dict(zip(speeds['cycle'][known], speeds['cycle_start'][known], strict=True))
-    found = []
+    curves = []
     for cycle, start in starts.items():
         own = (table['cycle'] == cycle) & (table['time'] >= start)
         # A recording that was played twice holds its cycles twice: the first time is enough.
@@ -188,7 +188,7 @@ def measured_packing(folder: Path, tray: int) -> tuple[PackingCurve, ...]:
         first = times.size if rising.all() else int(np.argmin(rising))
         if first > 1:
             nothing = np.full(first, math.nan)
-            found.append(
+            curves.append(
                 PackingCurve(
                     tray=tray,
                     cycle=int(cycle),
@@ -200,13 +200,13 @@ def measured_packing(folder: Path, tray: int) -> tuple[PackingCurve, ...]:
                     in_space=nothing,
                 )
             )
-    if not found:
+    if not curves:
         raise RecordingError(
             str(folder),
             f'holds no autocorrelation of tray {tray} after a shaking event',
             'analyse a recording with a shaking event',
         )
-    return tuple(found)
+    return tuple(curves)
 
 
 def simulated_packing(
@@ -277,8 +277,8 @@ def _truth(
 ) -> tuple[float, float, float, float]:
     """Beads in a cluster, and filling factors: of a layer, by the paper, in space."""
     bodies, radii = gas.bodies, gas.radii
-    found = packing_of_clusters(positions[:, :2], radii, bodies, tray.dimensions[2])
-    if found is None:
+    packing = packing_of_clusters(positions[:, :2], radii, bodies, tray.dimensions[2])
+    if packing is None:
         return math.nan, math.nan, math.nan, math.nan
     volume = room = 0.0
     for label in np.unique(bodies):
@@ -287,14 +287,14 @@ def _truth(
             z, r = positions[own, 2], radii[own]
             volume += 4.0 / 3.0 * math.pi * float(np.sum(r**3))
             room += hull_area(positions[own, :2], r) * float((z + r).max() - (z - r).min())
-    return found.beads, found.filling, found.paper, volume / room
+    return packing.beads, packing.filling, packing.paper, volume / room
 
 
 def _curves(tray: int, rows: NDArray[np.float64]) -> tuple[PackingCurve, ...]:
-    found = []
+    curves = []
     for cycle in np.unique(rows[:, 0]):
         own = rows[rows[:, 0] == cycle]
-        found.append(
+        curves.append(
             PackingCurve(
                 tray=tray,
                 cycle=int(cycle),
@@ -306,4 +306,4 @@ def _curves(tray: int, rows: NDArray[np.float64]) -> tuple[PackingCurve, ...]:
                 in_space=own[:, 6],
             )
         )
-    return tuple(found)
+    return tuple(curves)

@@ -91,9 +91,9 @@ def size_measure(trays: Mapping[Path, tuple[int, ...]]) -> SizeMeasure:
         values = read_columns(path, (), (one.column,)).get(one.column)
         return values is not None and bool(np.isfinite(values).any())
 
-    for one in SIZE_MEASURES[:-1]:
-        if all(has(folder, number, one) for folder, own in trays.items() for number in own):
-            return one
+    for measure in SIZE_MEASURES[:-1]:
+        if all(has(folder, number, measure) for folder, own in trays.items() for number in own):
+            return measure
     return SIZE_MEASURES[-1]
 
 
@@ -125,7 +125,7 @@ def cycles_of(folder: Path, tray: int, measure: SizeMeasure) -> list[CycleSummar
         ('time', 'cycle', measure.column),
         (measure.error,),
     )
-    found = []
+    summaries = []
     known = np.isfinite(speeds['cycle_start']) & (speeds['cycle'] > 0.0)
     for cycle in np.unique(speeds['cycle'][known]):
         own = known & (speeds['cycle'] == cycle)
@@ -133,7 +133,7 @@ def cycles_of(folder: Path, tray: int, measure: SizeMeasure) -> list[CycleSummar
         # Of a recording that was played twice the first time is enough.
         own &= speeds['cycle_start'] == start
         end = float(speeds['time'][own].max())
-        found.append(
+        summaries.append(
             CycleSummary(
                 tray=tray,
                 recording=folder.name,
@@ -145,7 +145,7 @@ def cycles_of(folder: Path, tray: int, measure: SizeMeasure) -> list[CycleSummar
                 **_size(sizes, measure, cycle, (max(start, end - _END), end)),
             )
         )
-    return found
+    return summaries
 
 
 def _table(

@@ -59,14 +59,14 @@ class Campaign:
     @property
     def trays(self) -> tuple[int, ...]:
         """Numbers of the trays."""
-        return tuple(sorted({one.tray for one in self.cycles}))
+        return tuple(sorted({cycle.tray for cycle in self.cycles}))
 
     def values(self, tray: int, quantity: str) -> NDArray[np.float64]:
         """One quantity of one tray by place, (places,); NaN where not known."""
         found = np.full(self.places, math.nan)
-        for one in self.cycles:
-            if one.tray == tray:
-                found[one.place] = getattr(one, quantity)
+        for cycle in self.cycles:
+            if cycle.tray == tray:
+                found[cycle.place] = getattr(cycle, quantity)
         return found
 
 
@@ -89,7 +89,7 @@ def read_campaign(folders: Sequence[Path], false_alarms: float = 0.01) -> Campai
     """
     places_of = [folder.resolve() for folder in folders]
     if len(set(places_of)) < len(places_of):
-        again = next(one for one in places_of if places_of.count(one) > 1)
+        again = next(place for place in places_of if places_of.count(place) > 1)
         raise ConfigurationError(str(again), 'is named twice', 'name each recording once')
     trays = {folder: trays_of(folder, 'speed') for folder in folders}
     measure = size_measure(trays)
@@ -99,7 +99,7 @@ def read_campaign(folders: Sequence[Path], false_alarms: float = 0.01) -> Campai
     ]
     if not any(own for found in recordings for own in found.values()):
         raise RecordingError(
-            ', '.join(str(one) for one in folders),
+            ', '.join(str(folder) for folder in folders),
             'hold no cycle after a shaking event',
             'analyse recordings with shaking events',
         )
@@ -131,9 +131,11 @@ def campaign_of(
     places = 0
     for found in recordings:
         # Trays are filmed together, but a shaking event may be missed in one of them.
-        known = sorted({one.cycle for own in found.values() for one in own})
+        known = sorted({summary.cycle for own in found.values() for summary in own})
         cycles += [
-            _placed(one, places + known.index(one.cycle)) for own in found.values() for one in own
+            _placed(summary, places + known.index(summary.cycle))
+            for own in found.values()
+            for summary in own
         ]
         places += len(known)
     cycles.sort(key=lambda one: (one.place, one.tray))
@@ -180,15 +182,18 @@ def write_campaign(campaign: Campaign, path: Path) -> None:
         'quiet': '1',
     }
     rows = [
-        [*(getattr(one, name) for name in list(units)[:-1]), int(in_period(campaign, one.place))]
-        for one in campaign.cycles
+        [
+            *(getattr(cycle, name) for name in list(units)[:-1]),
+            int(in_period(campaign, cycle.place)),
+        ]
+        for cycle in campaign.cycles
     ]
     write_csv(path, list(units), list(units.values()), rows)
 
 
 def in_period(campaign: Campaign, place: int) -> bool:
     """Whether a cycle is in a quiet period."""
-    return any(one.first <= place <= one.last for one in campaign.periods)
+    return any(period.first <= place <= period.last for period in campaign.periods)
 
 
 def _placed(one: CycleSummary, place: int) -> CycleSummary:

@@ -28,8 +28,8 @@ def trays_of(folder: Path, table: str) -> tuple[int, ...]:
     """
     if not folder.is_dir():
         raise RecordingError(str(folder), 'is no folder', _FORM)
-    names = (one.stem.split('_') for one in folder.glob(f'tray_*_{table}.csv'))
-    found = tuple(sorted(int(one[1]) for one in names if len(one) == 3 and one[1].isdigit()))
+    names = (path.stem.split('_') for path in folder.glob(f'tray_*_{table}.csv'))
+    found = tuple(sorted(int(name[1]) for name in names if len(name) == 3 and name[1].isdigit()))
     if not found:
         raise RecordingError(str(folder), f'holds no tray_K_{table}.csv', _FORM)
     return found

@@ -62,7 +62,7 @@ def check_results_folder(folder: Path) -> Path:
         raise RecordingError(
             str(folder), 'exists and holds no results of ours', 'pass another --output'
         )
-    return next(one for one in folder.absolute().parents if one.is_dir())
+    return next(parent for parent in folder.absolute().parents if parent.is_dir())
 
 
 def write_results(
@@ -129,13 +129,13 @@ def _keep_others(folder: Path, fresh: Path) -> None:
     tables = rf'tray_\d+_({"|".join(_tables(TrayResults()))})\.({"|".join(FORMATS)})'
     names = map(re.escape, (RESULTS_MARK, BAG_NAME, SUMMARY, EVIDENCE))
     ours = re.compile('|'.join([tables, *names]))
-    for one in folder.iterdir():
-        if ours.fullmatch(one.name) or (fresh / one.name).exists():
+    for path in folder.iterdir():
+        if ours.fullmatch(path.name) or (fresh / path.name).exists():
             continue
-        if one.is_dir() and not one.is_symlink():
-            shutil.copytree(one, fresh / one.name, symlinks=True, copy_function=_linked)
+        if path.is_dir() and not path.is_symlink():
+            shutil.copytree(path, fresh / path.name, symlinks=True, copy_function=_linked)
         else:
-            _linked(one, fresh / one.name)
+            _linked(path, fresh / path.name)
 
 
 def _linked(source: str | Path, target: str | Path) -> None:
@@ -162,7 +162,7 @@ def _write_table(
     path: Path, records: Sequence[ArrayRecord], epoch_ns: int, provenance: dict[str, str]
 ) -> None:
     fields = layout(type(records[0])).fields
-    values = (to_array(one, epoch_ns) for one in records)
+    values = (to_array(record, epoch_ns) for record in records)
     if path.suffix == '.csv':
         names, units = zip(*((field.name, field.unit) for field in fields), strict=True)
         write_csv(path, names, units, (row.tolist() for row in values))
@@ -212,7 +212,7 @@ def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> No
 
 def _in_order(records: Sequence[ArrayRecord]) -> Iterator[ArrayRecord]:
     """By their stamps; in memory are only those that wait for earlier ones further on."""
-    stamps = np.fromiter((one.stamp_ns for one in records), np.int64, len(records))
+    stamps = np.fromiter((record.stamp_ns for record in records), np.int64, len(records))
     # The earliest of those that come later.
     to_come = np.minimum.accumulate(np.append(stamps, _NEVER_NS)[::-1])[::-1][1:]
     waiting: list[tuple[int, int, ArrayRecord]] = []

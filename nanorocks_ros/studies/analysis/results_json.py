@@ -23,14 +23,14 @@ def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
     latest: dict[tuple[int, int], CorEstimate] = {}
     passes = 0
     last: CorEstimate | None = None
-    for one in cors:
+    for cor in cors:
         # Time went back: cycles are counted from 1 again, and are others.
-        if last is not None and one.stamp_ns < last.stamp_ns and not _ended_by_merge(last, one):
+        if last is not None and cor.stamp_ns < last.stamp_ns and not _ended_by_merge(last, cor):
             passes += 1
-        last = one
-        before = latest.get((passes, one.cycle))
+        last = cor
+        before = latest.get((passes, cor.cycle))
         if before is None or before.status is not CorStatus.FINAL:
-            latest[passes, one.cycle] = one
+            latest[passes, cor.cycle] = cor
     return list(latest.values())
 
 
@@ -69,18 +69,22 @@ def as_json(analysis: Analysis, *, series: bool = True) -> dict[str, Any]:
 def _tray_as_json(analysis: Analysis, results: TrayResults, *, series: bool) -> dict[str, Any]:
     epoch_ns = analysis.epoch_ns
     cycles = last_of_each_cycle(results.cors)
-    wanted = {one.stamp_ns for one in cycles}
-    starts = {one.stamp_ns: one.cycle_start_ns for one in results.speeds if one.stamp_ns in wanted}
+    wanted = {cycle.stamp_ns for cycle in cycles}
+    starts = {
+        speed.stamp_ns: speed.cycle_start_ns
+        for speed in results.speeds
+        if speed.stamp_ns in wanted
+    }
     clusters = _ends_of_cycles(results.clusters)
     return {
         **(_series_as_json(results, epoch_ns) if series else {}),
         'cycles': [
             _cycle_as_json(
-                one,
-                ((starts[one.stamp_ns] or 0) - epoch_ns) / NS,
-                _end_of_cycle(clusters.get(one.cycle, []), one),
+                estimate,
+                ((starts[estimate.stamp_ns] or 0) - epoch_ns) / NS,
+                _end_of_cycle(clusters.get(estimate.cycle, []), estimate),
             )
-            for one in cycles
+            for estimate in cycles
         ],
         'truth': _truth_as_json(analysis, results, series=series),
     }
@@ -88,15 +92,15 @@ def _tray_as_json(analysis: Analysis, results: TrayResults, *, series: bool) -> 
 
 def _series_as_json(results: TrayResults, epoch_ns: int) -> dict[str, Any]:
     return {
-        'time': [(one.stamp_ns - epoch_ns) / NS for one in results.speeds],
-        'mean_projected_speed': [_known(one.mean_projected_speed) for one in results.speeds],
+        'time': [(speed.stamp_ns - epoch_ns) / NS for speed in results.speeds],
+        'mean_projected_speed': [_known(speed.mean_projected_speed) for speed in results.speeds],
         'mean_projected_speed_error': [
-            _known(one.mean_projected_speed_error) for one in results.speeds
+            _known(speed.mean_projected_speed_error) for speed in results.speeds
         ],
-        'first_species_speed': [_known(one.first_species_speed) for one in results.speeds],
-        'second_species_speed': [_known(one.second_species_speed) for one in results.speeds],
-        'method': [one.method.name.lower() for one in results.speeds],
-        'quality': [one.quality.names() for one in results.speeds],
+        'first_species_speed': [_known(speed.first_species_speed) for speed in results.speeds],
+        'second_species_speed': [_known(speed.second_species_speed) for speed in results.speeds],
+        'method': [speed.method.name.lower() for speed in results.speeds],
+        'quality': [speed.quality.names() for speed in results.speeds],
     }
 
 
@@ -105,12 +109,12 @@ def _ends_of_cycles(
 ) -> dict[int, list[tuple[int, ClusterEstimate]]]:
     """Of each cycle, and every time it was played: stamp of the first estimate, and the last."""
     found: dict[int, list[tuple[int, ClusterEstimate]]] = {}
-    for one in clusters:
-        parts = found.setdefault(one.cycle, [])
-        if parts and one.stamp_ns > parts[-1][1].stamp_ns:
-            parts[-1] = parts[-1][0], one
+    for cluster in clusters:
+        parts = found.setdefault(cluster.cycle, [])
+        if parts and cluster.stamp_ns > parts[-1][1].stamp_ns:
+            parts[-1] = parts[-1][0], cluster
         else:
-            parts.append((one.stamp_ns, one))
+            parts.append((cluster.stamp_ns, cluster))
     return found
 
 

@@ -69,12 +69,12 @@ def write_tracks(path: Path, found: TrackedBag) -> None:
         write_parquet(path, COLUMNS, _pieces(found), _provenance(found))
         return
     with whole_file(path) as part, part.open('w', encoding='utf-8', newline='') as stream:
-        units = ', '.join(f'{one.name} [{one.unit}]' for one in COLUMNS if one.unit)
+        units = ', '.join(f'{column.name} [{column.unit}]' for column in COLUMNS if column.unit)
         stream.write(f'# {units}\n')
         writer = csv.writer(stream, lineterminator='\n')
-        writer.writerow([one.name for one in COLUMNS])
+        writer.writerow([column.name for column in COLUMNS])
         for piece in _pieces(found):
-            columns = [_as_text(piece[one.name]) for one in COLUMNS]
+            columns = [_as_text(piece[column.name]) for column in COLUMNS]
             writer.writerows(zip(*columns, strict=True))
 
 
@@ -109,8 +109,8 @@ def _rows(tracks: Tracks, frame: int, found: TrackedBag) -> dict[str, NDArray[An
 
 def _as_text(values: NDArray[Any]) -> list[str]:
     if values.dtype.kind != 'f':
-        return [str(one) for one in values.tolist()]
-    return ['' if one != one else f'{one:.{_DIGITS}g}' for one in values.tolist()]
+        return [str(value) for value in values.tolist()]
+    return ['' if value != value else f'{value:.{_DIGITS}g}' for value in values.tolist()]
 
 
 def _provenance(found: TrackedBag) -> str:

@@ -118,16 +118,16 @@ class Batch:
     @property
     def counted(self) -> list[BagResults]:
         """Each recording once."""
-        return [one for one in self.results if not one.twin]
+        return [result for result in self.results if not result.twin]
 
 
 def told(results: Sequence[BagResults]) -> list[str]:
     """What is to be said of recordings, the same of many in one line."""
     found: dict[str, list[BagResults]] = {}
-    for one in results:
-        for text in one.notes:
-            what = text.removeprefix(one.name).lstrip(':/ ')
-            found.setdefault(what, []).append(one)
+    for result in results:
+        for text in result.notes:
+            what = text.removeprefix(result.name).lstrip(':/ ')
+            found.setdefault(what, []).append(result)
     lines = []
     for what, own in found.items():
         if len(own) > _MOST_ALIKE:
@@ -223,7 +223,7 @@ def _size(path: Path) -> int:
 
 
 def _kept(store: BatchStore) -> str:
-    done = sum(one.outcome.state in (DONE, PARTIAL) for one in store.entries.values())
+    done = sum(entry.outcome.state in (DONE, PARTIAL) for entry in store.entries.values())
     return (
         f'{done} of {len(store.entries)} recordings are done and kept in {store.folder}; the same '
         'command goes on from there'

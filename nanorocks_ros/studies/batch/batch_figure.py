@@ -88,7 +88,7 @@ def _cycles(folders: Sequence[Path], tray: int) -> list[CycleSpeeds]:
 
 
 def _draw(axes: Axes, means: TrayMeans, cycles: Sequence[CycleSpeeds]) -> None:
-    lines = [np.column_stack((one.times, _MM * one.speed)) for one in cycles]
+    lines = [np.column_stack((cycle.times, _MM * cycle.speed)) for cycle in cycles]
     axes.add_collection(LineCollection(lines, colors='#30506f', linewidths=0.5, alpha=0.35))
     times, speeds = _median(cycles)
     axes.plot(times, _MM * speeds, color='#30506f', lw=2.0, label='median')
@@ -109,8 +109,8 @@ def _draw(axes: Axes, means: TrayMeans, cycles: Sequence[CycleSpeeds]) -> None:
 
 
 def _median(cycles: Sequence[CycleSpeeds]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    times = np.concatenate([one.times for one in cycles])
-    speeds = np.concatenate([one.speed for one in cycles])
+    times = np.concatenate([cycle.times for cycle in cycles])
+    speeds = np.concatenate([cycle.speed for cycle in cycles])
     places = np.digitize(times, _EDGES)
     inside = [k for k in range(1, _EDGES.size) if (places == k).any()]
     return (

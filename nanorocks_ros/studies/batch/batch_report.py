@@ -44,15 +44,15 @@ def write_batch_report(
     RecordingError
         When it cannot be written.
     """
-    frames = sum(one.summary['frames'] for one in batch.results)
-    seconds = sum(one.summary['seconds'] for one in batch.results)
+    frames = sum(result.summary['frames'] for result in batch.results)
+    seconds = sum(result.summary['seconds'] for result in batch.results)
     cycles = len(together.cycles)
     failed = f'; {len(batch.failed)} failed' if batch.failed else ''
     summary = (
         f'nanorocks_ros {__version__}: {counted(len(batch.results), "recording")}, '
         f'{counted(frames, "frame")}, {seconds:.0f} s{failed}. '
         f'{counted(cycles, "cooling cycle")} of '
-        f'{counted(sum(one.cycles > 0 for one in together.trays.values()), "tray")}.'
+        f'{counted(sum(tray.cycles > 0 for tray in together.trays.values()), "tray")}.'
     )
     try:
         with TemporaryDirectory() as scratch:
@@ -79,8 +79,12 @@ def _failures(batch: Batch) -> Section:
             Table(
                 head=('recording', 'why', 'results'),
                 rows=[
-                    (one.name, one.reason, 'of a part of it' if one.analysed else 'none')
-                    for one in batch.failed
+                    (
+                        failure.name,
+                        failure.reason,
+                        'of a part of it' if failure.analysed else 'none',
+                    )
+                    for failure in batch.failed
                 ],
             )
         ],
@@ -118,11 +122,11 @@ def _restitutions(together: Combined) -> Section:
 
 
 def _unread(together: Combined) -> list[str]:
-    return [f'{one}.' for one in together.notices]
+    return [f'{notice}.' for notice in together.notices]
 
 
 def _known(together: Combined) -> list[TrayMeans]:
-    return [one for _, one in sorted(together.trays.items()) if one.cycles]
+    return [tray for _, tray in sorted(together.trays.items()) if tray.cycles]
 
 
 def _together(one: TrayMeans) -> tuple[str, ...]:
@@ -256,7 +260,7 @@ def _recordings(batch: Batch, settings: PipelineSettings) -> Section:
         parts=[
             Table(
                 head=('recording', 'began', 'frames', 'lost', 'seconds', 'cycles', 'complete'),
-                rows=[_recording(one) for one in batch.results],
+                rows=[_recording(result) for result in batch.results],
             )
         ],
     )
@@ -295,8 +299,8 @@ def _date(stamp_ns: int) -> str:
 def _metadata(results: Sequence[BagResults]) -> list[tuple[str, str]]:
     """Entries of all recordings, with the value that most of them have."""
     values: dict[str, list[str]] = {}
-    for one in results:
-        for key, value in one.summary['metadata'].items():
+    for result in results:
+        for key, value in result.summary['metadata'].items():
             values.setdefault(key, []).append(value)
     found = []
     for key, own in values.items():

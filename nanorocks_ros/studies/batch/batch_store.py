@@ -119,11 +119,11 @@ class BatchStore:
 
     def _sweep(self) -> None:
         """What killed workers left."""
-        for one in (*(self.folder / BAGS).glob('.*'), *(self.folder / _NOTES).iterdir()):
-            if one.is_dir() and not one.is_symlink():
-                shutil.rmtree(one, ignore_errors=True)
+        for path in (*(self.folder / BAGS).glob('.*'), *(self.folder / _NOTES).iterdir()):
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
             else:
-                one.unlink(missing_ok=True)
+                path.unlink(missing_ok=True)
 
     def place(self, entry: Entry) -> Path:
         """The folder of the results of a recording."""
@@ -173,9 +173,9 @@ class BatchStore:
         except OSError:
             return ()
         return tuple(
-            self.place(one)
-            for one in self._known.values()
-            if total_size(one.outcome.files) == size and not os.path.lexists(one.path)
+            self.place(entry)
+            for entry in self._known.values()
+            if total_size(entry.outcome.files) == size and not os.path.lexists(entry.path)
         )
 
     def _untouched(self, before: Entry) -> bool:
@@ -207,7 +207,7 @@ class BatchStore:
         found = {}
         for note in (self.folder / _NOTES).glob('*'):
             with suppress(OSError, ValueError):
-                done, total = (int(one) for one in note.read_text('ascii').split())
+                done, total = (int(word) for word in note.read_text('ascii').split())
                 found[note.name] = done, total
         return found
 
@@ -224,7 +224,7 @@ class BatchStore:
             'nanorocks_ros': __version__,
             'image_topic': self._image_topic,
             'settings': {row.name: row.default for row in rows(self._settings)},
-            'bags': [_as_json(one) for one in {**self._known, **self.entries}.values()],
+            'bags': [_as_json(entry) for entry in {**self._known, **self.entries}.values()],
         }
         write_whole(self.folder / MANIFEST, json.dumps(content, indent=1).encode())
 
@@ -232,7 +232,7 @@ class BatchStore:
         path = self.folder / MANIFEST
         try:
             content = json.loads(path.read_text('utf-8'))
-            return {one.path: one for one in map(_from_json, content['bags'])}
+            return {entry.path: entry for entry in map(_from_json, content['bags'])}
         except FileNotFoundError:
             return {}
         except (OSError, ValueError, KeyError, TypeError):
@@ -240,14 +240,14 @@ class BatchStore:
             return self._from_folders()
 
     def _from_folders(self) -> dict[Path, Entry]:
-        found = {}
+        entries = {}
         for place in sorted((self.folder / BAGS).glob(f'*/{SUMMARY}')):
             summary = read_summary(place.parent)
             if summary is not None:
                 path = Path(summary['bag'])
                 outcome = BagOutcome(state=_WAITING)
-                found[path] = Entry(path=path, folder=place.parent.name, outcome=outcome)
-        return found
+                entries[path] = Entry(path=path, folder=place.parent.name, outcome=outcome)
+        return entries
 
 
 def _question(settings: PipelineSettings, image_topic: str) -> str:
@@ -283,7 +283,7 @@ def _as_json(entry: Entry) -> dict[str, Any]:
         'state': outcome.state,
         'reason': outcome.reason,
         'content': outcome.content,
-        'files': [list(one) for one in outcome.files],
+        'files': [list(file) for file in outcome.files],
     }
 
 

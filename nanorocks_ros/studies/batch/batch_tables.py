@@ -65,10 +65,11 @@ def write_tables(combined: Combined, folder: Path, kind: str, provenance: str) -
         When they cannot be written.
     """
     cycles = [
-        {'recording': one.recording, 'tray': one.tray, **one.values} for one in combined.cycles
+        {'recording': cycle.recording, 'tray': cycle.tray, **cycle.values}
+        for cycle in combined.cycles
     ]
     trays = [
-        {'tray': number, **means_as_json(one)} for number, one in sorted(combined.trays.items())
+        {'tray': number, **means_as_json(tray)} for number, tray in sorted(combined.trays.items())
     ]
     paths = []
     for name, rows, columns in (
@@ -81,7 +82,9 @@ def write_tables(combined: Combined, folder: Path, kind: str, provenance: str) -
             values = [[_cell(row.get(column)) for column in columns] for row in rows]
             write_csv(path, columns, list(units.values()), values)
         else:
-            kinds = [Column(name=one, kind=_kind(one), unit=units[one]) for one in columns]
+            kinds = [
+                Column(name=column, kind=_kind(column), unit=units[column]) for column in columns
+            ]
             write_parquet(path, kinds, [_arrays(kinds, rows)], provenance)
         paths.append(path)
     return paths
@@ -91,7 +94,7 @@ def _unit(column: str, size: str) -> str:
     if column in _TEXTS:
         return 'name'
     base = column.removeprefix('mean_').removesuffix('_scatter').removesuffix('_error')
-    known = {one.name: one.unit for one in layout(CorEstimate).fields}
+    known = {field.name: field.unit for field in layout(CorEstimate).fields}
     if base == 'cluster_size':
         return size
     return _UNITS.get(base) or known.get(base) or '1'
@@ -109,9 +112,12 @@ def _arrays(columns: Sequence[Column], rows: Sequence[Mapping[str, Any]]) -> dic
     types = {'text': np.str_, 'i4': np.int32, 'f8': np.float64}
     empty = {'text': '', 'i4': 0, 'f8': np.nan}
     return {
-        one.name: np.array(
-            [empty[one.kind] if row.get(one.name) is None else row[one.name] for row in rows],
-            dtype=types[one.kind],
+        column.name: np.array(
+            [
+                empty[column.kind] if row.get(column.name) is None else row[column.name]
+                for row in rows
+            ],
+            dtype=types[column.kind],
         )
-        for one in columns
+        for column in columns
     }

@@ -200,7 +200,7 @@ def _summary(analysis: Analysis) -> dict[str, Any]:
     error = analysis.error
     return {
         **found,
-        'notices': [shown(one) for one in analysis.notices],
+        'notices': [shown(notice) for notice in analysis.notices],
         'state': DONE if error is None else PARTIAL,
         'reason': '' if error is None else shown(str(error)),
         'start_ns': min(analysis.stamps_ns),
@@ -219,12 +219,12 @@ def _cycles(folder: Path, tray: int) -> dict[str, list[dict[str, Any]]]:
     for measure in SIZE_MEASURES:
         cycles = cycles_of(folder, tray, measure)
         if measure is SIZE_MEASURES[-1] or _any_size(cycles):
-            found[measure.column] = [_finite(one) for one in cycles]
+            found[measure.column] = [_finite(cycle) for cycle in cycles]
     return found
 
 
 def _any_size(cycles: list[CycleSummary]) -> bool:
-    return any(np.isfinite(one.cluster_size) for one in cycles)
+    return any(np.isfinite(cycle.cluster_size) for cycle in cycles)
 
 
 def _finite(cycle: CycleSummary) -> dict[str, Any]:

@@ -130,12 +130,12 @@ def combined(
     """
     notices: list[str] = []
     column, unit = _measure(results)
-    rows = [row for one in results for row in _rows(one, column)]
+    rows = [row for result in results for row in _rows(result, column)]
     evidence, sticking = _added_up(results, notices, progress)
     trays: dict[int, TrayMeans] = {}
     settings = calibrated(settings)
     for number, tray in trays_of(settings).items():
-        own = [one for one in rows if one.tray == number]
+        own = [row for row in rows if row.tray == number]
         stages = TrayStages(settings, tray)
         mean = None
         if number in evidence:
@@ -145,7 +145,7 @@ def combined(
                 notices.append(str(error))
         trays[number] = TrayMeans(
             tray=number,
-            recordings=len({one.recording for one in own}),
+            recordings=len({row.recording for row in own}),
             cycles=len(own),
             restitution=mean,
             sticking=stages.clusters.together(sticking.get(number, [])),
@@ -168,14 +168,14 @@ def _measure(results: Sequence[BagResults]) -> tuple[str, str]:
     last = SIZE_MEASURES[-1]
     trays = [
         tray['by_cycle']
-        for one in results
-        for tray in one.summary['trays'].values()
+        for result in results
+        for tray in result.summary['trays'].values()
         if tray['by_cycle'].get(last.column)
         and not any(cycle['quality'] & Quality.WRONG_SCALE for cycle in tray['cycles'])
     ]
-    for one in SIZE_MEASURES:
-        if trays and all(one.column in tray for tray in trays):
-            return one.column, one.unit
+    for measure in SIZE_MEASURES:
+        if trays and all(measure.column in tray for tray in trays):
+            return measure.column, measure.unit
     return last.column, last.unit
 
 
@@ -196,10 +196,10 @@ def _rows(one: BagResults, column: str) -> Iterable[CycleRow]:
 
 
 def _mean(rows: Sequence[CycleRow], name: str) -> Mean:
-    values = [one.values for one in rows]
+    values = [row.values for row in rows]
     if name in _FITTED:
-        values = [one for one in values if _fitted(one, name)]
-    mean, scatter, count = mean_of([one.get(name) for one in values])
+        values = [value for value in values if _fitted(value, name)]
+    mean, scatter, count = mean_of([value.get(name) for value in values])
     error = scatter / math.sqrt(count) if count else math.nan
     return Mean(mean=mean, error=error, scatter=scatter, cycles=count)
 
@@ -217,19 +217,19 @@ def _added_up(
     """One recording after the other: never more than one of them in memory."""
     evidence: dict[int, Evidence] = {}
     sticking: dict[int, list[StickingCycle]] = {}
-    for done, one in enumerate(results, start=1):
+    for done, result in enumerate(results, start=1):
         try:
-            arrays = read_archive(one.folder / EVIDENCE)
-            for number in map(int, one.summary['trays']):
+            arrays = read_archive(result.folder / EVIDENCE)
+            for number in map(int, result.summary['trays']):
                 own = _below(arrays, f'{number}/cor/')
                 if own:
-                    found = Evidence.from_arrays(own, str(one.folder / EVIDENCE))
+                    found = Evidence.from_arrays(own, str(result.folder / EVIDENCE))
                     evidence[number] = evidence[number] + found if number in evidence else found
                 sticking.setdefault(number, []).extend(_sticking(arrays, number))
         except (RecordingError, FitError, ValueError) as error:
             notices.append(
-                f'{one.name}: is not part of what all cycles say together ({error}); delete '
-                f'{one.folder} and run the command again'
+                f'{result.name}: is not part of what all cycles say together ({error}); delete '
+                f'{result.folder} and run the command again'
             )
         if progress is not None:
             progress(done, len(results))
@@ -245,20 +245,20 @@ def _sticking(arrays: Mapping[str, NDArray[Any]], number: int) -> list[StickingC
     for name, values in _below(arrays, f'{number}/sticking/').items():
         cycle, _, what = name.partition('/')
         found.setdefault(cycle, {})[what] = values
-    names = {one.name for one in fields(StickingCycle)}
+    names = {field.name for field in fields(StickingCycle)}
     return [StickingCycle(**found[cycle]) for cycle in sorted(found) if names == {*found[cycle]}]
 
 
 def _campaign(results: Sequence[BagResults], column: str) -> Campaign | None:
     measure = next(one for one in SIZE_MEASURES if one.column == column)
     recordings = []
-    for one in results:
+    for result in results:
         own = {
             int(number): [
-                replace(_cycle(cycle), recording=one.name)
+                replace(_cycle(cycle), recording=result.name)
                 for cycle in tray['by_cycle'].get(column, [])
             ]
-            for number, tray in one.summary['trays'].items()
+            for number, tray in result.summary['trays'].items()
         }
         recordings.append(own)
     if not any(cycles for own in recordings for cycles in own.values()):

@@ -117,9 +117,11 @@ def calibrate_area(
             pictures[image.tray].append(_picture(image))
             numbers[image.tray].append(shot.number)
             records = estimators[image.tray].push(image)
-            speeds[image.tray] += [one for one in records if isinstance(one, SpeedEstimate)]
+            speeds[image.tray] += [
+                record for record in records if isinstance(record, SpeedEstimate)
+            ]
     scale = images.settings.preprocess.pixels_per_metre
-    found = AreaCalibration(notices=images.notices)
+    calibration = AreaCalibration(notices=images.notices)
     for number, tray in images.trays.items():
         marks = manual_reference(
             manual,
@@ -132,8 +134,8 @@ def calibrate_area(
         )
         if marks:
             by_hand = _manual_speeds(marks, pictures[number], tray, scale)
-            _fit(found, tray, speeds[number], by_hand)
-    return _checked(found)
+            _fit(calibration, tray, speeds[number], by_hand)
+    return _checked(calibration)
 
 
 def _checked(found: AreaCalibration) -> AreaCalibration:
@@ -233,23 +235,23 @@ def _pairs(
     pairs: list[SpeedPair] = []
     full = 0
     last_end = -np.inf
-    for one in speeds if by_hand else ():
-        near = by_hand[int(np.abs(middles - one.stamp_ns).argmin())]
-        half = 0.5 * max(one.window, near.window) * NS
+    for speed in speeds if by_hand else ():
+        near = by_hand[int(np.abs(middles - speed.stamp_ns).argmin())]
+        half = 0.5 * max(speed.window, near.window) * NS
         # Beads at rest tell the jitter of the hand, not a speed.
         moving = near.mean_projected_speed > _MOVING * near.mean_projected_speed_error
-        beside = abs(near.stamp_ns - one.stamp_ns) <= half
-        if not (moving and beside) or one.stamp_ns - half < last_end:
+        beside = abs(near.stamp_ns - speed.stamp_ns) <= half
+        if not (moving and beside) or speed.stamp_ns - half < last_end:
             continue
-        last_end = one.stamp_ns + half
-        if not np.isfinite(one.mean_projected_speed):
+        last_end = speed.stamp_ns + half
+        if not np.isfinite(speed.mean_projected_speed):
             full += 1
             continue
         pairs.append(
             SpeedPair(
-                stamp_ns=one.stamp_ns,
-                area_speed=one.mean_projected_speed,
-                area_speed_error=one.mean_projected_speed_error,
+                stamp_ns=speed.stamp_ns,
+                area_speed=speed.mean_projected_speed,
+                area_speed_error=speed.mean_projected_speed_error,
                 manual_speed=near.mean_projected_speed,
                 manual_speed_error=near.mean_projected_speed_error,
                 beads=near.beads,

@@ -49,12 +49,12 @@ def area_figure(path: Path, fits: Mapping[int, AreaFit]) -> None:
 
 
 def _draw(axes: Axes, number: int, fit: AreaFit) -> None:
-    area = _MM * np.array([one.area_speed for one in fit.pairs])
+    area = _MM * np.array([pair.area_speed for pair in fit.pairs])
     axes.errorbar(
         area,
-        [_MM * one.manual_speed for one in fit.pairs],
-        xerr=[_MM * one.area_speed_error for one in fit.pairs],
-        yerr=[_MM * one.manual_speed_error for one in fit.pairs],
+        [_MM * pair.manual_speed for pair in fit.pairs],
+        xerr=[_MM * pair.area_speed_error for pair in fit.pairs],
+        yerr=[_MM * pair.manual_speed_error for pair in fit.pairs],
         fmt='o',
         ms=4,
         lw=0.8,

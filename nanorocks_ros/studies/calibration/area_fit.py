@@ -86,12 +86,12 @@ class AreaFit:
     @property
     def slowest(self) -> float:
         """Slowest manual speed, [m/s]."""
-        return min(one.manual_speed for one in self.pairs)
+        return min(pair.manual_speed for pair in self.pairs)
 
     @property
     def fastest(self) -> float:
         """Fastest manual speed, [m/s]."""
-        return max(one.manual_speed for one in self.pairs)
+        return max(pair.manual_speed for pair in self.pairs)
 
 
 def fit_area(pairs: Sequence[SpeedPair], beads: int, where: str) -> AreaFit:
@@ -115,8 +115,8 @@ def fit_area(pairs: Sequence[SpeedPair], beads: int, where: str) -> AreaFit:
         raise FitError(
             where, f'the tracks cover {len(pairs)} windows, {_FEWEST} are needed', _REMEDY
         )
-    area = np.array([one.area_speed for one in pairs])
-    manual = np.array([one.manual_speed for one in pairs])
+    area = np.array([pair.area_speed for pair in pairs])
+    manual = np.array([pair.manual_speed for pair in pairs])
     with_offset = len(pairs) >= _FEWEST_FOR_OFFSET and area.max() >= _LEAST_RANGE * area.min()
     design = np.stack((area, np.ones_like(area)), axis=1)[:, : 1 + with_offset]
     found = np.array([float(manual.sum() / max(area.sum(), 1e-12)), 0.0])[: 1 + with_offset]
@@ -147,9 +147,9 @@ def _variances(
     pairs: Sequence[SpeedPair], expected: NDArray[np.float64], factor: float, beads: int
 ) -> NDArray[np.float64]:
     """Of the manual speed less the calibrated one, [m^2/s^2]."""
-    measured = np.array([one.manual_speed_error for one in pairs])
+    measured = np.array([pair.manual_speed_error for pair in pairs])
     sample = expected * _sample_spread(pairs, beads)
-    by_area = factor * np.array([one.area_speed_error for one in pairs])
+    by_area = factor * np.array([pair.area_speed_error for pair in pairs])
     return np.asarray(measured**2 + sample**2 + by_area**2 + 1e-18)
 
 
@@ -158,7 +158,7 @@ def _sample_spread(pairs: Sequence[SpeedPair], beads: int) -> NDArray[np.float64
 
     It is usually the same beads that are marked throughout, so more windows do not make it less.
     """
-    marked = np.minimum(np.array([one.beads for one in pairs]), beads)
+    marked = np.minimum(np.array([pair.beads for pair in pairs]), beads)
     return np.asarray(_RAYLEIGH_SPREAD * np.sqrt((1.0 - marked / beads) / marked))
 
 

@@ -94,7 +94,7 @@ def still_picture(frames: BagFrames) -> NDArray[np.uint8]:
     if not pictures:
         raise RecordingError(frames.where, 'holds no frame that can be used', 'pass another')
     size = pictures[0].shape
-    stack = [one for one in pictures if one.shape == size]
+    stack = [picture for picture in pictures if picture.shape == size]
     median = np.empty(size, dtype=np.uint8)
     # Some rows at a time: all at once would take gigabytes.
     for row in range(0, size[0], 64):

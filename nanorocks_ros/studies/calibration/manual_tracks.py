@@ -168,7 +168,7 @@ def _number_rows(lines: Sequence[tuple[int, str]], where: str) -> Iterable[_Row]
     started = False
     for number, line in lines:
         try:
-            values = [float(one) for one in _cells(line) if one]
+            values = [float(cell) for cell in _cells(line) if cell]
         except ValueError as error:
             if not started:
                 continue

@@ -98,7 +98,7 @@ class PlateModel:
     def __init__(self, trays: Sequence[Tray], size: tuple[int, int], guess: PlateGuess) -> None:
         self.trays = trays
         self.size = size
-        self._order = {one.number: k for k, one in enumerate(trays)}
+        self._order = {tray.number: k for k, tray in enumerate(trays)}
         self._boxes = np.array(list(plate_places(trays).values()))
         self.values = np.zeros(_COMMON + 4 * len(trays))
         middle = 0.5 * np.array(size)
@@ -150,7 +150,7 @@ class PlateModel:
 
     def residuals(self, values: NDArray[np.float64], edges: Edges) -> NDArray[np.float64]:
         """Distance of each edge from where it should be, [px]."""
-        order = np.array([self._order[one] for one in edges.trays])
+        order = np.array([self._order[tray] for tray in edges.trays])
         boxes = self._boxes + values[_COMMON:].reshape(-1, 4) * _TOLERANCE
         boxes = boxes + values[_WALL] * _OUTWARDS
         own = boxes[order]
@@ -226,7 +226,7 @@ def fit_plate(
         calibration=_calibration(model, float(np.sqrt(np.mean(residuals**2)))),
         edges=edges,
         residuals=residuals,
-        tray_scales={one.number: _local_scale(model, one) for one in trays},
+        tray_scales={tray.number: _local_scale(model, tray) for tray in trays},
     )
 
 

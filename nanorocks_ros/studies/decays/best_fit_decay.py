@@ -144,6 +144,6 @@ def _matched(
     def misfit(log_initial: float) -> float:
         return float(np.sum((np.log(speed) - log_speed(log_initial)) ** 2))
 
-    bounds = tuple(float(np.log(speed[0])) + one for one in _LEADS)
+    bounds = tuple(float(np.log(speed[0])) + lead for lead in _LEADS)
     best = optimize.minimize_scalar(misfit, bounds=bounds, method='bounded').x
     return np.exp(log_speed(float(best))), math.exp(float(best))

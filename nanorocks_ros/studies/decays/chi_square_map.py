@@ -77,7 +77,7 @@ def chi_square(sweep: Sweep, curve: SpeedCurve, *, scaled: bool = False) -> NDAr
         found: NDArray[np.float64] = weigh(sweep.mean_projected_speed[..., covered] - measured)
         return found
     scales = np.geomspace(1.0 / most, most, _SCALES)
-    every = [weigh(_scaled(sweep, times[covered], one) - measured) for one in scales]
+    every = [weigh(_scaled(sweep, times[covered], scale) - measured) for scale in scales]
     if int(np.argmin(np.min(np.reshape(every, (_SCALES, -1)), axis=1))) in (0, _SCALES - 1):
         raise ConfigurationError(
             '--reference',

@@ -210,9 +210,9 @@ def mean_cycle(
     RecordingError
         When the cycles have fewer than 4 times in common between these ends.
     """
-    start = max(first, *(one.times[0] for one in cycles), 0.0)
-    end = min(last, *(one.times[-1] for one in cycles), math.inf)
-    step = float(np.median(np.concatenate([np.diff(one.times) for one in cycles])))
+    start = max(first, *(cycle.times[0] for cycle in cycles), 0.0)
+    end = min(last, *(cycle.times[-1] for cycle in cycles), math.inf)
+    step = float(np.median(np.concatenate([np.diff(cycle.times) for cycle in cycles])))
     count = int((end - start) / step + 1e-6) + 1 if end >= start else 0
     if count < _FEWEST:
         raise RecordingError(
@@ -221,8 +221,8 @@ def mean_cycle(
             'choose a longer time, or leave out short cycles',
         )
     times = start + step * np.arange(count)
-    speeds = [np.interp(times, one.times, one.speed) for one in cycles]
-    errors = [np.interp(times, one.times, one.error) for one in cycles]
+    speeds = [np.interp(times, cycle.times, cycle.speed) for cycle in cycles]
+    errors = [np.interp(times, cycle.times, cycle.error) for cycle in cycles]
     return SpeedCurve(
         times=times,
         speed=np.mean(speeds, axis=0),

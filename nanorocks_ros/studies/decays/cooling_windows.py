@@ -54,7 +54,7 @@ def cooling_window(speeds: Path) -> CoolingWindow | None:
         with path.open(encoding='utf-8', newline='') as stream:
             header, *lines = [line for line in csv.reader(stream) if line]
         names = [name.split('[')[0].strip() for name in header]
-        rows = np.array([[float(line[names.index(one)]) for one in _FIELDS] for line in lines])
+        rows = np.array([[float(line[names.index(field)]) for field in _FIELDS] for line in lines])
     except (OSError, ValueError, IndexError, csv.Error):
         return None
     if rows.ndim != 2:

@@ -75,7 +75,7 @@ def species_energies(
     tuple of SpeciesEnergy
         Empty where speeds of two species are not known over that time.
     """
-    found = []
+    energies = []
     for species, own in zip(tray.species, cycles, strict=False):
         try:
             curve = mean_cycle(own, *span)
@@ -87,8 +87,8 @@ def species_energies(
             fit: HaffFit | None = fit_haff(curve.times - origin, curve.speed, curve.error, beads)
         except FitError:
             fit = None
-        found.append(SpeciesEnergy(species=species, cycles=tuple(own), curve=curve, fit=fit))
-    return tuple(found) if len(found) > 1 else ()
+        energies.append(SpeciesEnergy(species=species, cycles=tuple(own), curve=curve, fit=fit))
+    return tuple(energies) if len(energies) > 1 else ()
 
 
 def relative_energy(speed: float, mass: float) -> float:
@@ -112,7 +112,7 @@ def energy_ratio(found: Sequence[SpeciesEnergy]) -> tuple[float, float]:
         Mean over the time all cycles cover; the error is from the scatter of the cycles, NaN for
         a single one.
     """
-    first, second = (_log_energies(one) for one in found[:2])
+    first, second = (_log_energies(energy) for energy in found[:2])
     ratio = math.exp(float(first.mean() - second.mean()))
     if first.size != second.size or first.size < 2:
         return ratio, math.nan
@@ -122,7 +122,7 @@ def energy_ratio(found: Sequence[SpeciesEnergy]) -> tuple[float, float]:
 def _log_energies(one: SpeciesEnergy) -> NDArray[np.float64]:
     """Mean over the times of the logarithm of the energy in each cycle, (n_cycles,)."""
     times = one.curve.times
-    logs = [np.log(np.interp(times, each.times, each.speed)).mean() for each in one.cycles]
+    logs = [np.log(np.interp(times, cycle.times, cycle.speed)).mean() for cycle in one.cycles]
     return math.log(relative_energy(1.0, one.species.bead_mass)) + 2.0 * np.array(logs)
 
 
@@ -134,13 +134,13 @@ def species_values(found: Sequence[SpeciesEnergy]) -> dict[str, Any]:
     return {
         'species': [
             {
-                'material': one.species.material,
-                'initial_speed': one.fit and one.fit.initial_speed,
-                'initial_speed_error': one.fit and one.fit.initial_speed_error,
-                'haff_time': one.fit and one.fit.haff_time,
-                'haff_time_error': one.fit and one.fit.haff_time_error,
+                'material': energy.species.material,
+                'initial_speed': energy.fit and energy.fit.initial_speed,
+                'initial_speed_error': energy.fit and energy.fit.initial_speed_error,
+                'haff_time': energy.fit and energy.fit.haff_time,
+                'haff_time_error': energy.fit and energy.fit.haff_time_error,
             }
-            for one in found
+            for energy in found
         ],
         'energy_ratio': ratio,
         'energy_ratio_error': error if math.isfinite(error) else None,
@@ -149,9 +149,9 @@ def species_values(found: Sequence[SpeciesEnergy]) -> dict[str, Any]:
 
 def draw_species(axes: Axes, found: Sequence[SpeciesEnergy], origin: float = 0.0) -> None:
     """Energies of both species over time, each in its colour with its fit."""
-    for one, line in zip(found, ('-', '--'), strict=False):
-        curve, fit, name = one.curve, one.fit, one.species.material
-        scale = relative_energy(1.0, one.species.bead_mass) * _NANOJOULE
+    for energy, line in zip(found, ('-', '--'), strict=False):
+        curve, fit, name = energy.curve, energy.fit, energy.species.material
+        scale = relative_energy(1.0, energy.species.bead_mass) * _NANOJOULE
         colour = np.array(COLOURS.get(name, _UNKNOWN))[::-1] / _MOST_GRAY
         axes.errorbar(
             curve.times,
@@ -175,7 +175,7 @@ def draw_species(axes: Axes, found: Sequence[SpeciesEnergy], origin: float = 0.0
             label=f'{name}: {_fit_text(fit)}',
         )
     ratio, error = energy_ratio(found)
-    names = ' bead over that of one '.join(one.species.material for one in found)
+    names = ' bead over that of one '.join(energy.species.material for energy in found)
     spread = f' ± {error:.2f}' if math.isfinite(error) else ''
     axes.set_title(f'Energy of one {names} bead: {ratio:.2f}{spread}', fontsize=10)
     axes.set_yscale('log')

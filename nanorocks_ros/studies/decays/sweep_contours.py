@@ -78,14 +78,14 @@ def contours(sweep: Sweep, curve: SpeedCurve) -> tuple[Contour, ...]:
     except (ConfigurationError, FitError):
         return ()
     (axis,) = (one for one in sweep.axes if one.name == other)
-    ends = [float(one) for one in axis.values]
+    ends = [float(value) for value in axis.values]
     values = np.linspace(min(ends), max(ends), _STEPS)
     if other == _WALLS:
         fixed = float(settings[_WIDTH])
-        ours = [_restitution(gas, rate, float(one), fixed) for one in values]
+        ours = [_restitution(gas, rate, float(value), fixed) for value in values]
     else:
         fixed = float(settings[_WALLS])
-        ours = [_restitution(gas, rate, fixed, float(one)) for one in values]
+        ours = [_restitution(gas, rate, fixed, float(value)) for value in values]
     theirs = _paper(tray, rate, values if other == _WALLS else np.ones_like(values))
     return (
         Contour(label=f'confined theory, {rate:.3g} /m', restitution=np.array(ours), other=values),
@@ -107,7 +107,7 @@ def _paper(tray: Tray, rate: float, walls: NDArray[np.float64]) -> NDArray[np.fl
         )
     except FitError:
         return np.full(walls.size, np.nan)
-    return np.array([ellipse.restitution(float(one)) for one in walls])
+    return np.array([ellipse.restitution(float(wall)) for wall in walls])
 
 
 def reference_rate(sweep: Sweep, curve: SpeedCurve, tray: Tray) -> float:

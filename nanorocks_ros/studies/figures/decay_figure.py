@@ -103,8 +103,8 @@ def decay_figure(
     _draw_laws(panels[0], tray, (curve.times, age), (fit, energy, time), found)
     _draw_library(panels[0], tray, library)
     panels[0].legend(frameon=False, fontsize=9)
-    for one in panels[1:]:
-        draw_species(one, each, origin)
+    for panel in panels[1:]:
+        draw_species(panel, each, origin)
     panels[-1].set_xlabel('time since the shaking event [s]')
     panels[0].set_title(
         f'Tray {tray.number}, {len(cycles)} cycle{"s" if len(cycles) > 1 else ""}: '
@@ -246,7 +246,7 @@ def _cor_text(name: str, found: dict[str, float | None], key: str) -> str:
 def _draw_energy(axes: Axes, tray: Tray, cycles: Sequence[CycleSpeeds], curve: SpeedCurve) -> None:
     scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
     if len(cycles) > 1:
-        lines = [np.column_stack((one.times, scale * one.speed**2)) for one in cycles]
+        lines = [np.column_stack((cycle.times, scale * cycle.speed**2)) for cycle in cycles]
         axes.add_collection(
             LineCollection(
                 lines,

@@ -51,7 +51,7 @@ def cooling_figure(
     """
     figure = Figure(figsize=(8.0, 7.5), layout='constrained')
     energy, convergence = figure.subplots(2, 1, height_ratios=(3, 2), sharex=True)
-    start_ns = next(one.cycle_start_ns for one in speeds if one.cycle_start_ns is not None)
+    start_ns = next(speed.cycle_start_ns for speed in speeds if speed.cycle_start_ns is not None)
     _draw_energy(energy, tray, (speeds, cors, truth), start_ns)
     _draw_convergence(convergence, cors, truth, start_ns)
     figure.savefig(path, dpi=110)
@@ -78,10 +78,10 @@ def _draw_energy(
             alpha=0.6,
             label='truth (simulator)',
         )
-    time = np.array([(one.stamp_ns - start_ns) / NS for one in speeds])
+    time = np.array([(speed.stamp_ns - start_ns) / NS for speed in speeds])
     axes.plot(
         time,
-        energy([one.mean_projected_speed for one in speeds]),
+        energy([speed.mean_projected_speed for speed in speeds]),
         'o',
         ms=3.5,
         color=_MEASURED,
@@ -110,13 +110,13 @@ def _draw_energy(
 def _draw_convergence(
     axes: Axes, cors: Sequence[CorEstimate], truth: Sequence[GroundTruth], start_ns: int
 ) -> None:
-    known = [one for one in cors if one.status is not CorStatus.NO_DECAY]
+    known = [cor for cor in cors if cor.status is not CorStatus.NO_DECAY]
     by_paper = bool(cors) and cors[-1].relation is CorRelation.PAPER
-    time = [(one.stamp_ns - start_ns) / NS for one in known]
+    time = [(estimate.stamp_ns - start_ns) / NS for estimate in known]
     axes.fill_between(
         time,
-        [one.restitution_lower for one in known],
-        [one.restitution_upper for one in known],
+        [estimate.restitution_lower for estimate in known],
+        [estimate.restitution_upper for estimate in known],
         color=_FIT,
         alpha=0.2,
         lw=0,
@@ -124,7 +124,7 @@ def _draw_convergence(
     )
     axes.plot(
         time,
-        [one.restitution for one in known],
+        [estimate.restitution for estimate in known],
         '-o',
         ms=3,
         color=_FIT,
@@ -143,7 +143,7 @@ def _draw_convergence(
     if not by_paper:
         axes.plot(
             time,
-            [one.paper_restitution for one in known],
+            [estimate.paper_restitution for estimate in known],
             ':',
             lw=1.2,
             color=_MEASURED,

@@ -109,7 +109,7 @@ def dust_figure(path: Path, points: Sequence[MeasuredThreshold]) -> dict[str, An
     _draw_points(axes, points)
     axes.set_xscale('log')
     axes.set_yscale('log')
-    axes.set_xlim(*(_MG * one for one in _MASSES))
+    axes.set_xlim(*(_MG * mass for mass in _MASSES))
     axes.set_ylim(0.02, 2000.0)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter('{x:g}')
@@ -120,7 +120,7 @@ def dust_figure(path: Path, points: Sequence[MeasuredThreshold]) -> dict[str, An
     axes.grid(alpha=0.25)
     with whole_file(path) as part:
         figure.savefig(part, dpi=110)
-    return {'points': [_as_dict(one) for one in points], 'curves': _curves_as_dict()}
+    return {'points': [_as_dict(point) for point in points], 'curves': _curves_as_dict()}
 
 
 def _as_dict(point: MeasuredThreshold) -> dict[str, Any]:
@@ -141,14 +141,14 @@ def _as_dict(point: MeasuredThreshold) -> dict[str, Any]:
 def _curves_as_dict() -> list[dict[str, Any]]:
     return [
         {
-            'name': one.name,
-            'mass': one.mass,
-            'speed': one.speed,
-            'exponent': one.exponent,
-            'source': one.source,
-            'verified': one.verified,
+            'name': curve.name,
+            'mass': curve.mass,
+            'speed': curve.speed,
+            'exponent': curve.exponent,
+            'source': curve.source,
+            'verified': curve.verified,
         }
-        for one in CURVES
+        for curve in CURVES
     ]
 
 
@@ -189,7 +189,7 @@ def _draw_published(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
         lw=1.2,
         label=f'aggregates of a millimetre always stick below: {STICKING_SEEN.source}',
     )
-    middle = np.exp(np.mean(np.log([(one.mass, one.speed) for one in points]), axis=0))
+    middle = np.exp(np.mean(np.log([(point.mass, point.speed) for point in points]), axis=0))
     ends = middle[0] * np.array([1.0 / _SLOPE_SPAN, _SLOPE_SPAN])
     axes.plot(
         _MG * ends,
@@ -203,14 +203,14 @@ def _draw_published(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
 
 def _draw_points(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
     labelled: set[str] = set()
-    for one in points:
-        of_paper = one.source == PAPER_SOURCE
+    for point in points:
+        of_paper = point.source == PAPER_SOURCE
         colour = _PAPER if of_paper else _MEASURED
         axes.errorbar(
-            _MG * one.mass,
-            _MM * one.speed,
-            xerr=_MG * np.array([[one.mass - one.lightest], [one.heaviest - one.mass]]),
-            yerr=_MM * np.array([[one.speed - one.lower], [one.upper - one.speed]]),
+            _MG * point.mass,
+            _MM * point.speed,
+            xerr=_MG * np.array([[point.mass - point.lightest], [point.heaviest - point.mass]]),
+            yerr=_MM * np.array([[point.speed - point.lower], [point.upper - point.speed]]),
             fmt='D' if of_paper else 'o',
             ms=7,
             mec='black',
@@ -220,14 +220,16 @@ def _draw_points(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
             elinewidth=0.8,
             capsize=2,
             zorder=5,
-            label=None if one.source in labelled else f'{one.source} (bar: masses in the tray)',
+            label=None
+            if point.source in labelled
+            else f'{point.source} (bar: masses in the tray)',
         )
-        labelled.add(one.source)
-        above = one.speed == max(other.speed for other in points)
-        left = one.mass == min(other.mass for other in points) and not above
+        labelled.add(point.source)
+        above = point.speed == max(other.speed for other in points)
+        left = point.mass == min(other.mass for other in points) and not above
         axes.annotate(
-            f'tray {one.tray}',
-            (_MG * one.mass, _MM * one.speed),
+            f'tray {point.tray}',
+            (_MG * point.mass, _MM * point.speed),
             xytext=(-6 if left else 6, 7 if above else -14),
             textcoords='offset points',
             ha='right' if left else 'left',

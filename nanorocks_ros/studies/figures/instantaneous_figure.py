@@ -68,7 +68,7 @@ def instantaneous_figure(
     """
     curve = mean_cycle(cycles, *span)
     check_errors(curve)
-    found = instantaneous_cor(
+    cor = instantaneous_cor(
         (curve.times, curve.speed, curve.error),
         tray,
         confined_gas(tray),
@@ -78,8 +78,8 @@ def instantaneous_figure(
     )
     figure = Figure(figsize=(9.0, 8.0), layout='constrained')
     above, below = figure.subplots(2, 1, sharex=True)
-    _draw_paper(above, found)
-    _draw_local(below, found, wall_restitution)
+    _draw_paper(above, cor)
+    _draw_local(below, cor, wall_restitution)
     above.set_title(
         f'Tray {tray.number}, '
         + (f'mean over {len(cycles)} cycles' if len(cycles) > 1 else 'one cycle'),
@@ -87,7 +87,7 @@ def instantaneous_figure(
     )
     with whole_file(path) as part:
         figure.savefig(part, dpi=110)
-    return found
+    return cor
 
 
 def _draw_paper(axes: Axes, found: InstantaneousCor) -> None:

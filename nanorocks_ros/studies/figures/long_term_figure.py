@@ -140,12 +140,12 @@ def campaign_values(campaign: Campaign) -> dict[str, Any]:
         'cluster_size_unit': campaign.measure.unit,
         'quiet_periods': [
             {
-                'first': one.first + 1,
-                'last': one.last + 1,
-                'excess': one.excess,
-                'chance': one.chance,
+                'first': period.first + 1,
+                'last': period.last + 1,
+                'excess': period.excess,
+                'chance': period.chance,
             }
-            for one in campaign.periods
+            for period in campaign.periods
         ],
         'trays': {
             str(number): {

@@ -58,10 +58,10 @@ def packing_figure(
     RecordingError
         When a cycle is too short, or the picture cannot be written.
     """
-    found = {number: [compaction(one) for one in own] for number, own in curves.items()}
+    found = {number: [compaction(curve) for curve in own] for number, own in curves.items()}
     figure = Figure(figsize=(11.0, 4.8), layout='constrained')
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
-    known = any(np.isfinite(one.filling).any() for own in curves.values() for one in own)
+    known = any(np.isfinite(curve.filling).any() for own in curves.values() for curve in own)
     (_draw_fillings if known else _draw_areas)(left, curves)
     _draw_compaction(right, found)
     left.set_xlabel('time since the shaking event [s]')
@@ -80,7 +80,7 @@ def _values(
     apparent = _mean([one.apparent for one in found])
     true = _mean([one.true for one in found])
     single = float(
-        np.median(np.concatenate([one.level_area[one.times < _SINGLE] for one in curves]))
+        np.median(np.concatenate([curve.level_area[curve.times < _SINGLE] for curve in curves]))
     )
     end = float(np.mean([one.end for one in found]))
     return {
@@ -93,10 +93,10 @@ def _values(
         'paper_filling_from_picture': (
             paper_filling_of_level_area(tray, end, single) if single > 0.0 else None
         ),
-        'layer_filling': _mean([one.filling[-1] for one in curves])[0],
-        'paper_filling': _mean([one.paper[-1] for one in curves])[0],
-        'filling_in_space': _mean([one.in_space[-1] for one in curves])[0],
-        'beads_per_cluster': _mean([one.beads[-1] for one in curves])[0],
+        'layer_filling': _mean([curve.filling[-1] for curve in curves])[0],
+        'paper_filling': _mean([curve.paper[-1] for curve in curves])[0],
+        'filling_in_space': _mean([curve.in_space[-1] for curve in curves])[0],
+        'beads_per_cluster': _mean([curve.beads[-1] for curve in curves])[0],
     }
 
 
@@ -114,7 +114,7 @@ def _binned(
     curves: Sequence[PackingCurve], values: Sequence[NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Mean over all cycles by time; times without a value are left out."""
-    times = np.concatenate([one.times for one in curves])
+    times = np.concatenate([curve.times for curve in curves])
     every = np.concatenate(values)
     edges = np.linspace(0.0, float(times.max()) * (1.0 + 1e-9), _BINS + 1)
     place = np.digitize(times, edges) - 1
@@ -133,7 +133,7 @@ def _draw_fillings(axes: Axes, curves: Mapping[int, Sequence[PackingCurve]]) -> 
             ('-', 'filling', 'layer one bead high'),
             (':', 'in_space', 'true height'),
         ):
-            times, mean = _binned(own, [getattr(one, kind) for one in own])
+            times, mean = _binned(own, [getattr(curve, kind) for curve in own])
             axes.plot(times, mean, style, color=colour, lw=1.8, label=f'tray {number}, {text}')
     axes.axhline(HEXAGONAL_LAYER, color='black', lw=1.0, ls='--')
     axes.text(
@@ -164,8 +164,8 @@ def _draw_fillings(axes: Axes, curves: Mapping[int, Sequence[PackingCurve]]) -> 
 
 def _draw_areas(axes: Axes, curves: Mapping[int, Sequence[PackingCurve]]) -> None:
     for colour, (number, own) in zip(_COLOURS, curves.items(), strict=False):
-        ends = [compaction(one).end for one in own]
-        relative = [end / one.level_area for one, end in zip(own, ends, strict=True)]
+        ends = [compaction(curve).end for curve in own]
+        relative = [end / curve.level_area for curve, end in zip(own, ends, strict=True)]
         times, mean = _binned(own, relative)
         axes.plot(times, mean, '-', color=colour, lw=1.8, label=f'tray {number}')
     axes.axhline(1.0, color='black', lw=0.7)

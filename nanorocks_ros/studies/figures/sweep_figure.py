@@ -54,7 +54,7 @@ def check_drawable(path: Path, axes: tuple[Axis, ...]) -> None:
     numbers = [
         axis
         for axis in axes
-        if len(axis.values) > 1 and all(isinstance(one, int | float) for one in axis.values)
+        if len(axis.values) > 1 and all(isinstance(value, int | float) for value in axis.values)
     ]
     if len(axes) != 2 or len(numbers) != 2:
         shape = ' x '.join(str(len(axis.values)) for axis in axes) or 'a single point'
@@ -150,11 +150,13 @@ def _held(sweep: Sweep) -> str:
 def _draw_contours(axes: Axes, sweep: Sweep, curve: SpeedCurve) -> None:
     """Lines of one decay rate, within the map."""
     ends = axes.get_xlim(), axes.get_ylim()
-    for one, style in zip(contours(sweep, curve), ('-', '--'), strict=False):
+    for contour, style in zip(contours(sweep, curve), ('-', '--'), strict=False):
         first = sweep.axes[0].name == 'restitution'
-        x, y = (one.restitution, one.other) if first else (one.other, one.restitution)
+        x, y = (
+            (contour.restitution, contour.other) if first else (contour.other, contour.restitution)
+        )
         seen = (x >= ends[0][0]) & (x <= ends[0][1]) & (y >= ends[1][0]) & (y <= ends[1][1])
-        label = one.label if seen.any() else f'{one.label} (outside)'
+        label = contour.label if seen.any() else f'{contour.label} (outside)'
         axes.plot(x, y, style, color=_MARK, lw=2.2, label=label, path_effects=_OUTLINE)
     axes.set_xlim(*ends[0])
     axes.set_ylim(*ends[1])

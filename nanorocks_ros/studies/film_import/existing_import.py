@@ -41,7 +41,7 @@ def check_same_source(bag: Path, film: Path) -> None:
         raise RecordingError(str(bag), what, _NEW)
     files = images_in(film) if film.is_dir() else [film]
     try:
-        size = sum(one.stat().st_size for one in files)
+        size = sum(file.stat().st_size for file in files)
     except OSError as error:
         raise RecordingError(
             str(film), f'cannot be read ({error.strerror})', 'pass another film'

@@ -69,7 +69,7 @@ def _stand_for(path: Path) -> FoundFilms:
     if not path.is_dir():
         return FoundFilms([path])
     held = look_into(path)
-    if images_in(path) and not any(one.is_file() for one in held.films):
+    if images_in(path) and not any(film.is_file() for film in held.films):
         return FoundFilms([path])
     return held
 
@@ -83,16 +83,16 @@ def look_into(folder: Path) -> FoundFilms:
         When it cannot be read.
     """
     found = FoundFilms()
-    for one in sorted(folder.iterdir(), key=lambda one: natural(one.name)):
-        if one.name.startswith('.') or one.name in OF_THE_DISK:
+    for path in sorted(folder.iterdir(), key=lambda one: natural(one.name)):
+        if path.name.startswith('.') or path.name in OF_THE_DISK:
             continue
         try:
-            if bool(images_in(one)) if one.is_dir() else one.suffix.lower() in VIDEOS:
-                found.films.append(one)
-            elif one.suffix.lower() in IMAGES or looks_like_film(one):
-                found.left_out.append(one)
+            if bool(images_in(path)) if path.is_dir() else path.suffix.lower() in VIDEOS:
+                found.films.append(path)
+            elif path.suffix.lower() in IMAGES or looks_like_film(path):
+                found.left_out.append(path)
         except OSError as error:
-            found.failed[one] = _unreadable(one, error)
+            found.failed[path] = _unreadable(path, error)
     return found
 
 

@@ -134,7 +134,7 @@ class _Import:
         self._films = films
         self._settings = settings
         self._progress = progress
-        self._sizes = [sum(one.stat().st_size for one in film.info.files) for film in films]
+        self._sizes = [sum(file.stat().st_size for file in film.info.files) for film in films]
         self._result = Imported(bag=bag)
         self._workers = settings.threads or os.cpu_count() or 1
         self._end_ns: int | None = None
@@ -144,7 +144,7 @@ class _Import:
     def run(self) -> Imported:
         result = self._result
         image, lens = topics.RAW_COMPRESSED, topics.CAMERA_INFO
-        table = {one.absolute(): offered(one) for one in (image, lens)}
+        table = {topic.absolute(): offered(topic) for topic in (image, lens)}
         result.provenance = self._provenance()
         with (
             ThreadPoolExecutor(self._workers + 1) as pool,
@@ -186,11 +186,11 @@ class _Import:
         done, whole = 0, max(1, sum(self._sizes))
         for number, (film, size) in enumerate(zip(self._films, self._sizes, strict=True)):
             self._result.notices += film.info.remarks
-            for one in self._shots_of(film, number):
+            for shot in self._shots_of(film, number):
                 # Pictures that were sorted come from further behind.
-                self._done = max(self._done, min(1.0, (done + size * one.item.done) / whole))
+                self._done = max(self._done, min(1.0, (done + size * shot.item.done) / whole))
                 self._progress(self._done)
-                yield one
+                yield shot
             done += size
             self._tell_losses(film)
 
@@ -255,16 +255,16 @@ class _Import:
     def _provenance(self) -> dict[str, str]:
         infos = [film.info for film in self._films]
         settings = self._settings
-        unchanged = all(one.as_stored for one in infos)
+        unchanged = all(info.as_stored for info in infos)
         return {
             'nanorocks_ros': __version__,
             'import': 'unfinished',
-            'source': ', '.join(one.path.name for one in infos),
+            'source': ', '.join(info.path.name for info in infos),
             'source_bytes': ' '.join(str(size) for size in self._sizes),
-            'codec': ', '.join(one.codec for one in infos),
+            'codec': ', '.join(info.codec for info in infos),
             'pictures': 'as stored' if unchanged else picture_words(settings),
             **{f'import.{name}': value for name, value in settings.given().items() if value},
-            **{f'camera.{k}': v for one in infos[:1] for k, v in one.tags.items()},
+            **{f'camera.{k}': v for info in infos[:1] for k, v in info.tags.items()},
         }
 
     def _outcome(self) -> dict[str, str]:

@@ -89,11 +89,11 @@ class CycleClusters:
     @property
     def times(self) -> NDArray[np.float64]:
         """Of the estimates, since the start, (n,), [s]."""
-        return np.array([(one.stamp_ns - self.start_ns) / NS for one in self.estimates])
+        return np.array([(estimate.stamp_ns - self.start_ns) / NS for estimate in self.estimates])
 
     def column(self, name: str) -> NDArray[np.float64]:
         """A field of all estimates, (n,)."""
-        return np.array([float(getattr(one, name)) for one in self.estimates])
+        return np.array([float(getattr(estimate, name)) for estimate in self.estimates])
 
     def true_sizes(self) -> NDArray[np.float64]:
         """The true weight-averaged size at each estimate, (n,); NaN where not known."""
@@ -184,7 +184,7 @@ def cycle_clusters(
             stage = stages[image.tray]
             stage.emit_image = True
             records = stage.push(image)
-            notices += [one.text for one in records if isinstance(one, Notice)]
+            notices += [record.text for record in records if isinstance(record, Notice)]
             if image.cycle != cycle or not records:
                 continue
             start = image.stamp_ns if image.cycle_start_ns is None else image.cycle_start_ns
@@ -254,20 +254,22 @@ def _rows(found: BagClusters) -> Iterator[tuple[object, ...]]:
     for number, tray in found.trays.items():
         paper = tray.paper_sizes().tolist()
         times, truth = tray.times.tolist(), tray.true_sizes().tolist()
-        for since, by_paper, true, one in zip(times, paper, truth, tray.estimates, strict=True):
+        for since, by_paper, true, estimate in zip(
+            times, paper, truth, tray.estimates, strict=True
+        ):
             yield (
                 number,
-                (one.stamp_ns - found.epoch_ns) / NS,
+                (estimate.stamp_ns - found.epoch_ns) / NS,
                 since,
-                one.level_area,
-                one.breadth,
-                one.axes_ratio,
-                one.direction,
-                one.cluster_size,
-                one.cluster_size_error,
-                one.cluster_size_lower,
-                one.cluster_size_upper,
-                one.size_status.name.lower(),
+                estimate.level_area,
+                estimate.breadth,
+                estimate.axes_ratio,
+                estimate.direction,
+                estimate.cluster_size,
+                estimate.cluster_size_error,
+                estimate.cluster_size_lower,
+                estimate.cluster_size_upper,
+                estimate.size_status.name.lower(),
                 by_paper,
                 true,
             )

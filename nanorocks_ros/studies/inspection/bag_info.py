@@ -147,7 +147,7 @@ def bag_info(path: Path, progress: Callable[[int, int], None]) -> BagInfo:
         topics={name: TopicReport(info=info) for name, info in sorted(reader.topics.items())},
         start_ns=reader.start_ns,
         end_ns=reader.end_ns,
-        size=sum(one.stat().st_size for one in reader.files),
+        size=sum(file.stat().st_size for file in reader.files),
         metadata=reader.metadata,
         trays=sorted({tray for name in reader.topics if (tray := topics.tray_of(name))}),
     )
@@ -224,7 +224,9 @@ def _camera_ailments(found: BagInfo) -> list[Ailment]:
                 'record JPEG or PNG, or write a video of them and run nanorocks import',
             )
         )
-    if found.calibration is None and not any('camera_info' in one.what for one in found.health):
+    if found.calibration is None and not any(
+        'camera_info' in ailment.what for ailment in found.health
+    ):
         ailments.append(
             Ailment(
                 'it has no camera_info: pictures are taken as straight',

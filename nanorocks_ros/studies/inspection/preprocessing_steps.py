@@ -228,7 +228,7 @@ def _as_filmed(
     along = np.linspace(0.0, 1.0, _SIDE_POINTS, endpoint=False)
     none, full = np.zeros(_SIDE_POINTS), np.ones(_SIDE_POINTS)
     sides = [(along, none), (full, along), (1.0 - along, full), (none, 1.0 - along)]
-    edge = np.concatenate([np.stack(one, axis=-1) for one in sides])
+    edge = np.concatenate([np.stack(side, axis=-1) for side in sides])
     places = view.source((region.x, region.y) + edge * (region.width, region.height))
     size = frame.image.shape[1::-1]
     low = np.clip(np.floor(places.min(axis=0)) - _MARGIN_PX, 0, size).astype(int)

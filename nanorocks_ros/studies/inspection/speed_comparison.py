@@ -67,11 +67,11 @@ class ComparedSpeeds:
         """
         if not self.truth:
             return np.full(len(found), np.nan)
-        stamps = np.array([one.stamp_ns for one in self.truth], dtype=np.int64)
-        sums = np.cumsum([0.0, *(one.mean_projected_speed for one in self.truth)])
-        middles = np.array([one.stamp_ns for one in found], dtype=np.int64)
+        stamps = np.array([truth.stamp_ns for truth in self.truth], dtype=np.int64)
+        sums = np.cumsum([0.0, *(truth.mean_projected_speed for truth in self.truth)])
+        middles = np.array([estimate.stamp_ns for estimate in found], dtype=np.int64)
         # A stamp on the edge is inside, whatever its last digits.
-        halves = np.array([0.5 * one.window * NS + 1e3 for one in found])
+        halves = np.array([0.5 * estimate.window * NS + 1e3 for estimate in found])
         first = np.searchsorted(stamps, middles - halves)
         last = np.searchsorted(stamps, middles + halves)
         counts = np.maximum(last - first, 1)
@@ -86,25 +86,27 @@ class ComparedSpeeds:
         cycle : int, optional
             Of this cycle alone.
         """
-        found = [one for one in self.speeds[method] if cycle is None or one.cycle == cycle]
-        values = np.array([one.mean_projected_speed for one in found])
+        estimates = [
+            speed for speed in self.speeds[method] if cycle is None or speed.cycle == cycle
+        ]
+        values = np.array([estimate.mean_projected_speed for estimate in estimates])
         with np.errstate(divide='ignore', invalid='ignore'):
-            ratios = values / self.true_speeds(found)
+            ratios = values / self.true_speeds(estimates)
         return np.asarray(ratios[np.isfinite(ratios)])
 
     def chosen(self, cycle: int | None = None) -> dict[str, float]:
         """Share of the speeds chosen from the data that each method gave."""
         found = [
-            one.method.name.lower()
-            for one in self.speeds[AUTO]
-            if cycle is None or one.cycle == cycle
+            speed.method.name.lower()
+            for speed in self.speeds[AUTO]
+            if cycle is None or speed.cycle == cycle
         ]
         return {method: found.count(method) / len(found) for method in METHODS if found}
 
     @property
     def cycles(self) -> list[int]:
         """Cycles in which anything was measured."""
-        return sorted({one.cycle for found in self.speeds.values() for one in found})
+        return sorted({estimate.cycle for found in self.speeds.values() for estimate in found})
 
 
 @dataclass(slots=True, kw_only=True)
@@ -127,7 +129,7 @@ class BagSpeeds:
 
     def first_cycle(self) -> int:
         """The first cycle after a shaking event; 0 where there was none."""
-        cycles = {cycle for one in self.trays.values() for cycle in one.cycles}
+        cycles = {cycle for tray in self.trays.values() for cycle in tray.cycles}
         return min(cycles - {0}, default=0)
 
 
@@ -182,7 +184,7 @@ def compare_speeds(
         for image in shot.images:
             for method, speeds in found.trays[image.tray].speeds.items():
                 records = estimators[image.tray, method].push(image)
-                speeds += [one for one in records if isinstance(one, SpeedEstimate)]
+                speeds += [record for record in records if isinstance(record, SpeedEstimate)]
     found.frames = images.frames
     found.notices = images.notices
     return found
@@ -202,18 +204,18 @@ def write_speeds(path: Path, found: BagSpeeds) -> None:
 def _rows(found: BagSpeeds) -> Iterator[tuple[object, ...]]:
     for number, tray in found.trays.items():
         for method, speeds in tray.speeds.items():
-            for one, true in zip(speeds, tray.true_speeds(speeds).tolist(), strict=True):
-                start = one.cycle_start_ns
+            for speed, true in zip(speeds, tray.true_speeds(speeds).tolist(), strict=True):
+                start = speed.cycle_start_ns
                 yield (
                     number,
                     method,
-                    (one.stamp_ns - found.epoch_ns) / NS,
-                    one.cycle,
-                    float('nan') if start is None else (one.stamp_ns - start) / NS,
-                    one.mean_projected_speed,
-                    one.mean_projected_speed_error,
-                    one.window,
-                    one.method.name.lower(),
+                    (speed.stamp_ns - found.epoch_ns) / NS,
+                    speed.cycle,
+                    float('nan') if start is None else (speed.stamp_ns - start) / NS,
+                    speed.mean_projected_speed,
+                    speed.mean_projected_speed_error,
+                    speed.window,
+                    speed.method.name.lower(),
                     true,
-                    '+'.join(one.quality.names()),
+                    '+'.join(speed.quality.names()),
                 )

@@ -60,7 +60,7 @@ def speeds_figure(path: Path, found: BagSpeeds, cycle: int) -> None:
     ----------
     After [B19] fig. 2.
     """
-    known = any(one.truth for one in found.trays.values())
+    known = any(tray.truth for tray in found.trays.values())
     figure = Figure(figsize=(_WIDTH, _HEIGHT * len(found.trays) + 0.4), layout='constrained')
     shares: dict[str, Any] = {'width_ratios': (3, 2)} if known else {}
     rows = figure.subplots(len(found.trays), 1 + known, squeeze=False, sharex=True, **shares)
@@ -80,17 +80,17 @@ def speeds_figure(path: Path, found: BagSpeeds, cycle: int) -> None:
 
 def _start_ns(found: BagSpeeds, cycle: int) -> int:
     starts = [
-        one.cycle_start_ns
+        speed.cycle_start_ns
         for tray in found.trays.values()
         for speeds in tray.speeds.values()
-        for one in speeds
-        if one.cycle == cycle and one.cycle_start_ns is not None
+        for speed in speeds
+        if speed.cycle == cycle and speed.cycle_start_ns is not None
     ]
     return min(starts, default=found.epoch_ns)
 
 
 def _of(tray: ComparedSpeeds, method: str, cycle: int) -> list[SpeedEstimate]:
-    return [one for one in tray.speeds[method] if one.cycle == cycle]
+    return [speed for speed in tray.speeds[method] if speed.cycle == cycle]
 
 
 def _draw_speeds(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) -> None:
@@ -102,10 +102,10 @@ def _draw_speeds(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) ->
         axes.plot(times, values, color=_TRUTH, lw=4, alpha=0.6, label='truth')
         tops += values
     for method in METHODS:
-        found = _of(tray, method, cycle)
-        times = [(one.stamp_ns - start_ns) / NS for one in found]
-        speed = _MM * np.array([one.mean_projected_speed for one in found])
-        error = _MM * np.array([one.mean_projected_speed_error for one in found])
+        estimates = _of(tray, method, cycle)
+        times = [(estimate.stamp_ns - start_ns) / NS for estimate in estimates]
+        speed = _MM * np.array([estimate.mean_projected_speed for estimate in estimates])
+        error = _MM * np.array([estimate.mean_projected_speed_error for estimate in estimates])
         colour = _COLOURS[method]
         axes.fill_between(times, speed - error, speed + error, color=colour, alpha=0.2, lw=0)
         axes.plot(times, speed, color=colour, lw=1.2, label=method.replace('_', ' '))
@@ -113,8 +113,8 @@ def _draw_speeds(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) ->
             tops += speed[np.isfinite(speed)].tolist()
     chosen = _of(tray, AUTO, cycle)
     axes.plot(
-        [(one.stamp_ns - start_ns) / NS for one in chosen],
-        [_MM * one.mean_projected_speed for one in chosen],
+        [(estimate.stamp_ns - start_ns) / NS for estimate in chosen],
+        [_MM * estimate.mean_projected_speed for estimate in chosen],
         '.',
         ms=3.5,
         color=_CHOSEN,
@@ -129,10 +129,10 @@ def _draw_speeds(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) ->
 def _draw_ratios(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) -> None:
     axes.axhspan(1.0 - _GOAL, 1.0 + _GOAL, color=_TRUTH, alpha=0.25, lw=0)
     for method in METHODS:
-        found = _of(tray, method, cycle)
-        true = tray.true_speeds(found)
-        times = [(one.stamp_ns - start_ns) / NS for one in found]
-        speeds = np.array([one.mean_projected_speed for one in found])
+        estimates = _of(tray, method, cycle)
+        true = tray.true_speeds(estimates)
+        times = [(estimate.stamp_ns - start_ns) / NS for estimate in estimates]
+        speeds = np.array([estimate.mean_projected_speed for estimate in estimates])
         with np.errstate(divide='ignore', invalid='ignore'):
             axes.plot(times, speeds / true, color=_COLOURS[method], lw=1.2)
     axes.set_yscale('log')

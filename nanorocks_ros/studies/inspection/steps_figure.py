@@ -55,12 +55,12 @@ def steps_figure(path: Path, steps: FrameSteps, settings: SpeedSettings) -> None
     ----------
     After [B19] fig. 4.
     """
-    panels = [_panels(one, settings) for one in steps.trays.values()]
-    heights = [_height(one) for one in steps.trays.values()]
+    panels = [_panels(tray, settings) for tray in steps.trays.values()]
+    heights = [_height(tray) for tray in steps.trays.values()]
     figure = Figure(figsize=(_WIDTH, sum(heights)), layout='constrained')
     parts: Any = figure.subfigures(len(panels), 1, height_ratios=heights, squeeze=False)
-    for part, one, drawn in zip(parts[:, 0], steps.trays.values(), panels, strict=True):
-        part.suptitle(_headline(one, steps), fontsize=11, x=0.01, ha='left', weight='bold')
+    for part, tray, drawn in zip(parts[:, 0], steps.trays.values(), panels, strict=True):
+        part.suptitle(_headline(tray, steps), fontsize=11, x=0.01, ha='left', weight='bold')
         axes = part.subplots(2, _COLUMNS, squeeze=False).ravel()
         for place, (title, draw) in zip(axes, drawn, strict=True):
             place.set_title(title, fontsize=9, loc='left')

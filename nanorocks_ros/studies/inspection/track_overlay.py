@@ -81,10 +81,10 @@ def write_overlay(path: Path, pictures: Sequence[NDArray[np.uint8]]) -> None:
     RecordingError
         When the file cannot be written.
     """
-    width = max(one.shape[1] for one in pictures)
+    width = max(picture.shape[1] for picture in pictures)
     parts = [
-        cv2.copyMakeBorder(one, 0, _GAP_PX, 0, width - one.shape[1], cv2.BORDER_CONSTANT)
-        for one in pictures
+        cv2.copyMakeBorder(picture, 0, _GAP_PX, 0, width - picture.shape[1], cv2.BORDER_CONSTANT)
+        for picture in pictures
     ]
     encoded, content = cv2.imencode('.png', np.vstack(parts)[:-_GAP_PX])
     if not encoded:

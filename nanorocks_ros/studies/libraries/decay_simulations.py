@@ -153,7 +153,7 @@ def _decays(plan: LibraryPlan, journal: Journal) -> Decays:
     nodes = [node_of(number) for number in range(plan.nodes)]
 
     def column(name: str) -> NDArray[np.float64]:
-        return np.array([one[name] for one in nodes])
+        return np.array([node[name] for node in nodes])
 
     return Decays(
         restitution=column('restitution'),

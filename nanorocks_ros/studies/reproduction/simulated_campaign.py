@@ -216,7 +216,7 @@ def run_campaign(
         Ctrl-C; its text says what is kept.
     """
     tasks = plan.tasks(folder)
-    missing = {name: one for name, one in tasks.items() if not _finished(one.folder)}
+    missing = {name: task for name, task in tasks.items() if not _finished(task.folder)}
     done = len(tasks) - len(missing)
     progress(done / len(tasks))
     try:
@@ -227,24 +227,24 @@ def run_campaign(
             lambda count, _: progress((done + count) / len(tasks)),
         )
     except KeyboardInterrupt:
-        kept = sum(_finished(one.folder) for one in tasks.values())
+        kept = sum(_finished(task.folder) for task in tasks.values())
         raise KeyboardInterrupt(
             f'{kept} of {len(tasks)} cycles are kept in {folder}; the same command goes on from '
             'there'
         ) from None
-    return [_read(one) for one in tasks.values()]
+    return [_read(task) for task in tasks.values()]
 
 
 def parts_done(folder: Path, plan: CampaignPlan) -> float:
     """How much of the campaign is done, 0 to 1, cycles that are under way among them."""
     total = 0.0
     tasks = plan.tasks(folder)
-    for one in tasks.values():
-        if _finished(one.folder):
+    for task in tasks.values():
+        if _finished(task.folder):
             total += 1.0
             continue
         try:
-            total += float(_part(one.folder).joinpath('done').read_text('utf-8') or 0.0)
+            total += float(_part(task.folder).joinpath('done').read_text('utf-8') or 0.0)
         except (OSError, ValueError):
             continue
     return total / len(tasks)
@@ -260,14 +260,14 @@ def film_and_analyse(task: CycleTask) -> str:
     recorder = SceneRecorder(task.simulation, scene, task.plan.seconds)
     recorder.into_bag(film, CompressionSettings(), _QUALITY, partial(_note, part, 0))
     settings = plate_settings()
-    found = analyse(film, settings, progress=partial(_note, part, 1), scratch=part)
-    write_results(found, part / RESULTS, film, settings)
+    analysis = analyse(film, settings, progress=partial(_note, part, 1), scratch=part)
+    write_results(analysis, part / RESULTS, film, settings)
     by_paper = analyse(film, paper_settings(), progress=partial(_note, part, 2), scratch=part)
     write_results(by_paper, part / PAPER, film, paper_settings())
     summary = {
-        'default': as_json(found),
+        'default': as_json(analysis),
         'paper': as_json(by_paper),
-        'followed': _followed(found),
+        'followed': _followed(analysis),
         'clusters': _true_clusters(film),
     }
     (part / SUMMARY).write_text(json.dumps(summary), 'utf-8')
@@ -308,7 +308,7 @@ def _followed(found: Analysis) -> dict[str, float | None]:
     """Of each tray the mean share of its beads in tracks, after the shaking event."""
     shares: dict[str, float | None] = {}
     for number, results in found.trays.items():
-        after = [one.followed / one.beads for one in results.bodies if one.cycle > 0]
+        after = [body.followed / body.beads for body in results.bodies if body.cycle > 0]
         shares[str(number)] = float(np.mean(after)) if after else None
     return shares
 
@@ -345,4 +345,4 @@ def _true_clusters(film: Path) -> dict[str, dict[str, list[float]]]:
 
 def of_kind(cycles: Sequence[CycleFiles], kind: str) -> list[CycleFiles]:
     """Those with or without sticking."""
-    return [one for one in cycles if one.kind == kind]
+    return [cycle for cycle in cycles if cycle.kind == kind]

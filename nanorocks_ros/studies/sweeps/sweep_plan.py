@@ -135,7 +135,7 @@ class SweepPlan:
                 'axes': {axis.name: axis.values for axis in self.axes},
                 'times': self.times,
                 'settings': {row.name: row.default for row in rows(self.settings)},
-                'trays': {str(one.number): asdict(one) for one in self.trays},
+                'trays': {str(tray.number): asdict(tray) for tray in self.trays},
             }
         )
 
@@ -212,7 +212,7 @@ def _axis(settings: SimulationSettings, name: str, values: Iterable[Any]) -> Axi
 
 def _times(times: Sequence[float] | NDArray[np.float64]) -> tuple[float, ...]:
     try:
-        found = tuple(float(one) for one in times)
+        found = tuple(float(time) for time in times)
     except (TypeError, ValueError) as error:
         raise ConfigurationError('--times', f'{times!r}', 'give numbers of seconds') from error
     steps = itertools.pairwise(found)
@@ -229,7 +229,7 @@ def _times(times: Sequence[float] | NDArray[np.float64]) -> tuple[float, ...]:
 
 def _shown(values: Sequence[float]) -> str:
     more = ', ...' if len(values) > 6 else ''
-    return (', '.join(f'{one:g}' for one in values[:6]) or 'no times') + more
+    return (', '.join(f'{value:g}' for value in values[:6]) or 'no times') + more
 
 
 def _trays(numbers: Iterable[Scalar]) -> tuple[Tray, ...]:

@@ -110,7 +110,7 @@ class Sweep:
             axes = tuple(
                 Axis(name=name, values=tuple(values)) for name, values in asked['axes'].items()
             )
-            found = cls(
+            sweep = cls(
                 axes=axes,
                 times=arrays[_TIMES],
                 runs=asked['runs'],
@@ -118,12 +118,12 @@ class Sweep:
                 **{name: arrays[name] for name in (*CURVES, *COUNTS)},
                 **{name: arrays[name] for name in _RUNS if name in arrays},
             )
-            found._check_shapes()
+            sweep._check_shapes()
         except (KeyError, ValueError, TypeError, AttributeError) as error:
             raise RecordingError(
                 str(path), 'holds no sweep', 'name a file that `nanorocks sweep` wrote'
             ) from error
-        return found
+        return sweep
 
     def _check_shapes(self) -> None:
         times = (len(self.times),)

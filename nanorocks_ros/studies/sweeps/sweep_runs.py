@@ -225,12 +225,12 @@ def _mean(runs: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.fl
     # machine, and with it the last digit.
     count = len(runs)
     mean = np.zeros(runs.shape[1])
-    for one in runs:
-        mean += one
+    for run in runs:
+        mean += run
     mean /= count
     squares = np.zeros(runs.shape[1])
-    for one in runs:
-        squares += (one - mean) ** 2
+    for run in runs:
+        squares += (run - mean) ** 2
     if count == 1:
         return mean, np.full_like(mean, np.nan)
     return mean, np.sqrt(squares / (count - 1) / count)

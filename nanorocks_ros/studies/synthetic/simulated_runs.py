@@ -65,20 +65,20 @@ def simulate(
     # Here first: where it is not on disk yet, each process would compile it.
     load_compiled_code()
     report(0.0)
-    found: list[SimulatedRun] = []
+    runs: list[SimulatedRun] = []
     if plan.runs == 1 or plan.tray.count <= _MOST_FOR_TRIAL:
         start = time.perf_counter()
-        found.append(_followed(plan, 0, lambda part: report(part / plan.runs)))
-        plan.check_events(len(found[0].events) * plan.runs)
+        runs.append(_followed(plan, 0, lambda part: report(part / plan.runs)))
+        plan.check_events(len(runs[0].events) * plan.runs)
         if (time.perf_counter() - start) * (plan.runs - 1) < _WORTH_PROCESSES:
             workers = replace(workers, processes=1)
-    with closing(as_finished(_work, _tasks(plan, len(found), workers), workers)) as results:
+    with closing(as_finished(_work, _tasks(plan, len(runs), workers), workers)) as results:
         for _, some in results:
-            found.extend(some)
-            report(len(found) / plan.runs)
-            plan.check_events(sum(len(run.events) for run in found))
+            runs.extend(some)
+            report(len(runs) / plan.runs)
+            plan.check_events(sum(len(run.events) for run in runs))
     report(1.0)
-    return SimulatedRuns(plan=plan, runs=tuple(sorted(found, key=lambda run: run.number)))
+    return SimulatedRuns(plan=plan, runs=tuple(sorted(runs, key=lambda run: run.number)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

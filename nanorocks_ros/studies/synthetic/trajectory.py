@@ -91,7 +91,7 @@ def write_events(path: Path, found: SimulatedRuns) -> None:
     rows = list(pieces)
 
     def joined(name: str) -> Callable[[], Any]:
-        return lambda: np.concatenate([one[name] for one in rows])
+        return lambda: np.concatenate([row[name] for row in rows])
 
     arrays = {column.name: joined(column.name) for column in _EVENT_COLUMNS}
     _write_arrays(path, {**arrays, 'provenance': lambda: np.array(found.provenance())})

@@ -105,13 +105,13 @@ def topics_page() -> str:
         ('topic', 'type', 'depth', 'latched', 'content'),
         (
             (
-                f'`{one.name.format(tray="K")}`',
-                one.type,
-                str(one.depth),
-                'yes' if one.latched else '',
-                one.doc,
+                f'`{topic.name.format(tray="K")}`',
+                topic.type,
+                str(topic.depth),
+                'yes' if topic.latched else '',
+                topic.doc,
             )
-            for one in topics.TOPICS
+            for topic in topics.TOPICS
         ),
     )
     text += (
@@ -183,7 +183,7 @@ def _default(value: st.Value) -> str:
 
 def _range(row: st.SettingRow) -> str:
     if row.bounds.choices:
-        return ', '.join(f'`{one}`' for one in row.bounds.choices)
+        return ', '.join(f'`{choice}`' for choice in row.bounds.choices)
     if isinstance(row.default, bool | str):
         return ''
     return f'{row.bounds.low:g} to {row.bounds.high:g}'

@@ -80,13 +80,13 @@ def examine_graph(found: list[dict[str, Any]]) -> list[Finding]:
 
 def _topic_finding(topic: dict[str, Any]) -> Finding:
     name = topic['name']
-    senders = [one['node'] for one in topic['publishers']]
-    listeners = [one['node'] for one in topic['subscriptions']]
+    senders = [publisher['node'] for publisher in topic['publishers']]
+    listeners = [subscription['node'] for subscription in topic['subscriptions']]
     found = f'{_named(senders)} -> {_named(listeners)}'
     if topic['mismatches']:
         pairs = '; '.join(
-            f'{one["publisher"]} -> {one["subscription"]}: {one["reason"]}'
-            for one in topic['mismatches']
+            f'{mismatch["publisher"]} -> {mismatch["subscription"]}: {mismatch["reason"]}'
+            for mismatch in topic['mismatches']
         )
         return Finding(
             name=name,
@@ -102,7 +102,7 @@ def _topic_finding(topic: dict[str, Any]) -> Finding:
             found=found,
             remedy='start the publisher, remap the topic, or check the namespace',
         )
-    if len(senders) > 1 and any(name.endswith(f'/{one}') for one in _CAMERAS):
+    if len(senders) > 1 and any(name.endswith(f'/{camera}') for camera in _CAMERAS):
         return Finding(
             name=name,
             status=Status.WARNING,

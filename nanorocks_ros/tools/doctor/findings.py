@@ -38,5 +38,5 @@ class Finding:
 
 def worst(findings: list[Finding]) -> Status:
     """The status of the whole."""
-    statuses = {one.status for one in findings}
+    statuses = {finding.status for finding in findings}
     return next((one for one in (Status.PROBLEM, Status.WARNING) if one in statuses), Status.OK)

@@ -49,11 +49,15 @@ def libraries() -> list[Finding]:
                 remedy='pip install --editable .',
             )
         ]
-    needed = [one for one in requirements if _applies(one, '')]
+    needed = [requirement for requirement in requirements if _applies(requirement, '')]
     findings = [_library_finding('libraries', needed, Status.PROBLEM, 'everything')]
     extras = importlib.metadata.metadata(_PACKAGE).get_all('Provides-Extra') or []
     for extra in sorted(set(extras) - _FOR_DEVELOPERS):
-        wanted = [one for one in requirements if _applies(one, extra) and one not in needed]
+        wanted = [
+            requirement
+            for requirement in requirements
+            if _applies(requirement, extra) and requirement not in needed
+        ]
         purpose = _PURPOSES.get(extra, 'an extra')
         findings.append(_library_finding(f'extra [{extra}]', wanted, Status.WARNING, purpose))
     return findings
@@ -74,18 +78,24 @@ def _library_finding(
 ) -> Finding:
     found: dict[str, str] = {}
     lacking = {}
-    for one in requirements:
+    for requirement in requirements:
         try:
-            found[one.name] = importlib.metadata.version(one.name)
+            found[requirement.name] = importlib.metadata.version(requirement.name)
         except importlib.metadata.PackageNotFoundError:
-            lacking[one.name] = f'{one.name} is not there'
+            lacking[requirement.name] = f'{requirement.name} is not there'
             continue
-        if not one.specifier.contains(found[one.name], prereleases=True):
-            lacking[one.name] = f'{one.name} {found[one.name]} is not {one.specifier}'
+        if not requirement.specifier.contains(found[requirement.name], prereleases=True):
+            lacking[requirement.name] = (
+                f'{requirement.name} {found[requirement.name]} is not {requirement.specifier}'
+            )
     if not lacking:
         versions = ', '.join(f'{key} {value}' for key, value in sorted(found.items()))
         return Finding(name=name, found=versions)
-    asked = ' '.join(f"'{one.name}{one.specifier}'" for one in requirements if one.name in lacking)
+    asked = ' '.join(
+        f"'{requirement.name}{requirement.specifier}'"
+        for requirement in requirements
+        if requirement.name in lacking
+    )
     return Finding(
         name=name,
         status=status,

@@ -163,9 +163,11 @@ def profile() -> Finding:
 def executables(names: tuple[str, ...]) -> Finding:
     """Whether ``ros2 run`` finds the nodes, on the prefixes it looks at."""
     name = 'executables'
-    prefixes = [Path(one) for one in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)]
+    prefixes = [Path(part) for part in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)]
     marker = Path('share/ament_index/resource_index/packages') / _PACKAGE
-    holders = [one for one in prefixes if one.is_absolute() and (one / marker).is_file()]
+    holders = [
+        prefix for prefix in prefixes if prefix.is_absolute() and (prefix / marker).is_file()
+    ]
     installed_here = (Path(sys.prefix) / marker).is_file()
     remedy = (
         f'export AMENT_PREFIX_PATH={sys.prefix}'

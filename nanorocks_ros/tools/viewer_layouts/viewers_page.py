@@ -135,7 +135,7 @@ def viewers_page() -> str:
         curve for chart in CHARTS for curve in chart.curves if curve.topic is topics.COR
     ]
     first = restitution[:3]
-    pictures = [f'`{one.absolute(_TRAY)}`: {one.doc}' for one in PICTURES]
+    pictures = [f'`{picture.absolute(_TRAY)}`: {picture.doc}' for picture in PICTURES]
     return (
         _INTRODUCTION.format(
             share=_SHARE,
@@ -145,14 +145,16 @@ def viewers_page() -> str:
             upper=element(topics.COR, 'restitution_upper'),
         )
         + _FOXGLOVE.format(
-            paths=_bullets([f'`{message_path(_TRAY, one)}`: {one.label}' for one in first]),
+            paths=_bullets([f'`{message_path(_TRAY, curve)}`: {curve.label}' for curve in first]),
             time=f'{cor}.data[{element(topics.COR, "time")}]',
         )
         + _RVIZ.format(
             pictures=_bullets([f'{one}; trays 1 to {max(load_trays())}' for one in pictures])
         )
         + _PLOTJUGGLER.format(
-            series=_bullets([f'`{series(_TRAY, one)}`: {one.label}' for one in first])
+            series=_bullets([f'`{series(_TRAY, curve)}`: {curve.label}' for curve in first])
         )
-        + _RQT.format(plot=' '.join(series(_TRAY, one) for one in first), cor=cor, table=_table())
+        + _RQT.format(
+            plot=' '.join(series(_TRAY, curve) for curve in first), cor=cor, table=_table()
+        )
     )

@@ -57,11 +57,11 @@ def colours(path):
 def test_all_figures_are_drawn_and_their_numbers_printed(table, folder, capsys):
     for name in FIGURES:
         (folder / name).unlink()
-    searches = {one: one.stat().st_mtime_ns for one in folder.glob('*.npz')}
+    searches = {path: path.stat().st_mtime_ns for path in folder.glob('*.npz')}
     assert len(searches) == 2
     assert draw(table, folder, '--json') == 0
     # What was searched once is drawn again, but not searched again.
-    assert {one: one.stat().st_mtime_ns for one in folder.glob('*.npz')} == searches
+    assert {path: path.stat().st_mtime_ns for path in folder.glob('*.npz')} == searches
     printed, said = capsys.readouterr()
     found = json.loads(printed)
     assert (found['tray'], found['cycles']) == (1, 18)
@@ -216,7 +216,7 @@ def test_a_folder_of_something_else_is_left_alone(table, tmp_path, capsys):
     (tmp_path / 'mine.txt').write_text('mine')
     assert draw(table, tmp_path) == 1
     assert 'holds no figures of ours' in capsys.readouterr().err
-    assert [one.name for one in tmp_path.iterdir()] == ['mine.txt']
+    assert [path.name for path in tmp_path.iterdir()] == ['mine.txt']
 
 
 def test_speeds_that_rise_are_no_decay(tmp_path, capsys):

@@ -11,20 +11,20 @@ from nanorocks_ros.experiment.trays import load_trays
 
 
 def draw(*arguments):
-    return main(['figure', 'dust', *(str(one) for one in arguments)])
+    return main(['figure', 'dust', *(str(argument) for argument in arguments)])
 
 
 def test_the_papers_points_and_measured_ones_are_drawn_with_the_curves(tmp_path, capsys):
     output = tmp_path / 'a.svg'
     assert draw('-o', output, '--measured', '1:0.003:0.002:0.004', '--json') == 0
     found = json.loads(capsys.readouterr().out)
-    assert [one['tray'] for one in found['points']] == [1, 3, 5, 1]
+    assert [point['tray'] for point in found['points']] == [1, 3, 5, 1]
     measured = found['points'][-1]
     assert measured['sticking_speed'] == 0.003
     assert measured['sticking_speed_lower'] == 0.002
     assert measured['mass'] == load_trays()[1].mean_mass
     assert found['collapse_time_factor'] == pytest.approx(4.81, abs=0.01)
-    assert all(not one['verified'] for one in found['curves'])
+    assert all(not curve['verified'] for curve in found['curves'])
     assert output.stat().st_size > 10_000
 
 

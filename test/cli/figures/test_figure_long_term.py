@@ -13,7 +13,7 @@ from nanorocks_ros.cli.main import main
 
 
 def draw(*arguments):
-    return main(['figure', 'long-term', *(str(one) for one in arguments)])
+    return main(['figure', 'long-term', *(str(argument) for argument in arguments)])
 
 
 @pytest.fixture(scope='module')

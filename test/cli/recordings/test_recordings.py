@@ -50,7 +50,7 @@ def write_bag(path, numbers=range(20), pictures=jpeg, metadata=None):
 
 def called(capsys, *arguments):
     """Exit code, what was printed, and the last line on standard error."""
-    code = main([str(one) for one in arguments])
+    code = main([str(argument) for argument in arguments])
     printed = capsys.readouterr()
     return code, printed.out, (printed.err.splitlines() or [''])[-1]
 
@@ -194,7 +194,7 @@ def test_names_that_are_no_utf_8_are_shown_all_the_same(tmp_path, command):
     }.get(command) or [images(folder / 'images'), '--rate', '30', '-o', folder / 'new']
     code = 'from nanorocks_ros.cli.main import main; exit(main())'
     done = subprocess.run(
-        [sys.executable, '-c', code, *command.split(), *(str(one) for one in arguments)],
+        [sys.executable, '-c', code, *command.split(), *(str(argument) for argument in arguments)],
         env={**os.environ, 'PYTHONIOENCODING': 'utf-8:strict'},
         timeout=120,
         check=False,
@@ -277,7 +277,7 @@ def limited(size, *arguments):
     code = 'import signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); '
     code += 'from nanorocks_ros.cli.main import main; exit(main())'
     return subprocess.run(
-        [sys.executable, '-c', code, *(str(one) for one in arguments)],
+        [sys.executable, '-c', code, *(str(argument) for argument in arguments)],
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)),
         stderr=subprocess.PIPE,
         text=True,

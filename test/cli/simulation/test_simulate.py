@@ -118,7 +118,7 @@ def test_everything_at_once(capsys, tmp_path):
     assert cv2.imread(paths['picture']) is not None
     assert cv2.VideoCapture(paths['video']).read()[1].shape == (64, 64, 3)
     assert len(BagFrames(tmp_path / 'bag').truth(START_NS)[4]) == 30
-    assert {one.name for one in tmp_path.iterdir()} == {*files.values(), 'bag', 'own.yaml'}
+    assert {path.name for path in tmp_path.iterdir()} == {*files.values(), 'bag', 'own.yaml'}
 
 
 def test_a_bag_says_what_it_holds_beside_the_contract(capsys, tmp_path):
@@ -217,4 +217,4 @@ def test_ctrl_c_ends_it_and_says_what_is_left(tmp_path):
         'nanorocks: interrupted; complete: run.npz; what bag holds until now can be read'
     )
     assert len(BagFrames(tmp_path / 'bag').truth(START_NS)[1]) > 0
-    assert {one.name for one in tmp_path.iterdir()} == {'run.npz', 'bag'}
+    assert {path.name for path in tmp_path.iterdir()} == {'run.npz', 'bag'}

@@ -40,12 +40,12 @@ def test_a_sweep_prints_curves_and_writes_them(tmp_path, capsys):
     assert printed['runs'] == 3
     assert printed['seed'] == 4
     assert printed['time'] == [0.0, 1.0, 2.0]
-    found = Sweep.load(output)
+    sweep = Sweep.load(output)
     for name in CURVES:
-        np.testing.assert_array_equal(printed[name], getattr(found, name))
-    total = int(found.pair_collisions.sum() + found.wall_collisions.sum())
+        np.testing.assert_array_equal(printed[name], getattr(sweep, name))
+    total = int(sweep.pair_collisions.sum() + sweep.wall_collisions.sum())
     assert printed['events'] == total > 0
-    assert json.loads(found.question)['settings']['mean_speed'] == 0.01
+    assert json.loads(sweep.question)['settings']['mean_speed'] == 0.01
     with table.open(newline='') as stream:
         lines = list(csv.DictReader(stream))
     assert len(lines) == 3 * 2 * 3
@@ -55,7 +55,7 @@ def test_a_sweep_prints_curves_and_writes_them(tmp_path, capsys):
         'time [s]',
         'mean_speed [m/s]',
     ]
-    assert float(lines[-1]['mean_projected_speed [m/s]']) == found.mean_projected_speed[2, 1, 2]
+    assert float(lines[-1]['mean_projected_speed [m/s]']) == sweep.mean_projected_speed[2, 1, 2]
 
 
 def test_what_is_not_known_is_null(tmp_path, capsys):

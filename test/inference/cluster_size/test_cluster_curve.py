@@ -40,13 +40,13 @@ CURVE = fit_curve('a tray', 0.5, made_up(0.2, 0.03))
 
 @pytest.mark.parametrize('size', [1.5, 3.0, 8.0, 15.0])
 def test_sizes_within_the_range_are_those_simulated_with_their_error(size):
-    found = CURVE.size_of(seen(2.5 * size**0.2))
-    assert found.status is SizeStatus.MEASURED
-    assert found.size == pytest.approx(size, rel=0.07)
-    assert found.lower < found.size < found.upper
+    estimate = CURVE.size_of(seen(2.5 * size**0.2))
+    assert estimate.status is SizeStatus.MEASURED
+    assert estimate.size == pytest.approx(size, rel=0.07)
+    assert estimate.lower < estimate.size < estimate.upper
     # A scatter of 0.03 over a slope of 0.2.
     if size > 3.0:
-        assert found.error / found.size == pytest.approx(0.15, rel=0.35)
+        assert estimate.error / estimate.size == pytest.approx(0.15, rel=0.35)
 
 
 def test_the_curve_rises():
@@ -58,24 +58,24 @@ def test_the_curve_rises():
 
 def test_where_the_breadth_no_longer_grows_the_range_ends():
     assert 12.0 < CURVE.largest < 65.0
-    found = CURVE.size_of(
+    estimate = CURVE.size_of(
         seen(1.03 * math.exp(0.5 * (CURVE.reading[CURVE.end - 1] - math.log(AREA))))
     )
-    assert found.status is SizeStatus.BEYOND
-    assert math.isnan(found.size)
-    assert found.lower <= CURVE.largest
-    assert found.upper == pytest.approx(100.0, rel=0.03)
+    assert estimate.status is SizeStatus.BEYOND
+    assert math.isnan(estimate.size)
+    assert estimate.lower <= CURVE.largest
+    assert estimate.upper == pytest.approx(100.0, rel=0.03)
 
 
 def test_what_may_as_well_be_all_beads_is_not_bounded_below_that():
-    found = CURVE.size_of(seen(2.5 * 20.0**0.2 * math.exp(-0.02)))
-    assert found.status is SizeStatus.MEASURED
-    assert found.upper == pytest.approx(100.0, rel=0.03)
+    estimate = CURVE.size_of(seen(2.5 * 20.0**0.2 * math.exp(-0.02)))
+    assert estimate.status is SizeStatus.MEASURED
+    assert estimate.upper == pytest.approx(100.0, rel=0.03)
 
 
 def test_single_beads_have_size_one_however_narrow_their_picture_happens_to_be():
-    found = CURVE.size_of(seen(2.5 * math.exp(-0.05)))
-    assert (found.status, found.size, found.lower) == (SizeStatus.MEASURED, 1.0, 1.0)
+    estimate = CURVE.size_of(seen(2.5 * math.exp(-0.05)))
+    assert (estimate.status, estimate.size, estimate.lower) == (SizeStatus.MEASURED, 1.0, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -90,9 +90,9 @@ def test_single_beads_have_size_one_however_narrow_their_picture_happens_to_be()
     ],
 )
 def test_what_no_picture_of_beads_showed_has_no_size(width):
-    found = CURVE.size_of(width)
-    assert found.status is SizeStatus.NOTHING
-    assert math.isnan(found.size)
+    estimate = CURVE.size_of(width)
+    assert estimate.status is SizeStatus.NOTHING
+    assert math.isnan(estimate.size)
 
 
 def test_where_beads_are_missing_there_is_no_size():

@@ -55,9 +55,9 @@ def test_a_wall_whose_own_motion_is_uncertain_says_less():
 def test_two_cycles_add_up():
     rng = np.random.default_rng(3)
     cycles = [list(drawn_rebounds(rng, 20, 0.9)) for _ in range(2)]
-    logs = [rebound_log_likelihood(one, WALLS) for one in cycles]
+    logs = [rebound_log_likelihood(cycle, WALLS) for cycle in cycles]
     both = contact_estimate(WALLS, sum(logs))
-    assert both.restitution_error < min(_walls(one).restitution_error for one in cycles)
+    assert both.restitution_error < min(_walls(cycle).restitution_error for cycle in cycles)
 
 
 def _pairs(collisions, **values):
@@ -131,7 +131,7 @@ def test_a_share_of_outliers_that_cannot_be_is_refused(share):
 
 def test_an_estimate_finds_a_peak_between_the_nodes():
     logs = -0.5 * ((WALLS - 0.8013) / 0.004) ** 2
-    found = contact_estimate(WALLS, logs)
-    assert found.restitution == pytest.approx(0.8013, abs=2e-4)
-    assert found.restitution_error == pytest.approx(0.004, rel=0.02)
-    assert found.upper - found.lower == pytest.approx(2.0 * 0.004 * 0.9945, rel=0.02)
+    estimate = contact_estimate(WALLS, logs)
+    assert estimate.restitution == pytest.approx(0.8013, abs=2e-4)
+    assert estimate.restitution_error == pytest.approx(0.004, rel=0.02)
+    assert estimate.upper - estimate.lower == pytest.approx(2.0 * 0.004 * 0.9945, rel=0.02)

@@ -54,9 +54,9 @@ def test_the_result_does_not_depend_on_the_unit_of_speed():
 
 def coverage(fits, rate):
     pulls = np.array(
-        [abs(math.log(one.decay_rate / rate)) / one.log_decay_rate_error for one in fits]
+        [abs(math.log(fit.decay_rate / rate)) / fit.log_decay_rate_error for fit in fits]
     )
-    freedom = np.array([one.degrees_of_freedom for one in fits])
+    freedom = np.array([fit.degrees_of_freedom for fit in fits])
     return [
         (pulls < special.stdtrit(freedom, 0.5 + 0.5 * probability)).mean()
         for probability in (0.68, 0.95)
@@ -81,13 +81,13 @@ def test_the_interval_of_one_simulated_cycle_covers_the_decay_of_the_ensemble(re
     runs = cooling_runs(settings, tray, TIME, range(100)).mean_projected_speed
     mean = runs.mean(axis=0)
     ensemble = fit_haff(TIME, mean, 0.01 * mean, tray.count * len(runs))
-    fits = [fit_haff(TIME, one, 0.04 * one, tray.count) for one in runs]
+    fits = [fit_haff(TIME, run, 0.04 * run, tray.count) for run in runs]
     inside_68, inside_95 = coverage(fits, ensemble.decay_rate)
     assert 0.58 < inside_68 < 0.92
     assert inside_95 > 0.91
     # And it is no wider than twice the scatter of the runs.
-    scatter = np.std([math.log(one.decay_rate) for one in fits])
-    assert np.median([one.log_decay_rate_error for one in fits]) < 2.0 * scatter
+    scatter = np.std([math.log(fit.decay_rate) for fit in fits])
+    assert np.median([fit.log_decay_rate_error for fit in fits]) < 2.0 * scatter
 
 
 def test_residuals_taken_for_independent_would_be_far_too_sure():

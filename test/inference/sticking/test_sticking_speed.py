@@ -37,7 +37,7 @@ def _cycle(rng, sticking_speed, measure='normal'):
 @pytest.mark.parametrize('measure', ['normal', 'total'])
 def test_the_interval_holds_the_truth_as_often_as_it_says(measure):
     rng = np.random.default_rng(1)
-    found = [
+    estimates = [
         sticking_estimate(
             [_cycle(rng, 3e-3, measure)],
             CONTACTS,
@@ -48,9 +48,11 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(measure):
         )
         for _ in range(40)
     ]
-    held = np.mean([one.lower <= 3e-3 <= one.upper for one in found])
+    held = np.mean([estimate.lower <= 3e-3 <= estimate.upper for estimate in estimates])
     assert held == pytest.approx(0.68, abs=3.0 * math.sqrt(0.68 * 0.32 / 40))
-    assert np.mean([one.sticking_speed for one in found]) == pytest.approx(3e-3, rel=0.1)
+    assert np.mean([estimate.sticking_speed for estimate in estimates]) == pytest.approx(
+        3e-3, rel=0.1
+    )
 
 
 def test_many_cycles_tell_more_than_one_but_not_more_than_the_theory():
@@ -82,19 +84,19 @@ def test_everything_stuck_at_the_start_says_nothing():
     cycle = StickingCycle(
         times=TIMES, speeds=SPEEDS, bodies=np.ones(TIMES.size), merges=np.empty(0)
     )
-    found = sticking_estimate([cycle], CONTACTS, BEADS, highest=0.02)
-    assert found.status is StickingStatus.STUCK_FROM_THE_START
-    assert (found.lower, found.upper) == (0.0, 0.02)
-    assert math.isnan(found.sticking_speed)
+    estimate = sticking_estimate([cycle], CONTACTS, BEADS, highest=0.02)
+    assert estimate.status is StickingStatus.STUCK_FROM_THE_START
+    assert (estimate.lower, estimate.upper) == (0.0, 0.02)
+    assert math.isnan(estimate.sticking_speed)
 
 
 def test_where_all_that_meet_stick_there_is_a_lower_limit_only():
-    found = sticking_estimate(
+    estimate = sticking_estimate(
         [_cycle(np.random.default_rng(3), 1.0)], CONTACTS, BEADS, highest=0.05
     )
-    assert found.status is StickingStatus.NO_UPPER_LIMIT
-    assert found.upper == pytest.approx(0.05)
-    assert found.lower > 3e-3
+    assert estimate.status is StickingStatus.NO_UPPER_LIMIT
+    assert estimate.upper == pytest.approx(0.05)
+    assert estimate.lower > 3e-3
 
 
 def _merge(seconds, joins=True):

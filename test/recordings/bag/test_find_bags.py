@@ -37,25 +37,25 @@ def flight(tmp_path):
 
 
 def names(found, folder):
-    return [str(one.relative_to(folder)) for one in found.bags]
+    return [str(bag.relative_to(folder)) for bag in found.bags]
 
 
 def test_a_folder_of_recordings_gives_each_of_them_in_order_of_their_numbers(flight):
-    found = find_bags([str(flight / 'day_1')])
-    assert names(found, flight) == ['day_1/loose.mcap', 'day_1/run_2', 'day_1/run_10']
-    assert found.left_out == [f'{flight}/day_1/run_2_results: holds results']
+    bags = find_bags([str(flight / 'day_1')])
+    assert names(bags, flight) == ['day_1/loose.mcap', 'day_1/run_2', 'day_1/run_10']
+    assert bags.left_out == [f'{flight}/day_1/run_2_results: holds results']
     assert len(find_bags([str(flight)]).bags) == 4
 
 
 def test_a_pattern_leaves_out_what_is_no_recording_but_not_one_that_never_began(flight):
-    found = find_bags([str(flight / 'day_1' / '*')])
-    assert set(names(found, flight)) == {
+    bags = find_bags([str(flight / 'day_1' / '*')])
+    assert set(names(bags, flight)) == {
         'day_1/loose.mcap',
         'day_1/never_began',
         'day_1/run_2',
         'day_1/run_10',
     }
-    assert {one.rpartition('/')[2] for one in found.left_out} == {
+    assert {one.rpartition('/')[2] for one in bags.left_out} == {
         'notes.txt: is no recording',
         'run_2_results: holds results',
     }
@@ -71,9 +71,9 @@ def test_each_is_taken_once_whatever_the_names(flight):
 
 
 def test_what_is_not_there_is_told_and_the_rest_is_found(flight):
-    found = find_bags([str(flight / 'day_3*'), str(flight / 'day_2'), str(flight / 'nothing')])
-    assert names(found, flight) == ['day_2/run_2']
-    first, second = (str(one) for one in found.missing.values())
+    bags = find_bags([str(flight / 'day_3*'), str(flight / 'day_2'), str(flight / 'nothing')])
+    assert names(bags, flight) == ['day_2/run_2']
+    first, second = (str(error) for error in bags.missing.values())
     assert 'matches nothing; correct the pattern' in first
     assert 'does not exist' in second
 

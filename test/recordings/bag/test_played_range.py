@@ -46,9 +46,9 @@ def test_a_start_beyond_the_end_is_refused(bag):
 
 @pytest.mark.parametrize(('seconds', 'value'), [(0.6, 1.0), (150.0, 299.0), (300.0, 599.0)])
 def test_latched_topics_held_the_last_message_before(bag, seconds, value):
-    found = latest(bag, list(TOPICS), 100 * NS + round(seconds * NS))
-    assert [one.topic for one in found] == ['/epoch', '/cor']
-    assert bag.deserialize(found[1]).data[0] == value
+    messages = latest(bag, list(TOPICS), 100 * NS + round(seconds * NS))
+    assert [message.topic for message in messages] == ['/epoch', '/cor']
+    assert bag.deserialize(messages[1]).data[0] == value
 
 
 def test_at_the_start_nothing_was_latched_yet(bag):
@@ -64,7 +64,7 @@ def test_the_metadata_are_what_ros2_bag_of_jazzy_reads(bag):
     assert (found['compression_format'], found['compression_mode']) == ('', '')
     assert isinstance(found['duration']['nanoseconds'], int)
     assert isinstance(found['starting_time']['nanoseconds_since_epoch'], int)
-    assert found['relative_file_paths'] == [one['path'] for one in found['files']]
+    assert found['relative_file_paths'] == [file['path'] for file in found['files']]
     assert set(found['files'][0]) == {'path', 'starting_time', 'duration', 'message_count'}
     assert found['custom_data'] == {'made': 'here'}
     assert isinstance(found['ros_distro'], str)
@@ -80,4 +80,4 @@ def test_the_metadata_are_what_ros2_bag_of_jazzy_reads(bag):
         assert set(profile['deadline']) == {'sec', 'nsec'}
     with Reader(bag.path) as reader:
         assert reader.message_count == found['message_count'] == 602
-        assert {one.topic for one in reader.connections} == set(TOPICS)
+        assert {connection.topic for connection in reader.connections} == set(TOPICS)

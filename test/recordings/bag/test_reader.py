@@ -64,7 +64,7 @@ def test_only_the_topics_asked_for_are_given(tmp_path, record):
 def test_a_bag_can_be_read_twice_and_by_two_at_once(tmp_path, record):
     bag = open_bag(record(tmp_path / 'run'))
     pairs = list(zip(bag.messages(), bag.messages(), strict=True))
-    assert all(one == other for one, other in pairs)
+    assert all(message == other for message, other in pairs)
     assert len(pairs) == 81
 
 
@@ -144,8 +144,8 @@ def test_qualities_of_service_that_make_no_sense_are_not_known(text):
 ])  # fmt: skip
 def test_of_a_stretch_of_time_both_ends_are_given(tmp_path, plugin, start, end, expected):
     bag = open_bag(write_with_rosbags(tmp_path / 'run', plugin))
-    found = bag.messages(['/time'], start_ns=start, end_ns=end)
-    assert [m.log_time_ns for m in found] == expected
+    messages = bag.messages(['/time'], start_ns=start, end_ns=end)
+    assert [m.log_time_ns for m in messages] == expected
 
 
 @pytest.mark.parametrize('cut', [None, -30])
@@ -196,15 +196,15 @@ def test_a_bag_cut_anywhere_is_read_up_to_the_cut(tmp_path, record):
         short = tmp_path / 'short.mcap'
         short.write_bytes(whole[:cut])
         bag = open_bag(short)
-        found = list(bag.messages())
-        assert found == everything[: len(found)], cut
-        assert sum(info.count for info in bag.topics.values()) == len(found)
-        assert len(found) >= before
+        messages = list(bag.messages())
+        assert messages == everything[: len(messages)], cut
+        assert sum(info.count for info in bag.topics.values()) == len(messages)
+        assert len(messages) >= before
         assert not bag.complete
         (notice,) = bag.notices
-        assert f'cut short; {len(found)} messages over ' in notice
+        assert f'cut short; {len(messages)} messages over ' in notice
         assert 'bytes at the end hold no whole record' in notice
-        before = len(found)
+        before = len(messages)
     assert before == len(everything)
 
 
@@ -276,9 +276,9 @@ def test_a_damaged_chunk_is_skipped_and_counted(tmp_path, record):
     path.write_bytes(content)
     bag = open_bag(path)
     for _ in range(2):
-        found = list(bag.messages())
-        lost = [m for m in everything if m not in found]
-        assert [m for m in everything if m in found] == found
+        messages = list(bag.messages())
+        lost = [m for m in everything if m not in messages]
+        assert [m for m in everything if m in messages] == messages
         assert len(lost) == bag.messages_lost > 0
         assert not bag.complete
         (notice,) = bag.notices
@@ -299,9 +299,9 @@ def test_a_flipped_bit_anywhere_costs_messages_but_never_more(tmp_path, record):
         content[place] ^= 1 << int(generator.integers(8))
         path.write_bytes(content)
         bag = open_bag(path)
-        found = list(bag.messages())
-        assert len(found) <= len(everything)
-        for message in found:
+        messages = list(bag.messages())
+        assert len(messages) <= len(everything)
+        for message in messages:
             if message in everything:
                 continue
             # A name in the index may have changed, never what was measured.
@@ -316,9 +316,9 @@ def test_a_damaged_chunk_of_a_file_cut_short_is_counted_by_its_index(tmp_path, r
     content[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 0x10
     path.write_bytes(content)
     bag = open_bag(path)
-    found = list(bag.messages())
+    messages = list(bag.messages())
     assert bag.messages_lost > 0
-    assert len(found) + bag.messages_lost == 301
+    assert len(messages) + bag.messages_lost == 301
 
 
 # --- several files, SQLite, compression -----------------------------------------------------
@@ -575,7 +575,7 @@ def test_messages_of_a_time_that_cannot_be_are_left_out_and_counted(tmp_path, ch
         path.write_bytes(path.read_bytes()[:-40])
     bag = open_bag(path)
     for _ in range(2):
-        assert [one.log_time_ns for one in bag.messages()] == [5, 6, 8, 2**63 - 1]
+        assert [message.log_time_ns for message in bag.messages()] == [5, 6, 8, 2**63 - 1]
         assert bag.messages_lost == 2
         assert not bag.complete
         assert (

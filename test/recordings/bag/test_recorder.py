@@ -70,8 +70,8 @@ def test_pictures_are_left_out_when_the_disk_does_not_keep_up_and_results_never_
     assert one.dropped == 8
     bag, messages = held(tmp_path / 'bag')
     assert bag.complete
-    assert [one.topic for one in messages].count(CAMERA) == 2
-    values = [bag.deserialize(one).data[0] for one in messages if one.topic == SPEED]
+    assert [message.topic for message in messages].count(CAMERA) == 2
+    values = [bag.deserialize(message).data[0] for message in messages if message.topic == SPEED]
     assert values == [float(k) for k in range(1, 10)]
 
 

@@ -31,9 +31,9 @@ IMAGE = 'sensor_msgs/msg/CompressedImage'
 
 def salvaged(source, target):
     """What was salvaged; the source is as it was, and the new recording is whole."""
-    before = {one: hashlib.sha256(one.read_bytes()).digest() for one in files(source)}
+    before = {file: hashlib.sha256(file.read_bytes()).digest() for file in files(source)}
     found = salvage(source, target, lambda done, total: None)
-    assert {one: hashlib.sha256(one.read_bytes()).digest() for one in files(source)} == before
+    assert {file: hashlib.sha256(file.read_bytes()).digest() for file in files(source)} == before
     bag = open_bag(target)
     assert bag.complete
     assert bag.notices == ()
@@ -109,13 +109,13 @@ def test_a_damaged_chunk_costs_its_own_messages_alone(tmp_path, record, ended, n
     whole[chunk.chunk_start_offset + at] ^= 0x55
     file.write_bytes(whole if ended else whole[:-40])
     found, messages = salvaged(path, tmp_path / 'new')
-    assert [one for one in everything if one in messages] == messages
+    assert [message for message in everything if message in messages] == messages
     outside = [
-        one
-        for one in everything
-        if not chunk.message_start_time <= one.log_time_ns <= chunk.message_end_time
+        message
+        for message in everything
+        if not chunk.message_start_time <= message.log_time_ns <= chunk.message_end_time
     ]
-    assert [one for one in messages if one in outside] == outside
+    assert [message for message in messages if message in outside] == outside
     assert found.recovered + found.lost == len(everything)
 
 
@@ -133,7 +133,7 @@ def test_a_length_inside_a_chunk_that_no_memory_holds_costs_that_chunk(tmp_path,
     # The highest byte of the length of the records, behind times, size, checksum and 'zstd'.
     changed(path / 'run.mcap', chunks(path / 'run.mcap')[1].chunk_start_offset + 52, b'\xff', cut)
     found, messages = salvaged(path, tmp_path / 'new')
-    assert [one for one in everything if one in messages] == messages
+    assert [message for message in everything if message in messages] == messages
     assert found.lost > 0
     assert found.recovered + found.lost == 201
 
@@ -220,7 +220,7 @@ def test_of_a_sqlite_file_the_rows_that_can_be_read_are_recovered(tmp_path):
     file.write_bytes(content[: int(0.6 * len(content)) // 4096 * 4096])
     found, messages = salvaged(path, tmp_path / 'cut')
     assert 40 <= len(messages) <= 70
-    assert [one for one in everything if one in messages] == messages
+    assert [message for message in everything if message in messages] == messages
     assert found.recovered + found.lost == 100
     file.write_bytes(content[:81920] + bytes(40960) + content[122880:])
     found, messages = salvaged(path, tmp_path / 'hole')
@@ -255,7 +255,7 @@ def test_a_damaged_page_of_a_sqlite_file_costs_its_own_rows_alone(tmp_path, shar
     bag = open_bag(path)
     for _ in range(2):
         found = list(bag.messages())
-        assert [one for one in everything if one in found] == found
+        assert [message for message in everything if message in found] == found
         assert len(found) >= 400 - 8
         assert len(found) + bag.messages_lost == 400
     assert not bag.complete
@@ -298,7 +298,7 @@ def test_a_row_that_cannot_have_been_written_so_is_left_out(tmp_path, change, da
         file.write_bytes(content)
     found, messages = salvaged(path, tmp_path / 'new')
     assert everything[9] not in messages
-    assert [one for one in everything if one in messages] == messages
+    assert [message for message in everything if message in messages] == messages
     assert found.recovered + found.lost == 60
     assert found.recovered >= (55 if damaged else 59)
     left_out = 'run.db3: 1 messages have a time, topic or content that cannot be and were left out'

@@ -192,7 +192,7 @@ def test_a_stamp_that_no_ros_time_holds_is_refused(tmp_path, topics):
         bag.write(EPOCH, last_ns, time_message(last_ns))
         with pytest.raises(RecordingError, match=r'beyond what a ROS time holds, .*; .*--rate'):
             bag.write(EPOCH, last_ns + 1_000_000_000, time_message(last_ns + 1_000_000_000))
-    assert [one.log_time_ns for one in open_bag(tmp_path / 'run').messages()] == [last_ns]
+    assert [message.log_time_ns for message in open_bag(tmp_path / 'run').messages()] == [last_ns]
 
 
 def test_a_number_that_does_not_fit_its_field_is_refused(tmp_path, topics):

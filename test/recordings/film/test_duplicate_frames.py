@@ -54,7 +54,7 @@ def swinging(count, period, phase=0.5):
 
 
 def twice(places, where=lambda k: True):
-    return [one for k, one in enumerate(places) for _ in range(2 if where(k) else 1)]
+    return [place for k, place in enumerate(places) for _ in range(2 if where(k) else 1)]
 
 
 @pytest.mark.parametrize('sensor', [1.0, 3.0])
@@ -82,7 +82,7 @@ def test_pictures_that_are_no_longer_compared_do_not_overtake_one_that_waits():
     images = [Drawn(20 + 2 * k, 0.0).image for k in range(70)]
     again = np.clip(images[63].astype(int) + 1, 0, 255).astype(np.uint8)
     images.insert(64, again)
-    stored = [StoredPicture('png', cv2.imencode('.png', one)[1].tobytes()) for one in images]
-    shots = [Stamped(k * STEP_NS, Shot(None, one, 0.0)) for k, one in enumerate(stored)]
+    stored = [StoredPicture('png', cv2.imencode('.png', image)[1].tobytes()) for image in images]
+    shots = [Stamped(k * STEP_NS, Shot(None, picture, 0.0)) for k, picture in enumerate(stored)]
     kept = list(Repeats().without(shots))
     assert all(one.stamp_ns < other.stamp_ns for one, other in pairwise(kept))

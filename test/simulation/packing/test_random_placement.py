@@ -54,8 +54,9 @@ def beads_of(tray, run):
     sizes_key = key_for(SEED, run, Purpose.DIAMETERS)
     kinds = [one for one in tray.species for _ in range(one.count)]
     radii = [
-        0.5 * (one.diameter_low + (one.diameter_high - one.diameter_low) * uniform(sizes_key, i))
-        for i, one in enumerate(kinds)
+        0.5
+        * (kind.diameter_low + (kind.diameter_high - kind.diameter_low) * uniform(sizes_key, i))
+        for i, kind in enumerate(kinds)
     ]
     return np.array(radii), key_for(SEED, run, Purpose.POSITIONS)
 

@@ -48,14 +48,14 @@ def test_trays_with_the_same_beads_do_different_things():
 
 def test_one_tray_may_hold_another_gas_than_the_rest():
     elastic = replace(SHAKEN, restitution=1.0, wall_restitution=1.0, seed=99, first_shake=0.2)
-    found = SceneFilm(SHAKEN, SMALL, gases={3: elastic}).at(9, 0)
+    moment = SceneFilm(SHAKEN, SMALL, gases={3: elastic}).at(9, 0)
     alone, same = film().at(9, 0).beads
-    np.testing.assert_array_equal(found.beads[0].velocities, alone.velocities)
+    np.testing.assert_array_equal(moment.beads[0].velocities, alone.velocities)
     gas = ShakenTray(
         replace(SHAKEN, tray=3, restitution=1.0, wall_restitution=1.0), TRAYS[3], run=3
     )
-    np.testing.assert_array_equal(found.beads[1].velocities, gas.at(0.3)[1])
-    assert not np.array_equal(found.beads[1].velocities, same.velocities)
+    np.testing.assert_array_equal(moment.beads[1].velocities, gas.at(0.3)[1])
+    assert not np.array_equal(moment.beads[1].velocities, same.velocities)
 
 
 def test_positions_are_relative_to_the_floor_of_the_swinging_tray():
@@ -141,8 +141,8 @@ def test_a_film_is_the_same_every_time_and_a_frame_needs_none_before_it():
 
 def test_stamps_are_those_of_the_frame_rate():
     moments = list(film(scene=replace(SMALL, trays=(1,))).moments(3, 5))
-    assert [one.frame.stamp_ns for one in moments] == [5, 33_333_338, 66_666_672]
-    assert all(one.frame.encoding == 'bgr8' for one in moments)
+    assert [moment.frame.stamp_ns for moment in moments] == [5, 33_333_338, 66_666_672]
+    assert all(moment.frame.encoding == 'bgr8' for moment in moments)
     assert not moments[0].frame.image.flags.writeable
 
 

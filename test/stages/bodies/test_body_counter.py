@@ -69,9 +69,9 @@ def sticky():
 def test_bodies_and_sizes_of_a_gas_that_sticks_are_those_that_it_has(sticky):
     counts, _ = _counted([tracks for tracks, _ in sticky])
     truth = {tracks.stamp_ns: np.unique(b, return_counts=True)[1] for tracks, b in sticky}
-    wrong = np.array([one.bodies - truth[one.stamp_ns].size for one in counts])
-    sizes = np.array([(truth[one.stamp_ns] ** 2).sum() / 15 for one in counts])
-    ratio = np.array([one.weighted_size for one in counts]) / sizes
+    wrong = np.array([count.bodies - truth[count.stamp_ns].size for count in counts])
+    sizes = np.array([(truth[count.stamp_ns] ** 2).sum() / 15 for count in counts])
+    ratio = np.array([count.weighted_size for count in counts]) / sizes
     assert truth[counts[-1].stamp_ns].size < 5
     assert np.mean(wrong == 0.0) > 0.9
     assert ratio.mean() == pytest.approx(1.0, abs=0.05)
@@ -83,18 +83,18 @@ def test_bodies_and_sizes_of_a_gas_that_sticks_are_those_that_it_has(sticky):
 def test_the_first_merge_is_dated_back_to_when_it_happened(sticky):
     counts, merges = _counted([tracks for tracks, _ in sticky])
     first = next(tracks.stamp_ns for tracks, b in sticky if np.unique(b).size < 15)
-    assert min(one.stamp_ns for one in merges) == pytest.approx(first, abs=0.1 * NS)
-    assert all(one.known_ns >= one.stamp_ns + 0.3 * NS for one in merges)
-    assert [one.merged for one in counts] == [one.stamp_ns >= first for one in counts]
-    assert sum(one.joins for one in merges) == 15 - counts[-1].bodies
+    assert min(merge.stamp_ns for merge in merges) == pytest.approx(first, abs=0.1 * NS)
+    assert all(merge.known_ns >= merge.stamp_ns + 0.3 * NS for merge in merges)
+    assert [count.merged for count in counts] == [count.stamp_ns >= first for count in counts]
+    assert sum(merge.joins for merge in merges) == 15 - counts[-1].bodies
 
 
 def test_a_gas_without_sticking_has_no_merge_and_fifteen_bodies():
     pictures = [tracks for tracks, _ in _gas(0.0, 20.0, restitution=0.7)]
     counts, merges = _counted(pictures)
     assert not merges
-    assert {one.bodies for one in counts} == {15.0}
-    assert not any(one.merged for one in counts)
+    assert {count.bodies for count in counts} == {15.0}
+    assert not any(count.merged for count in counts)
 
 
 def test_beads_at_rest_beside_each_other_are_not_taken_for_a_body():
@@ -131,7 +131,7 @@ def test_a_bead_of_a_body_that_is_lost_stays_in_it_and_comes_back_under_its_numb
     whole, _ = _counted([tracks for tracks, _ in sticky])
     differs = [a.bodies != b.bodies for a, b in zip(counts, whole, strict=True)]
     assert np.mean(differs) < 0.1
-    assert min(one.followed for one in counts) == 15
+    assert min(count.followed for count in counts) == 15
 
 
 def test_beads_that_are_never_seen_widen_the_error_and_numbers_are_those_of_all(sticky):
@@ -145,8 +145,8 @@ def test_beads_that_are_never_seen_widen_the_error_and_numbers_are_those_of_all(
 
 def test_a_body_that_comes_apart_is_two_again(sticky):
     counts, merges = _counted([tracks for tracks, _ in sticky])
-    pair = next(one.tracks for one in merges if one.joins)
-    alone = next(one for one in counts if one.clusters == 1.0).stamp_ns + 2 * NS
+    pair = next(merge.tracks for merge in merges if merge.joins)
+    alone = next(count for count in counts if count.clusters == 1.0).stamp_ns + 2 * NS
     pictures = []
     for tracks, _ in sticky:
         places = tracks.positions.copy()
@@ -155,7 +155,7 @@ def test_a_body_that_comes_apart_is_two_again(sticky):
         pictures.append(replace(tracks, positions=places))
     parted, _ = _counted(pictures)
     # Two seconds later it is 10 mm away, though all others went on as they were.
-    at = next(k for k, one in enumerate(counts) if one.stamp_ns > alone + 2 * NS)
+    at = next(k for k, count in enumerate(counts) if count.stamp_ns > alone + 2 * NS)
     assert parted[at].bodies > counts[at].bodies
 
 
@@ -170,7 +170,7 @@ def test_a_shaking_event_sets_all_beads_apart(sticky):
     found = [one for tracks in later for one in counter.push(tracks, 2)]
     new = [one for one in found if isinstance(one, BodyEstimate) and one.cycle == 2]
     assert new
-    assert {(one.bodies, one.merged) for one in new} == {(15.0, False)}
+    assert {(estimate.bodies, estimate.merged) for estimate in new} == {(15.0, False)}
 
 
 def test_a_stamp_that_goes_back_starts_afresh(sticky):
@@ -204,7 +204,7 @@ def test_a_tray_in_which_nothing_is_seen_says_that_nothing_is_known():
     counts, merges = _counted([_tracks(int(k * NS / RATE), nothing, nothing) for k in range(60)])
     assert not merges
     assert counts
-    assert all(np.isnan(one.bodies) and np.isnan(one.bodies_error) for one in counts)
+    assert all(np.isnan(count.bodies) and np.isnan(count.bodies_error) for count in counts)
 
 
 def test_one_bead_is_one_body():
@@ -265,7 +265,7 @@ def test_where_tracks_break_all_the_time_nothing_is_said(sticky):
     assert merges
     counts, merges = _counted(broken)
     assert not merges
-    assert not [one for one in counts if one.stamp_ns > NS]
+    assert not [count for count in counts if count.stamp_ns > NS]
 
 
 def test_a_bead_that_comes_back_over_its_cluster_is_in_it_once_others_stick(sticky):

@@ -34,7 +34,7 @@ def test_a_body_that_falls_apart_is_named_though_others_meet_meanwhile(odd):
         away = 0.0 if number < 30 else 4e-3
         places = [(0.0, 0.0), (apart, 0.0), (0.02, 0.0), (0.02 + 2.0 * RADIUS + away, 0.0)]
         new, fallen = pairs.push(number / 30.0, _beads(places), 0.5)
-        bonds += [one.ids for one in new]
+        bonds += [bond.ids for bond in new]
         broken += fallen
     assert (2, 3) in bonds
     assert broken == [(2, 3)]

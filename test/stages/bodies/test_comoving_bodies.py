@@ -23,7 +23,7 @@ def _joined(drift, *, hidden):
     """Bonds found in three seconds at 1 mm/s, the bodies drifting apart at some speed."""
     companions = Companions(encounter_rate(TRAY))
     rng = np.random.default_rng(1)
-    found = []
+    bonds = []
     for k in range(90):
         time = k * STEP
         if not companions.due(time):
@@ -40,8 +40,8 @@ def _joined(drift, *, hidden):
             variances=np.full(4, 1e-6),
             height=2e-3,
         )
-        found += companions.push(time, beads, BODY, hidden, 1e-2)
-    return found
+        bonds += companions.push(time, beads, BODY, hidden, 1e-2)
+    return bonds
 
 
 def test_bodies_that_move_as_one_are_one_where_a_bead_between_them_may_be_hidden():

@@ -52,8 +52,10 @@ def as_they_come(records, delays):
 def test_estimates_come_two_seconds_later_with_what_tracks_say_of_the_instant():
     stage = ClusterEstimator(PipelineSettings(), TRAY)
     records = as_they_come([*cooling(until=12.0), *images(12.0)], {BodyEstimate: 1.0})
-    true = {one.stamp_ns: one.bodies for one in records if isinstance(one, BodyEstimate)}
-    first = min(one.stamp_ns for one in records if isinstance(one, Merge)) / NS
+    true = {
+        record.stamp_ns: record.bodies for record in records if isinstance(record, BodyEstimate)
+    }
+    first = min(record.stamp_ns for record in records if isinstance(record, Merge)) / NS
     seen = 0
     for record in records:
         for one in stage.push(record):
@@ -89,15 +91,15 @@ def test_without_tracks_the_autocorrelation_speaks_alone():
 def test_sizes_by_both_are_weighted_by_their_errors():
     (body, *_) = (one for one in cooling() if isinstance(one, BodyEstimate))
     by_tracks = [
-        replace(body, stamp_ns=one.stamp_ns, weighted_size=3.0, weighted_size_error=0.5)
-        for one in images(5.0)
+        replace(body, stamp_ns=image.stamp_ns, weighted_size=3.0, weighted_size_error=0.5)
+        for image in images(5.0)
     ]
-    for one in estimates(as_they_come([*images(5.0), *by_tracks], {})):
-        known = math.isfinite(one.cluster_size)
-        weights = np.array([4.0, 1.0 / one.cluster_size_error**2 if known else 0.0])
-        sizes = np.array([3.0, one.cluster_size if known else 0.0])
-        assert one.combined_size == pytest.approx(weights @ sizes / weights.sum())
-        assert one.combined_size_error == pytest.approx(weights.sum() ** -0.5)
+    for estimate in estimates(as_they_come([*images(5.0), *by_tracks], {})):
+        known = math.isfinite(estimate.cluster_size)
+        weights = np.array([4.0, 1.0 / estimate.cluster_size_error**2 if known else 0.0])
+        sizes = np.array([3.0, estimate.cluster_size if known else 0.0])
+        assert estimate.combined_size == pytest.approx(weights @ sizes / weights.sum())
+        assert estimate.combined_size_error == pytest.approx(weights.sum() ** -0.5)
 
 
 def test_the_image_is_sent_at_once_while_somebody_looks():
@@ -106,7 +108,7 @@ def test_the_image_is_sent_at_once_while_somebody_looks():
     found = [(one, record) for record in images(3.0) for one in stage.push(record)]
     pictures = [(one, record) for one, record in found if isinstance(one, Autocorrelation)]
     assert pictures
-    assert all(one.stamp_ns == record.stamp_ns for one, record in pictures)
+    assert all(autocorrelation.stamp_ns == record.stamp_ns for autocorrelation, record in pictures)
 
 
 def test_time_that_goes_back_gives_out_what_was_held():
@@ -123,10 +125,10 @@ def test_where_the_scale_is_wrong_nothing_is_said_of_clusters_and_sticking():
     records = as_they_come([*cooling(until=12.0), *images(12.0)], {})
     assert math.isfinite(estimates(records)[-1].sticking_speed)
     wrong = [
-        replace(one, quality=Quality.WRONG_SCALE)
-        if isinstance(one, TrayImage | SpeedEstimate)
-        else one
-        for one in records
+        replace(record, quality=Quality.WRONG_SCALE)
+        if isinstance(record, TrayImage | SpeedEstimate)
+        else record
+        for record in records
     ]
     found = estimates(wrong)
     assert len(found) > 40
@@ -141,7 +143,7 @@ def test_where_the_scale_is_wrong_nothing_is_said_of_clusters_and_sticking():
 
 def test_a_cycle_with_a_wrong_scale_tells_no_sticking_speed_even_once_it_is_right_again():
     records = as_they_come([*cooling(until=12.0), *images(12.0)], {})
-    first = next(k for k, one in enumerate(records) if isinstance(one, SpeedEstimate))
+    first = next(k for k, record in enumerate(records) if isinstance(record, SpeedEstimate))
     records[first] = replace(records[first], quality=Quality.WRONG_SCALE)
     stage = ClusterEstimator(PipelineSettings(), TRAY)
     found = [one for record in records for one in stage.push(record)]

@@ -21,22 +21,22 @@ def two_clusters():
 
 
 def test_areas_and_beads_of_clusters_are_added_before_they_are_divided():
-    found = packing_of_clusters(*two_clusters(), HEIGHT)
-    assert found.clusters == 2
-    assert found.beads == 4.5
+    packing = packing_of_clusters(*two_clusters(), HEIGHT)
+    assert packing.clusters == 2
+    assert packing.beads == 4.5
     pair, hexagon = math.pi + 4, math.pi + 12 + 6 * math.sqrt(3)
-    assert found.area == pytest.approx(0.5 * (pair + hexagon) * R**2, rel=3e-5)
-    assert found.filling == pytest.approx(2 / 3 * 9 * math.pi / (pair + hexagon), rel=3e-5)
-    assert found.filling < HEXAGONAL_LAYER
-    assert found.paper == pytest.approx(2 * found.filling)
-    assert found.least == pytest.approx(found.filling * 2 * R / HEIGHT)
+    assert packing.area == pytest.approx(0.5 * (pair + hexagon) * R**2, rel=3e-5)
+    assert packing.filling == pytest.approx(2 / 3 * 9 * math.pi / (pair + hexagon), rel=3e-5)
+    assert packing.filling < HEXAGONAL_LAYER
+    assert packing.paper == pytest.approx(2 * packing.filling)
+    assert packing.least == pytest.approx(packing.filling * 2 * R / HEIGHT)
 
 
 def test_the_error_is_half_of_the_difference_that_either_of_two_clusters_makes():
-    found = packing_of_clusters(*two_clusters(), HEIGHT)
+    packing = packing_of_clusters(*two_clusters(), HEIGHT)
     pair, hexagon = math.pi + 4, math.pi + 12 + 6 * math.sqrt(3)
     alone = 2 / 3 * math.pi * np.array([2 / pair, 7 / hexagon])
-    assert found.filling_error == pytest.approx(0.5 * abs(alone[0] - alone[1]), rel=1e-2)
+    assert packing.filling_error == pytest.approx(0.5 * abs(alone[0] - alone[1]), rel=1e-2)
 
 
 def test_a_single_cluster_has_no_error_that_is_known():

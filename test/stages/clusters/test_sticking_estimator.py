@@ -13,14 +13,14 @@ from nanorocks_ros.stages.clusters.sticking_estimator import StickingMeter
 
 def meter(records):
     stage = StickingMeter(PipelineSettings(), TRAY)
-    for one in records:
-        stage.push(one)
+    for record in records:
+        stage.push(record)
     return stage
 
 
 def test_the_onset_is_that_of_the_first_merge_once_it_happened():
     records = cooling()
-    first = min(one.stamp_ns for one in records if isinstance(one, Merge)) / NS
+    first = min(record.stamp_ns for record in records if isinstance(record, Merge)) / NS
     stage = meter(records)
     assert stage.onset(1, ns(first - 0.01)) is None
     assert stage.onset(1, ns(first)) == pytest.approx(first)
@@ -45,9 +45,9 @@ def test_the_sticking_speed_is_found_and_cycles_together_tell_more():
         together = stage.of_all(cycle, ns(start + 39.9))
         assert (together is None) == (cycle == 1)
     # 95 % intervals, 12 of them.
-    assert sum(one.lower < STICKING < one.upper for one in each) >= 10
+    assert sum(estimate.lower < STICKING < estimate.upper for estimate in each) >= 10
     assert together.lower < STICKING < together.upper
-    widths = [one.upper - one.lower for one in each]
+    widths = [estimate.upper - estimate.lower for estimate in each]
     assert together.upper - together.lower < 0.7 * np.mean(widths)
 
 

@@ -52,21 +52,25 @@ def test_every_rebound_found_is_a_collision_with_that_wall(gas):
     events, found = gas
     rebounds = [one for one in found if isinstance(one, Rebound)]
     assert len(rebounds) > 15
-    for one in rebounds:
-        hits = _events(events, 'wall', one.stamp_ns / 1e9)
-        hit = hits[(hits['bead'] == one.track) & (hits['partner'] == one.wall)]
+    for rebound in rebounds:
+        hits = _events(events, 'wall', rebound.stamp_ns / 1e9)
+        hit = hits[(hits['bead'] == rebound.track) & (hits['partner'] == rebound.wall)]
         assert hit.size == 1
-        assert one.incoming == pytest.approx(hit['normal_speed'][0], abs=5.0 * one.incoming_error)
+        assert rebound.incoming == pytest.approx(
+            hit['normal_speed'][0], abs=5.0 * rebound.incoming_error
+        )
 
 
 def test_rebounds_return_the_restitution_of_the_wall_within_their_errors(gas):
     rebounds = [one for one in gas[1] if isinstance(one, Rebound)]
-    errors = np.array([math.hypot(one.outgoing_error, one.incoming_error) for one in rebounds])
-    misses = np.array([one.outgoing - WALLS * one.incoming for one in rebounds])
-    assert np.median(np.abs(misses / errors)) < 1.0
-    assert np.median([one.outgoing / one.incoming for one in rebounds]) == pytest.approx(
-        WALLS, abs=0.01
+    errors = np.array(
+        [math.hypot(rebound.outgoing_error, rebound.incoming_error) for rebound in rebounds]
     )
+    misses = np.array([rebound.outgoing - WALLS * rebound.incoming for rebound in rebounds])
+    assert np.median(np.abs(misses / errors)) < 1.0
+    assert np.median(
+        [rebound.outgoing / rebound.incoming for rebound in rebounds]
+    ) == pytest.approx(WALLS, abs=0.01)
 
 
 def test_every_collision_found_is_one_of_those_two_beads(gas):
@@ -74,10 +78,10 @@ def test_every_collision_found_is_one_of_those_two_beads(gas):
     pairs = [one for one in found if isinstance(one, PairCollision)]
     assert len(pairs) > 15
     wrong = 0
-    for one in pairs:
-        hits = _events(events, 'pair', one.stamp_ns / 1e9)
+    for pair in pairs:
+        hits = _events(events, 'pair', pair.stamp_ns / 1e9)
         names = np.sort(np.column_stack([hits['bead'], hits['partner']]), axis=1)
-        wrong += not (names == np.sort(one.tracks)).all(axis=1).any()
+        wrong += not (names == np.sort(pair.tracks)).all(axis=1).any()
     assert wrong <= 1
 
 
@@ -114,8 +118,8 @@ def test_a_rebound_is_measured_past_the_wall_that_swings():
         near = (times > at - 0.4) & (times < at + 0.4)
         records = list(tracks_of(ways, displacements=swing, jitter=0.01 * PIXEL))
         hidden = [
-            one if shown else replace(one, seen=np.zeros(1, dtype=bool))
-            for one, shown in zip(records, near, strict=True)
+            record if shown else replace(record, seen=np.zeros(1, dtype=bool))
+            for record, shown in zip(records, near, strict=True)
         ]
         (found,) = _found(hidden)
         assert found.wall == 0

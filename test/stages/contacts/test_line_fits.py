@@ -46,11 +46,11 @@ def test_a_line_says_how_wrong_it_may_be():
         fit_line(times, _way(times, 0.0, (2e-3, 0.0), (2e-3, 0.0), seed), np.full(12, ERROR))
         for seed in range(400)
     ]
-    velocities = np.array([one.velocity - (2e-3, 0.0) for one in lines])
+    velocities = np.array([line.velocity - (2e-3, 0.0) for line in lines])
     assert velocities.std() == pytest.approx(lines[0].velocity_variance ** 0.5, rel=0.1)
-    places = np.array([one.at(0.5) - (0.011, 0.01) for one in lines])
+    places = np.array([line.at(0.5) - (0.011, 0.01) for line in lines])
     assert places.std() == pytest.approx(lines[0].variance_at(0.5) ** 0.5, rel=0.1)
-    assert np.mean([one.chi_square for one in lines]) == pytest.approx(20.0, rel=0.1)
+    assert np.mean([line.chi_square for line in lines]) == pytest.approx(20.0, rel=0.1)
 
 
 def test_lines_before_and_after_meet_when_the_bead_turned():

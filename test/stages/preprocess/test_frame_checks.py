@@ -25,12 +25,14 @@ def frame(number, image=None, step=STEP, encoding='bgr8'):
 def judged(frames):
     checks = FrameChecks('cam')
     verdicts = [checks.push(one) for one in frames]
-    return checks, verdicts, [notice.text for one in verdicts for notice in one.notices]
+    return checks, verdicts, [notice.text for verdict in verdicts for notice in verdict.notices]
 
 
 def test_good_frames_are_used_without_a_word():
     _, verdicts, texts = judged([frame(k) for k in range(10)])
-    assert all(one.usable and one.rows == 240 and one.quality == 0 for one in verdicts)
+    assert all(
+        verdict.usable and verdict.rows == 240 and verdict.quality == 0 for verdict in verdicts
+    )
     assert texts == []
 
 
@@ -39,7 +41,7 @@ def test_blank_frames_are_left_out_and_told_when_they_begin_and_end(level, name)
     blank = np.full((240, 320, 3), level, np.uint8)
     frames = [frame(k, blank if 3 <= k < 8 else None) for k in range(12)]
     _, verdicts, texts = judged(frames)
-    assert [one.usable for one in verdicts] == [True] * 3 + [False] * 5 + [True] * 4
+    assert [verdict.usable for verdict in verdicts] == [True] * 3 + [False] * 5 + [True] * 4
     assert texts == [
         f'cam: the picture is {name} (mean level {level}.0); left out until it returns',
         'cam: the picture is back; 5 blank frames were left out',
@@ -49,7 +51,7 @@ def test_blank_frames_are_left_out_and_told_when_they_begin_and_end(level, name)
 def test_a_30_hz_film_in_a_60_hz_file_gives_every_picture_once():
     frames = [frame(k, picture(k // 2), step=NS // 60) for k in range(40)]
     checks, verdicts, texts = judged(frames)
-    assert [one.usable for one in verdicts] == [True, False] * 20
+    assert [verdict.usable for verdict in verdicts] == [True, False] * 20
     assert checks.duplicates == 20
     (text,) = texts
     assert 'the same as the one before it' in text
@@ -64,7 +66,7 @@ def test_the_same_holds_when_the_second_copy_was_compressed_anew():
 
     _, verdicts, _ = judged([frame(k, recoded(k), step=NS // 60) for k in range(60)])
     # From the first frames one cannot tell what is usual.
-    assert [one.usable for one in verdicts[10:]] == [True, False] * 25
+    assert [verdict.usable for verdict in verdicts[10:]] == [True, False] * 25
 
 
 def test_pictures_that_change_little_from_frame_to_frame_are_all_used():
@@ -74,13 +76,13 @@ def test_pictures_that_change_little_from_frame_to_frame_are_all_used():
         frame(k, still + (rng.random(still.shape) < 0.02).astype(np.uint8)) for k in range(40)
     ]
     _, verdicts, _ = judged(frames)
-    assert all(one.usable for one in verdicts)
+    assert all(verdict.usable for verdict in verdicts)
 
 
 def test_a_frozen_picture_is_passed_on_with_a_flag_and_told_once():
     frames = [frame(k, picture(min(k, 5))) for k in range(60)]
     _, verdicts, texts = judged(frames)
-    frozen = [k for k, one in enumerate(verdicts) if one.quality & Quality.FROZEN]
+    frozen = [k for k, verdict in enumerate(verdicts) if verdict.quality & Quality.FROZEN]
     assert frozen == list(range(13, 60))
     assert all(verdicts[k].usable for k in frozen)
     assert [text for text in texts if 'stood still' in text] == [
@@ -107,7 +109,7 @@ def half(number, kind, rows=150):
 def test_of_half_a_frame_the_upper_half_is_used(kind):
     frames = [frame(k, half(k, kind) if k in (8, 20) else None) for k in range(30)]
     _, verdicts, texts = judged(frames)
-    assert [k for k, one in enumerate(verdicts) if one.rows < 240] == [8, 20]
+    assert [k for k, verdict in enumerate(verdicts) if verdict.rows < 240] == [8, 20]
     assert verdicts[8].rows == pytest.approx(150, abs=1)
     (text,) = texts
     assert 'a frame breaks off at row 1' in text
@@ -120,12 +122,12 @@ def test_a_scene_that_always_ends_in_an_even_floor_is_whole():
         return image
 
     _, verdicts, texts = judged([frame(k, even(k)) for k in range(20)])
-    assert all(one.rows == 240 for one in verdicts)
+    assert all(verdict.rows == 240 for verdict in verdicts)
     assert texts == []
 
 
 def test_gray_pictures_are_flagged_whether_they_are_called_gray_or_not():
     copies = [np.repeat(picture(k, 'mono8')[..., None], 3, axis=2) for k in range(3)]
-    _, called_color, _ = judged([frame(k, one) for k, one in enumerate(copies)])
+    _, called_color, _ = judged([frame(k, copy) for k, copy in enumerate(copies)])
     _, called_gray, _ = judged([frame(k, encoding='mono8') for k in range(3)])
     assert all(one.quality == Quality.GRAY_CAMERA for one in (*called_color, *called_gray))

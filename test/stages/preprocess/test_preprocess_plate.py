@@ -30,8 +30,8 @@ def preprocessor(view=None, **values):
 
 def pushed(stage, frames):
     records = [one for frame in frames for one in stage.push(frame)]
-    images = [one for one in records if isinstance(one, TrayImage)]
-    return images, [one.text for one in records if isinstance(one, Notice)]
+    images = [record for record in records if isinstance(record, TrayImage)]
+    return images, [record.text for record in records if isinstance(record, Notice)]
 
 
 def swing(number):
@@ -49,9 +49,9 @@ def swinging():
 def test_the_trays_are_held_still_and_their_motion_is_told(swinging):
     images, texts = pushed(preprocessor(View(camera=LENS)), swinging)
     assert texts == []
-    assert [one.tray for one in images[:8]] == list(range(1, 9))
+    assert [image.tray for image in images[:8]] == list(range(1, 9))
     for number in (2, 5, 8):
-        own = [one for one in images if one.tray == number]
+        own = [image for image in images if image.tray == number]
         moved = np.array([one.displacement for one in own]) * SCALE
         assert moved == pytest.approx(np.array([swing(k) for k in range(16)]), abs=0.1)
         speed = np.diff(moved, axis=0) * 30 / SCALE
@@ -75,17 +75,17 @@ def test_without_stabilisation_the_trays_move_in_their_pictures(swinging):
 
 def test_all_trays_count_the_shake_of_the_plate_together(swinging):
     images, _ = pushed(preprocessor(View(camera=LENS)), swinging)
-    cycles = np.array([one.cycle for one in images]).reshape(-1, 8)
+    cycles = np.array([image.cycle for image in images]).reshape(-1, 8)
     assert (cycles == cycles[:, :1]).all()
     assert cycles[:, 0].tolist() == [0] * 5 + [1] * 11
-    assert {one.cycle_start_ns for one in images} == {None, swinging[4].stamp_ns}
+    assert {image.cycle_start_ns for image in images} == {None, swinging[4].stamp_ns}
 
 
 def test_the_pipeline_hands_the_count_on_to_its_stages(swinging):
     pipeline = Pipeline(settings(), 'cam', View(camera=LENS))
     for frame in swinging:
         pipeline.push(frame)
-    assert {one.clusters._images._shakes.cycle for one in pipeline.trays.values()} == {1}
+    assert {tray.clusters._images._shakes.cycle for tray in pipeline.trays.values()} == {1}
 
 
 def test_a_lens_of_another_size_is_refused(plate):
@@ -101,10 +101,10 @@ def test_trays_below_the_break_of_half_a_frame_are_left_out_and_flagged_afterwar
     broken[230:] = 128
     frames[2] = replace(frames[2], image=broken)
     images, texts = pushed(preprocessor(), frames)
-    seen = [[one.tray for one in images if one.stamp_ns == f.stamp_ns] for f in frames]
+    seen = [[image.tray for image in images if image.stamp_ns == f.stamp_ns] for f in frames]
     assert seen[2] == [1, 2, 3, 6, 8]
     assert seen[3] == list(range(1, 9))
-    flagged = {one.tray for one in images if one.quality & Quality.HALF_FRAME}
+    flagged = {image.tray for image in images if image.quality & Quality.HALF_FRAME}
     assert flagged == {4, 5, 7}
     assert any('breaks off at row 230 of 420' in text for text in texts)
 
@@ -116,7 +116,7 @@ def test_a_tray_that_is_hidden_is_flagged_and_moves_with_its_plate(plate):
     hidden[y - 12 : y + height + 12, x - 12 : x + width + 12] = 90
     frames[1] = replace(frames[1], image=hidden)
     images, _ = pushed(preprocessor(), frames)
-    lost = [one for one in images if one.quality & Quality.STABILISATION_LOST]
+    lost = [image for image in images if image.quality & Quality.STABILISATION_LOST]
     assert [(one.tray, one.stamp_ns) for one in lost] == [(3, frames[1].stamp_ns)]
     assert np.array(lost[0].displacement) * SCALE == pytest.approx([1.5, 0.5], abs=0.1)
     assert lost[0].quality & Quality.LOW_CONTRAST
@@ -127,7 +127,7 @@ def test_a_tray_alone_that_is_hidden_is_not_known_to_be_anywhere(plate):
     stage = preprocessor(**{'trays': [3], 'preprocess.regions_px': regions})
     flat = replace(plate.frame(1), image=np.full((*plate.shape, 3), (88, 90, 92), np.uint8))
     images, _ = pushed(stage, [plate.frame(0), flat, plate.frame(2)])
-    assert [math.isnan(one.displacement[0]) for one in images] == [False, True, False]
+    assert [math.isnan(image.displacement[0]) for image in images] == [False, True, False]
     assert images[1].quality & Quality.STABILISATION_LOST
 
 
@@ -163,7 +163,7 @@ def test_a_gray_camera_works_in_gray_and_says_so(plate):
         for one in (plate.frame(k, (0.3 * k, 0.0)) for k in range(3))
     ]
     images, _ = pushed(preprocessor(), frames)
-    assert all(one.color is None and one.quality == Quality.GRAY_CAMERA for one in images)
+    assert all(image.color is None and image.quality == Quality.GRAY_CAMERA for image in images)
     assert images[-1].displacement[0] * SCALE == pytest.approx(0.6, abs=0.1)
 
 
@@ -180,10 +180,10 @@ def test_a_gray_camera_works_in_gray_and_says_so(plate):
     ],
 )
 def test_a_wrong_scale_or_map_is_told_with_the_number_that_looks_wrong(plate, values, message):
-    regions = {number: list(one) for number, one in plate.regions.items()}
+    regions = {number: list(region) for number, region in plate.regions.items()}
     if values == 'shift':
-        for one in regions.values():
-            one[0], one[1] = one[0] - 16, one[1] + 12
+        for region in regions.values():
+            region[0], region[1] = region[0] - 16, region[1] + 12
     elif values == 'tray 5':
         regions[5][0], regions[5][1] = 370, 300
     if isinstance(values, str):
@@ -192,13 +192,13 @@ def test_a_wrong_scale_or_map_is_told_with_the_number_that_looks_wrong(plate, va
     images, texts = pushed(preprocessor(**values), [plate.frame(k) for k in range(18)])
     (text,) = [one for one in texts if 'looks wrong' in one]
     assert re.search(message, text)
-    assert any(one.quality & Quality.WRONG_SCALE for one in images[-8:])
+    assert any(image.quality & Quality.WRONG_SCALE for image in images[-8:])
 
 
 def test_a_map_that_is_right_is_not_called_wrong(plate):
     images, texts = pushed(preprocessor(), [plate.frame(k) for k in range(18)])
     assert texts == []
-    assert all(one.quality == 0 for one in images)
+    assert all(image.quality == 0 for image in images)
 
 
 @pytest.mark.parametrize('noise', [1.0, 4.0])
@@ -224,7 +224,7 @@ def test_frames_of_any_rate_and_with_gaps_give_speeds_by_their_stamps(plate):
         for k, ms in enumerate(times)
     ]
     images, _ = pushed(preprocessor(), frames)
-    speeds = [one.velocity[0] * SCALE for one in images if one.tray == 2]
+    speeds = [image.velocity[0] * SCALE for image in images if image.tray == 2]
     assert speeds[1:] == pytest.approx([20.0] * 5, abs=4.0)
 
 

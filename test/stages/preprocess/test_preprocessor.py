@@ -61,7 +61,7 @@ def test_several_trays_come_in_the_order_of_their_regions():
     regions = [0, 0, 60, 40, 100, 20, 50, 30]
     both = preprocessor(**{'trays': [2, 1], 'preprocess.regions_px': regions})
     images = both.push(frame())
-    assert [(one.tray, one.gray.shape) for one in images] == [(2, (40, 60)), (1, (30, 50))]
+    assert [(image.tray, image.gray.shape) for image in images] == [(2, (40, 60)), (1, (30, 50))]
 
 
 def test_records_cannot_be_written_to():

@@ -203,7 +203,11 @@ def test_of_trays_that_are_not_where_the_settings_say_nothing_is_told():
 
 def test_a_cycle_that_the_next_shake_cuts_short_is_final_then():
     speeds = cooling_cycle(until=10.0) + cooling_cycle(cycle=2, start=10.0, until=3.0)
-    finals = [one for one in all_estimates(fitter(), speeds) if one.status is CorStatus.FINAL]
+    finals = [
+        estimate
+        for estimate in all_estimates(fitter(), speeds)
+        if estimate.status is CorStatus.FINAL
+    ]
     assert [one.cycle for one in finals] == [1]
 
 
@@ -220,7 +224,11 @@ def test_the_mean_of_the_paper_is_over_the_final_estimates():
     finals = []
     for cycle in (1, 2, 3):
         speeds = cooling_cycle(cycle, start=60.0 * (cycle - 1), noise=0.05)
-        finals += [one for one in all_estimates(stage, speeds) if one.status is CorStatus.FINAL]
+        finals += [
+            estimate
+            for estimate in all_estimates(stage, speeds)
+            if estimate.status is CorStatus.FINAL
+        ]
     values = [one.restitution for one in finals]
     assert finals[-1].mean_restitution == pytest.approx(np.mean(values))
     assert finals[-1].mean_restitution_error == pytest.approx(np.std(values, ddof=1) / 3**0.5)
@@ -231,7 +239,11 @@ def test_many_cycles_together_say_more():
     finals = []
     for cycle in range(1, 7):
         speeds = simulated_cycle(cycle, start=60.0 * (cycle - 1))
-        finals += [one for one in all_estimates(stage, speeds) if one.status is CorStatus.FINAL]
+        finals += [
+            estimate
+            for estimate in all_estimates(stage, speeds)
+            if estimate.status is CorStatus.FINAL
+        ]
     assert finals[-1].mean_restitution_error < 0.8 * finals[0].mean_restitution_error
     off = finals[-1].mean_restitution - 0.89
     assert abs(off) < 3.0 * finals[-1].mean_restitution_error
@@ -419,14 +431,14 @@ def test_speeds_of_grains_by_their_pictures_alone_say_nothing():
     settings = SimulationSettings(tray=8, restitution=0.89, wall_restitution=0.97, seed=9)
     times = np.arange(0.5, 12.0, 0.1)
     (values,) = cooling_runs(settings, tray, times, [1]).mean_projected_speed
-    found = {}
+    estimates = {}
     for method in (SpeedMethod.STRUCTURE_FUNCTION, SpeedMethod.TRACKING):
         speeds = [
             replace(speed(t, v), tray=8, method=method) for t, v in zip(times, values, strict=True)
         ]
         stage = HaffFitter(PipelineSettings(), tray)
-        *_, found[method] = [*all_estimates(stage, speeds), *stage.flush()]
-    grains, beads = found.values()
+        *_, estimates[method] = [*all_estimates(stage, speeds), *stage.flush()]
+    grains, beads = estimates.values()
     assert grains.status is CorStatus.UNDETERMINED
     assert (grains.restitution_lower, grains.restitution_upper) == (0.0, 1.0)
     assert math.isnan(grains.restitution)

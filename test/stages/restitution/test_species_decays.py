@@ -53,9 +53,9 @@ def lawful(noise=0.02):
 
 def final_of(speeds, tray=TRAY, **values):
     stage = HaffFitter(with_values(PipelineSettings(), values, 'test'), tray)
-    found = [one for speed in speeds for one in stage.push(speed)] + list(stage.flush())
-    (final,) = [one for one in found if one.status in (CorStatus.FINAL, CorStatus.NO_DECAY)]
-    live = [one for one in found if one.status is CorStatus.COOLING]
+    estimates = [one for speed in speeds for one in stage.push(speed)] + list(stage.flush())
+    (final,) = [one for one in estimates if one.status in (CorStatus.FINAL, CorStatus.NO_DECAY)]
+    live = [one for one in estimates if one.status is CorStatus.COOLING]
     return final, live
 
 
@@ -77,7 +77,7 @@ def test_live_estimates_do_not_take_the_time_for_it():
 
 def test_a_species_that_is_not_known_leaves_the_other_alone():
     speeds = lawful()
-    blind = [replace(one, second_species_speed=math.nan) for one in speeds]
+    blind = [replace(speed, second_species_speed=math.nan) for speed in speeds]
     whole, part = final_of(speeds)[0], final_of(blind)[0]
     assert part.first_species_haff_time == whole.first_species_haff_time
     assert math.isnan(part.second_species_haff_time)
@@ -88,8 +88,8 @@ def test_a_species_that_is_not_known_leaves_the_other_alone():
 def test_a_few_speeds_of_a_species_are_no_decay():
     speeds = lawful()
     few = [
-        replace(one, first_species_speed=math.nan) if k > 13 else one
-        for k, one in enumerate(speeds)
+        replace(speed, first_species_speed=math.nan) if k > 13 else speed
+        for k, speed in enumerate(speeds)
     ]
     assert math.isnan(final_of(few)[0].first_species_haff_time)
     assert final_of(few, **{'cooling.fewest_samples': 4})[0].first_species_haff_time > 0.0

@@ -76,10 +76,10 @@ def test_of_an_empty_tray_nothing_is_said():
     found = records_of(TrayStages(PipelineSettings(), FLOWN), images)
     clusters = [one for one in found if isinstance(one, ClusterEstimate)]
     assert clusters
-    for one in clusters:
-        assert one.size_status is SizeStatus.NOTHING
-        assert math.isnan(one.combined_size)
-        assert math.isnan(one.bodies)
-        assert one.sticking_status is StickingStatus.UNKNOWN
+    for cluster in clusters:
+        assert cluster.size_status is SizeStatus.NOTHING
+        assert math.isnan(cluster.combined_size)
+        assert math.isnan(cluster.bodies)
+        assert cluster.sticking_status is StickingStatus.UNKNOWN
     assert not any(isinstance(one, Merge) for one in found)
     assert all(math.isnan(one.restitution) for one in found if isinstance(one, CorEstimate))

@@ -67,10 +67,10 @@ def ratios(estimates, truth):
     time = np.array([one.stamp_ns for one in truth]) / NS
     true = np.array([one.mean_projected_speed for one in truth])
     found = []
-    for one in estimates:
-        inside = np.abs(time - one.stamp_ns / NS) <= 0.5 * one.window + 1e-6
-        if one.cycle > 0:
-            measured = (one.mean_projected_speed, one.mean_projected_speed_error)
+    for estimate in estimates:
+        inside = np.abs(time - estimate.stamp_ns / NS) <= 0.5 * estimate.window + 1e-6
+        if estimate.cycle > 0:
+            measured = (estimate.mean_projected_speed, estimate.mean_projected_speed_error)
             found.append((*measured, true[inside].mean()))
     return np.array(found)
 
@@ -122,8 +122,8 @@ def test_nothing_is_said_until_the_beads_are_known(run):
 def test_the_number_of_beads_visible_does_not_matter(run):
     images, truth = run
     half = [
-        TrayImage(stamp_ns=one.stamp_ns, tray=1, gray=one.gray[:, : one.gray.shape[1] // 2])
-        for one in images
+        TrayImage(stamp_ns=image.stamp_ns, tray=1, gray=image.gray[:, : image.gray.shape[1] // 2])
+        for image in images
     ]
     speed, _, true = ratios(pushed(half), truth).T
     assert (speed / true).mean() == pytest.approx(1.0, abs=0.15)
@@ -159,7 +159,7 @@ def test_half_the_time_between_frames_is_twice_the_speed(run):
 def test_frames_that_are_missing_do_not_change_the_speed(run, method):
     images, truth = run
     rng = np.random.default_rng(3)
-    kept = [one for one in images if rng.random() > 0.2]
+    kept = [image for image in images if rng.random() > 0.2]
     speed, _, true = ratios(pushed(kept, method), truth).T
     assert (speed / true).mean() == pytest.approx(1.0, abs=0.05)
 
@@ -174,7 +174,7 @@ def test_contacts_are_found_where_beads_are_tracked_and_belong_to_their_cycle(ru
     images, _ = run
     kinds = (Rebound, PairCollision)
     found = list(measured(SpeedEstimator(PipelineSettings(), TRAY), images, kinds))
-    start_ns = next(one.cycle_start_ns for one in images if one.cycle_start_ns is not None)
+    start_ns = next(image.cycle_start_ns for image in images if image.cycle_start_ns is not None)
     assert {type(one) for one in found} == set(kinds)
     assert all(one.cycle == int(one.stamp_ns >= start_ns) for one in found)
     off = {'cooling.rebounds': False, 'cooling.collisions': False}
@@ -231,7 +231,10 @@ def test_the_mask_shows_where_beads_moved_and_only_while_somebody_looks(run):
     estimator = SpeedEstimator(PipelineSettings(), TRAY)
     estimator.emit_mask = True
     masks = [
-        one for image in images for one in estimator.push(image) if isinstance(one, MotionMask)
+        record
+        for image in images
+        for record in estimator.push(image)
+        if isinstance(record, MotionMask)
     ]
     moving = {one.stamp_ns: (one.mask > 0).mean() for one in masks}
     assert all(set(np.unique(one.mask)) <= {0, 255} for one in masks)
@@ -242,7 +245,7 @@ def test_the_mask_shows_where_beads_moved_and_only_while_somebody_looks(run):
     assert min(shaken[1:]) > 0.01
     estimator.emit_mask = False
     later = [estimator.push(image) for image in images]
-    assert not any(isinstance(one, MotionMask) for found in later for one in found)
+    assert not any(isinstance(record, MotionMask) for found in later for record in found)
 
 
 def test_frozen_frames_after_motion_are_slow_and_no_shake(run):
@@ -252,9 +255,9 @@ def test_frozen_frames_after_motion_are_slow_and_no_shake(run):
         TrayImage(stamp_ns=last.stamp_ns + (k + 1) * round(NS / 30), tray=1, gray=last.gray)
         for k in range(90)
     ]
-    found = [one for one in pushed([*images, *frozen]) if isinstance(one, SpeedEstimate)]
-    assert {one.cycle for one in found} == {0, 1}
-    assert found[-1].mean_projected_speed < 1e-4
+    estimates = [one for one in pushed([*images, *frozen]) if isinstance(one, SpeedEstimate)]
+    assert {estimate.cycle for estimate in estimates} == {0, 1}
+    assert estimates[-1].mean_projected_speed < 1e-4
 
 
 def test_tracks_are_relied_upon_where_nearly_all_beads_are_followed(run):
@@ -300,7 +303,7 @@ def from_crowd(images, method, emit_tracks=False):
     settings = with_values(PipelineSettings(), {'trays': (6,), 'speed.method': method}, 'test')
     estimator = SpeedEstimator(settings, load_trays()[6])
     estimator.emit_tracks = emit_tracks
-    return [one for image in images for one in estimator.push(image)]
+    return [record for image in images for record in estimator.push(image)]
 
 
 def test_a_tray_too_crowded_to_follow_is_left_to_the_structure_function_at_once(crowd):
@@ -320,7 +323,7 @@ def test_who_wants_the_tracks_of_a_crowded_tray_gets_them_beside_the_same_speeds
 def test_a_lost_frame_is_no_shaking_event(run):
     images, _ = run
     for lost in range(60, 300, 20):
-        kept = [one for k, one in enumerate(images) if k != lost]
+        kept = [image for k, image in enumerate(images) if k != lost]
         assert max(one.cycle for one in pushed(kept)) == 1
 
 
@@ -329,24 +332,24 @@ def test_the_motion_of_a_swinging_tray_is_taken_off():
     images, truth = filmed(12.0, mean_speed=0.002)
     away = 3.0
     swung = []
-    for k, one in enumerate(images):
+    for k, image in enumerate(images):
         shift = away * np.sin(2.0 * np.pi * 1.5 * k / 30.0)
         matrix = np.float32([[1.0, 0.0, -shift], [0.0, 1.0, 0.0]])
         moved = cv2.warpAffine(
-            one.gray, matrix, one.gray.shape[::-1], borderMode=cv2.BORDER_REPLICATE
+            image.gray, matrix, image.gray.shape[::-1], borderMode=cv2.BORDER_REPLICATE
         )
         swung.append(
             TrayImage(
-                stamp_ns=one.stamp_ns,
+                stamp_ns=image.stamp_ns,
                 tray=1,
                 gray=moved,
                 cycle=int(k > 15),
                 cycle_start_ns=images[15].stamp_ns if k > 15 else None,
-                noise_power=one.noise_power,
+                noise_power=image.noise_power,
                 displacement=(shift / SCALE, 0.0),
             )
         )
-    blind = [replace(one, displacement=(0.0, 0.0)) for one in swung]
+    blind = [replace(image, displacement=(0.0, 0.0)) for image in swung]
     found, wrong = (ratios(pushed(some), truth).T for some in (swung, blind))
     assert (wrong[0] / wrong[2]).mean() > 1.3
     assert (found[0] / found[2]).mean() == pytest.approx(1.0, abs=0.1)

@@ -67,12 +67,17 @@ def mixture():
 def pushed(images, number, method, **values):
     estimator = SpeedEstimator(settings_of(number, method, **values), load_trays()[number])
     return [
-        one for image in images for one in estimator.push(image) if isinstance(one, SpeedEstimate)
+        record
+        for image in images
+        for record in estimator.push(image)
+        if isinstance(record, SpeedEstimate)
     ]
 
 
 def ratios(estimates, truth):
-    moving = [one for one in estimates if one.cycle > 0 and one.stamp_ns > 1.0 * NS]
+    moving = [
+        estimate for estimate in estimates if estimate.cycle > 0 and estimate.stamp_ns > 1.0 * NS
+    ]
     true = np.interp([one.stamp_ns for one in moving], *truth.T)
     return np.array([one.mean_projected_speed for one in moving]) / true, moving
 
@@ -101,7 +106,7 @@ def test_the_structure_function_is_chosen_for_crowded_fast_grains_and_is_right(g
 def test_the_noise_of_grains_in_motion_is_that_of_grains_at_rest(grains):
     images, _ = grains
     meter = NoiseMeter()
-    noise = [meter.push(one.gray) for one in images]
+    noise = [meter.push(image.gray) for image in images]
     assert max(noise[20:]) <= max(noise[5:14])
 
 
@@ -124,7 +129,8 @@ def test_the_papers_recipe_is_flagged_where_the_area_is_saturated():
 def test_a_picture_without_colour_in_between_is_left_out_and_flagged(mixture):
     images, truth = mixture
     some = [
-        replace(one, color=None) if k in (90, 91, 120) else one for k, one in enumerate(images)
+        replace(image, color=None) if k in (90, 91, 120) else image
+        for k, image in enumerate(images)
     ]
     ratio, found = ratios(pushed(some, 3, 'structure_function'), truth)
     assert ratio.mean() == pytest.approx(1.0, abs=0.1)
@@ -134,7 +140,7 @@ def test_a_picture_without_colour_in_between_is_left_out_and_flagged(mixture):
 
 def test_when_colour_is_gone_for_good_all_beads_are_seen_as_one_and_the_error_flags_it(mixture):
     images, _ = mixture
-    gone = [replace(one, color=None) if k >= 60 else one for k, one in enumerate(images)]
+    gone = [replace(image, color=None) if k >= 60 else image for k, image in enumerate(images)]
     found = pushed(gone, 3, 'structure_function')
     last = found[-1]
     assert np.isnan(last.first_species_speed)
@@ -145,7 +151,7 @@ def test_when_colour_is_gone_for_good_all_beads_are_seen_as_one_and_the_error_fl
 def test_a_species_that_never_shows_does_not_silence_the_structure_function(mixture):
     images, truth = mixture
     # A gray camera whose driver says that it gives colour.
-    dull = [replace(one, color=np.repeat(one.gray[:, :, None], 3, axis=2)) for one in images]
+    dull = [replace(image, color=np.repeat(image.gray[:, :, None], 3, axis=2)) for image in images]
     found = pushed(dull, 3, 'structure_function')
     assert found
     assert all(np.isnan(one.first_species_speed) for one in found)

@@ -67,10 +67,10 @@ def test_blue_beads_are_seen_and_linked_but_for_those_that_are_hidden(tray_3):
 
 def test_hidden_beads_are_predicted_and_say_so(tray_3):
     records = [tracks for tracks, _ in tray_3[20:]]
-    counts = [np.count_nonzero(one.species == 1) for one in records]
+    counts = [np.count_nonzero(record.species == 1) for record in records]
     assert np.mean(counts) == pytest.approx(40.0, abs=0.8)
-    hidden = np.concatenate([one.position_errors[~one.seen] for one in records])
-    shown = np.concatenate([one.position_errors[one.seen] for one in records])
+    hidden = np.concatenate([record.position_errors[~record.seen] for record in records])
+    shown = np.concatenate([record.position_errors[record.seen] for record in records])
     assert hidden.size > 0
     assert np.median(hidden) > 2.0 * np.median(shown)
     assert records[-1].expected.tolist() == [15, 40]
@@ -189,7 +189,7 @@ def test_lens_chalk_shadows_glare_and_swing_leave_most_beads_to_be_tracked():
     trackers = {number: Tracker(settings, tray) for number, tray in trays.items()}
     shares = {(2, 0): [], (2, 1): [], (3, 0): [], (3, 1): []}
     for moment in film.moments(40):
-        known = {one.tray: one for one in moment.beads}
+        known = {bead.tray: bead for bead in moment.beads}
         for image in stage.push(moment.frame):
             if not isinstance(image, TrayImage):
                 continue

@@ -36,7 +36,7 @@ def picture(number):
 def bag_of(path, pictures, rate=30, info=None):
     """A bag of gray pictures, with what is told of the lens where anything is."""
     names = (topics.EPOCH, topics.RAW, topics.CAMERA_INFO)
-    with BagWriter(path, {one.absolute(): offered(one) for one in names}, metadata={}) as bag:
+    with BagWriter(path, {name.absolute(): offered(name) for name in names}, metadata={}) as bag:
         bag.write(topics.EPOCH.absolute(), NS, time_message(NS))
         if info is not None:
             message = camera_info_message(
@@ -57,20 +57,20 @@ def lens(model='equidistant', size=210):
 
 def test_frames_stored_twice_count_once_and_the_lags_are_those_of_the_film(tmp_path):
     twice = [picture(k // 2) for k in range(120)]
-    found = analyse(bag_of(tmp_path / 'bag', twice, rate=60), PipelineSettings())
-    assert found.frames == 60
-    assert found.frames_lost == 0
-    assert any('60 frames were stored twice and left out' in one for one in found.notices)
+    analysis = analyse(bag_of(tmp_path / 'bag', twice, rate=60), PipelineSettings())
+    assert analysis.frames == 60
+    assert analysis.frames_lost == 0
+    assert any('60 frames were stored twice and left out' in notice for notice in analysis.notices)
 
 
 def test_black_frames_in_the_middle_are_a_gap(tmp_path):
     pictures = [np.zeros((210, 210), np.uint8) if 30 <= k < 40 else picture(k) for k in range(70)]
-    found = analyse(bag_of(tmp_path / 'bag', pictures), PipelineSettings())
-    assert found.frames == 60
-    assert found.frames_lost == 10
-    assert any('the picture is black' in one for one in found.notices)
-    assert any('10 blank frames were left out' in one for one in found.notices)
-    assert {one.cycle for one in found.trays[1].clusters} == {0}
+    analysis = analyse(bag_of(tmp_path / 'bag', pictures), PipelineSettings())
+    assert analysis.frames == 60
+    assert analysis.frames_lost == 10
+    assert any('the picture is black' in notice for notice in analysis.notices)
+    assert any('10 blank frames were left out' in notice for notice in analysis.notices)
+    assert {cluster.cycle for cluster in analysis.trays[1].clusters} == {0}
 
 
 def test_a_recording_that_is_black_throughout_is_refused(tmp_path, capsys):
@@ -85,7 +85,10 @@ def test_without_a_lens_the_picture_is_taken_as_straight_and_that_is_said(tmp_pa
     pictures = [picture(k) for k in range(10)]
     without = analyse(bag_of(tmp_path / 'without', pictures), PipelineSettings())
     with_one = analyse(bag_of(tmp_path / 'with', pictures, info=lens()), PipelineSettings())
-    said = [[one for one in found.notices if 'straight' in one] for found in (without, with_one)]
+    said = [
+        [notice for notice in found.notices if 'straight' in notice]
+        for found in (without, with_one)
+    ]
     assert len(said[0]) == 1
     assert 'no camera_info and no calibration file' in said[0][0]
     assert said[1] == []
@@ -128,14 +131,14 @@ def changed_sample(path, topic, number, change):
 def test_one_message_that_is_none_costs_one_frame(tmp_path):
     name = topics.RAW_COMPRESSED.absolute()
     path = changed_sample(tmp_path / 'bag', name, 40, lambda content: content[:20])
-    found = analyse(path, PipelineSettings())
+    analysis = analyse(path, PipelineSettings())
     whole = analyse(
         changed_sample(tmp_path / 'whole', name, 0, lambda content: content), PipelineSettings()
     )
-    assert found.refused == 1
-    assert found.frames == whole.frames - 1
-    assert not found.complete
-    assert any('1 frames could not be used' in one for one in found.notices)
+    assert analysis.refused == 1
+    assert analysis.frames == whole.frames - 1
+    assert not analysis.complete
+    assert any('1 frames could not be used' in notice for notice in analysis.notices)
 
 
 def test_a_first_message_that_is_none_does_not_take_the_epoch_away(tmp_path):
@@ -148,15 +151,15 @@ def test_a_first_message_that_is_none_does_not_take_the_epoch_away(tmp_path):
 def test_a_message_of_the_truth_that_is_none_is_told_and_the_rest_is_taken(tmp_path):
     name = topics.TRUTH.absolute(1)
     path = changed_sample(tmp_path / 'bag', name, 5, lambda content: content[:30])
-    found = analyse(path, PipelineSettings())
-    assert found.refused == 0
-    assert len(found.trays[1].truth) > 20
-    assert any('1 messages of the truth cannot be used' in one for one in found.notices)
+    analysis = analyse(path, PipelineSettings())
+    assert analysis.refused == 0
+    assert len(analysis.trays[1].truth) > 20
+    assert any('1 messages of the truth cannot be used' in notice for notice in analysis.notices)
 
 
 def without_stamps(path, frames):
     names = (topics.RAW,)
-    with BagWriter(path, {one.absolute(): offered(one) for one in names}, metadata={}) as bag:
+    with BagWriter(path, {name.absolute(): offered(name) for name in names}, metadata={}) as bag:
         for number in range(30):
             stamp_ns = 0 if number in frames else NS + number * NS // 30
             message = image_message(stamp_ns, 'camera', 'mono8', picture(number))
@@ -165,10 +168,10 @@ def without_stamps(path, frames):
 
 
 def test_frames_without_a_stamp_are_refused_and_set_no_epoch(tmp_path, capsys):
-    found = analyse(without_stamps(tmp_path / 'bag', {0, 7}), PipelineSettings())
-    assert found.refused == 2
-    assert found.epoch_ns == NS + NS // 30
-    assert found.seconds < 1.0
+    analysis = analyse(without_stamps(tmp_path / 'bag', {0, 7}), PipelineSettings())
+    assert analysis.refused == 2
+    assert analysis.epoch_ns == NS + NS // 30
+    assert analysis.seconds < 1.0
     path = without_stamps(tmp_path / 'none', range(30))
     assert main(['analyse', str(path), '--no-output']) == 1
     (line,) = capsys.readouterr().err.splitlines()

@@ -59,10 +59,10 @@ def test_every_frame_of_the_bag_has_tracks_of_all_beads(found):
 def test_a_table_holds_what_was_tracked(found, tmp_path):
     write_tracks(tmp_path / 'tracks.csv', found)
     rows = _rows(tmp_path / 'tracks.csv')
-    assert list(rows[0]) == [one.name for one in COLUMNS]
+    assert list(rows[0]) == [column.name for column in COLUMNS]
     assert len(rows) == 15 * FRAMES
     last = found.tracks[1][-1]
-    shown = [(float(one['x']), float(one['y'])) for one in rows if int(one['frame']) == FRAMES - 1]
+    shown = [(float(row['x']), float(row['y'])) for row in rows if int(row['frame']) == FRAMES - 1]
     np.testing.assert_allclose(shown, last.positions, rtol=1e-6)
     assert rows[0]['vx'] == ''
     assert rows[0]['species'] == 'acrylic'
@@ -75,9 +75,9 @@ def test_parquet_and_csv_hold_the_same(found, tmp_path):
     write_tracks(tmp_path / 'tracks.parquet', found)
     table = parquet.read_table(tmp_path / 'tracks.parquet').to_pydict()
     rows = _rows(tmp_path / 'tracks.csv')
-    assert [str(one) for one in table['id']] == [one['id'] for one in rows]
-    np.testing.assert_allclose(table['radius'], [float(one['radius']) for one in rows], rtol=1e-6)
-    assert table['species'] == [one['species'] for one in rows]
+    assert [str(one) for one in table['id']] == [row['id'] for row in rows]
+    np.testing.assert_allclose(table['radius'], [float(row['radius']) for row in rows], rtol=1e-6)
+    assert table['species'] == [row['species'] for row in rows]
     # Where CSV leaves a field empty.
     assert np.isnan(table['vx'][0])
     # One group of rows for a frame each would make the file many times as large.
@@ -164,7 +164,7 @@ def test_a_gray_camera_is_refused_with_the_remedy(tmp_path):
     names = (topics.EPOCH, topics.RAW)
     path = tmp_path / 'gray'
     rng = np.random.default_rng(1)
-    with BagWriter(path, {one.absolute(): offered(one) for one in names}, metadata={}) as bag:
+    with BagWriter(path, {name.absolute(): offered(name) for name in names}, metadata={}) as bag:
         bag.write(topics.EPOCH.absolute(), NS, time_message(NS))
         for number in range(4):
             pixels = rng.integers(90, 110, (210, 210), dtype=np.uint8)

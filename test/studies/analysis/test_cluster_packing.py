@@ -108,17 +108,17 @@ def test_no_cycle_is_refused():
 
 
 def test_a_gas_that_does_not_stick_has_no_filling_factor():
-    found = simulated_packing(TRAY, replace(STICKING, sticking_speed=0.0), 1)
-    assert np.isnan(found[0].filling).all()
-    assert math.isnan(compaction(found[0]).true)
+    curves = simulated_packing(TRAY, replace(STICKING, sticking_speed=0.0), 1)
+    assert np.isnan(curves[0].filling).all()
+    assert math.isnan(compaction(curves[0]).true)
 
 
 def test_results_of_an_analysis_are_read_by_cycle(tmp_path):
     areas = 1e-6 * np.linspace(1.0, 2.0, 60)
-    found = measured_packing(write_results(tmp_path / 'r', areas), 1)
-    assert [one.cycle for one in found] == [1, 2]
-    assert found[1].times[:2].tolist() == [0.0, 1.0]
-    assert found[1].level_area == pytest.approx(areas)
+    curves = measured_packing(write_results(tmp_path / 'r', areas), 1)
+    assert [one.cycle for one in curves] == [1, 2]
+    assert curves[1].times[:2].tolist() == [0.0, 1.0]
+    assert curves[1].level_area == pytest.approx(areas)
 
 
 def test_results_without_a_shaking_event_are_refused(tmp_path):

@@ -32,54 +32,54 @@ def folders(tmp_path_factory):
 
 
 def test_every_cycle_of_every_recording_has_its_place(folders):
-    found = read_campaign(folders)
-    assert found.trays == (1, 3)
-    assert found.places == 36
-    assert len(found.cycles) == 72
-    last = found.cycles[-1]
+    campaign = read_campaign(folders)
+    assert campaign.trays == (1, 3)
+    assert campaign.places == 36
+    assert len(campaign.cycles) == 72
+    last = campaign.cycles[-1]
     assert (last.recording, last.cycle, last.place, last.tray) == ('r2', 12, 35, 3)
     assert last.start == 661.0
 
 
 def test_peak_restitution_and_size_are_those_of_the_tables(folders):
-    for one in read_campaign(folders[:1]).cycles:
-        assert one.peak_speed == pytest.approx(PEAK)
-        assert one.peak_speed_error == pytest.approx(1e-4)
-        assert (one.restitution, one.restitution_lower, one.restitution_upper) == (
+    for cycle in read_campaign(folders[:1]).cycles:
+        assert cycle.peak_speed == pytest.approx(PEAK)
+        assert cycle.peak_speed_error == pytest.approx(1e-4)
+        assert (cycle.restitution, cycle.restitution_lower, cycle.restitution_upper) == (
             0.89,
             0.87,
             0.91,
         )
-        assert SIZE * 0.8 < one.cluster_size < SIZE * 1.2
-        assert 0.0 < one.cluster_size_error < 1e-3 * SIZE
+        assert SIZE * 0.8 < cycle.cluster_size < SIZE * 1.2
+        assert 0.0 < cycle.cluster_size_error < 1e-3 * SIZE
 
 
 def test_the_period_of_larger_clusters_is_found(folders):
-    found = read_campaign(folders)
-    (one,) = found.periods
+    campaign = read_campaign(folders)
+    (one,) = campaign.periods
     assert (one.first, one.last) == (18, 23)
-    assert in_period(found, 20)
-    assert not in_period(found, 30)
+    assert in_period(campaign, 20)
+    assert not in_period(campaign, 30)
 
 
 def test_a_trend_of_peaks_is_that_which_was_put_in(tmp_path):
     peaks = 0.005 + 1e-5 * np.arange(20)
     folder = write_recording(tmp_path / 'r', (1,), 20, np.full(20, SIZE), peaks=peaks)
-    found = read_campaign([folder]).trends
-    assert found[1, 'peak_speed'].slope == pytest.approx(1e-5)
-    assert found[1, 'restitution'].slope == 0.0
-    assert math.isnan(found[1, 'restitution'].slope_error)
+    trends = read_campaign([folder]).trends
+    assert trends[1, 'peak_speed'].slope == pytest.approx(1e-5)
+    assert trends[1, 'restitution'].slope == 0.0
+    assert math.isnan(trends[1, 'restitution'].slope_error)
 
 
 def test_beads_of_bodies_are_preferred_where_all_recordings_have_them(tmp_path):
     sizes = np.full(6, SIZE)
     with_bodies = write_recording(tmp_path / 'a', (1,), 6, sizes, bodies=True)
     without = write_recording(tmp_path / 'b', (1,), 6, sizes)
-    found = read_campaign([with_bodies])
-    assert found.measure.column == 'weighted_size'
-    assert found.cycles[0].cluster_size == pytest.approx(6.0, rel=1e-3)
+    campaign = read_campaign([with_bodies])
+    assert campaign.measure.column == 'weighted_size'
+    assert campaign.cycles[0].cluster_size == pytest.approx(6.0, rel=1e-3)
     # The error of one count is that of all: they are of the same bodies.
-    assert found.cycles[0].cluster_size_error == 0.5
+    assert campaign.cycles[0].cluster_size_error == 0.5
     assert read_campaign([with_bodies, without]).measure.column == 'correlation_length'
 
 
@@ -99,19 +99,19 @@ def test_a_tray_that_missed_a_shaking_event_keeps_in_step(tmp_path):
     (folder / 'tray_3_speed.csv').write_text(
         ''.join(line for line in lines if line.split(',')[1] != '2')
     )
-    found = read_campaign([folder])
-    assert found.places == 3
-    assert np.isnan(found.values(3, 'peak_speed')).tolist() == [False, True, False]
-    assert np.isnan(found.values(3, 'cluster_size')).all()
+    campaign = read_campaign([folder])
+    assert campaign.places == 3
+    assert np.isnan(campaign.values(3, 'peak_speed')).tolist() == [False, True, False]
+    assert np.isnan(campaign.values(3, 'cluster_size')).all()
 
 
 def test_the_table_holds_every_cycle(folders, tmp_path):
-    found = read_campaign(folders)
-    write_campaign(found, tmp_path / 'all.csv')
+    campaign = read_campaign(folders)
+    write_campaign(campaign, tmp_path / 'all.csv')
     columns = read_columns(tmp_path / 'all.csv', ('place', 'tray', 'cluster_size', 'quiet'))
-    assert columns['place'].tolist() == [one.place for one in found.cycles]
+    assert columns['place'].tolist() == [cycle.place for cycle in campaign.cycles]
     assert columns['quiet'].sum() == 12
-    assert columns['cluster_size'][0] == found.cycles[0].cluster_size
+    assert columns['cluster_size'][0] == campaign.cycles[0].cluster_size
 
 
 def test_recordings_without_a_shaking_event_are_refused(tmp_path):

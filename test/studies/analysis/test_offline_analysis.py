@@ -82,9 +82,9 @@ def test_the_speeds_from_the_frames_are_those_of_the_truth(analysis):
     stamps = np.array([one.stamp_ns for one in results.truth])
     true = np.array([one.mean_projected_speed for one in results.truth])
     ratios = [
-        one.mean_projected_speed / np.interp(one.stamp_ns, stamps, true)
-        for one in results.speeds
-        if one.cycle == 1
+        speed.mean_projected_speed / np.interp(speed.stamp_ns, stamps, true)
+        for speed in results.speeds
+        if speed.cycle == 1
     ]
     assert len(ratios) > 150
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.1)
@@ -106,15 +106,15 @@ def test_results_are_written_as_tables_and_as_a_bag(analysis, tmp_path):
     cors = [
         from_array(
             CorEstimate,
-            bag.deserialize(one).data,
+            bag.deserialize(message).data,
             tray=1,
             epoch_ns=analysis.epoch_ns,
-            where=one.topic,
+            where=message.topic,
         )
-        for one in bag.messages([topics.COR.absolute(1)])
+        for message in bag.messages([topics.COR.absolute(1)])
     ]
-    expected = [one.restitution for one in analysis.trays[1].cors]
-    assert [one.restitution for one in cors] == pytest.approx(expected, rel=1e-6, nan_ok=True)
+    expected = [cor.restitution for cor in analysis.trays[1].cors]
+    assert [cor.restitution for cor in cors] == pytest.approx(expected, rel=1e-6, nan_ok=True)
     assert bag.metadata['source'] == SAMPLE.name
 
 
@@ -149,14 +149,14 @@ def test_a_late_frame_is_dropped_and_told(tmp_path):
     stamps[30], stamps[31] = stamps[31], stamps[30]
     found = analyse(raw_bag(tmp_path / 'bag', stamps), PipelineSettings())
     assert found.frames == 59
-    assert any('came 0.033 s late and was dropped' in one for one in found.notices)
+    assert any('came 0.033 s late and was dropped' in notice for notice in found.notices)
 
 
 def test_time_that_goes_back_starts_afresh_and_is_told(tmp_path):
     stamps = at_30_hz(60)
     found = analyse(raw_bag(tmp_path / 'bag', stamps + stamps), PipelineSettings())
     assert found.frames == 120
-    assert any('time went back by 1.967 s; starting afresh' in one for one in found.notices)
+    assert any('time went back by 1.967 s; starting afresh' in notice for notice in found.notices)
 
 
 def test_a_scene_in_which_nothing_moves_gives_no_restitution(tmp_path):
@@ -168,11 +168,11 @@ def test_a_scene_in_which_nothing_moves_gives_no_restitution(tmp_path):
 
     found = analyse(raw_bag(tmp_path / 'bag', at_30_hz(120), picture), PipelineSettings())
     assert found.trays[1].cors == []
-    assert all(one.cycle == 0 for one in found.trays[1].clusters)
+    assert all(cluster.cycle == 0 for cluster in found.trays[1].clusters)
 
 
 def run(*arguments):
-    return main([str(one) for one in arguments])
+    return main([str(argument) for argument in arguments])
 
 
 def error_of(capsys):
@@ -384,7 +384,7 @@ def test_cycles_of_a_second_pass_are_cycles_of_their_own(tmp_path):
                 content = source.deserialize(message)
                 bag.write(name, message.log_time_ns + again * length, content)
     cycles = as_json(analyse(path, PipelineSettings()))['trays']['1']['cycles']
-    assert [one['cycle'] for one in cycles] == [1, 1]
+    assert [cycle['cycle'] for cycle in cycles] == [1, 1]
     assert cycles[0]['restitution'] == cycles[1]['restitution']
 
 
@@ -395,7 +395,7 @@ def test_nothing_but_our_own_results_is_ever_removed(analysis, tmp_path):
     for _ in range(2):
         write_results(analysis, tmp_path / 'out', SAMPLE, PipelineSettings())
     assert (beside / 'thesis.txt').read_text() == 'precious'
-    assert sorted(one.name for one in tmp_path.iterdir()) == ['out', 'out.part']
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['out', 'out.part']
 
 
 def test_results_are_written_though_nobody_reads_what_is_printed(tmp_path):

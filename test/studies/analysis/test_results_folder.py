@@ -79,8 +79,8 @@ def test_tables_in_parquet_hold_the_numbers_of_the_csv(tmp_path):
     for form in FORMATS:
         folder = tmp_path / form
         write_results(analysis(), folder, tmp_path / 'bag', PipelineSettings(), form)
-    assert {one.stem for one in (tmp_path / 'parquet').glob('*.parquet')} == {
-        one.stem for one in (tmp_path / 'csv').glob('*.csv')
+    assert {path.stem for path in (tmp_path / 'parquet').glob('*.parquet')} == {
+        path.stem for path in (tmp_path / 'csv').glob('*.csv')
     }
     table = parquet.read_table(tmp_path / 'parquet' / 'tray_5_cor.parquet')
     with (tmp_path / 'csv' / 'tray_5_cor.csv').open(newline='') as stream:
@@ -100,11 +100,11 @@ def test_every_kind_of_result_goes_into_the_bag_and_into_the_tables(tmp_path):
             getattr(found.trays[5], name).append(record)
     # What cycles say together is kept beside the tables.
     beside = {'truth', 'evidence', 'sticking'}
-    assert set(_LISTS.values()) == {one.name for one in fields(TrayResults)} - beside
+    assert set(_LISTS.values()) == {field.name for field in fields(TrayResults)} - beside
     write_results(found, tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
     bag = open_bag(tmp_path / 'results' / 'results_bag')
     assert bag.complete
-    tables = {one.stem.removeprefix('tray_5_') for one in (tmp_path / 'results').glob('*.csv')}
+    tables = {path.stem.removeprefix('tray_5_') for path in (tmp_path / 'results').glob('*.csv')}
     assert {one.rpartition('/')[2] for one in bag.topics} == {*tables, 'epoch'}
     assert len(tables) == len(_LISTS)
 
@@ -127,13 +127,13 @@ def test_records_that_came_in_another_order_stand_by_their_stamps_in_the_bag(tmp
     bag = open_bag(tmp_path / 'results' / 'results_bag')
     topic = topics.MERGE.absolute(5)
     stored = [
-        from_array(Merge, bag.deserialize(one).data, tray=5, epoch_ns=0, where=topic)
-        for one in bag.messages([topic])
+        from_array(Merge, bag.deserialize(message).data, tray=5, epoch_ns=0, where=topic)
+        for message in bag.messages([topic])
     ]
-    assert [one.stamp_ns // NS for one in stored] == sorted(came)
+    assert [merge.stamp_ns // NS for merge in stored] == sorted(came)
     # Those of one stamp as they came in.
     order = sorted(range(len(came)), key=came.__getitem__)
-    assert [one.tracks.tolist() for one in stored] == [[number, 99] for number in order]
+    assert [merge.tracks.tolist() for merge in stored] == [[number, 99] for number in order]
 
 
 def test_tables_in_parquet_are_put_together_of_pieces(tmp_path):
@@ -162,5 +162,8 @@ def test_a_cycle_that_a_merge_ended_in_hindsight_is_one_cycle_and_a_second_pass_
         replace(COR, cycle=cycle, stamp_ns=round(time * NS), status=status)
         for cycle, time, status in course
     ]
-    found = [(one.cycle, one.stamp_ns / NS, one.status) for one in last_of_each_cycle(cors)]
+    found = [
+        (estimate.cycle, estimate.stamp_ns / NS, estimate.status)
+        for estimate in last_of_each_cycle(cors)
+    ]
     assert found == [course[5], course[9], course[11], course[12]]

@@ -89,8 +89,8 @@ def done(films, tmp_path_factory):
     bags = folder / 'bags'
     bags.mkdir()
     broken_bags(bags, short_film(folder / 'spoilt', 3, 2.0))
-    for one in films:
-        shutil.copytree(one, bags / one.name)
+    for film in films:
+        shutil.copytree(film, bags / film.name)
     out, err, results = io.StringIO(), io.StringIO(), folder / 'results'
     with redirect_stdout(out), redirect_stderr(err):
         code = main(['analyse', f'{bags}/*', '-o', str(results), '--json', '--workers', '2'])
@@ -109,14 +109,14 @@ def test_bad_bags_are_told_in_the_end_with_their_reasons(done):
     last = errors.strip().splitlines()[-1]
     assert '3 of 7 recordings failed' in last
     assert 'run the same command again' in last
-    bags = {Path(one['bag']).name: one for one in found['bags']}
+    bags = {Path(bag['bag']).name: bag for bag in found['bags']}
     assert set(bags) == {'run_1', 'run_2', 'truncated.mcap', 'flipped.mcap'}
     for name in ('truncated.mcap', 'flipped.mcap'):
         assert not bags[name]['complete']
         assert 0 < bags[name]['frames'] < bags['run_1']['frames']
         assert bags[name]['notices']
     manifest = json.loads((results / 'manifest.json').read_text())
-    states = {Path(one['bag']).name: one['state'] for one in manifest['bags']}
+    states = {Path(bag['bag']).name: bag['state'] for bag in manifest['bags']}
     assert states['empty.mcap'] == 'failed'
     assert states['run_1'] == 'done'
 
@@ -124,9 +124,9 @@ def test_bad_bags_are_told_in_the_end_with_their_reasons(done):
 def test_each_bag_has_the_results_it_has_alone_and_a_tray_what_all_cycles_say(done, films):
     results, found, _, _ = done
     alone = analyse(films[1], PipelineSettings())
-    (own,) = (Path(one['results']) for one in found['bags'] if one['bag'].endswith('/run_2'))
+    (own,) = (Path(bag['results']) for bag in found['bags'] if bag['bag'].endswith('/run_2'))
     speeds = read_columns(own / 'tray_1_speed.csv', ('mean_projected_speed',))
-    expected = [one.mean_projected_speed for one in alone.trays[1].speeds]
+    expected = [speed.mean_projected_speed for speed in alone.trays[1].speeds]
     assert speeds['mean_projected_speed'] == pytest.approx(expected, rel=1e-6)
     # Of a single recording its own running mean; of two of them, more than of one.
     batch = [
@@ -145,22 +145,23 @@ def test_each_bag_has_the_results_it_has_alone_and_a_tray_what_all_cycles_say(do
     both = combined([*batch, replace(batch[0], summary=wrong)], PipelineSettings())
     assert both.size_unit == combined(batch, PipelineSettings()).size_unit == '1'
     tray = found['trays']['1']
-    cycles = [one for bag in found['bags'] for one in bag['trays']['1']['cycles']]
+    cycles = [cycle for bag in found['bags'] for cycle in bag['trays']['1']['cycles']]
     assert tray['cycles'] == len(cycles) >= tray['cycles_read'] == 2
     assert tray['restitution_lower'] < 0.89 < tray['restitution_upper']
-    widths = [one['restitution_upper'] - one['restitution_lower'] for one in cycles]
-    known = [one for one in widths if one < 1.0]
+    widths = [cycle['restitution_upper'] - cycle['restitution_lower'] for cycle in cycles]
+    known = [width for width in widths if width < 1.0]
     assert tray['restitution_upper'] - tray['restitution_lower'] < max(known)
-    assert tray['collisions'] == sum(one['collisions'] for one in cycles)
+    assert tray['collisions'] == sum(cycle['collisions'] for cycle in cycles)
     peaks = read_columns(results / 'cycles.csv', ('peak_speed', 'initial_speed'))
     known = peaks['peak_speed'][np.isfinite(peaks['peak_speed'])]
     assert len(peaks['peak_speed']) == len(cycles)
     assert tray['mean_peak_speed'] == pytest.approx(known.mean())
     # What a fit to a stump of a decay says is no part of a mean.
     fitted = [
-        one['initial_speed']
-        for one in cycles
-        if one['initial_speed_error'] and one['initial_speed_error'] < 0.5 * one['initial_speed']
+        cycle['initial_speed']
+        for cycle in cycles
+        if cycle['initial_speed_error']
+        and cycle['initial_speed_error'] < 0.5 * cycle['initial_speed']
     ]
     assert tray['initial_speed_cycles'] == len(fitted) > 0
     assert tray['mean_initial_speed'] == pytest.approx(np.mean(fitted))
@@ -170,13 +171,13 @@ def test_the_same_command_again_does_only_what_failed(done, capsys):
     parquet = pytest.importorskip('pyarrow.parquet')
     results, found, _, _ = done
     bags = Path(found['bags'][0]['bag']).parent
-    before = {one: one.stat().st_mtime_ns for one in results.glob('bags/*/bag.json')}
+    before = {path: path.stat().st_mtime_ns for path in results.glob('bags/*/bag.json')}
     call = ['analyse', str(bags), '-o', str(results), '--json', '--format', 'parquet']
     assert main([*call, '--workers', '1']) == 1
     printed = capsys.readouterr()
     assert json.loads(printed.out)['trays'] == found['trays']
     assert '4 of 7 recordings are done already' in printed.err
-    assert before == {one: one.stat().st_mtime_ns for one in results.glob('bags/*/bag.json')}
+    assert before == {path: path.stat().st_mtime_ns for path in results.glob('bags/*/bag.json')}
     table = parquet.read_table(results / 'trays.parquet')
     assert table['restitution'].to_pylist() == [found['trays']['1']['restitution']]
     cycles = parquet.read_table(results / 'cycles.parquet')
@@ -230,25 +231,28 @@ def test_one_name_twice_what_changed_what_moved_and_a_lost_manifest(tiny, tmp_pa
             batch_of(store.folder, tiny)
 
     batch, _ = batch_of(out, bags, watcher=Watcher(when_begun=twice))
-    assert [one.folder.name for one in batch.results] == ['run', 'run-2', 'four', 'three']
+    assert [result.folder.name for result in batch.results] == ['run', 'run-2', 'four', 'three']
     assert not batch.failed
     # Untouched; touched; another content; elsewhere.
-    for one in (bags / 'day 2' / 'run').iterdir():
-        os.utime(one)
+    for path in (bags / 'day 2' / 'run').iterdir():
+        os.utime(path)
     with next((bags / 'three').glob('*.mcap')).open('ab') as stream:
         stream.write(b'more')
     (bags / 'four').rename(bags / 'five')
     batch, watcher = batch_of(out, bags)
-    frames = {name: one.frames for name, one in watcher.outcomes.items()}
+    frames = {name: outcome.frames for name, outcome in watcher.outcomes.items()}
     assert frames == {'run-2': 0, 'three': 12, 'five': 0}
-    assert [one.folder.name for one in batch.results] == ['run', 'run-2', 'four', 'three']
+    assert [result.folder.name for result in batch.results] == ['run', 'run-2', 'four', 'three']
     # Twins are told.
     shutil.copytree(bags / 'five', bags / 'six')
     (out / 'manifest.json').write_text('{')
     batch, watcher = batch_of(out, bags)
     assert 'is damaged' in watcher.notices[0]
-    assert {name for name, one in watcher.outcomes.items() if one.frames} <= {'six', 'five'}
-    assert [bool(one.twin) for one in batch.results] == [False, False, False, True, False]
+    assert {name for name, outcome in watcher.outcomes.items() if outcome.frames} <= {
+        'six',
+        'five',
+    }
+    assert [bool(result.twin) for result in batch.results] == [False, False, False, True, False]
     other = with_values(PipelineSettings(), {'speed.interval': 0.2}, 'test')
     _, watcher = batch_of(out, bags / 'three', settings=other)
     assert watcher.outcomes['three'].frames == 12
@@ -286,17 +290,17 @@ def test_results_that_fit_no_bag_are_a_matter_of_that_recording_alone(tiny, tmp_
     outcomes = [
         batch_task.analyse_bag(
             batch_task.BagTask(
-                path=one,
-                folder=tmp_path / 'out' / one.name,
+                path=bag,
+                folder=tmp_path / 'out' / bag.name,
                 settings=PipelineSettings(),
                 image_topic='',
                 question='',
                 note=tmp_path / 'note',
             )
         )
-        for one in bags
+        for bag in bags
     ]
-    assert [one.state for one in outcomes] == [batch_task.FAILED, batch_task.DONE]
+    assert [outcome.state for outcome in outcomes] == [batch_task.FAILED, batch_task.DONE]
     assert 'lies before 1970' in outcomes[0].reason
 
 
@@ -340,10 +344,10 @@ def test_what_is_done_outlives_an_interruption_and_a_full_disk(tiny, films, tmp_
 def test_a_call_that_cannot_be_is_one_line(tiny, tmp_path, capsys, arguments, code, message):
     (tmp_path / 'precious').touch()
     places = {'tmp': tmp_path, 'tiny': tiny}
-    assert main(['analyse', *(one.format(**places) for one in arguments)]) == code
+    assert main(['analyse', *(argument.format(**places) for argument in arguments)]) == code
     lines = capsys.readouterr().err.strip().splitlines()
     assert message in lines[-1]
-    assert not any('Traceback' in one for one in lines)
+    assert not any('Traceback' in line for line in lines)
 
 
 def test_a_cluster_does_the_same(scheduler, tiny, tmp_path):
@@ -353,7 +357,7 @@ def test_a_cluster_does_the_same(scheduler, tiny, tmp_path):
         bags=find_bags([str(tiny)]), folder=tmp_path / 'out', settings=PipelineSettings()
     )
     batch = run_batch(plan, Workers(scheduler=scheduler.address), Watcher())
-    assert [one.folder.name for one in batch.results] == ['tiny']
+    assert [result.folder.name for result in batch.results] == ['tiny']
     assert not batch.failed
 
 
@@ -361,11 +365,11 @@ def test_two_copies_of_one_video_count_once(tmp_path):
     videos = [write_video(tmp_path / name, range(8)) for name in ('a.avi', 'b.avi', 'c.avi')]
     shutil.copy(videos[0], videos[2])
     write_video(videos[1], range(1, 9))
-    made = [tmp_path / 'bags' / one.stem for one in videos]
+    made = [tmp_path / 'bags' / video.stem for video in videos]
     for video, bag in zip(videos, made, strict=True):
         import_films([video], bag, ImportSettings(start_ns=10**18), lambda _: None)
     settings = with_values(PipelineSettings(), {'preprocess.pixels_per_metre': 1000.0}, 'test')
     batch, _ = batch_of(tmp_path / 'out', *made, settings=settings)
     assert not batch.failed
-    twins = {Path(one.name).name: Path(one.twin).name for one in batch.results}
+    twins = {Path(result.name).name: Path(result.twin).name for result in batch.results}
     assert twins == {'a': '', 'b': '', 'c': 'a'}

@@ -72,7 +72,7 @@ def test_beads_that_were_not_marked_leave_an_error_that_more_windows_do_not_take
     # That is beside the mean of all 15, which scatters itself.
     own = np.std([rng.rayleigh(1.0, N).mean() for _ in range(4000)]) / np.sqrt(np.pi / 2.0)
     expected = FACTOR * np.sqrt(spread**2 - own**2)
-    few = [replace(one, beads=4) for one in pairs(count=2000, noise=0.05)]
+    few = [replace(pair, beads=4) for pair in pairs(count=2000, noise=0.05)]
     assert fit_area(few, N, 'test').factor_error == pytest.approx(expected, rel=0.1)
 
 

@@ -49,10 +49,10 @@ Frame   X1      Y1      X2      Y2
 def _places(tmp_path, text, name='tracks.txt'):
     path = tmp_path / name
     path.write_text(text, encoding='utf-8')
-    found = read_manual_tracks(path)
-    first = np.unique(found.ids)[0]
-    one = found.ids == first
-    return found, found.frames[one].tolist(), found.places[one].tolist()
+    tracks = read_manual_tracks(path)
+    first = np.unique(tracks.ids)[0]
+    one = tracks.ids == first
+    return tracks, tracks.frames[one].tolist(), tracks.places[one].tolist()
 
 
 @pytest.mark.parametrize('text', [PLAIN, TRACKMATE, MODEL, EXPORTED, SPOTLIGHT])

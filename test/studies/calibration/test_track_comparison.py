@@ -51,33 +51,33 @@ def _reference(tracks):
 
 def test_tracks_agree_with_themselves():
     tracks = list(_tracks(10))
-    found = compare_tracks(tracks, _reference(tracks), reach=5e-4)
-    assert (found.beads, found.places, found.found) == (3, 30, 1.0)
-    assert (found.links, found.links_correct, found.switches) == (27, 27, 0)
-    assert found.rms_distance == 0.0
-    assert found.speed_ratio == 1.0
+    comparison = compare_tracks(tracks, _reference(tracks), reach=5e-4)
+    assert (comparison.beads, comparison.places, comparison.found) == (3, 30, 1.0)
+    assert (comparison.links, comparison.links_correct, comparison.switches) == (27, 27, 0)
+    assert comparison.rms_distance == 0.0
+    assert comparison.speed_ratio == 1.0
 
 
 def test_an_offset_is_measured_and_does_not_change_the_speed():
     shifted = list(_tracks(10, shift=(3e-5, -4e-5)))
-    found = compare_tracks(shifted, _reference(_tracks(10)), reach=5e-4)
-    assert found.offset == pytest.approx((3e-5, -4e-5))
-    assert found.rms_distance == pytest.approx(5e-5)
-    assert found.speed_ratio == pytest.approx(1.0)
+    comparison = compare_tracks(shifted, _reference(_tracks(10)), reach=5e-4)
+    assert comparison.offset == pytest.approx((3e-5, -4e-5))
+    assert comparison.rms_distance == pytest.approx(5e-5)
+    assert comparison.speed_ratio == pytest.approx(1.0)
 
 
 def test_two_beads_that_swap_numbers_are_two_switches_and_two_wrong_links():
     tracks = [*list(_tracks(5)), *list(_tracks(10, ids=(1, 0, 2)))[5:]]
-    found = compare_tracks(tracks, _reference(_tracks(10)), reach=5e-4)
-    assert found.switches == 2
-    assert found.links - found.links_correct == 2
-    assert found.switches_per_minute == pytest.approx(2 / 3 / (9 * STEP_NS / 60e9))
+    comparison = compare_tracks(tracks, _reference(_tracks(10)), reach=5e-4)
+    assert comparison.switches == 2
+    assert comparison.links - comparison.links_correct == 2
+    assert comparison.switches_per_minute == pytest.approx(2 / 3 / (9 * STEP_NS / 60e9))
 
 
 def test_beads_that_were_not_seen_are_missing():
     fewer = list(_tracks(10, ids=(0, 1)))
-    found = compare_tracks(fewer, _reference(_tracks(10)), reach=5e-4)
-    assert found.found == pytest.approx(2 / 3)
+    comparison = compare_tracks(fewer, _reference(_tracks(10)), reach=5e-4)
+    assert comparison.found == pytest.approx(2 / 3)
 
 
 def test_a_reference_of_other_pictures_is_refused():
@@ -105,6 +105,6 @@ def test_marks_in_a_bent_picture_that_moves_come_to_the_place_in_the_tray():
         view=View(camera=camera), first_frame=1,
     )  # fmt: skip
     assert len(reference) == 4
-    found = compare_tracks(tracks, reference, reach=5e-4)
-    assert found.found == 1.0
-    assert found.rms_distance * scale < 0.01
+    comparison = compare_tracks(tracks, reference, reach=5e-4)
+    assert comparison.found == 1.0
+    assert comparison.rms_distance * scale < 0.01

@@ -27,17 +27,17 @@ def cycles(tmp_path_factory):
 
 def test_it_goes_through_the_speeds_and_its_intervals_hold_the_truth(cycles):
     curve = mean_cycle(cycles, 0.5, 20.0)
-    found = library_decay(TRAY, cycles, curve)
+    decay = library_decay(TRAY, cycles, curve)
     # It has to be as late as the stage is.
-    assert found.times[0] == pytest.approx(1.8)
-    measured = np.interp(found.times, curve.times, curve.speed)
-    assert np.abs(np.log(found.speed / measured)).max() < 0.15
-    assert abs(np.log(found.speed / measured).mean()) < 0.01
+    assert decay.times[0] == pytest.approx(1.8)
+    measured = np.interp(decay.times, curve.times, curve.speed)
+    assert np.abs(np.log(decay.speed / measured)).max() < 0.15
+    assert abs(np.log(decay.speed / measured).mean()) < 0.01
     # Mean speed in space times pi/4.
-    assert found.initial_speed == pytest.approx(0.25 * np.pi * 0.007, rel=0.15)
-    _, lower, upper = found.restitution
+    assert decay.initial_speed == pytest.approx(0.25 * np.pi * 0.007, rel=0.15)
+    _, lower, upper = decay.restitution
     assert lower < 0.89 < upper
-    assert found.wall_restitution[1] < 0.99
+    assert decay.wall_restitution[1] < 0.99
 
 
 def test_it_says_of_a_cycle_what_the_stage_says(cycles):
@@ -59,18 +59,18 @@ def test_it_says_of_a_cycle_what_the_stage_says(cycles):
         if time > 19.95:
             break
     (final,) = stage.flush()
-    found = library_decay(TRAY, [one], mean_cycle([one], 1.75, 20.0))
-    assert found.restitution[0] == pytest.approx(final.restitution, abs=2e-3)
-    assert found.wall_restitution[0] == pytest.approx(final.wall_restitution, abs=2e-3)
+    decay = library_decay(TRAY, [one], mean_cycle([one], 1.75, 20.0))
+    assert decay.restitution[0] == pytest.approx(final.restitution, abs=2e-3)
+    assert decay.wall_restitution[0] == pytest.approx(final.wall_restitution, abs=2e-3)
 
 
 def test_a_gas_that_began_to_cool_later_is_the_same_gas(cycles):
-    later = [replace(one, times=one.times + 4.0) for one in cycles]
-    found = library_decay(TRAY, cycles, mean_cycle(cycles, 1.75, 20.0))
+    later = [replace(cycle, times=cycle.times + 4.0) for cycle in cycles]
+    decay = library_decay(TRAY, cycles, mean_cycle(cycles, 1.75, 20.0))
     same = library_decay(TRAY, later, mean_cycle(later, 5.75, 24.0), start=4.0)
-    assert same.restitution == pytest.approx(found.restitution, abs=1e-6)
-    assert same.initial_speed == pytest.approx(found.initial_speed, rel=1e-6)
-    np.testing.assert_allclose(same.times - 4.0, found.times)
+    assert same.restitution == pytest.approx(decay.restitution, abs=1e-6)
+    assert same.initial_speed == pytest.approx(decay.initial_speed, rel=1e-6)
+    np.testing.assert_allclose(same.times - 4.0, decay.times)
 
 
 def test_a_tray_without_a_library_and_a_decay_too_short_are_named(cycles):

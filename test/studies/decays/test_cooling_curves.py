@@ -54,18 +54,18 @@ def test_what_is_before_the_first_shake_or_not_known_is_left_out(tmp_path):
 
 def test_the_mean_over_cycles_has_the_error_of_a_mean(tmp_path):
     rows = [row for k in range(4) for row in cycle(k + 1, 60.0 * k, 1.0 + 0.1 * k)]
-    found = mean_cycle(read_cycles(write_rows(tmp_path / 'a.csv', rows)), 0.5, 2.0)
-    assert found.cycles == 4
-    assert found.times == pytest.approx(np.arange(0.5, 2.05, 0.1))
-    assert found.speed == pytest.approx(1.15 * 0.01 / (1.0 + found.times), rel=1e-6)
-    assert found.error == pytest.approx(np.full(16, 0.5e-4))
+    curve = mean_cycle(read_cycles(write_rows(tmp_path / 'a.csv', rows)), 0.5, 2.0)
+    assert curve.cycles == 4
+    assert curve.times == pytest.approx(np.arange(0.5, 2.05, 0.1))
+    assert curve.speed == pytest.approx(1.15 * 0.01 / (1.0 + curve.times), rel=1e-6)
+    assert curve.error == pytest.approx(np.full(16, 0.5e-4))
 
 
 def test_only_times_that_all_cycles_cover_count(tmp_path):
     rows = cycle(1, 0.0) + cycle(2, 60.0)[5:15]
-    found = mean_cycle(read_cycles(write_rows(tmp_path / 'a.csv', rows)))
-    assert found.times[0] == pytest.approx(0.6)
-    assert found.times[-1] == pytest.approx(1.5)
+    curve = mean_cycle(read_cycles(write_rows(tmp_path / 'a.csv', rows)))
+    assert curve.times[0] == pytest.approx(0.6)
+    assert curve.times[-1] == pytest.approx(1.5)
 
 
 def test_cycles_without_common_times_are_an_error(tmp_path):
@@ -116,12 +116,12 @@ def test_what_the_analysis_writes_can_be_read(tmp_path):
     ]
     analysis = Analysis(epoch_ns=epoch_ns, trays={1: TrayResults(speeds=speeds)})
     write_results(analysis, tmp_path / 'results', Path('bag'), PipelineSettings())
-    found = read_decay(tmp_path / 'results')
-    assert found.cycles == 2
-    assert found.times == pytest.approx([age for age, _ in LAW], abs=1e-4)
+    curve = read_decay(tmp_path / 'results')
+    assert curve.cycles == 2
+    assert curve.times == pytest.approx([age for age, _ in LAW], abs=1e-4)
     # Tables hold what goes over the wire, float32.
-    assert found.speed == pytest.approx([speed for _, speed in LAW], rel=1e-3)
-    check_errors(found)
+    assert curve.speed == pytest.approx([speed for _, speed in LAW], rel=1e-3)
+    check_errors(curve)
 
 
 @pytest.mark.parametrize('text', ['', 'time [s],cycle [1]\n1,2\n', 'a,b\nc,d\n', '\x00\xff'])

@@ -24,8 +24,8 @@ def test_it_is_the_median_over_the_final_estimates(tmp_path):
         (FINAL, 4.5, 9.0, 2.75),
         (NO_DECAY, 9.0, 9.9, 7.0),
     ]
-    found = cooling_window(write(tmp_path, rows))
-    assert found == CoolingWindow(first=4.5, last=20.0, start=2.75)
+    window = cooling_window(write(tmp_path, rows))
+    assert window == CoolingWindow(first=4.5, last=20.0, start=2.75)
 
 
 @pytest.mark.parametrize(

@@ -52,10 +52,10 @@ def test_the_error_is_from_the_scatter_of_the_cycles():
 
 
 def test_a_species_that_does_not_slow_down_has_no_fit_but_an_energy():
-    found = species_energies(TRAY, ([cycle(1, 1.0)], [cycle(1, 1.0, rise=True)]), SPAN)
-    assert found[0].fit is not None
-    assert found[1].fit is None
-    glass, copper = species_values(found)['species']
+    energies = species_energies(TRAY, ([cycle(1, 1.0)], [cycle(1, 1.0, rise=True)]), SPAN)
+    assert energies[0].fit is not None
+    assert energies[1].fit is None
+    glass, copper = species_values(energies)['species']
     assert glass['haff_time'] == pytest.approx(2.0, rel=1e-2)
     assert copper['haff_time'] is None
 

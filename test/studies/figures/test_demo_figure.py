@@ -17,7 +17,7 @@ SAMPLE = Path(__file__).parents[3] / 'bags' / 'tray_1_sample'
 def test_the_figure_of_a_cycle_is_drawn(tmp_path):
     results = analyse(SAMPLE, PipelineSettings()).trays[1]
     path = tmp_path / 'cooling.png'
-    speeds = [one for one in results.speeds if one.cycle == 1]
+    speeds = [speed for speed in results.speeds if speed.cycle == 1]
     truth = [one for one in results.truth if one.cycle == 1]
     cooling_figure(path, load_trays()[1], speeds, results.cors, truth)
     picture = cv2.imread(str(path))

@@ -40,23 +40,23 @@ def test_each_video_of_a_folder_becomes_a_bag_and_bad_ones_stop_nothing(tmp_path
     (folder / 'read me.txt').write_text('left alone')
     write_images(folder / 'stills', [f'{1_700_000_000_000 + 40 * k}.jpg' for k in range(3)])
     films = films_of([folder]).films
-    assert [one.stem for one in films] == ['run 1', 'run 2', 'run 9', 'run 10', 'stills']
+    assert [film.stem for film in films] == ['run 1', 'run 2', 'run 9', 'run 10', 'stills']
     told = []
     found = import_each(films, tmp_path / 'bags', STARTED, lambda *one: told.append(one))
     assert [one.bag.name for one in found.imported] == ['run 1', 'run 9', 'run 10', 'stills']
     assert list(found.failed) == [folder / 'run 2.avi']
     assert told[-1] == (1.0, 'stills')
     frames = BagFrames(tmp_path / 'bags' / 'run 9').frames()
-    assert [number_of(one.image) for one in frames] == [9, 10, 11]
+    assert [number_of(frame.image) for frame in frames] == [9, 10, 11]
     # Once more: nothing is made twice, and what failed is tried again.
     write_video(folder / 'run 2.avi', range(2))
-    before = {one: one.stat().st_mtime_ns for one in (tmp_path / 'bags').rglob('*.mcap')}
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / 'bags').rglob('*.mcap')}
     again = import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
     assert [one.bag.name for one in again.imported] == ['run 2']
     assert len(again.skipped) == 4
     assert not again.failed
     assert all(one.stat().st_mtime_ns == stamp for one, stamp in before.items())
-    assert sorted(os.listdir(tmp_path / 'bags')) == sorted(one.stem for one in films)
+    assert sorted(os.listdir(tmp_path / 'bags')) == sorted(film.stem for film in films)
 
 
 def test_a_bag_of_another_video_is_not_taken_for_ours(tmp_path):
@@ -126,7 +126,7 @@ def test_a_bag_of_another_calibration_is_not_taken_for_what_is_wanted(tmp_path):
 
     def said(settings):
         found = import_each(films, tmp_path / 'bags', settings, lambda *_: None)
-        return ''.join(str(one) for one in found.failed.values())
+        return ''.join(str(error) for error in found.failed.values())
 
     films = [write_video(tmp_path / 'a.avi', range(3))]
     assert said(settings(CALIBRATION)) == said(settings(CALIBRATION)) == ''

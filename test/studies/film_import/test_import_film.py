@@ -115,7 +115,7 @@ def test_pictures_out_of_order_are_sorted_by_their_times(tmp_path, times, order,
     found, numbers, stamps = imported(tmp_path / 'a.mkv', tmp_path / 'bag')
     assert numbers == order
     assert stamps == [0, 40, 80, 120, 160, 200]
-    assert any(f'{moved} frames came out of order' in one for one in found.notices)
+    assert any(f'{moved} frames came out of order' in notice for notice in found.notices)
 
 
 def test_a_time_that_cannot_be_is_replaced(tmp_path):
@@ -123,7 +123,7 @@ def test_a_time_that_cannot_be_is_replaced(tmp_path):
     found, numbers, stamps = imported(tmp_path / 'a.mkv', tmp_path / 'bag')
     assert numbers == list(range(8))
     assert stamps == [0, 40, 80, 120, 160, 200, 240, 280]
-    assert any('1 frames have a time that cannot be' in one for one in found.notices)
+    assert any('1 frames have a time that cannot be' in notice for notice in found.notices)
 
 
 def test_a_clock_that_was_set_back_goes_on(tmp_path):
@@ -132,7 +132,7 @@ def test_a_clock_that_was_set_back_goes_on(tmp_path):
     found, numbers, stamps = imported(tmp_path / 'a.mkv', tmp_path / 'bag')
     assert numbers == list(range(20))
     assert stamps == list(range(0, 800, 40))
-    assert any('1 times the clock was set back' in one for one in found.notices)
+    assert any('1 times the clock was set back' in notice for notice in found.notices)
 
 
 def test_the_rate_of_the_camera_can_be_given(tmp_path):
@@ -152,7 +152,7 @@ def test_a_film_begins_when_its_container_says(tmp_path, tags, expected):
     found = import_films([tmp_path / 'a.mp4'], tmp_path / 'bag', ImportSettings(), lambda _: None)
     assert found.start_ns == open_bag(tmp_path / 'bag').start_ns == expected
     unknown = expected == NS * NS
-    assert unknown == any('does not say when it was taken' in one for one in found.notices)
+    assert unknown == any('does not say when it was taken' in notice for notice in found.notices)
 
 
 def test_parts_of_a_film_follow_one_another(tmp_path):
@@ -170,7 +170,7 @@ def test_a_pause_between_parts_is_kept(tmp_path):
     found, _, stamps = imported(films, tmp_path / 'bag', ImportSettings())
     assert stamps[3] == pytest.approx(3 * STEP, abs=0.1)
     assert stamps[4] == 30_000
-    assert any('begins 29.9 s after the part before it' in one for one in found.notices)
+    assert any('begins 29.9 s after the part before it' in notice for notice in found.notices)
 
 
 # --- pictures stored twice ------------------------------------------------------------------
@@ -201,7 +201,7 @@ def test_of_a_picture_that_stands_still_a_frame_a_second_is_kept(tmp_path):
     found, numbers, _ = imported(tmp_path / 'a.mkv', tmp_path / 'bag')
     assert numbers == [0, 1, 2, 2, 2, 3]
     assert found.duplicates_dropped == 57
-    assert any('stood still for 2.4 s' in one for one in found.notices)
+    assert any('stood still for 2.4 s' in notice for notice in found.notices)
 
 
 # --- rotation, calibration ------------------------------------------------------------------
@@ -220,7 +220,7 @@ def test_a_rotation_flag_is_applied_and_reported(tmp_path, turn, rotation, codec
         expected = cv2.rotate(picture(number), rotation)
         assert frame.image.shape == expected.shape
         assert np.abs(frame.image.astype(int) - expected).mean() < 8
-    assert any('as its rotation flag says' in one for one in found.notices)
+    assert any('as its rotation flag says' in notice for notice in found.notices)
 
 
 def test_the_calibration_goes_into_the_camera_info(tmp_path):
@@ -351,7 +351,7 @@ def test_a_video_with_damage_in_its_middle_is_imported_around_it(tmp_path):
     assert numbers == [k for k in range(20) if k != 8]
     assert stamps == [STEP * k for k in numbers]
     assert found.broken == 1
-    assert any('1 frames are damaged' in one for one in found.notices)
+    assert any('1 frames are damaged' in notice for notice in found.notices)
 
 
 def test_parts_of_different_sizes_are_refused(tmp_path):
@@ -410,7 +410,7 @@ def interrupted(arguments, bag):
     process = subprocess.Popen([*COMMAND, *arguments], stderr=subprocess.PIPE, text=True)
     try:
         end = time.monotonic() + 60
-        while not (bag.is_dir() and any(one.stat().st_size > 9999 for one in bag.iterdir())):
+        while not (bag.is_dir() and any(path.stat().st_size > 9999 for path in bag.iterdir())):
             assert time.monotonic() < end
             time.sleep(0.01)
         process.send_signal(signal.SIGINT)
@@ -444,7 +444,7 @@ def test_an_interrupted_import_of_many_goes_on_where_it_was(tmp_path):
     said = interrupted(arguments, bags / '.unfinished' / 'b')
     assert said == 'nanorocks: interrupted; the same command goes on with what is left'
     # Of what is in the folder everything is whole.
-    assert [one.name for one in bags.iterdir() if not one.name.startswith('.')] == ['a']
+    assert [path.name for path in bags.iterdir() if not path.name.startswith('.')] == ['a']
     done = subprocess.run([*COMMAND, *arguments, '--json'], capture_output=True, check=True)
     found = json.loads(done.stdout)
     assert found['skipped'] == [str(bags / 'a')]

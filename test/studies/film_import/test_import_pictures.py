@@ -40,7 +40,7 @@ def test_images_of_another_size_are_left_out_and_counted(tmp_path, ending, size)
     assert numbers == [0, 1, 3, 4, 5]
     assert times == [0, 40, 120, 160, 200]
     assert found.broken == 1
-    assert any('1 frames are damaged or of another size' in one for one in found.notices)
+    assert any('1 frames are damaged or of another size' in notice for notice in found.notices)
 
 
 def ramp(number, bits):
@@ -60,12 +60,12 @@ def test_images_of_16_bits_keep_the_levels_that_the_camera_had(tmp_path, bits, e
         cv2.imwrite(str(folder / f'{number}.{ending}'), ramp(number, bits) >> (number == 0))
     found, numbers, _ = imported(folder, tmp_path / 'bag', TIMED)
     assert numbers[1:] == [1, 2, 3]
-    levels = [one.image[-1].astype(int) for one in BagFrames(tmp_path / 'bag').frames()]
+    levels = [frame.image[-1].astype(int) for frame in BagFrames(tmp_path / 'bag').frames()]
     expected = np.linspace(0, 255, WIDTH)
     np.testing.assert_allclose(levels[0], expected / 2, atol=4)
     np.testing.assert_allclose(levels[1], expected, atol=4)
     said = f'its images use {bits} of their 16 bits'
-    assert any(said in one for one in found.notices) == (bits < 16)
+    assert any(said in notice for notice in found.notices) == (bits < 16)
     as_stored = bits == 16 and ending == 'png'
     assert (found.provenance['pictures'] == 'as stored') == as_stored
 
@@ -107,8 +107,8 @@ def test_lengths_along_both_axes_are_the_same(tmp_path, name, codec, ratio, size
     seen = first.max(axis=2) > 128
     across, down = (np.count_nonzero(seen.any(axis=axis)) for axis in (0, 1))
     assert abs(across - down) <= 2
-    assert any('its pixels are not square; stretched from 96x64 px to' in one
-               for one in found.notices) == (size != (WIDTH, HEIGHT))  # fmt: skip
+    assert any('its pixels are not square; stretched from 96x64 px to' in notice
+               for notice in found.notices) == (size != (WIDTH, HEIGHT))  # fmt: skip
     as_stored = codec == 'mjpeg' and size == (WIDTH, HEIGHT)
     assert (found.provenance['pictures'] == 'as stored') == as_stored
 
@@ -156,4 +156,4 @@ def test_the_film_is_taken_not_the_picture_beside_it(tmp_path, name, streams):
     found, numbers, times = imported(film, tmp_path / 'bag')
     assert numbers == list(range(12))
     np.testing.assert_allclose(times, [40 * k for k in range(12)], atol=0.6)
-    assert any('holds 2 video streams; number ' in one for one in found.notices)
+    assert any('holds 2 video streams; number ' in notice for notice in found.notices)

@@ -50,8 +50,8 @@ def test_a_raw_stream_has_the_rate_that_it_says(tmp_path, name, options):
     found, numbers, times = imported(film, tmp_path / 'bag')
     assert numbers == list(range(12))
     assert times == [20 * k for k in range(12)]
-    assert any('has no times; its stream says 50 pictures per second' in one
-               for one in found.notices)  # fmt: skip
+    assert any('has no times; its stream says 50 pictures per second' in notice
+               for notice in found.notices)  # fmt: skip
 
 
 @pytest.mark.parametrize(('name', 'options'), [
@@ -72,7 +72,7 @@ def test_uncompressed_video_says_its_rate_in_its_head_or_needs_one(tmp_path, sai
     levels = [bytes([level]) * (16 * 16 * 3 // 2) for level in (10, 80, 160)]
     film = tmp_path / 'a.y4m'
     film.write_bytes(f'YUV4MPEG2 W16 H16 {said} C420jpeg\n'.encode()
-                     + b''.join(b'FRAME\n' + one for one in levels))  # fmt: skip
+                     + b''.join(b'FRAME\n' + level for level in levels))  # fmt: skip
     if step is None:
         with pytest.raises(ConfigurationError, match='has no times'):
             import_films([film], tmp_path / 'bag', STARTED, lambda _: None)
@@ -153,6 +153,6 @@ def test_images_that_are_missing_by_their_numbers_took_their_time(tmp_path, name
     found, numbers, stamps = imported(folder, tmp_path / 'bag', FAST)
     assert numbers == list(range(len(names)))
     assert stamps == times
-    notices = [one for one in found.notices if 'numbers' in one]
+    notices = [notice for notice in found.notices if 'numbers' in notice]
     assert len(notices) == bool(said)
     assert said in ''.join(notices)

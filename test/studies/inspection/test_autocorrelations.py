@@ -93,7 +93,7 @@ def test_what_is_counted_at_the_end_is_the_truth_and_makes_the_papers_line(found
 
 def test_in_a_tray_full_of_grains_there_is_an_area_but_no_size(found):
     tray = found.trays[6]
-    assert {one.size_status for one in tray.estimates} == {SizeStatus.INSENSITIVE}
+    assert {estimate.size_status for estimate in tray.estimates} == {SizeStatus.INSENSITIVE}
     assert (tray.column('level_area') > 0.0).all()
 
 

@@ -174,7 +174,7 @@ def test_a_frame_that_cannot_be_used_is_said_in_a_line(tmp_path, capsys):
     names = (topics.EPOCH, topics.RAW)
     path = tmp_path / 'black'
     rng = np.random.default_rng(1)
-    with BagWriter(path, {one.absolute(): offered(one) for one in names}, metadata={}) as bag:
+    with BagWriter(path, {name.absolute(): offered(name) for name in names}, metadata={}) as bag:
         bag.write(topics.EPOCH.absolute(), NS, time_message(NS))
         for number in range(5):
             pixels = rng.integers(90, 110, (210, 210, 3), dtype=np.uint8)

@@ -142,7 +142,7 @@ def test_a_gray_camera_at_rest_is_drawn_too(tmp_path, capsys):
     names = (topics.EPOCH, topics.RAW)
     path = tmp_path / 'gray'
     rng = np.random.default_rng(1)
-    with BagWriter(path, {one.absolute(): offered(one) for one in names}, metadata={}) as bag:
+    with BagWriter(path, {name.absolute(): offered(name) for name in names}, metadata={}) as bag:
         bag.write(topics.EPOCH.absolute(), NS, time_message(NS))
         for number in range(20):
             pixels = rng.integers(90, 110, (210, 210), dtype=np.uint8)

@@ -62,10 +62,10 @@ def test_weight_and_number_averages_of_known_bodies():
 
 def test_runs_differ_and_cover_the_sticking_speeds_and_strengths():
     drawn = [drawn_run(PLAN, run) for run in range(200)]
-    speeds = np.sort([one.sticking_speed for one in drawn])
+    speeds = np.sort([run.sticking_speed for run in drawn])
     assert np.diff(np.log(speeds)).max() < 0.1
     for name in EFFECTS:
-        strengths = [one.strengths[name] for one in drawn]
+        strengths = [run.strengths[name] for run in drawn]
         assert min(strengths) < 0.1 < 1.4 < max(strengths) < 1.5
     assert drawn_run(PLAN, 3) == drawn[3]
     assert drawn_run(replace(PLAN, seed=2), 3) != drawn[3]

@@ -54,7 +54,7 @@ def test_every_cycle_is_filmed_analysed_twice_and_knows_its_truth(campaign):
 def test_what_is_there_is_not_made_again(campaign):
     before = (campaign / 'bouncing_001' / 'summary.json').stat().st_mtime_ns
     cycles = run_campaign(campaign, PLAN, ALONE, lambda done: None)
-    assert [one.kind for one in cycles] == ['bouncing', 'sticking']
+    assert [cycle.kind for cycle in cycles] == ['bouncing', 'sticking']
     assert (campaign / 'bouncing_001' / 'summary.json').stat().st_mtime_ns == before
 
 
@@ -64,7 +64,7 @@ def test_the_report_has_every_chapter_even_of_films_too_short_for_some(campaign)
     text = path.read_text('utf-8')
     assert text.count('<section') == 10
     # Nothing cools for long enough in three seconds.
-    assert any(one.startswith('restitution: ') for one in notices)
+    assert any(notice.startswith('restitution: ') for notice in notices)
     assert 'Could not be made' in text
     for name in ('Table 1', 'Table 2', 'Figure 1b', 'Figure 2:', 'Figure 4', 'Figure 11'):
         assert name in text

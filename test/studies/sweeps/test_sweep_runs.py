@@ -318,7 +318,7 @@ def test_settings_that_cannot_be_are_refused():
 
 
 def test_no_two_runs_share_a_number():
-    numbers = [one for point in range(6) for one in PLAN.run_numbers(point, 0, 20)]
+    numbers = [number for point in range(6) for number in PLAN.run_numbers(point, 0, 20)]
     assert len(set(numbers)) == 120
 
 

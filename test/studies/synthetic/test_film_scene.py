@@ -119,7 +119,9 @@ def test_h264_keeps_the_frames_in_order_and_loses_detail():
     compression = CompressionSettings(codec='h264', rate=40e6)
     moments = list(film().moments(20))
     made = list(compressed(iter(moments), compression, quality=95, frame_rate=30.0))
-    assert [one.frame.stamp_ns for one, _ in made] == [one.frame.stamp_ns for one in moments]
+    assert [moment.frame.stamp_ns for moment, _ in made] == [
+        moment.frame.stamp_ns for moment in moments
+    ]
     for (after, jpeg), before in zip(made, moments, strict=True):
         assert after.beads == before.beads
         change = after.frame.image.astype(float) - before.frame.image
@@ -131,7 +133,7 @@ def test_h264_keeps_the_frames_in_order_and_loses_detail():
 def test_a_stream_of_h264_has_the_size_asked_for():
     pytest.importorskip('av')
     stream = H264Stream(30e3, 30.0)
-    decoded = [image for one in film().moments(45) for image in stream.push(one.frame.image)]
+    decoded = [image for moment in film().moments(45) for image in stream.push(moment.frame.image)]
     decoded += stream.finish()
     assert len(decoded) == 45
     assert stream.bytes_written / 45 == pytest.approx(30e3, rel=0.25)

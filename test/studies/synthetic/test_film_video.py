@@ -50,7 +50,7 @@ def test_motion_jpeg_reads_back(tmp_path):
     assert made == {'frames': 15, 'duration': 0.6}
     assert rate == 25.0
     assert_as_drawn(frames, 4.0)
-    assert [one.name for one in tmp_path.iterdir()] == ['run.avi']
+    assert [path.name for path in tmp_path.iterdir()] == ['run.avi']
 
 
 def test_h264_reads_back(tmp_path):

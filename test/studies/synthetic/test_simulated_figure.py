@@ -41,7 +41,7 @@ def test_beads_and_decay_are_drawn(tmp_path, tray):
     upper = picture[: picture.shape[0] // 2]
     coloured = upper.max(axis=2).astype(int) - upper.min(axis=2) > 60
     assert coloured.mean() > 0.05
-    assert [one.name for one in tmp_path.iterdir()] == ['tray.png']
+    assert [path.name for path in tmp_path.iterdir()] == ['tray.png']
 
 
 def test_beads_at_rest_and_two_times_are_drawn_too(tmp_path):

@@ -94,9 +94,9 @@ def test_the_film_shows_the_first_run(tmp_path):
 
 
 def test_the_speed_has_halved_when_it_has():
-    found = simulate(plan_of(3, duration=20.0, samples=2001), HERE)
-    speed = np.interp(found.half_time, found.plan.times, found.mean('mean_speed'))
-    assert speed == pytest.approx(found.mean('mean_speed')[0] / 2.0, rel=1e-3)
+    runs = simulate(plan_of(3, duration=20.0, samples=2001), HERE)
+    speed = np.interp(runs.half_time, runs.plan.times, runs.mean('mean_speed'))
+    assert speed == pytest.approx(runs.mean('mean_speed')[0] / 2.0, rel=1e-3)
     assert simulate(plan_of(duration=0.1), HERE).half_time is None
     assert simulate(plan_of(mean_speed=0.0), HERE).half_time is None
 

@@ -79,10 +79,10 @@ def test_an_extra_that_is_missing_is_a_warning_that_says_for_what(monkeypatch):
         return real(name)
 
     monkeypatch.setattr(importlib.metadata, 'version', version)
-    found = {one.name: one for one in package_checks.libraries()}
-    assert found['extra [video]'].status is Status.WARNING
-    assert 'nanorocks import' in found['extra [video]'].found
-    assert found['libraries'].status is Status.OK
+    findings = {library.name: library for library in package_checks.libraries()}
+    assert findings['extra [video]'].status is Status.WARNING
+    assert 'nanorocks import' in findings['extra [video]'].found
+    assert findings['libraries'].status is Status.OK
 
 
 @pytest.mark.parametrize(

@@ -49,9 +49,9 @@ def test_foxglove_plots_the_restitution_of_each_tray_with_its_interval(fields):
     layout = json.loads(foxglove())
     for tray in range(1, 9):
         (chart,) = (
-            one
-            for name, one in plots(layout).items()
-            if name.startswith(f'Plot!tray{tray}') and one['foxglovePanelTitle'] == 'Restitution'
+            plot
+            for name, plot in plots(layout).items()
+            if name.startswith(f'Plot!tray{tray}') and plot['foxglovePanelTitle'] == 'Restitution'
         )
         found = [field_of(path['value'], fields) for path in chart['paths']]
         assert found == [
@@ -98,7 +98,7 @@ def test_every_panel_of_foxglove_has_a_place():
 
 @pytest.mark.parametrize('name', ['foxglove/nanorocks.json', 'docs/viewers.md'])
 def test_pictures_and_arrays_are_topics_of_the_graph(name):
-    known = {one.absolute(tray) for one in topics.TOPICS for tray in range(1, 9)}
+    known = {topic.absolute(tray) for topic in topics.TOPICS for tray in range(1, 9)}
     named = set(re.findall(r'/nanorocks/[\w/]*\w', FILES[name]()))
     assert named - known <= {'/nanorocks/tray_1/cor/data'}  # as rqt_plot names elements
     assert len(named) > 3

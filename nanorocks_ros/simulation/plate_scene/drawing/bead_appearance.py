@@ -59,7 +59,10 @@ class Appearance:
         first = parts or [_NOTHING]
         names = [field.name for field in fields(Appearance)]
         return Appearance(
-            **{name: np.concatenate([getattr(one, name) for one in first]) for name in names}
+            **{
+                name: np.concatenate([getattr(appearance, name) for appearance in first])
+                for name in names
+            }
         )
 
 

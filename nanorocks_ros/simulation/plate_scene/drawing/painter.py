@@ -65,14 +65,14 @@ class BeadPainter:
         radii: Mapping[int, NDArray[np.float64]],
         seed: int,
     ) -> None:
-        for number, one in radii.items():
-            _check_radii(trays[number], one)
+        for number, radius in radii.items():
+            _check_radii(trays[number], radius)
         self._geometry, self._shadows = geometry, scene.shadows
         rng = np.random.default_rng(seed)
         self._dust = dust_pattern(rng)
         shapes = grain_shapes(scene.irregularity, rng)
         self._shapes = shapes.astype(np.float32)
-        self._counts = {number: len(one) for number, one in radii.items()}
+        self._counts = {number: len(radius) for number, radius in radii.items()}
         looks = [
             appearance_of(trays[number], scene, np.random.default_rng([seed, number]))
             for number in radii

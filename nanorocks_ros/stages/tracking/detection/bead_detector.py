@@ -100,7 +100,7 @@ class BeadDetector:
     @property
     def crowded(self) -> bool:
         """Whether there are too many grains to look for."""
-        return any(one.most == 0 for one in self._searches)
+        return any(search.most == 0 for search in self._searches)
 
     @property
     def darkness(self) -> NDArray[np.uint8] | None:
@@ -161,7 +161,9 @@ class BeadDetector:
         self, picture: Picture, hints: Sequence[NDArray[np.float64]]
     ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Discs and fits of each species."""
-        found = [(np.zeros((one.most, 3)), np.zeros((one.most, 4))) for one in self._searches]
+        found = [
+            (np.zeros((search.most, 3)), np.zeros((search.most, 4))) for search in self._searches
+        ]
         # Gray ones last: the outline of a coloured bead looks gray.
         for k in sorted(range(len(found)), key=lambda k: self._searches[k].kind == GRAY):
             discs, fits = found[k]

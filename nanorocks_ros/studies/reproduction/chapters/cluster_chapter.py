@@ -170,7 +170,7 @@ def packing_chapter(context: Context) -> Chapter:
     section = Section(title='Long-term evolution and packing (Figures 9 and 10)')
     trays = load_trays()
     long_term = context.picture('long_term.png')
-    long_term_figure(long_term, read_campaign([one.results for one in context.cycles]))
+    long_term_figure(long_term, read_campaign([cycle.results for cycle in context.cycles]))
     curves = {
         tray: [curve for one in context.sticking for curve in measured_packing(one.results, tray)]
         for tray in _TRAYS
@@ -239,13 +239,13 @@ def _table(one: CycleFiles, tray: int) -> dict[str, NDArray[np.float64]]:
 def _paper_onsets(cycles: list[CycleFiles], tray: int) -> tuple[float, float]:
     """Onset by the paper's rule, [s], and twice the mean speed then, [m/s]; means of cycles."""
     onsets, speeds = [], []
-    for one in cycles:
-        table = _table(one, tray)
+    for cycle in cycles:
+        table = _table(cycle, tray)
         at = paper_onset(table['time'], table['level_area'], _SHAKE)
         if math.isnan(at):
             continue
         onsets.append(at - _SHAKE)
-        found = one.tray(tray)
+        found = cycle.tray(tray)
         speeds.append(2.0 * float(np.interp(at, found['time'], found['mean_projected_speed'])))
     return mean_of(onsets)[0], mean_of(speeds)[0]
 

@@ -45,8 +45,8 @@ def experiment_chapter(context: Context) -> Chapter:
         Table(
             head=('tray', 'inner size [mm]', 'content', 'chalk'),
             rows=[
-                (str(k), _size(one), _content(one), 'yes' if one.chalk else '')
-                for k, one in trays.items()
+                (str(k), _size(tray), _content(tray), 'yes' if tray.chalk else '')
+                for k, tray in trays.items()
             ],
             caption='Table 1: the trays, as the package knows them.',
         ),
@@ -81,7 +81,7 @@ def processing_chapter(context: Context) -> Chapter:
     )
     rows, differences = [], []
     for tray in load_trays():
-        shares = [one.summary['followed'].get(str(tray)) for one in context.cycles]
+        shares = [cycle.summary['followed'].get(str(tray)) for cycle in context.cycles]
         mean, scatter, _ = mean_of(shares)
         paper = PAPER_TRACKED.get(tray)
         reported = f'{paper[0]:.0f} ± {paper[1]:.0f}' if paper else '–'
@@ -144,12 +144,12 @@ def _write_frame(film: Path, path: Path) -> None:
 
 def _draw_tracks(context: Context, path: Path) -> None:
     settings = plate_settings(trays=[1])
-    found = track_bag(
+    bag = track_bag(
         context.film(STICKING),
         settings,
         progress=lambda done, total: context.progress(0.5 + 0.5 * done / max(total, 1)),
     )
-    picture = overlay(found.pictures[1], found.tracks[1], found.pixels_per_metre, path_frames=600)
+    picture = overlay(bag.pictures[1], bag.tracks[1], bag.pixels_per_metre, path_frames=600)
     _, content = cv2.imencode('.png', picture)
     with whole_file(path) as part:
         part.write_bytes(content.tobytes())

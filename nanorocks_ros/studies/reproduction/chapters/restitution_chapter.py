@@ -123,9 +123,9 @@ def simulation_chapter(context: Context) -> Chapter:
         runs=reported.PAPER_RUNS,
         picture=True,
     )
-    found = simulate(plan, context.workers, context.progress)
+    runs = simulate(plan, context.workers, context.progress)
     path = context.picture('simulated.png')
-    simulated_figure(path, found)
+    simulated_figure(path, runs)
     section = Section(
         title='The simulation (Figure 11)',
         parts=[
@@ -192,7 +192,7 @@ def _with_interval(cycles: Sequence[dict[str, Any]], name: str) -> str:
     if not cycles:
         return '–'
     value, lower, upper = (
-        mean_of([one.get(name + end) for one in cycles])[0] for end in ('', '_lower', '_upper')
+        mean_of([cycle.get(name + end) for cycle in cycles])[0] for end in ('', '_lower', '_upper')
     )
     if math.isnan(value):
         return '–'

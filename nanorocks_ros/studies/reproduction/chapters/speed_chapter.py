@@ -44,11 +44,11 @@ def speed_chapter(context: Context) -> Chapter:
     """Figures 2, 5 and 6."""
     section = Section(title='Speeds (Figures 2, 5 and 6)')
     settings = plate_settings(trays=[1])
-    found = compare_speeds(context.film(), settings, progress=context.count)
-    one = found.trays[1]
-    cycle = found.first_cycle()
+    speeds = compare_speeds(context.film(), settings, progress=context.count)
+    one = speeds.trays[1]
+    cycle = speeds.first_cycle()
     over_time, ratios = context.picture('speeds.png'), context.picture('speed_ratios.png')
-    speeds_figure(over_time, found, cycle)
+    speeds_figure(over_time, speeds, cycle)
     _draw_ratios(ratios, one, cycle)
     section.parts += [
         Picture(path=over_time, caption='Figure 2: tray 1 by every method over one cycle, with '
@@ -111,11 +111,11 @@ def _draw_ratios(path: Path, found: ComparedSpeeds, cycle: int) -> None:
     figure = Figure(figsize=(8.0, 4.5), layout='constrained')
     axes = figure.subplots()
     for method, colour, marker in _SHOWN:
-        speeds = [one for one in found.speeds[method] if one.cycle == cycle]
+        speeds = [speed for speed in found.speeds[method] if speed.cycle == cycle]
         if not speeds:
             continue
         true = found.true_speeds(speeds)
-        ratio = np.array([one.mean_projected_speed for one in speeds]) / true
+        ratio = np.array([speed.mean_projected_speed for speed in speeds]) / true
         axes.plot(_MM * true, ratio, marker, color=colour, ms=3, alpha=0.6, label=_NAMES[method])
     axes.axhline(1.0, color='0.5', lw=1)
     axes.set(xscale='log', yscale='log', xlabel='true mean projected speed [mm/s]',

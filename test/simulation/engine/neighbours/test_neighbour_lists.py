@@ -33,12 +33,12 @@ def lists_that_agree(beads, rules, events_per_bead=1):
         beads, rules, Kernel.SCAN, int(events_per_bead * len(beads.radii))
     )
     lists = HardSphereGas(beads, rules, Kernel.LISTS)
-    found = lists.follow(scan.now, [scan.now], log=True)
+    course = lists.follow(scan.now, [scan.now], log=True)
     for field in ('kind', 'bead', 'partner'):
-        np.testing.assert_array_equal(found.events[field], expected.events[field])
+        np.testing.assert_array_equal(course.events[field], expected.events[field])
     for field in ('time', 'normal_speed', 'impulse'):
-        np.testing.assert_allclose(found.events[field], expected.events[field], atol=1e-6)
-    np.testing.assert_allclose(found.positions, expected.positions, atol=1e-6)
+        np.testing.assert_allclose(course.events[field], expected.events[field], atol=1e-6)
+    np.testing.assert_allclose(course.positions, expected.positions, atol=1e-6)
     return lists
 
 
