@@ -3,6 +3,7 @@
 # PYTHON       the interpreter for new environments (default: the first of python3, python3.13,
 #              ... python3.10 that runs)
 # PYTEST_ARGS  added to the command line of pytest
+# GOLDEN_ARGS  added to the command line of the golden check
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
@@ -26,7 +27,7 @@ export PYTHON
 RUN := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" AMENT_PREFIX_PATH="$(AMENT)" \
        ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST OPENBLAS_NUM_THREADS=1
 
-.PHONY: help demo test test-oldest lint bench docs venv lock clean
+.PHONY: help demo test test-oldest golden lint bench docs venv lock clean
 
 help: ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' $(MAKEFILE_LIST) | \
@@ -47,16 +48,20 @@ test: venv ## Run all tests, then those of the core with the oldest dependencies
 # What takes minutes and only goes through, once more, what other tests go through: analyses of
 # whole bags go through all stages and the inference. The simulation is the same, bit by bit, with
 # all dependencies, and one command of it is enough.
-ONCE := test/validation test/simulation test/inference test/stages test/dashboard/test_page.py \
-        test/physics/test_confined_theory.py test/studies/reproduction test/studies/batch \
-        test/pipeline test/studies/calibration test/studies/libraries test/studies/sweeps \
-        test/cli/simulation/test_sweep.py \
-        test/cli/figures/test_figure_cor.py test/cli/simulation/test_simulate_scene.py test/test_contributing.py
+ONCE := test/golden test/validation test/simulation test/inference test/stages test/pipeline \
+        test/dashboard/test_page.py test/physics/test_confined_theory.py \
+        test/studies/reproduction test/studies/batch test/studies/calibration \
+        test/studies/libraries test/studies/sweeps test/cli/simulation/test_sweep.py \
+        test/cli/figures/test_figure_cor.py test/cli/simulation/test_simulate_scene.py \
+        test/test_contributing.py
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba" \
 	    PATH="$(CURDIR)/$(OLDEST)/bin:$$PATH" python -m pytest \
 	    $(SIDE_BY_SIDE) $(patsubst %,--ignore=%,$(NODES) $(ONCE)) $(PYTEST_ARGS)
+
+golden: venv ## Hold every number that the commands give against test/golden/golden.json
+	@$(RUN) python -m benchmarks golden $(GOLDEN_ARGS)
 
 lint: venv ## Check style, format, types and which module may import which
 	@$(RUN) ruff check .

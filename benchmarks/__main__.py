@@ -1,9 +1,14 @@
-"""``python -m benchmarks [NAME ...]``: run the benchmarks, all or those named."""
+"""``python -m benchmarks [NAME ...]``: run the benchmarks, all or those named.
+
+``python -m benchmarks golden [OPTION ...]`` is no measurement but a check; see its ``--help``.
+"""
 
 from __future__ import annotations
 
 import sys
 from importlib import import_module
+
+from benchmarks import golden
 
 ALL = (
     'offline',
@@ -39,7 +44,9 @@ ALL = (
 
 
 def main() -> int:
-    """Run each benchmark and print its report."""
+    """Run each benchmark and print its report, or run the golden check."""
+    if sys.argv[1:2] == ['golden']:
+        return golden.main(sys.argv[2:])
     names = sys.argv[1:] or ALL
     unknown = [name for name in names if name not in ALL]
     if unknown:
