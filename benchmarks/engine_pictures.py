@@ -1,6 +1,6 @@
 """Draw a cooling gas and a gas that sticks: ``python -m benchmarks.engine_pictures [FOLDER]``.
 
-Writes cooling_gas.png and clusters.png, for the documentation, into docs/pictures or the folder given.
+Writes cooling_gas.png and clusters.png for the documentation, into docs/pictures or FOLDER.
 """
 
 from __future__ import annotations
