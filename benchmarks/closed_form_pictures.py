@@ -1,4 +1,4 @@
-"""Pictures for docs/theory.md, restitution.md and sweeps.md, made by commands anybody can give.
+"""Pictures of docs/method/theory.md and restitution.md and of docs/use/sweeps.md, by commands.
 
 ``python -m benchmarks.closed_form_pictures FOLDER`` writes them: some minutes of one core. Cycles
 are simulated, without rotation, and their mean speeds have random errors put on them.
@@ -110,4 +110,4 @@ def main(folder):
 
 
 if __name__ == '__main__':
-    sys.exit(main(sys.argv[1] if len(sys.argv) > 1 else 'docs'))
+    sys.exit(main(sys.argv[1] if len(sys.argv) > 1 else 'docs/pictures'))

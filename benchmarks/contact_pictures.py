@@ -1,6 +1,6 @@
 """Draw a rebound and a collision as found: ``python -m benchmarks.contact_pictures [FOLDER]``.
 
-Writes rebounds.png, for the documentation, into docs or the folder given.
+Writes rebounds.png, for the documentation, into docs/pictures or the folder given.
 """
 
 from __future__ import annotations
@@ -142,4 +142,4 @@ def write(folder: Path) -> None:
 
 
 if __name__ == '__main__':
-    write(Path(sys.argv[1] if len(sys.argv) > 1 else 'docs'))
+    write(Path(sys.argv[1] if len(sys.argv) > 1 else 'docs/pictures'))

@@ -1,7 +1,7 @@
 """Take the pictures of the live page: ``python -m benchmarks.dashboard_pictures BAG [FOLDER]``.
 
 Plays a film of the plate, as slowly as all trays of it are followed, and writes dashboard.png and
-dashboard_phone.png, for the documentation, into docs or the folder given. BAG is made by
+dashboard_phone.png, for the documentation, into docs/pictures or the folder given. BAG is made by
 ``nanorocks simulate --scene --duration 32 --first-shake 0.5 --shake-period 20 --bag BAG``.
 """
 
@@ -32,7 +32,7 @@ _PICTURES = (
 
 def main() -> None:
     """Start the graph, wait until the gas has cooled for a while, and take the pictures."""
-    folder = Path(sys.argv[2] if len(sys.argv) > 2 else 'docs')
+    folder = Path(sys.argv[2] if len(sys.argv) > 2 else 'docs/pictures')
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ['ROS_DOMAIN_ID'] = _DOMAIN
     pipeline = start_node(

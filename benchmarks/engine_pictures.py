@@ -1,6 +1,6 @@
 """Draw a cooling gas and a gas that sticks: ``python -m benchmarks.engine_pictures [FOLDER]``.
 
-Writes cooling_gas.png and clusters.png, for the documentation, into docs or the folder given.
+Writes cooling_gas.png and clusters.png for the documentation, into docs/pictures or FOLDER.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ _TRAY = (0.015, 0.015, 0.003)
 _BEADS = 15
 _RULES = {'restitution': 0.89, 'wall_restitution': 0.99}
 _RUNS = 60
+_PICTURES = Path(__file__).parents[1] / 'docs/pictures'
 _MOMENTS = (0.5, 5.0, 30.0)
 _TRAIL = 0.4
 # The gas is in Haff's decay from here on, [s].
@@ -52,7 +53,7 @@ _STICKY_MOMENTS = (0.5, 6.0, 20.0)
 
 def main() -> None:
     """Draw both."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1] / 'docs'
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else _PICTURES
     with plt.rc_context(_STYLE):
         cooling_gas().savefig(folder / 'cooling_gas.png')
         clusters().savefig(folder / 'clusters.png')

@@ -1,7 +1,7 @@
 """Rotation: how rough beads share their energy, and what that does to speeds and restitutions.
 
 Tangential restitution β, coefficient of friction μ (none given: contacts never slide), at walls
-as between beads unless said otherwise. ``docs/rotation.md`` says what follows.
+as between beads unless said otherwise. ``docs/method/rotation.md`` says what follows.
 """
 
 from __future__ import annotations

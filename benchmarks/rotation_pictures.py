@@ -1,4 +1,4 @@
-"""The picture of docs/rotation.md: ``python -m benchmarks.rotation_pictures FOLDER``, a minute."""
+"""The picture of docs/method/rotation.md, by ``python -m benchmarks.rotation_pictures FOLDER``."""
 
 from __future__ import annotations
 
@@ -118,4 +118,4 @@ def _readings(axes):
 
 
 if __name__ == '__main__':
-    main(sys.argv[1] if len(sys.argv) > 1 else 'docs')
+    main(sys.argv[1] if len(sys.argv) > 1 else 'docs/pictures')

@@ -1,4 +1,4 @@
-"""The validation report of camera, tracking and speed, written to docs/validation.md.
+"""Validation report of camera, tracking and speed, written to docs/validation/validation.md.
 
 What was to be reached, what is reached on one cycle of the simulated plate with all effects, and
 by how much it is missed; beside the numbers of the paper where it has them.
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.inspection.speed_comparison import ComparedSpeeds
 
 _ROOT = Path(__file__).parents[1]
-_PAGE = _ROOT / 'docs' / 'validation.md'
+_PAGE = _ROOT / 'docs' / 'validation' / 'validation.md'
 _TEXT = Path(__file__).with_name('validation.md')
 _PAPER = _ROOT / 'test' / 'paper_values.json'
 _TRAYS = (1, 2, 3, 4, 5, 6, 7)

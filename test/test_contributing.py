@@ -67,6 +67,6 @@ def test_the_tests_of_the_recipe_pass(tree):
 
 def test_the_stage_is_documented_on_the_wire(tree):
     run(tree, '-m', 'nanorocks_ros.tools.docs_pages.wire_pages')
-    page = (tree / 'docs/topics.md').read_text(encoding='utf-8')
+    page = (tree / 'docs/reference/topics.md').read_text(encoding='utf-8')
     assert '`tray_K/brightness`' in page
     assert '| 2 | `brightness` | gray levels |' in page

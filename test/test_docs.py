@@ -13,12 +13,12 @@ from nanorocks_ros import records
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').rglob('*.md'), ROOT / 'bags/README.md'])
 SUFFIXES = r'(_error|_errors|_lower|_upper|_[xy]|_[12])*$'
-LINK = re.compile(r'(?<!`)\[[^\]\n]*\]\(([^)\s]+)\)')
+LINK = re.compile(r'(?<!`)\[[^\]]*\]\(([^)\s]+)\)')
 
 
 def glossary():
     """The names in the first column of the tables."""
-    text = (ROOT / 'docs/glossary.md').read_text(encoding='utf-8')
+    text = (ROOT / 'docs/reference/glossary.md').read_text(encoding='utf-8')
     rows = [line.split('|')[1] for line in text.splitlines() if line.startswith('| `')]
     return {name for row in rows for name in re.findall(r'`([^`]+)`', row)}
 
@@ -67,5 +67,32 @@ def test_links_between_pages_lead_somewhere(page):
 def test_every_page_is_in_the_index():
     index = (ROOT / 'docs/README.md').read_text(encoding='utf-8')
     named = {target.partition('#')[0] for target in LINK.findall(index)}
-    pages = {path.name for path in (ROOT / 'docs').glob('*.md')} - {'README.md'}
-    assert pages - named == set()
+    pages = {str(path.relative_to(ROOT / 'docs')) for path in (ROOT / 'docs').rglob('*.md')}
+    records = {name for name in pages if name.startswith('develop/decisions/0')}
+    assert pages - records - {'README.md'} - named == set()
+
+
+def test_every_decision_is_in_its_list():
+    folder = ROOT / 'docs/develop/decisions'
+    named = set(LINK.findall((folder / 'README.md').read_text(encoding='utf-8')))
+    assert {path.name for path in folder.glob('*.md')} - {'README.md'} - named == set()
+
+
+def test_pages_that_code_names_exist():
+    mention = re.compile(r'docs/[\w/-]+\.(?:md|png)')
+    sources = [ROOT / 'CHANGELOG.rst', *(ROOT / 'config').glob('*.yaml')]
+    for folder in ('nanorocks_ros', 'benchmarks', 'test'):
+        sources += [*(ROOT / folder).rglob('*.py'), *(ROOT / folder).rglob('*.yaml')]
+    missing = {
+        f'{path.relative_to(ROOT)}: {name}'
+        for path in sources
+        for name in mention.findall(path.read_text(encoding='utf-8'))
+        if not (ROOT / name).exists()
+    }
+    assert missing == set()
+
+
+def test_every_picture_is_on_a_page():
+    shown = '\n'.join(page.read_text(encoding='utf-8') for page in PAGES)
+    pictures = {path.name for path in (ROOT / 'docs/pictures').iterdir()}
+    assert {name for name in pictures if f'pictures/{name})' not in shown} == set()

@@ -155,7 +155,7 @@ def _print_cycles(results: TrayResults) -> None:
         truth = results.truth[-1]
         print(f'  truth:   COR {truth.restitution:g}, walls {truth.wall_restitution:g}')
     if cycles and cycles[-1].relation is CorRelation.PAPER:
-        print("  relation 'paper': its interval is statistical only, see docs/physics.md")
+        print("  relation 'paper': its interval is statistical only, see docs/method/physics.md")
 
 
 def _cor_text(cor: CorEstimate) -> str:

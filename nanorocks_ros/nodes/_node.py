@@ -139,7 +139,7 @@ class NanorocksNode(Node):
                 raise ConfigurationError(
                     f'parameter {name}',
                     str(error).split('Reason: ')[-1],
-                    'see docs/parameters.md',
+                    'see docs/reference/parameters.md',
                 ) from error
             if isinstance(row.default, str) and not row.bounds.choices:
                 require_text(name, values[row.name])
@@ -161,7 +161,7 @@ class NanorocksNode(Node):
         problems = unknown_parameters(given, self._declared)
         if problems:
             raise ConfigurationError(
-                f'node {self.get_name()}', '; '.join(problems), 'see docs/parameters.md'
+                f'node {self.get_name()}', '; '.join(problems), 'see docs/reference/parameters.md'
             )
 
     def refuse_unheard_overrides(self):
@@ -379,7 +379,7 @@ class NanorocksNode(Node):
         if self._due('frames missing', _MISSING_S):
             self.get_logger().warning(
                 f'{topic}: {count} frames missing so far, by their stamps: lost on the way, or '
-                'this machine is too slow; follow fewer trays, see docs/doctor.md'
+                'this machine is too slow; follow fewer trays, see docs/start/doctor.md'
             )
 
     # Diagnostics

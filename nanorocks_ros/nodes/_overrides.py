@@ -63,7 +63,7 @@ def refuse_unheard_overrides(given, declared, late):
 
 def _refuse(name, problem):
     if problem is not None:
-        raise ConfigurationError(f'parameter {name}', problem, 'see docs/nodes.md')
+        raise ConfigurationError(f'parameter {name}', problem, 'see docs/reference/nodes.md')
 
 
 def _parts(name):

@@ -96,7 +96,7 @@ class DemoNode(NanorocksNode):
         print(
             f'walls {last.wall_restitution:.3f} [{last.wall_restitution_lower:.3f}, '
             f"{last.wall_restitution_upper:.3f}]; the paper's closed form says "
-            f'{last.paper_restitution:.3f}; see docs/restitution.md'
+            f'{last.paper_restitution:.3f}; see docs/method/restitution.md'
         )
         print(f'figure: {_FIGURE.resolve()}', flush=True)
 

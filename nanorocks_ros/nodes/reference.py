@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
-PAGE = 'docs/node_reference.md'
+PAGE = 'docs/reference/node_reference.md'
 _SAMPLE = 'bags/tray_1_sample'
 _NOTE = '<!-- Made by `make docs` from the nodes; change those instead. -->\n\n'
 _INTRODUCTION = """# Node reference
@@ -144,6 +144,7 @@ def page():
 def main(root):
     """Write the page into a source tree."""
     os.chdir(root)
+    Path(PAGE).parent.mkdir(parents=True, exist_ok=True)
     Path(PAGE).write_text(page(), encoding='utf-8')
 
 

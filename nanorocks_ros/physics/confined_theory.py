@@ -1,4 +1,4 @@
-"""Kinetic theory of a cooling gas of beads between close walls; derived in docs/theory.md.
+"""Kinetic theory of a cooling gas of beads between close walls; derived in docs/method/theory.md.
 
 Each class of beads has a temperature of its own along x, y and z: in a flat tray walls take most
 from the motion along z, and beads, which meet almost side by side, give little back. Velocities
@@ -251,7 +251,7 @@ class ConfinedGas:
         wall_restitution: float,
         width: float = 0.0,
     ) -> NDArray[np.float64]:
-        """Rates of change of ln T, (n, 3), [1/s]; derived in docs/theory.md."""
+        """Rates of change of ln T, (n, 3), [1/s]; derived in docs/method/theory.md."""
         masses = self.beads.masses
         share = (masses / (masses[:, np.newaxis] + masses))[..., np.newaxis]
         kick, kick_squared = 1.0 + restitution, (1.0 + restitution) ** 2 + width**2 / 12.0

@@ -121,7 +121,7 @@ def kinetic_decay_rate(restitution: float, diameter: float, number_density: floa
 
     References
     ----------
-    Haff 1983, J. Fluid Mech. 134, 401; derivation in docs/theory.md.
+    Haff 1983, J. Fluid Mech. 134, 401; derivation in docs/method/theory.md.
     """
     check_restitution(restitution=restitution)
     return _decay_at_zero(diameter, number_density) * (1.0 - restitution**2)

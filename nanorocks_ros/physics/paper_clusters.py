@@ -2,7 +2,7 @@
 
 Its calibration is a straight line through the origin, though the area of the autocorrelation
 saturates while clusters grow; its rule for the onset of sticking fires in gases that do not stick
-(``docs/autocorrelation.md``).
+(``docs/method/autocorrelation.md``).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The closed forms of [B19], kept under their own names because people compare with them.
 
 They are precise and wrong: on simulated gases that for the decay returns 0.94 to 0.99 whatever the
-truth between 0.6 and 0.95 (``docs/theory.md``). Errors therefore cover statistics only.
+truth between 0.6 and 0.95 (``docs/method/theory.md``). Errors therefore cover statistics only.
 """
 
 from __future__ import annotations

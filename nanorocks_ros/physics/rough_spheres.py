@@ -5,7 +5,7 @@ velocities and spins Gaussian and independent, both restitutions constant. A tem
 mean energy of one degree of freedom, T = m <v^2> / 3 and R T = I <w^2> / 3, both with three of
 them, so that R = 1 is equipartition. What a bead spins about and where it flies are correlated in
 truth (Brilliantov and others 2007), and walls of a tray take translation and rotation unevenly:
-``docs/rotation.md`` has both against simulation.
+``docs/method/rotation.md`` has both against simulation.
 
 References
 ----------
@@ -71,7 +71,7 @@ def rough_rates(restitution: float, tangential_restitution: float) -> RoughRates
 
     References
     ----------
-    [HZ]; derivation in docs/rotation.md.
+    [HZ]; derivation in docs/method/rotation.md.
     """
     check_restitution(restitution=restitution)
     if not -1.0 <= tangential_restitution <= 1.0:

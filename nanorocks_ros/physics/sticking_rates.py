@@ -1,6 +1,6 @@
 """How often beads of a gas meet slowly enough to stick, by the kinetic theory of `confined`.
 
-Derived in docs/clusters.md.
+Derived in docs/method/clusters.md.
 """
 
 from __future__ import annotations

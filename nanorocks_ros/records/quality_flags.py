@@ -62,7 +62,7 @@ class StickingStatus(IntEnum):
 class Quality(IntFlag):
     """What is wrong with the picture of a tray since the last one, or with a speed from it.
 
-    0 when nothing is; docs/speed.md says what each flag means.
+    0 when nothing is; docs/method/speed.md says what each flag means.
     """
 
     SATURATED = 1

@@ -131,7 +131,7 @@ def with_values(settings: SettingsType, values: Mapping[str, Any], where: str) -
             problems.append(f'{name}: {text}')
     if problems:
         raise ConfigurationError(
-            where, '; '.join(problems), 'see docs/parameters.md for names and ranges'
+            where, '; '.join(problems), 'see docs/reference/parameters.md for names and ranges'
         )
     changed: SettingsType = _replaced(
         settings, {name: _coerced(known[name], value) for name, value in values.items()}

@@ -270,5 +270,5 @@ def check_settings(settings: SimulationSettings) -> None:
     wrong = [f'{name}: {text}' for name, text in found if text]
     if wrong:
         raise ConfigurationError(
-            'simulation', '; '.join(wrong), 'see docs/parameters.md for names and ranges'
+            'simulation', '; '.join(wrong), 'see docs/reference/parameters.md for names and ranges'
         )

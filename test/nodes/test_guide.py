@@ -122,7 +122,7 @@ def test_the_guide_does_what_it_says(root, tmp_path, domain):
     shell = Shell(tmp_path, domain)
     said = {}
     try:
-        for mark, block in commands((root / 'docs/guide.md').read_text(encoding='utf-8')):
+        for mark, block in commands((root / 'docs/start/guide.md').read_text(encoding='utf-8')):
             if mark == 'Ctrl-C':
                 shell.interrupt()
             elif mark == 'goes on':

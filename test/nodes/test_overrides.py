@@ -76,5 +76,5 @@ def test_a_topic_that_the_node_does_not_have_is_not_heard():
     wrong = '/nanorocks/camera/imageraw'
     with refused(f'this node has no subscription of {wrong} (did you mean {RAW!r}?)'):
         give(wrong)
-    with refused(f'this node has no publisher of {RAW}; see docs/nodes.md'):
+    with refused(f'this node has no publisher of {RAW}; see docs/reference/nodes.md'):
         give(RAW, 'publisher')

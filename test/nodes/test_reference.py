@@ -15,8 +15,7 @@ from nanorocks_ros.nodes.reference import PAGE
 
 
 def test_the_reference_is_not_stale(root, tmp_path):
-    for name in ('bags', 'docs'):
-        (tmp_path / name).mkdir()
+    (tmp_path / 'bags').mkdir()
     (tmp_path / 'bags/tray_1_sample').symlink_to(root / 'bags/tray_1_sample')
     command = [sys.executable, '-m', 'nanorocks_ros.nodes.reference', str(tmp_path)]
     finished = subprocess.run(

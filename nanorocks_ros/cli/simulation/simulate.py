@@ -50,7 +50,8 @@ def add_parser(commands: Any) -> None:
 
 def _add_work(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        '--trays-file', help='YAML file of your own trays, numbered 1 to 8; see docs/simulate.md'
+        '--trays-file',
+        help='YAML file of your own trays, numbered 1 to 8; see docs/use/simulate.md',
     )
     parser.add_argument('--runs', type=int, default=1, help='default 1')
     parser.add_argument(
@@ -70,7 +71,7 @@ def _add_work(parser: argparse.ArgumentParser) -> None:
         '--scene',
         action='store_true',
         help='film the whole plate with all its trays, through the lens of the flight camera, '
-        'into --bag, --video or --picture (one .png, at the end); see docs/scene.md',
+        'into --bag, --video or --picture (one .png, at the end); see docs/use/scene.md',
     )
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')

@@ -2,7 +2,7 @@
 
 A camera sees beads in projection: any two may pass, or touch, and some do so slowly. What tells
 a body of two beads from that is how far beads of that gas would have come apart meanwhile.
-Derived in docs/clusters.md.
+Derived in docs/method/clusters.md.
 """
 
 from __future__ import annotations

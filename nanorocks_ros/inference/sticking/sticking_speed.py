@@ -1,6 +1,6 @@
 """The speed below which beads stick, from when bodies merged: a Poisson likelihood.
 
-Derived in docs/clusters.md, where its bias is measured.
+Derived in docs/method/clusters.md; accuracy in docs/validation/sticking_accuracy.md.
 """
 
 from __future__ import annotations

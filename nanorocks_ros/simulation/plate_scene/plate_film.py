@@ -245,5 +245,5 @@ def check_scene(scene: SceneSettings) -> None:
         wrong.append(f'trays: {scene.trays} name none, or one twice')
     if wrong:
         raise ConfigurationError(
-            'scene', '; '.join(wrong), 'see docs/parameters.md for names and ranges'
+            'scene', '; '.join(wrong), 'see docs/reference/parameters.md for names and ranges'
         )

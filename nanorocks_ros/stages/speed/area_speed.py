@@ -85,7 +85,7 @@ class AreaSpeed:
             cycle=shakes.cycle,
             cycle_start_ns=shakes.cycle_start_ns,
             mean_projected_speed=speed,
-            # The spread over so many beads; the bias of the method is larger (docs/physics.md).
+            # The spread over the beads; the bias is larger (docs/method/speed.md).
             mean_projected_speed_error=abs(speed) * _RAYLEIGH_SPREAD / math.sqrt(self._tray.count),
             window=(last - first) / NS,
             method=SpeedMethod.BINARISED_AREA,
@@ -96,7 +96,7 @@ class AreaSpeed:
         """What is to be said of a speed from a displacement, [m]."""
         quality = Quality(0)
         if self._settings.area_factor == 1.0 and self._settings.area_offset == 0.0:
-            # No reading of the recipe is right without manual tracks (docs/speed.md).
+            # No reading of the recipe is right without manual tracks (docs/method/speed.md).
             quality |= Quality.UNCALIBRATED
         most = _MOST_DIAMETERS * self._tray.diameter
         if not _LEAST_PX / self._scale <= displacement <= most:

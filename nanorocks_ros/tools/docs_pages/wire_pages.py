@@ -68,12 +68,12 @@ _GROUPS = (
     ('`bag_player`, `pipeline`', '', st.BagSettings()),
     (
         '`bag_player`',
-        '`position` and `rate` can be set while it plays; see [replay.md](replay.md).',
+        '`position` and `rate` can be set while it plays; see [replay.md](../use/replay.md).',
         st.PlayerSettings(),
     ),
     ('`preprocessor`, `pipeline`', '', st.CameraSettings()),
     ('`pipeline`', '', st.SourceSettings()),
-    ('`pipeline`', 'See [replay.md](replay.md#record).', st.RecordSettings()),
+    ('`pipeline`', 'See [replay.md](../use/replay.md#record).', st.RecordSettings()),
     ('`pipeline`, the live page', '', st.LivePageSettings()),
     (
         '`dashboard`, `pipeline` under `dashboard_`, and `nanorocks dashboard`',
@@ -190,9 +190,9 @@ def _range(row: st.SettingRow) -> str:
 
 
 FILES = {
-    'docs/topics.md': topics_page,
-    'docs/parameters.md': parameters_page,
-    'docs/viewers.md': lambda: _NOTE + viewers_page(),
+    'docs/reference/topics.md': topics_page,
+    'docs/reference/parameters.md': parameters_page,
+    'docs/use/viewers.md': lambda: _NOTE + viewers_page(),
     'foxglove/nanorocks.json': foxglove,
     'rviz/nanorocks.rviz': rviz,
     'plotjuggler/nanorocks.xml': plotjuggler,
@@ -203,7 +203,7 @@ def write(root: Path) -> None:
     """Write everything that is generated into a source tree."""
     for name, content in FILES.items():
         path = root / name
-        path.parent.mkdir(exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(content(), encoding='utf-8')
 
 

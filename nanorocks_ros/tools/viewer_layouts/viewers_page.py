@@ -32,7 +32,7 @@ stands for another.
 
 An estimate is a `std_msgs/Float32MultiArray`, so viewers name its elements by number. Of
 `{cor}`, for instance, element {restitution} is the restitution of the beads, {lower} and {upper}
-are the ends of its interval. [topics.md](topics.md#array-layouts) lists all.
+are the ends of its interval. [topics.md](../reference/topics.md#array-layouts) lists all.
 
 Where the package lies: `ros2 pkg prefix --share nanorocks_ros`, or with the wheels
 `$VIRTUAL_ENV/{share}`. The viewer has to be on the same ROS domain, and with
@@ -44,7 +44,7 @@ _FOXGLOVE = """## Foxglove and Lichtblick
 
 ![The tab of tray 1: tracks, motion, autocorrelation; speed, restitution with its interval, \
 clusters and sticking speed]\
-(viewers_foxglove.png)
+(../pictures/viewers_foxglove.png)
 
 The tab of tray 1 in Lichtblick 1.28, with what `pipeline` made of `bags/tray_1_sample`.
 

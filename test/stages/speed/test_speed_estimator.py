@@ -196,7 +196,7 @@ def test_the_papers_recipe_can_be_had_in_all_its_readings(run, averaging, geomet
     assert {one.method for one in found} == {SpeedMethod.BINARISED_AREA}
     speed, _, true = ratios(found, truth).T
     known = np.isfinite(speed)
-    # Off by the factors that docs/physics.md tells, but it follows the motion.
+    # Off by the factors that docs/method/speed.md gives, but it follows the motion.
     assert 0.3 < np.median(speed[known] / true[known]) < 6.0
 
 

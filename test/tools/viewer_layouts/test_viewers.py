@@ -96,7 +96,7 @@ def test_every_panel_of_foxglove_has_a_place():
     assert [tab['title'] for tab in tabs] == ['plate', *(f'tray {k}' for k in range(1, 9))]
 
 
-@pytest.mark.parametrize('name', ['foxglove/nanorocks.json', 'docs/viewers.md'])
+@pytest.mark.parametrize('name', ['foxglove/nanorocks.json', 'docs/use/viewers.md'])
 def test_pictures_and_arrays_are_topics_of_the_graph(name):
     known = {topic.absolute(tray) for topic in topics.TOPICS for tray in range(1, 9)}
     named = set(re.findall(r'/nanorocks/[\w/]*\w', FILES[name]()))

@@ -231,7 +231,7 @@ def _errata() -> list[Erratum]:
             f'gives {paper_restitution(*decay):.3f} here as printed, from a decay rate of '
             f'{rate:.0f} /m, {rate / expected:.1f} times that of a gas with such beads and walls: '
             'beads that stick cool so fast, and so do beads that rub on floor and lid '
-            '(docs/rotation.md).'
+            '(docs/method/rotation.md).'
         ),
         Erratum(
             text=f'The axes of its wall ellipse are printed as a = {printed[0]:g}, b = '

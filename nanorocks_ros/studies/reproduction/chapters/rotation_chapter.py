@@ -57,7 +57,8 @@ def rotation_chapter(context: Context) -> Chapter:
                 text='The paper takes the wider spread of its restitutions below 5 mm/s for '
                 'energy from rotation. Constant friction and tangential restitution single out '
                 'no speed, so rotation cannot set in at one. Noise of the mean speed does: the '
-                'band of Figure 13 holds no rotation at all and widens just so. docs/rotation.md '
+                'band of Figure 13 holds no rotation at all and widens just so. '
+                'docs/method/rotation.md '
                 'works it out with simulated rough beads, and says what could not be decided.'
             ),
         ],
