@@ -16,8 +16,8 @@ import numpy as np
 from benchmarks.scene_bag import SCALE, film_scene, settings
 from nanorocks_ros.experiment.plate import regions_on_plate
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import SpeedEstimate
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 from nanorocks_ros.studies.analysis.bag_images import BagImages
 from nanorocks_ros.studies.calibration.area_calibration import calibrate_area
@@ -77,7 +77,7 @@ def _ratios(path: Path, cases: dict[_Case, dict[str, float]]) -> dict[_Case, str
     images = BagImages(path, settings(_TRAYS))
     truth = images.bag.truth(images.epoch_ns)
     estimators = {
-        case: SpeedEstimator(
+        case: TrayMeasurement(
             settings(_TRAYS, method='binarised_area', **speed), images.trays[case[0]]
         )
         for case, speed in cases.items()

@@ -20,6 +20,7 @@ from benchmarks.drawn import varied
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.experiment.view import View
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import (
     Frame,
     PairCollision,
@@ -38,7 +39,6 @@ from nanorocks_ros.settings import (
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 
 FOLDER = 'NANOROCKS_FILMS'
 """Environment variable: where films are kept; without it, below the temporary directory."""
@@ -206,7 +206,7 @@ class _Follower:
     """What the stages make of the images of one cell."""
 
     def __init__(self, settings: PipelineSettings, cell: Tray) -> None:
-        self._speed = SpeedEstimator(settings, cell)
+        self._speed = TrayMeasurement(settings, cell)
         self._speed.emit_tracks = True
         self._finder = ContactFinder(cell)
         self._speeds: list[SpeedEstimate] = []

@@ -16,11 +16,11 @@ import numpy as np
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.pipeline.composition import trays_of
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import Frame, SpeedEstimate, TrayImage
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.tray_camera.tray_film import film
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 
 _NS = 1e9
 _SEEDS = range(1, 5)
@@ -46,12 +46,12 @@ _METHODS = {
 _OWN_ERROR = 'its own error / truth'
 
 
-def _estimators() -> dict[str, SpeedEstimator]:
+def _estimators() -> dict[str, TrayMeasurement]:
     estimators = {}
     for name, values in _METHODS.items():
         recipe = {'speed.method': 'binarised_area', **values}
         settings = with_values(PipelineSettings(), recipe, 'benchmark')
-        estimators[name] = SpeedEstimator(settings, load_trays()[1])
+        estimators[name] = TrayMeasurement(settings, load_trays()[1])
     return estimators
 
 

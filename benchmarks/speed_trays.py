@@ -19,6 +19,7 @@ import numpy as np
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import View
 from nanorocks_ros.jobs.worker_processes import finished_in_processes
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import Frame, Quality, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.settings import (
     PipelineSettings,
@@ -28,7 +29,6 @@ from nanorocks_ros.settings import (
 )
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm, without_effects
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -145,7 +145,7 @@ def _compared(task: _Task) -> _Found:
     return {key: _ratios(found, np.array(truth[key[0]]).T) for key, found in estimates.items()}
 
 
-def _stages(task: _Task) -> tuple[SceneFilm, Preprocessor, dict[tuple[int, str], SpeedEstimator]]:
+def _stages(task: _Task) -> tuple[SceneFilm, Preprocessor, dict[tuple[int, str], TrayMeasurement]]:
     scene = with_values(SceneSettings(trays=_TRAYS), {'swing_knocks': False}, 'benchmark')
     film = SceneFilm(
         SimulationSettings(
@@ -168,7 +168,7 @@ def _stages(task: _Task) -> tuple[SceneFilm, Preprocessor, dict[tuple[int, str],
         settings, {n: flown[n] for n in _TRAYS}, 'film', View(camera=film.camera.geometry.camera)
     )
     estimators = {
-        (tray, method): SpeedEstimator(with_values(settings, values, 'benchmark'), flown[tray])
+        (tray, method): TrayMeasurement(with_values(settings, values, 'benchmark'), flown[tray])
         for tray in _TRAYS
         for method, values in _METHODS.items()
     }

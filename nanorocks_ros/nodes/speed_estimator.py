@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from nanorocks_ros.nodes._tray_stage import TrayStageNode
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.wire import topics
 
 
@@ -13,7 +13,7 @@ class SpeedEstimatorNode(TrayStageNode):
     def __init__(self):
         outputs = (topics.SPEED, topics.MOTION, topics.TRACKS)
         outputs = (*outputs, topics.REBOUND, topics.COLLISION, topics.BODIES, topics.MERGE)
-        super().__init__('speed_estimator', SpeedEstimator, outputs, in_color=True)
+        super().__init__('speed_estimator', TrayMeasurement, outputs, in_color=True)
 
     def prepare(self, stage, tray):
         """Masks and pictures of tracks are made only while somebody looks."""

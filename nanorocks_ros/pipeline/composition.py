@@ -1,4 +1,4 @@
-"""The only composition of the stages: a frame in at the top, restitutions out at the bottom."""
+"""The only composition of the stages: from a frame to the coefficients of restitution."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import (
     Autocorrelation,
     BodyEstimate,
@@ -24,7 +25,6 @@ from nanorocks_ros.records import (
 from nanorocks_ros.stages.clusters.cluster_estimator import ClusterEstimator
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -79,18 +79,20 @@ class TrayStages:
     """
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
-        self.speed = SpeedEstimator(settings, tray)
+        self.measurement = TrayMeasurement(settings, tray)
         self.clusters = ClusterEstimator(settings, tray)
         self.cooling = HaffFitter(settings, tray)
 
     def emit(self, wanted: Wanted) -> None:
         """Make these pictures from now on."""
-        self.speed.emit_mask, self.speed.emit_tracks, self.clusters.emit_image = wanted
+        self.measurement.emit_mask = wanted.mask
+        self.measurement.emit_tracks = wanted.tracks
+        self.clusters.emit_image = wanted.autocorrelation
 
     def push(self, image: TrayImage) -> tuple[Result, ...]:
         """Everything that follows from the next image of the tray."""
         records: list[Result] = []
-        for record in self.speed.push(image):
+        for record in self.measurement.push(image):
             records.append(record)
             if isinstance(record, SpeedEstimate | Rebound | PairCollision | Merge):
                 records += self.cooling.push(record)

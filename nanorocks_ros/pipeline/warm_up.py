@@ -10,6 +10,7 @@ from nanorocks_ros.experiment.view import Straight, View
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
 from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
 from nanorocks_ros.physics.sticking_rates import slow_contacts
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import Frame, Rebound, SpeedEstimate, SpeedMethod, Tracks, TrayImage
 from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.stages.bodies.body_counter import BodyCounter
@@ -18,7 +19,6 @@ from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.shake_detection import CycleFollower
 from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 
 _SIDE = 160
 _REGION = (40, 40, 80, 80)
@@ -144,7 +144,7 @@ def warm_up_speed() -> None:
     settings = PipelineSettings()
     # Under chalk beads are looked for in another way.
     for tray in (load_trays()[3], load_trays()[2]):
-        estimator = SpeedEstimator(settings, tray)
+        estimator = TrayMeasurement(settings, tray)
         for number in range(8):
             color = np.full((80, 160, 3), 150, dtype=np.uint8)
             for k in range(8):

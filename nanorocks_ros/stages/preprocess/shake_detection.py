@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import cv2
@@ -292,3 +293,14 @@ class CycleFollower:
                 self.noise_power = image.noise_power
         # A recording that is joined in the middle of a cycle was not shaken just then.
         return self.cycle != before and not first
+
+    def counted(self, image: TrayImage) -> TrayImage:
+        """The last image with its cycle and noise filled in."""
+        if image.cycle is not None and not math.isnan(image.noise_power):
+            return image
+        return replace(
+            image,
+            cycle=self.cycle,
+            cycle_start_ns=self.cycle_start_ns,
+            noise_power=self.noise_power,
+        )

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import Quality, SpeedEstimate, SpeedMethod, TrayImage
-from nanorocks_ros.stages.preprocess.shake_detection import NS, CycleFollower, NoiseMeter
+from nanorocks_ros.stages.preprocess.shake_detection import NS, NoiseMeter
 from nanorocks_ros.stages.speed.species_images import SpeciesImages
 from nanorocks_ros.stages.speed.species_speeds import MeanMotion, MeanMotions
 
@@ -22,12 +22,12 @@ _UNKNOWN_MIXTURE = 0.25
 # Pictures that do not show every species, after which all beads are seen as one; and pictures
 # without colour in a row, after which one need not wait for it.
 _PATIENCE = 30
-# While others measure, two of so many pictures are looked at for the noise.
+# While another method measures, the noise is measured between two of so many pictures.
 _WATCHED = 10
 
 
 class StructureSpeed:
-    """Measures the speed by the structure function; silent until it knows the beads.
+    """Measures the speed by the structure function, once the appearance of the beads is known.
 
     A mixture is told apart by colour where there is one: the light beads of a mixture are the
     fast ones, and a bead counts by its area and contrast when all are seen as one.
@@ -42,59 +42,73 @@ class StructureSpeed:
         self._settings = settings.speed
         self._scale = settings.preprocess.pixels_per_metre
         self._tray = tray
-        self._watched = 0
-        self._flags = Quality(0)
-        self._restart()
+        self.reset()
 
-    def _restart(self) -> None:
+    def reset(self, stamp_ns: int | None = None) -> None:
+        """Start afresh."""
+        del stamp_ns
+        self._watched = 0
+        self._idle = False
+        self._cycle: int | None = None
+        self._flags = Quality(0)
+        self._forget_beads()
+
+    def _forget_beads(self) -> None:
         self._images = SpeciesImages(self._tray, self._scale)
         self._told_apart = False
         self._waited = 0
         self._noise: list[NoiseMeter] = []
         self._motions: MeanMotions | None = None
 
-    def push(
-        self, image: TrayImage, shakes: CycleFollower, shaken: bool
-    ) -> tuple[SpeedEstimate, ...]:
-        """Take the next image; one without colour, where there was colour before, is left out."""
+    def push(self, image: TrayImage) -> tuple[SpeedEstimate, ...]:
+        """Take the next image, whose cycle is known.
+
+        An image without colour is left out where there was colour before.
+        """
         self._flags |= image.quality
-        if self._motions is not None and shaken:
+        shaken = self._cycle not in (None, image.cycle)
+        self._cycle = image.cycle
+        # The images before a time without images are of no use.
+        if self._motions is not None and (shaken or self._idle):
             self._motions.shaken()
+        self._idle = False
         shown = self._shown(image)
         if not shown or self._motions is None:
             return ()
-        cycle = (shakes.cycle, shakes.cycle_start_ns)
         across, down = (
-            0.0 if math.isnan(one) else self._scale * one for one in image.displacement
+            0.0 if math.isnan(component) else self._scale * component
+            for component in image.displacement
         )
-        shift = (across, down)
-        noise = [meter.push(one) for meter, one in zip(self._noise, shown, strict=True)]
-        motions = self._motions.push(image.stamp_ns, shown, cycle, noise, shift)
-        if not motions:
-            return ()
-        estimates = tuple(self._estimate(motion) for motion in motions)
-        self._flags = Quality(0)
-        return estimates
+        cycle = (image.cycle or 0, image.cycle_start_ns)
+        noise = [meter.push(gray) for meter, gray in zip(self._noise, shown, strict=True)]
+        return self._estimates(
+            self._motions.push(image.stamp_ns, shown, cycle, noise, (across, down))
+        )
 
-    def rest(self) -> None:
-        """Hold no images while there is no use for them."""
-        if self._motions is not None:
+    def pause(self) -> None:
+        """Release the images while another method measures."""
+        if not self._idle and self._motions is not None:
             self._motions.shaken()
+        self._idle = True
 
-    def watch(self, image: TrayImage) -> None:
-        """See no more of an image than what the noise is, for when it will be needed."""
+    def watch_noise(self, image: TrayImage) -> None:
+        """Measure only the noise of an image, for when another method fails."""
         self._watched = (self._watched + 1) % _WATCHED
         if self._watched > 1:
             return
-        for meter, one in zip(self._noise, self._shown(image), strict=False):
+        for meter, gray in zip(self._noise, self._shown(image), strict=False):
             if self._watched == 0:
-                meter.begin(one)
+                meter.begin(gray)
             else:
-                meter.push(one)
+                meter.push(gray)
+
+    def flush(self) -> tuple[SpeedEstimate, ...]:
+        """Nothing yet."""
+        return ()
 
     def _shown(self, image: TrayImage) -> tuple[NDArray[np.uint8], ...]:
         """An image of each species, or one of all; none while that is not decided."""
-        if self._motions is None and not self._begin(image):
+        if self._motions is None and not self._learn_beads(image):
             return ()
         if not self._told_apart:
             return (image.gray,)
@@ -104,10 +118,10 @@ class StructureSpeed:
         self._flags |= Quality.GRAY_CAMERA
         self._waited += 1
         if self._waited > _PATIENCE:
-            self._restart()
+            self._forget_beads()
         return ()
 
-    def _begin(self, image: TrayImage) -> bool:
+    def _learn_beads(self, image: TrayImage) -> bool:
         """Decide whether species are told apart; False until the picture shows it."""
         tray = self._tray
         told_apart = image.color is not None and self._images.possible
@@ -117,9 +131,9 @@ class StructureSpeed:
                 return False
             told_apart = False
         if told_apart or len(tray.species) == 1:
-            diameters = [one.diameter * self._scale for one in tray.species]
-            counts = [one.count for one in tray.species]
-            factors = [size_factor(one) for one in tray.species]
+            diameters = [species.diameter * self._scale for species in tray.species]
+            counts = [species.count for species in tray.species]
+            factors = [size_factor(species) for species in tray.species]
         else:
             diameters, counts = [tray.diameter * self._scale], [tray.count]
             factors = [(1.0, _UNKNOWN_MIXTURE)]
@@ -128,6 +142,12 @@ class StructureSpeed:
         self._noise = [NoiseMeter() for _ in diameters]
         self._motions = MeanMotions(self._settings, diameters, counts, factors)
         return True
+
+    def _estimates(self, motions: tuple[MeanMotion, ...]) -> tuple[SpeedEstimate, ...]:
+        estimates = tuple(self._estimate(motion) for motion in motions)
+        if estimates:
+            self._flags = Quality(0)
+        return estimates
 
     def _estimate(self, motion: MeanMotion) -> SpeedEstimate:
         scale = self._scale

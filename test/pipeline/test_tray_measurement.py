@@ -12,6 +12,7 @@ import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.pipeline.composition import trays_of
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import (
     Frame,
     MotionMask,
@@ -28,7 +29,6 @@ from nanorocks_ros.simulation.shaken_tray import ShakenTray
 from nanorocks_ros.simulation.tray_camera.tray_film import film
 from nanorocks_ros.simulation.tray_camera.tray_renderer import TrayCamera
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 
 NS = 1e9
 TRAY = load_trays()[1]
@@ -55,7 +55,7 @@ def run():
 
 def pushed(images, method='structure_function', **values):
     settings = with_values(PipelineSettings(), {'speed.method': method, **values}, 'test')
-    return list(measured(SpeedEstimator(settings, TRAY), images))
+    return list(measured(TrayMeasurement(settings, TRAY), images))
 
 
 def measured(estimator, images, kinds=(SpeedEstimate, MotionMask)):
@@ -165,7 +165,7 @@ def test_frames_that_are_missing_do_not_change_the_speed(run, method):
 
 
 def test_time_that_goes_back_starts_all_afresh(run):
-    estimator = SpeedEstimator(PipelineSettings(), TRAY)
+    estimator = TrayMeasurement(PipelineSettings(), TRAY)
     passes = [list(measured(estimator, run[0])) for _ in range(2)]
     assert passes[0] == passes[1]
 
@@ -173,15 +173,15 @@ def test_time_that_goes_back_starts_all_afresh(run):
 def test_contacts_are_found_where_beads_are_tracked_and_belong_to_their_cycle(run):
     images, _ = run
     kinds = (Rebound, PairCollision)
-    found = list(measured(SpeedEstimator(PipelineSettings(), TRAY), images, kinds))
+    found = list(measured(TrayMeasurement(PipelineSettings(), TRAY), images, kinds))
     start_ns = next(image.cycle_start_ns for image in images if image.cycle_start_ns is not None)
     assert {type(one) for one in found} == set(kinds)
     assert all(one.cycle == int(one.stamp_ns >= start_ns) for one in found)
     off = {'cooling.rebounds': False, 'cooling.collisions': False}
     settings = with_values(PipelineSettings(), off, 'test')
-    assert not list(measured(SpeedEstimator(settings, TRAY), images, kinds))
+    assert not list(measured(TrayMeasurement(settings, TRAY), images, kinds))
     settings = with_values(PipelineSettings(), {'speed.method': 'structure_function'}, 'test')
-    assert not list(measured(SpeedEstimator(settings, TRAY), images, kinds))
+    assert not list(measured(TrayMeasurement(settings, TRAY), images, kinds))
 
 
 @pytest.mark.parametrize('averaging', ['none', 'running_mean', 'block_mean'])
@@ -228,7 +228,7 @@ def test_the_exact_geometry_reads_more_than_its_taylor_form(run):
 
 def test_the_mask_shows_where_beads_moved_and_only_while_somebody_looks(run):
     images, truth = run
-    estimator = SpeedEstimator(PipelineSettings(), TRAY)
+    estimator = TrayMeasurement(PipelineSettings(), TRAY)
     estimator.emit_mask = True
     masks = [
         record
@@ -267,7 +267,7 @@ def test_tracks_are_relied_upon_where_nearly_all_beads_are_followed(run):
 
 
 def test_images_are_not_kept_for_a_method_that_is_not_used(run):
-    estimator = SpeedEstimator(PipelineSettings(), TRAY)
+    estimator = TrayMeasurement(PipelineSettings(), TRAY)
     kept = []
     for image in run[0]:
         fresh = replace(image, gray=image.gray.copy(), color=image.color.copy())
@@ -301,7 +301,7 @@ def crowd():
 
 def from_crowd(images, method, emit_tracks=False):
     settings = with_values(PipelineSettings(), {'trays': (6,), 'speed.method': method}, 'test')
-    estimator = SpeedEstimator(settings, load_trays()[6])
+    estimator = TrayMeasurement(settings, load_trays()[6])
     estimator.emit_tracks = emit_tracks
     return [record for image in images for record in estimator.push(image)]
 
@@ -368,7 +368,7 @@ def test_species_are_told_apart(number, tolerance, method):
     crop = Preprocessor(stages, trays_of(stages), 'test')
     shaken = ShakenTray(settings, tray)
     camera = TrayCamera(settings, tray, shaken.radii, shaken.materials)
-    estimator = SpeedEstimator(stages, tray)
+    estimator = TrayMeasurement(stages, tray)
     first = np.array(shaken.materials) == tray.species[0].material
     found, truth = [], []
     for k, moment in enumerate(shaken.moments(300)):

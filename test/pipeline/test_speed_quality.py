@@ -9,13 +9,13 @@ import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.pipeline.composition import trays_of
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import Frame, Quality, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
 from nanorocks_ros.simulation.tray_camera.tray_renderer import TrayCamera
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.shake_detection import NoiseMeter
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 
 NS = 1e9
 SCALE = 12500.0
@@ -65,7 +65,7 @@ def mixture():
 
 
 def pushed(images, number, method, **values):
-    estimator = SpeedEstimator(settings_of(number, method, **values), load_trays()[number])
+    estimator = TrayMeasurement(settings_of(number, method, **values), load_trays()[number])
     return [
         record
         for image in images
