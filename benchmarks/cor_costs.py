@@ -13,7 +13,7 @@ from nanorocks_ros.inference.decay.haff_fit import fit_haff
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
-from nanorocks_ros.stages.restitution.restitution_methods import Decay, LibraryReading
+from nanorocks_ros.stages.restitution.restitution_methods import Decay, DecayLibraryMethod
 from nanorocks_ros.studies.libraries.decay_simulations import LibraryPlan, cool_node
 from nanorocks_ros.studies.sweeps.sweep_plan import sweep_plan
 from nanorocks_ros.studies.sweeps.sweep_runs import sweep
@@ -67,9 +67,9 @@ def _fits() -> tuple[float, float]:
     )
     (speed,) = cooling_runs(settings, tray, _TIMES, [0]).mean_projected_speed
     decay = Decay(time=_TIMES, speed=speed, error=_ERROR * speed)
-    reading, none = LibraryReading(PipelineSettings(), tray), ContactTerms.of(())
+    method, none = DecayLibraryMethod(PipelineSettings(), tray), ContactTerms.of(())
     return (
-        _cost(lambda: reading.read(decay, none, final=False), _REPEATS),
+        _cost(lambda: method.estimate(decay, none, final=False), _REPEATS),
         _cost(lambda: fit_haff(_TIMES, speed, _ERROR * speed, tray.count), _REPEATS),
     )
 

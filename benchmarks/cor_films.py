@@ -29,10 +29,10 @@ from nanorocks_ros.inference.decay.decay_library import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.posterior import Posterior, posterior_of, tables_of
 from nanorocks_ros.jobs.tasks import Workers
-from nanorocks_ros.records import CorEstimate, CorStatus
+from nanorocks_ros.records import CorEstimate, CorStatus, PairCollision
 from nanorocks_ros.settings import PipelineSettings, PriorSettings, with_values
-from nanorocks_ros.stages.contacts.contact_finder import LATEST_NS
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 from nanorocks_ros.stages.restitution.restitution_methods import Decay
 
 # Films of each: the first truth is what the goals are about.
@@ -138,7 +138,7 @@ def print_tables(films: dict[str, list[Film]]) -> None:
 
 def _said(tray: Tray, cycle: Cycle) -> _Said | None:
     names = {'cooling.update_interval': 60.0, **_ALONE}
-    fitter = HaffFitter(with_values(PipelineSettings(), names, 'benchmark'), tray)
+    fitter = RestitutionEstimator(with_values(PipelineSettings(), names, 'benchmark'), tray)
     made = [estimate for speed in cycle.speeds for estimate in fitter.push(speed)]
     # An estimate that is not yet known is not marked as cooling, so the last one it is.
     *_, final = (None, *made, *fitter.flush())
@@ -155,7 +155,11 @@ def _said(tray: Tray, cycle: Cycle) -> _Said | None:
     speed = np.array([estimate.mean_projected_speed for estimate in used])
     error = np.array([estimate.mean_projected_speed_error for estimate in used])
     true = np.array([_truth(cycle, estimate.stamp_ns / _NS, estimate.window) for estimate in used])
-    ripe = [contact for contact in cycle.contacts if contact.stamp_ns <= last_ns - LATEST_NS]
+    ripe = [
+        contact
+        for contact in cycle.contacts
+        if contact.stamp_ns <= last_ns - KNOWN_AFTER_NS[PairCollision]
+    ]
     return _Said(
         cycle=cycle,
         final=final,
@@ -175,7 +179,7 @@ def _truth(cycle: Cycle, middle: float, window: float) -> float:
 
 
 def _posterior(cycles: list[_Said], how: _From) -> Posterior:
-    """What `LibraryReading` makes of some cycles of a tray."""
+    """What `DecayLibraryMethod` makes of some cycles of a tray."""
     tray = load_trays()[cycles[0].cycle.tray]
     library = library_of(tray)
     prior = _TRAY_KNOWN if how.tray_known else _PRIOR

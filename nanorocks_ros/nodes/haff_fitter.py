@@ -9,7 +9,7 @@ from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.pipeline.warm_up import warm_up_cooling
 from nanorocks_ros.records import Merge, PairCollision, Rebound, SpeedEstimate
 from nanorocks_ros.settings import PipelineSettings
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array
 
@@ -42,7 +42,10 @@ class HaffFitterNode(NanorocksNode):
                 self.listen(topic, take, tray, required=record is SpeedEstimate)
 
     def _build(self, settings):
-        return {number: HaffFitter(settings, tray) for number, tray in trays_of(settings).items()}
+        return {
+            number: RestitutionEstimator(settings, tray)
+            for number, tray in trays_of(settings).items()
+        }
 
     def _adopt(self, settings, stages):
         self._settings, self._stages = settings, stages

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
-from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
+from nanorocks_ros.pipeline.tray_measurement import Measured, TrayMeasurement
 from nanorocks_ros.records import (
     Autocorrelation,
     BodyEstimate,
@@ -24,10 +24,10 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.stages.clusters.cluster_estimator import ClusterEstimator
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.experiment.view import View
@@ -70,7 +70,10 @@ def trays_of(settings: PipelineSettings) -> dict[int, Tray]:
 
 
 class TrayStages:
-    """The stages behind one tray image.
+    """The stages behind the images of one tray.
+
+    An image goes to the measurement of tracks, contacts, bodies and speeds; from these the
+    restitution and, with the image itself, the clusters are estimated.
 
     Parameters
     ----------
@@ -80,8 +83,8 @@ class TrayStages:
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self.measurement = TrayMeasurement(settings, tray)
+        self.restitution = RestitutionEstimator(settings, tray)
         self.clusters = ClusterEstimator(settings, tray)
-        self.cooling = HaffFitter(settings, tray)
 
     def emit(self, wanted: Wanted) -> None:
         """Make these pictures from now on."""
@@ -91,19 +94,22 @@ class TrayStages:
 
     def push(self, image: TrayImage) -> tuple[Result, ...]:
         """Everything that follows from the next image of the tray."""
-        records: list[Result] = []
-        for record in self.measurement.push(image):
-            records.append(record)
-            if isinstance(record, SpeedEstimate | Rebound | PairCollision | Merge):
-                records += self.cooling.push(record)
-            if isinstance(record, SpeedEstimate | BodyEstimate | Merge):
-                self.clusters.push(record)
-        records += self.clusters.push(image)
-        return tuple(records)
+        return (*self._estimates(self.measurement.push(image)), *self.clusters.push(image))
 
     def flush(self) -> tuple[CorEstimate | ClusterEstimate, ...]:
         """What was held back when the images ended."""
-        return (*self.cooling.flush(), *self.clusters.flush())
+        return (*self.restitution.flush(), *self.clusters.flush())
+
+    def _estimates(self, measured: Iterable[Measured]) -> list[Measured | CorEstimate]:
+        """The records measured, each with the estimates that follow from it."""
+        records: list[Measured | CorEstimate] = []
+        for record in measured:
+            records.append(record)
+            if isinstance(record, SpeedEstimate | Rebound | PairCollision | Merge):
+                records += self.restitution.push(record)
+            if isinstance(record, SpeedEstimate | BodyEstimate | Merge):
+                self.clusters.push(record)
+        return records
 
 
 class Pipeline:

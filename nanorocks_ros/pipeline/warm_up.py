@@ -18,7 +18,7 @@ from nanorocks_ros.stages.clusters.correlation_width import ClusterAutocorrelato
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.shake_detection import CycleFollower
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
 _SIDE = 160
 _REGION = (40, 40, 80, 80)
@@ -73,7 +73,7 @@ def warm_up() -> None:
 
 def warm_up_cooling() -> None:
     """Hold a decay against the simulated ones, and a rebound beside it."""
-    fitter = HaffFitter(PipelineSettings(), load_trays()[1])
+    fitter = RestitutionEstimator(PipelineSettings(), load_trays()[1])
     rebound = Rebound(
         stamp_ns=2_000_000_000,
         tray=1,

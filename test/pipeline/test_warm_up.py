@@ -15,8 +15,8 @@ from nanorocks_ros.physics.sticking_rates import _sum_slower
 from nanorocks_ros.pipeline.warm_up import warm_up_clusters, warm_up_cooling
 from nanorocks_ros.records import Rebound, SpeedEstimate
 from nanorocks_ros.settings import PipelineSettings
-from nanorocks_ros.stages.clusters.sticking_estimator import StickingMeter
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.clusters.sticking_estimator import StickingEstimator
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
 NS = 1_000_000_000
 
@@ -56,7 +56,9 @@ def test_the_estimates_of_a_first_cycle_compile_nothing_more():
     before = compiled_for()
     assert all(before)
     tray = load_trays()[1]
-    fitter, meter = (kind(PipelineSettings(), tray) for kind in (HaffFitter, StickingMeter))
+    fitter, meter = (
+        kind(PipelineSettings(), tray) for kind in (RestitutionEstimator, StickingEstimator)
+    )
     for time in (3.0, 4.0, 5.0):
         fitter.push(rebound(time))
     found = []

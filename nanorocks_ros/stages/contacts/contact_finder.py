@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import Tracks
 
 _NS = 1e9
-LATEST_NS = 2_000_000_000
-"""A contact is known that much later at the latest, at 30 pictures a second."""
 
 # Intervals between two pictures: a bead not seen for longer may have done anything; and a contact
 # while it was not seen is not used.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.records import PairCollision, Rebound
-from nanorocks_ros.stages.contacts.contact_finder import LATEST_NS
+from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,7 +43,7 @@ class ContactsOfCycle:
 
     def count(self, first_ns: int, last_ns: int) -> None:
         """Count those between the end of the shaking and the last speed so far."""
-        latest = last_ns - LATEST_NS
+        latest = last_ns - KNOWN_AFTER_NS[Rebound]
         ripe = [one for one in self._waiting if one.stamp_ns <= latest]
         self._keep(lambda stamp_ns: stamp_ns > latest)
         within = [one for one in ripe if one.stamp_ns >= first_ns]

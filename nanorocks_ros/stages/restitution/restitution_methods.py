@@ -1,4 +1,4 @@
-"""What turns the decay of one cycle into a restitution: simulated decays, or the paper's form."""
+"""The two methods that turn a decay into a restitution: simulated decays, or the paper's form."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood
     from nanorocks_ros.settings import PipelineSettings
 
-# With less known than that, nothing is: anything from 0 to 1 has a deviation of 0.29.
-_LEAST_KNOWN = 0.2
+# Largest standard deviation of a restitution that is given: a uniform one from 0 to 1 has 0.29.
+_LARGEST_DEVIATION = 0.2
 _UNKNOWN = {
     'status': CorStatus.UNDETERMINED,
     'restitution_lower': 0.0,
@@ -55,20 +55,20 @@ class Decay:
     of_grains: bool = False
 
 
-class Reading(Protocol):
-    """What a way to read decays does; it remembers the cycles that are finished."""
+class RestitutionMethod(Protocol):
+    """A method that turns decays into restitutions; it keeps the evidence of finished cycles."""
 
     relation: CorRelation
     evidence: Evidence | None
 
-    def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
+    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate; raises FitError where there is no decay."""
 
     def mean_of(self, evidence: Evidence) -> MeanRestitution:
-        """What all cycles of some evidence say together, those of other recordings, too."""
+        """Mean restitution of the cycles of some evidence, also of other recordings."""
 
 
-class PaperReading:
+class PaperMethod:
     """The closed form of [B19] on a fit of Haff's law.
 
     Parameters
@@ -84,8 +84,8 @@ class PaperReading:
         self._tray = tray
         self.evidence: Evidence | None = None
 
-    def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
-        """Fields of a CorEstimate; contacts are nothing that the paper uses.
+    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
+        """Fields of a CorEstimate; the method of the paper does not use contacts.
 
         Raises
         ------
@@ -132,8 +132,8 @@ class PaperReading:
         )
 
 
-class LibraryReading:
-    """Simulated decays of the tray, held against the measured one.
+class DecayLibraryMethod:
+    """Compares the measured decay with simulated decays of the tray.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ class LibraryReading:
     Raises
     ------
     ConfigurationError
-        When there is no library of such a tray, or no walls are as the prior says.
+        When there is no library of such a tray, or the prior of the walls is not valid.
     """
 
     relation = CorRelation.LIBRARY
@@ -153,7 +153,7 @@ class LibraryReading:
         known = settings.prior
         library = library_of(tray, settings.cooling.decay_library)
         self._tables = tables_of(library, tray, known)
-        # What the library itself is off by acts as a wrong scale would.
+        # An error of the library itself acts as an error of the scale.
         scale = math.hypot(known.scale_error, library.misfit)
         self._camera = {
             False: (scale, known.speed_bias),
@@ -167,7 +167,7 @@ class LibraryReading:
         self.evidence: Evidence | None = None
         self._mean_so_far: dict[str, float] = {}
 
-    def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
+    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate.
 
         Raises
@@ -178,8 +178,8 @@ class LibraryReading:
         if (decay.time - decay.time.mean()) @ np.log(decay.speed) >= 0.0:
             raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
         if decay.of_grains and not contacts.rebounds and not contacts.collisions:
-            # How such speeds are off changes while grains slow down: intervals of filmed trays 6
-            # and 8 lay beside the truth, and over many cycles that does not average out.
+            # The bias of such speeds changes while grains slow down: intervals of filmed trays 6
+            # and 8 missed the truth, and over many cycles that does not average out.
             return {**self._speeds(decay, final=final), **_UNKNOWN}
         likelihood = decay_likelihood(
             self._tables, decay.time, decay.speed, decay.error, self._camera[decay.of_grains]
@@ -194,7 +194,7 @@ class LibraryReading:
             **self._speeds(decay, final=final),
             'reduced_chi_square': likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
         }
-        if math.sqrt(posterior.covariance[0, 0]) > _LEAST_KNOWN:
+        if math.sqrt(posterior.covariance[0, 0]) > _LARGEST_DEVIATION:
             return {**fields, **_UNKNOWN, **self._mean(likelihood, contacts, final=final)}
         return {
             **fields,
@@ -214,7 +214,7 @@ class LibraryReading:
     def _mean(
         self, likelihood: DecayLikelihood, contacts: ContactTerms, *, final: bool
     ) -> dict[str, float]:
-        """The mean of what all finished cycles together say; a final one is among them."""
+        """Mean restitution of all finished cycles; a final one is among them."""
         if not final:
             return self._mean_so_far
         own = Evidence(cycles=1, decay=likelihood, contacts=contacts)
@@ -229,12 +229,12 @@ class LibraryReading:
         return self._mean_so_far
 
     def mean_of(self, evidence: Evidence) -> MeanRestitution:
-        """What the cycles say together: what is not known is the same in all of them.
+        """Mean restitution of several cycles, whose systematic errors are the same.
 
         Raises
         ------
         FitError
-            When they were not read by a library, or by one of another grid.
+            When the cycles were not compared with a library, or with one of another grid.
         """
         decay, contacts = evidence.decay, evidence.contacts
         if (
@@ -267,17 +267,17 @@ class LibraryReading:
         )
 
     def _speeds(self, decay: Decay, *, final: bool) -> dict[str, float]:
-        """Speed at the shaking event, and Haff time; with errors once the cycle is over."""
+        """Initial speed and Haff time, with errors once the cycle is over."""
         if final:
             with suppress(FitError):
-                # Next to elastic beads may have no Haff time, but have a restitution.
+                # Nearly elastic beads may have no Haff time, but have a restitution.
                 fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
                 return {
                     **_haff_fields(fit),
                     'paper_restitution': _by_paper(fit.decay_rate, self._tray),
                 }
         # A straight line through 1/v, as Haff's law is one; a proper fit takes too long.
-        slope, offset = (float(one) for one in np.polyfit(decay.time, 1.0 / decay.speed, 1))
+        slope, offset = (float(number) for number in np.polyfit(decay.time, 1.0 / decay.speed, 1))
         falling = slope > 0.0 and offset > 0.0
         return {
             'initial_speed': 1.0 / offset if falling else math.nan,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.records import SpeedEstimate
 
-# Those whose speeds a SpeedEstimate holds, in the order of `Tray.species`.
+# Names of the species in a SpeedEstimate, in the order of `Tray.species`.
 SPECIES = ('first', 'second')
 
 
@@ -44,15 +44,15 @@ def species_decays(
     -------
     dict of str to float
         ``first_species_initial_speed`` and ``first_species_haff_time``, each with its error
-        (``..._error``), and the same of the second species. Left out are species whose
-        speeds are not known or do not fall, and a tray with a single species.
+        (``..._error``), and the same of the second species. Species whose speeds are unknown
+        or do not fall are left out; empty for a tray with a single species.
     """
-    found: dict[str, float] = {}
+    fields: dict[str, float] = {}
     if len(tray.species) < 2:
-        return found
+        return fields
     for name, species in zip(SPECIES, tray.species, strict=False):
-        speed = np.array([getattr(one, f'{name}_species_speed') for one in speeds])
-        error = np.array([getattr(one, f'{name}_species_speed_error') for one in speeds])
+        speed = np.array([getattr(estimate, f'{name}_species_speed') for estimate in speeds])
+        error = np.array([getattr(estimate, f'{name}_species_speed_error') for estimate in speeds])
         known = np.isfinite(speed) & np.isfinite(error) & (speed > 0.0) & (error > 0.0)
         if int(known.sum()) < fewest:
             continue
@@ -60,8 +60,8 @@ def species_decays(
             fit = fit_haff(time[known], speed[known], error[known], species.count)
         except FitError:
             continue
-        found[f'{name}_species_initial_speed'] = fit.initial_speed
-        found[f'{name}_species_initial_speed_error'] = fit.initial_speed_error
-        found[f'{name}_species_haff_time'] = fit.haff_time
-        found[f'{name}_species_haff_time_error'] = fit.haff_time_error
-    return found
+        fields[f'{name}_species_initial_speed'] = fit.initial_speed
+        fields[f'{name}_species_initial_speed_error'] = fit.initial_speed_error
+        fields[f'{name}_species_haff_time'] = fit.haff_time
+        fields[f'{name}_species_haff_time_error'] = fit.haff_time_error
+    return fields

@@ -196,7 +196,7 @@ def analyse(
     for record in pipeline.flush():
         getattr(result.trays[record.tray], _LISTS[type(record)]).append(record)
     for number, stages in pipeline.trays.items():
-        result.trays[number].evidence = stages.cooling.evidence
+        result.trays[number].evidence = stages.restitution.evidence
         result.trays[number].sticking = stages.clusters.cycles
     # Known only after reading: where a damaged bag ends.
     result.notices[:0] = [*bag.reader.notices, *bag.notices]

@@ -140,7 +140,7 @@ def combined(
         mean = None
         if number in evidence:
             try:
-                mean = stages.cooling.mean_of(evidence[number])
+                mean = stages.restitution.mean_of(evidence[number])
             except FitError as error:
                 notices.append(str(error))
         trays[number] = TrayMeans(

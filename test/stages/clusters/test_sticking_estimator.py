@@ -8,11 +8,11 @@ from sticking_records import NS, STICKING, TRAY, cooling, count, merge, ns, spee
 
 from nanorocks_ros.records import BodyEstimate, Merge, SpeedEstimate, StickingStatus
 from nanorocks_ros.settings import PipelineSettings
-from nanorocks_ros.stages.clusters.sticking_estimator import StickingMeter
+from nanorocks_ros.stages.clusters.sticking_estimator import StickingEstimator
 
 
 def meter(records):
-    stage = StickingMeter(PipelineSettings(), TRAY)
+    stage = StickingEstimator(PipelineSettings(), TRAY)
     for record in records:
         stage.push(record)
     return stage
@@ -35,7 +35,7 @@ def test_a_merge_that_became_known_too_late_changes_nothing_said_of_before():
 
 
 def test_the_sticking_speed_is_found_and_cycles_together_tell_more():
-    stage = StickingMeter(PipelineSettings(), TRAY)
+    stage = StickingEstimator(PipelineSettings(), TRAY)
     each = []
     for cycle in range(1, 13):
         start = 60.0 * (cycle - 1)

@@ -23,14 +23,14 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.ensemble import cooling_runs
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
 NS = 1_000_000_000
 TRAY = load_trays()[1]
 
 
 def fitter(**values):
-    return HaffFitter(with_values(PipelineSettings(), values, 'test'), TRAY)
+    return RestitutionEstimator(with_values(PipelineSettings(), values, 'test'), TRAY)
 
 
 def speed(time, value, cycle=1, start=0.0):
@@ -252,7 +252,7 @@ def test_many_cycles_together_say_more():
 def test_another_tray_than_that_of_the_library_is_refused_at_once():
     tray = replace(TRAY, dimensions=(0.02, 0.02, 0.003))
     with pytest.raises(ConfigurationError, match='nanorocks library --tray 1'):
-        HaffFitter(PipelineSettings(), tray)
+        RestitutionEstimator(PipelineSettings(), tray)
 
 
 def test_nothing_is_said_before_the_first_shake():
@@ -436,7 +436,7 @@ def test_speeds_of_grains_by_their_pictures_alone_say_nothing():
         speeds = [
             replace(speed(t, v), tray=8, method=method) for t, v in zip(times, values, strict=True)
         ]
-        stage = HaffFitter(PipelineSettings(), tray)
+        stage = RestitutionEstimator(PipelineSettings(), tray)
         *_, estimates[method] = [*all_estimates(stage, speeds), *stage.flush()]
     grains, beads = estimates.values()
     assert grains.status is CorStatus.UNDETERMINED

@@ -13,7 +13,7 @@ from nanorocks_ros.physics.haff_law import haff_speed
 from nanorocks_ros.records import CorStatus, SpeedEstimate, SpeedMethod
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 from nanorocks_ros.stages.restitution.species_decays import species_decays
 
 NS = 1_000_000_000
@@ -52,7 +52,7 @@ def lawful(noise=0.02):
 
 
 def final_of(speeds, tray=TRAY, **values):
-    stage = HaffFitter(with_values(PipelineSettings(), values, 'test'), tray)
+    stage = RestitutionEstimator(with_values(PipelineSettings(), values, 'test'), tray)
     estimates = [one for speed in speeds for one in stage.push(speed)] + list(stage.flush())
     (final,) = [one for one in estimates if one.status in (CorStatus.FINAL, CorStatus.NO_DECAY)]
     live = [one for one in estimates if one.status is CorStatus.COOLING]

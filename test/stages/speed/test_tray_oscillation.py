@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.records import SpeedEstimate, SpeedMethod, TrayImage
-from nanorocks_ros.stages.speed.tray_oscillation import SwingMeter
+from nanorocks_ros.stages.speed.tray_oscillation import TrayOscillation
 
 NS = 1_000_000_000
 GRAY = np.zeros((8, 8), dtype=np.uint8)
@@ -34,7 +34,7 @@ def estimate(time):
 
 
 def test_the_root_mean_square_of_a_swing_is_found_whatever_its_phase():
-    meter = SwingMeter()
+    meter = TrayOscillation()
     for time in np.arange(0.0, 4.0, 1 / 30):
         meter.push(image(time, (3e-3 * math.cos(9.4 * time), 0.0), 1e-6))
     for time in (1.0, 1.2, 1.45, 2.0):
@@ -43,7 +43,7 @@ def test_the_root_mean_square_of_a_swing_is_found_whatever_its_phase():
 
 def test_noise_is_no_swing():
     random = np.random.default_rng(1)
-    meter = SwingMeter()
+    meter = TrayOscillation()
     for time in np.arange(0.0, 6.0, 1 / 30):
         meter.push(image(time, tuple(1e-4 * random.standard_normal(2))))
     found = [meter.speed(estimate(time)) for time in np.arange(0.5, 5.5, 0.5)]
@@ -51,7 +51,7 @@ def test_noise_is_no_swing():
 
 
 def test_a_tray_that_was_not_followed_has_no_speed():
-    meter = SwingMeter()
+    meter = TrayOscillation()
     assert math.isnan(meter.speed(estimate(1.0)))
     meter.push(image(1.0, (math.nan, math.nan), math.nan))
     assert math.isnan(meter.speed(estimate(1.0)))
