@@ -96,9 +96,16 @@ class TrayStages:
         """Everything that follows from the next image of the tray."""
         return (*self._estimates(self.measurement.push(image)), *self.clusters.push(image))
 
-    def flush(self) -> tuple[CorEstimate | ClusterEstimate, ...]:
-        """What was held back when the images ended."""
-        return (*self.restitution.flush(), *self.clusters.flush())
+    def flush(self) -> tuple[Result, ...]:
+        """Everything that is held back when the images end.
+
+        Contacts first: they are part of the final restitution, as bodies are of the clusters.
+        """
+        return (
+            *self._estimates(self.measurement.flush()),
+            *self.restitution.flush(),
+            *self.clusters.flush(),
+        )
 
     def _estimates(self, measured: Iterable[Measured]) -> list[Measured | CorEstimate]:
         """The records measured, each with the estimates that follow from it."""
@@ -168,6 +175,6 @@ class Pipeline:
                 found += self.trays[record.tray].push(record)
         return tuple(found)
 
-    def flush(self) -> tuple[CorEstimate | ClusterEstimate, ...]:
-        """What was held back when the frames ended: final estimates, and the last of clusters."""
+    def flush(self) -> tuple[Result, ...]:
+        """Everything that is held back when the frames end."""
         return tuple(estimate for tray in self.trays.values() for estimate in tray.flush())

@@ -10,7 +10,7 @@ import numpy as np
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.pipeline.composition import Pipeline, trays_of
 from nanorocks_ros.pipeline.tray_processes import TrayProcess
-from nanorocks_ros.records import CorEstimate, TrayImage
+from nanorocks_ros.records import TrayImage
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.view import View
     from nanorocks_ros.pipeline.composition import Result, Wanted
     from nanorocks_ros.pipeline.tray_processes import Found
-    from nanorocks_ros.records import ClusterEstimate, Notice
+    from nanorocks_ros.records import Notice
     from nanorocks_ros.settings import PipelineSettings
 
 # More share the work of eight trays unevenly: the slowest tray takes a quarter of it.
@@ -103,12 +103,12 @@ class SharedPipeline(Pipeline):
                 results += found[record.tray]
         return tuple(results)
 
-    def flush(self) -> tuple[CorEstimate | ClusterEstimate, ...]:
+    def flush(self) -> tuple[Result, ...]:
         """See `Pipeline.flush`."""
         if not self._begun:
             return super().flush()
         found = self._ask((), None, flush=True)
-        return tuple(record for number in self.trays for record in found[number])  # type: ignore[misc]
+        return tuple(record for number in self.trays for record in found[number])
 
     def _ask(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import (
@@ -102,8 +103,12 @@ class TrayMeasurement(RestartingStage[TrayImage, Measured]):
         return (*pictures, *self._selected(speeds), *self._reliable(events))
 
     def flush(self) -> tuple[Measured, ...]:
-        """Speeds, contacts and bodies of the last seconds, once there are no more images."""
-        return ()
+        """Contacts and bodies of the last seconds, and speeds that were still held back."""
+        self._track_speed.flush()
+        speeds = self._structure_speed.flush() if self._selector.uses_structure else ()
+        contacts = sorted(self._contacts.flush(), key=attrgetter('stamp_ns'))
+        events = [*self._in_cycle(contacts), *self._bodies.flush()]
+        return (*self._selected(speeds), *self._reliable(events))
 
     def _structure_speeds(self, image: TrayImage) -> tuple[SpeedEstimate, ...]:
         if self._selector.uses_structure:
@@ -129,7 +134,7 @@ class TrayMeasurement(RestartingStage[TrayImage, Measured]):
             for contact in contacts
         ]
 
-    def _selected(self, speeds: list[SpeedEstimate]) -> list[SpeedEstimate]:
+    def _selected(self, speeds: Iterable[SpeedEstimate]) -> list[SpeedEstimate]:
         return [
             replace(speed, tray_speed=self._oscillation.speed(speed))
             for speed in self._selector.push(speeds)

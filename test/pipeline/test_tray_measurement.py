@@ -1,4 +1,4 @@
-"""Speeds from simulated frames against the truth, and the events in between."""
+"""Tracks, speeds and contacts of one tray, from simulated frames against the truth."""
 
 from __future__ import annotations
 
@@ -117,6 +117,34 @@ def test_estimates_come_in_order_of_time(run, method):
 
 def test_nothing_is_said_until_the_beads_are_known(run):
     assert pushed(run[0][:45]) == []
+
+
+def at_the_end(images, method):
+    """Speeds while the images come, and those held back until the recording ends."""
+    settings = with_values(PipelineSettings(), {'speed.method': method}, 'test')
+    measurement = TrayMeasurement(settings, TRAY)
+    before = list(measured(measurement, images))
+    return before, [one for one in measurement.flush() if isinstance(one, SpeedEstimate)]
+
+
+def test_a_recording_too_short_to_know_the_beads_ends_with_flagged_speeds(run):
+    images, truth = run
+    before, held = at_the_end(images[:90], 'structure_function')
+    assert before == []
+    assert all(one.quality & Quality.UNCERTAIN for one in held)
+    speed, _, true = ratios(held, truth).T
+    assert speed.size > 20
+    assert (speed / true).mean() == pytest.approx(1.0, abs=0.1)
+    # Without motion nothing at all is known of the beads.
+    assert at_the_end(images[:15], 'structure_function') == ([], [])
+
+
+def test_a_recording_too_short_to_judge_the_tracks_ends_with_the_speeds_held_back(run):
+    images, truth = run
+    before, held = at_the_end(images[:25], 'auto')
+    assert before == []
+    speed, _, true = ratios(held, truth).T
+    assert (speed / true).mean() == pytest.approx(1.0, abs=0.1)
 
 
 def test_the_number_of_beads_visible_does_not_matter(run):

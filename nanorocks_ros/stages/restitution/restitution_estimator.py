@@ -22,6 +22,7 @@ from nanorocks_ros.records import (
     SpeedMethod,
 )
 from nanorocks_ros.stages.contacts.cycle_contacts import ContactsOfCycle
+from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 from nanorocks_ros.stages.preprocess.shake_detection import NS
 from nanorocks_ros.stages.restitution.restitution_methods import (
     Decay,
@@ -147,10 +148,18 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
                 estimates = (*estimates, *self._estimate(CorStatus.COOLING))
         return estimates
 
-    def _count_contacts(self, speed: SpeedEstimate) -> None:
-        """Count the contacts since the shaking was over, up to shortly before a speed."""
+    def _count_contacts(self, speed: SpeedEstimate, later_ns: int = 0) -> None:
+        """Count the contacts since the shaking was over that are all known after a speed.
+
+        Parameters
+        ----------
+        speed : SpeedEstimate
+        later_ns : int, [ns]
+            Time from the speed up to which contacts have come in.
+        """
         shake_ns = speed.cycle_start_ns or 0
-        self._contacts.count(shake_ns + round(self._settings.delay * NS), speed.stamp_ns)
+        first_ns = shake_ns + round(self._settings.delay * NS)
+        self._contacts.count(first_ns, speed.stamp_ns + later_ns)
 
     def _driven(self, speed: SpeedEstimate) -> bool:
         """Whether the tray still oscillates too fast for the gas in it to cool freely."""
@@ -165,7 +174,9 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
         return shake_ns + (late_ns if late_ns > _LATE_NS else 0)
 
     def flush(self) -> tuple[CorEstimate, ...]:
-        """The final estimate of the last cycle."""
+        """End the recording: the final estimate, with all contacts up to the last speed."""
+        if self._samples and not self._finished:
+            self._count_contacts(self._samples[-1], later_ns=KNOWN_AFTER_NS[Rebound])
         return self._end_cycle()
 
     def _interrupted(self) -> tuple[CorEstimate, ...]:

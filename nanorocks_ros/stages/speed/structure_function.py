@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 # that is made up for; and how many such pairs are needed before speeds are released.
 _UNRELATED_PATH = 4.0
 _PAIRS_NEEDED = 6
+# Fewer leave the spread of the response unknown; used for speeds that are flagged.
+_PAIRS_MEASURABLE = 2
 # A bead deflected between two images has come further than it is away. Share of the path lost
 # per path of one diameter, and variance of that loss for one bead per unit of it: measured on
 # simulated gases in tray 1; the rates of deflection per diameter in trays 3 and 5 are alike.
@@ -162,6 +164,11 @@ class StructureFunction:
     def ready(self) -> bool:
         """Whether enough unrelated image pairs have been seen."""
         return self._response.pairs >= _PAIRS_NEEDED
+
+    @property
+    def measurable(self) -> bool:
+        """Whether displacements can be measured at all, if not reliably."""
+        return self._response.pairs >= _PAIRS_MEASURABLE
 
     def _sample(
         self, cycle: tuple[int, int | None], noise_power: float, centred: bool = False

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from nanorocks_ros.records import Quality, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.stages.preprocess.shake_detection import NS, NoiseMeter
 from nanorocks_ros.stages.speed.species_images import SpeciesImages
-from nanorocks_ros.stages.speed.species_speeds import MeanMotion, MeanMotions
+from nanorocks_ros.stages.speed.species_speeds import PictureSpeed, SpeciesSpeeds
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,7 +58,7 @@ class StructureSpeed:
         self._told_apart = False
         self._waited = 0
         self._noise: list[NoiseMeter] = []
-        self._motions: MeanMotions | None = None
+        self._speeds: SpeciesSpeeds | None = None
 
     def push(self, image: TrayImage) -> tuple[SpeedEstimate, ...]:
         """Take the next image, whose cycle is known.
@@ -69,11 +69,11 @@ class StructureSpeed:
         shaken = self._cycle not in (None, image.cycle)
         self._cycle = image.cycle
         # The images before a time without images are of no use.
-        if self._motions is not None and (shaken or self._idle):
-            self._motions.shaken()
+        if self._speeds is not None and (shaken or self._idle):
+            self._speeds.shaken()
         self._idle = False
         shown = self._shown(image)
-        if not shown or self._motions is None:
+        if not shown or self._speeds is None:
             return ()
         across, down = (
             0.0 if math.isnan(component) else self._scale * component
@@ -82,13 +82,13 @@ class StructureSpeed:
         cycle = (image.cycle or 0, image.cycle_start_ns)
         noise = [meter.push(gray) for meter, gray in zip(self._noise, shown, strict=True)]
         return self._estimates(
-            self._motions.push(image.stamp_ns, shown, cycle, noise, (across, down))
+            self._speeds.push(image.stamp_ns, shown, cycle, noise, (across, down))
         )
 
     def pause(self) -> None:
         """Release the images while another method measures."""
-        if not self._idle and self._motions is not None:
-            self._motions.shaken()
+        if not self._idle and self._speeds is not None:
+            self._speeds.shaken()
         self._idle = True
 
     def watch_noise(self, image: TrayImage) -> None:
@@ -103,12 +103,12 @@ class StructureSpeed:
                 meter.push(gray)
 
     def flush(self) -> tuple[SpeedEstimate, ...]:
-        """Nothing yet."""
-        return ()
+        """Speeds held back in a recording too short to know the beads, flagged as uncertain."""
+        return self._estimates(self._speeds.flush()) if self._speeds is not None else ()
 
     def _shown(self, image: TrayImage) -> tuple[NDArray[np.uint8], ...]:
         """An image of each species, or one of all; none while that is not decided."""
-        if self._motions is None and not self._learn_beads(image):
+        if self._speeds is None and not self._learn_beads(image):
             return ()
         if not self._told_apart:
             return (image.gray,)
@@ -140,30 +140,32 @@ class StructureSpeed:
         self._told_apart = told_apart
         self._waited = 0
         self._noise = [NoiseMeter() for _ in diameters]
-        self._motions = MeanMotions(self._settings, diameters, counts, factors)
+        self._speeds = SpeciesSpeeds(self._settings, diameters, counts, factors)
         return True
 
-    def _estimates(self, motions: tuple[MeanMotion, ...]) -> tuple[SpeedEstimate, ...]:
-        estimates = tuple(self._estimate(motion) for motion in motions)
+    def _estimates(self, speeds: tuple[PictureSpeed, ...]) -> tuple[SpeedEstimate, ...]:
+        estimates = tuple(self._estimate(speed) for speed in speeds)
         if estimates:
             self._flags = Quality(0)
         return estimates
 
-    def _estimate(self, motion: MeanMotion) -> SpeedEstimate:
+    def _estimate(self, speed: PictureSpeed) -> SpeedEstimate:
         scale = self._scale
-        known = motion.species if self._told_apart else ()
-        out_of_range = Quality(0) if motion.in_range else Quality.UNCERTAIN
+        species = speed.species if self._told_apart else ()
+        out_of_range = Quality(0) if speed.in_range else Quality.UNCERTAIN
         return SpeedEstimate(
-            stamp_ns=motion.stamp_ns,
+            stamp_ns=speed.stamp_ns,
             tray=self._tray.number,
-            cycle=motion.cycle,
-            cycle_start_ns=motion.cycle_start_ns,
-            mean_projected_speed=motion.speed / scale,
-            mean_projected_speed_error=motion.error / scale,
-            window=motion.window_ns / NS,
+            cycle=speed.cycle,
+            cycle_start_ns=speed.cycle_start_ns,
+            mean_projected_speed=speed.speed / scale,
+            mean_projected_speed_error=speed.error / scale,
+            window=speed.window_ns / NS,
             method=SpeedMethod.STRUCTURE_FUNCTION,
             quality=self._flags | out_of_range,
-            **SpeedEstimate.by_species([(speed / scale, error / scale) for speed, error in known]),
+            **SpeedEstimate.by_species(
+                [(value / scale, error / scale) for value, error in species]
+            ),
         )
 
 

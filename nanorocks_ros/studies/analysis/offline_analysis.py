@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.inference.cycle_likelihoods import Evidence
     from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
     from nanorocks_ros.jobs.progress import Progress
+    from nanorocks_ros.pipeline.composition import Result
     from nanorocks_ros.settings import PipelineSettings
 
 NS = 1_000_000_000
@@ -193,8 +194,7 @@ def analyse(
     if result.refused:
         result.notices.append(f'{bag.where}: {result.refused} frames could not be used')
         result.complete = False
-    for record in pipeline.flush():
-        getattr(result.trays[record.tray], _LISTS[type(record)]).append(record)
+    _keep(result, pipeline.flush())
     for number, stages in pipeline.trays.items():
         result.trays[number].evidence = stages.restitution.evidence
         result.trays[number].sticking = stages.clusters.cycles
@@ -236,6 +236,10 @@ def _push(result: Analysis, pipeline: Pipeline, frame: Frame) -> None:
     records = pipeline.push(frame)
     if any(isinstance(record, TrayImage) for record in records):
         result.stamps_ns.append(frame.stamp_ns)
+    _keep(result, records)
+
+
+def _keep(result: Analysis, records: Iterable[Result]) -> None:
     for record in records:
         if isinstance(record, Notice):
             result.notices.append(record.text)

@@ -339,6 +339,24 @@ def test_it_does_not_matter_when_in_two_seconds_a_contact_comes_in():
     assert final.rebounds == sum(first <= one.stamp_ns <= last for one in seen) < 40
 
 
+def test_at_the_end_of_a_recording_contacts_count_up_to_the_last_speed():
+    speeds = [estimate for estimate in simulated_cycle() if estimate.stamp_ns < 15 * NS]
+    seen = list(rebounds(np.random.default_rng(1), 40, 2.0, 16.0))
+    last_ns = speeds[-1].stamp_ns
+    expected = sum(contact.stamp_ns <= last_ns for contact in seen)
+    ripe = sum(contact.stamp_ns <= last_ns - 2 * NS for contact in seen)
+    assert ripe < expected < 40
+    ended, interrupted = fitter(), fitter()
+    for record in by_stamp([*speeds, *seen]):
+        ended.push(record)
+        interrupted.push(record)
+    (final,) = ended.flush()
+    assert final.rebounds == expected
+    # After a loop or a seek it is not known which contacts are still on their way.
+    (final,) = interrupted.push(speeds[0])
+    assert final.rebounds == ripe
+
+
 def test_contacts_in_a_tray_that_swings_count_though_speeds_do_not():
     swinging = [
         replace(one, tray_speed=1.0 if one.stamp_ns < 8.0 * NS else 0.0)
