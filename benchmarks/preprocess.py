@@ -31,7 +31,7 @@ from nanorocks_ros.stages.preprocess.plate_search import guess_plate
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.rectify import mix_weights, nodes_of, resample_color
 from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter
-from nanorocks_ros.stages.preprocess.stabilise import TrayFollower
+from nanorocks_ros.stages.preprocess.stabilise import TrayRegistration
 from nanorocks_ros.studies.calibration.plate_fit import fit_plate
 
 _FRAMES = 75
@@ -95,7 +95,7 @@ def _stages(camera, frames):
     regions = regions_on_plate(load_trays().values(), (1080, 1920), _SCENE.pixels_per_metre)
     mix = np.array(settings.gray_mix)
     wall = settings.wall_width * settings.pixels_per_metre
-    followers = [TrayFollower(region, view, wall, mix) for region in regions.values()]
+    followers = [TrayRegistration(region, view, wall, mix) for region in regions.values()]
     nodes = [nodes_of(region, view) for region in regions.values()]
     crops = [
         (np.empty((region.height, region.width, 3), np.uint8), np.empty(region[:1:-1], np.uint8))

@@ -50,7 +50,7 @@ Result = (
 
 
 class Wanted(NamedTuple):
-    """Which pictures of a tray somebody looks at; they are not made otherwise."""
+    """The pictures of a tray that have a viewer; others are not made."""
 
     mask: bool = False
     tracks: bool = False
@@ -87,7 +87,7 @@ class TrayStages:
         self.clusters = ClusterEstimator(settings, tray)
 
     def emit(self, wanted: Wanted) -> None:
-        """Make these pictures from now on."""
+        """Choose the pictures to make from now on."""
         self.measurement.emit_mask = wanted.mask
         self.measurement.emit_tracks = wanted.tracks
         self.clusters.emit_image = wanted.autocorrelation
@@ -126,9 +126,9 @@ class Pipeline:
     ----------
     settings : PipelineSettings
     camera : str
-        What to call the source of the frames in an error.
+        Name of the source of the frames in errors.
     view : View, optional
-        What camera_info says of the lens.
+        The lens, from camera_info.
 
     Raises
     ------
@@ -143,7 +143,7 @@ class Pipeline:
         self.trays = {number: TrayStages(settings, tray) for number, tray in trays.items()}
 
     def prepare(self) -> None:
-        """Do now what the first frame would have to wait for."""
+        """Prepare for the first frame, so that it need not wait."""
 
     def push(self, frame: Frame) -> tuple[Result, ...]:
         """Everything that follows from the next frame, tray images first.
@@ -158,7 +158,7 @@ class Pipeline:
     def follow(
         self, records: Sequence[TrayImage | Notice], wanted: Mapping[int, Wanted] | None = None
     ) -> tuple[Result, ...]:
-        """The same, of what the preprocessor made of a frame: the rest may be done elsewhere.
+        """Everything that follows from the records of the preprocessor, these included.
 
         Parameters
         ----------
@@ -166,14 +166,14 @@ class Pipeline:
         wanted : mapping of int to Wanted, optional
             By number of the tray; None: as before.
         """
-        for number, one in (wanted or {}).items():
-            self.trays[number].emit(one)
-        found: list[Result] = []
+        for number, pictures in (wanted or {}).items():
+            self.trays[number].emit(pictures)
+        results: list[Result] = []
         for record in records:
-            found.append(record)
+            results.append(record)
             if isinstance(record, TrayImage):
-                found += self.trays[record.tray].push(record)
-        return tuple(found)
+                results += self.trays[record.tray].push(record)
+        return tuple(results)
 
     def flush(self) -> tuple[Result, ...]:
         """Everything that is held back when the frames end."""

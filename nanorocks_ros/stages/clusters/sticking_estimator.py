@@ -123,7 +123,7 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
     def onset(self, cycle: int, stamp_ns: int) -> float | None:
         """Time of the first merge since the shaking event, [s], as of an instant; None before."""
         own = self._cycles.get(cycle)
-        known = [merge.stamp_ns for merge in self._known(own, stamp_ns)] if own else []
+        known = [merge.stamp_ns for merge in self._known_merges(own, stamp_ns)] if own else []
         if not known or own is None or own.start_ns is None:
             return None
         return (min(known) - own.start_ns) / NS
@@ -131,7 +131,7 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
     def of_cycle(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
         """Sticking speed of the cycle up to an instant; None when it tells nothing."""
         cycle_so_far = self._cycle_until(cycle, stamp_ns)
-        return self._estimate([self._terms_of(cycle_so_far)]) if cycle_so_far else None
+        return self._estimate_by([self._terms_of(cycle_so_far)]) if cycle_so_far else None
 
     def cycles(self) -> tuple[StickingCycle, ...]:
         """All cycles since time last went back, with the one under way."""
@@ -151,7 +151,7 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
             return None
         # Other rates, so that those of the cycle under way need not be worked out again.
         rates = self._make_rates()
-        return self._estimate([self._terms_of(cycle, rates) for cycle in cycles])
+        return self._estimate_by([self._terms_of(cycle, rates) for cycle in cycles])
 
     def of_all(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
         """Sticking speed of all cycles that were over by then."""
@@ -161,10 +161,10 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
             if cycle_so_far is not None:
                 self._finished[before] = cycle_so_far
                 self._terms.append(self._terms_of(cycle_so_far))
-                self._all = self._estimate(self._terms)
+                self._all = self._estimate_by(self._terms)
         return self._all
 
-    def _known(self, cycle: _Cycle, stamp_ns: int) -> list[Merge]:
+    def _known_merges(self, cycle: _Cycle, stamp_ns: int) -> list[Merge]:
         last_ns = stamp_ns + _ROUNDING_NS
         return [
             merge
@@ -182,7 +182,7 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
             return None
         return sticking_cycle(
             self._tray.count,
-            self._known(own, stamp_ns),
+            self._known_merges(own, stamp_ns),
             np.array(own.stamps_ns[:used], dtype=np.int64),
             np.array(own.speeds[:used]),
             own.start_ns,
@@ -197,7 +197,7 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
             return rates.terms(cycle) if rates else None
         return None
 
-    def _estimate(self, terms: Sequence[MergeTerms | None]) -> StickingEstimate | None:
+    def _estimate_by(self, terms: Sequence[MergeTerms | None]) -> StickingEstimate | None:
         """Estimate from the terms of several cycles; None where one of them is missing."""
         known = [term for term in terms if term is not None]
         if len(known) < len(terms):

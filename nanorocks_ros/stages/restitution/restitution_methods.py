@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 # Largest standard deviation of a restitution that is given: a uniform one from 0 to 1 has 0.29.
 _LARGEST_DEVIATION = 0.2
-_UNKNOWN = {
+_UNKNOWN_FIELDS = {
     'status': CorStatus.UNDETERMINED,
     'restitution_lower': 0.0,
     'restitution_upper': 1.0,
@@ -97,7 +97,7 @@ class PaperMethod:
         quantile = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + 0.5 * self._probability))
         spread = math.exp(quantile * fit.log_decay_rate_error)
         value, lower, upper = (
-            _by_paper(rate, self._tray)
+            _paper_restitution(rate, self._tray)
             for rate in (fit.decay_rate, fit.decay_rate * spread, fit.decay_rate / spread)
         )
         if final:
@@ -150,17 +150,17 @@ class DecayLibraryMethod:
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._tray = tray
-        known = settings.prior
+        prior = settings.prior
         library = library_of(tray, settings.cooling.decay_library)
-        self._tables = tables_of(library, tray, known)
+        self._tables = tables_of(library, tray, prior)
         # An error of the library itself acts as an error of the scale.
-        scale = math.hypot(known.scale_error, library.misfit)
+        scale = math.hypot(prior.scale_error, library.misfit)
         self._camera = {
-            False: (scale, known.speed_bias),
-            True: (math.hypot(scale, known.grain_scale_error), known.grain_speed_bias),
+            False: (scale, prior.speed_bias),
+            True: (math.hypot(scale, prior.grain_scale_error), prior.grain_speed_bias),
         }
-        self._biases = (known.collision_bias, known.rebound_bias)
-        self._walls = (known.wall_low, known.wall_high)
+        self._biases = (prior.collision_bias, prior.rebound_bias)
+        self._walls = (prior.wall_low, prior.wall_high)
         check_walls(self._walls)
         half = 0.5 * settings.cooling.probability
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
@@ -180,7 +180,7 @@ class DecayLibraryMethod:
         if decay.of_grains and not contacts.rebounds and not contacts.collisions:
             # The bias of such speeds changes while grains slow down: intervals of filmed trays 6
             # and 8 missed the truth, and over many cycles that does not average out.
-            return {**self._speeds(decay, final=final), **_UNKNOWN}
+            return {**self._speeds(decay, final=final), **_UNKNOWN_FIELDS}
         likelihood = decay_likelihood(
             self._tables, decay.time, decay.speed, decay.error, self._camera[decay.of_grains]
         )
@@ -195,10 +195,10 @@ class DecayLibraryMethod:
             'reduced_chi_square': likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
         }
         if math.sqrt(posterior.covariance[0, 0]) > _LARGEST_DEVIATION:
-            return {**fields, **_UNKNOWN, **self._mean(likelihood, contacts, final=final)}
+            return {**fields, **_UNKNOWN_FIELDS, **self._mean(likelihood, contacts, final=final)}
         return {
             **fields,
-            **_known(posterior, self._ends),
+            **_restitution_fields(posterior, self._ends),
             **self._mean(likelihood, contacts, final=final),
         }
 
@@ -249,7 +249,7 @@ class DecayLibraryMethod:
             )
         posterior = self._posterior(decay.integrated(), contacts)
         error, wall_error = np.sqrt(np.diag(posterior.covariance)).tolist()
-        known = _known(posterior, self._ends)
+        fields = _restitution_fields(posterior, self._ends)
         return MeanRestitution(
             cycles=evidence.cycles,
             restitution=posterior.mean[0],
@@ -260,7 +260,7 @@ class DecayLibraryMethod:
             rebounds=contacts.rebounds,
             collisions=contacts.collisions,
             **{
-                f'{name}_{end}': known[f'{name}_{end}']
+                f'{name}_{end}': fields[f'{name}_{end}']
                 for name in ('restitution', 'wall_restitution')
                 for end in ('lower', 'upper')
             },
@@ -274,7 +274,7 @@ class DecayLibraryMethod:
                 fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
                 return {
                     **_haff_fields(fit),
-                    'paper_restitution': _by_paper(fit.decay_rate, self._tray),
+                    'paper_restitution': _paper_restitution(fit.decay_rate, self._tray),
                 }
         # A straight line through 1/v, as Haff's law is one; a proper fit takes too long.
         slope, offset = (float(number) for number in np.polyfit(decay.time, 1.0 / decay.speed, 1))
@@ -282,11 +282,11 @@ class DecayLibraryMethod:
         return {
             'initial_speed': 1.0 / offset if falling else math.nan,
             'haff_time': offset / slope if falling else math.nan,
-            'paper_restitution': _by_paper(max(slope, 0.0), self._tray),
+            'paper_restitution': _paper_restitution(max(slope, 0.0), self._tray),
         }
 
 
-def _known(posterior: Posterior, ends: NDArray[np.float64]) -> dict[str, float]:
+def _restitution_fields(posterior: Posterior, ends: NDArray[np.float64]) -> dict[str, float]:
     lower, value, upper = (float(quantile) for quantile in posterior.quantiles(ends))
     wall_lower, wall, wall_upper = (float(quantile) for quantile in posterior.wall_quantiles(ends))
     spread = posterior.covariance
@@ -311,5 +311,5 @@ def _haff_fields(fit: HaffFit) -> dict[str, float]:
     }
 
 
-def _by_paper(rate: float, tray: Tray) -> float:
+def _paper_restitution(rate: float, tray: Tray) -> float:
     return paper_restitution_of_decay(rate, tray.diameter, tray.number_density)

@@ -1,4 +1,4 @@
-"""How much an image changes when its beads move: learnt from the images themselves.
+"""Calibration of the structure function: image difference against displacement of the beads.
 
 The squared difference of two images in which every bead has moved by d is, for independent
 beads, the autocovariance of their appearance: D(d) = 2 [C(0) - C(d)]. The difference of two
@@ -83,7 +83,7 @@ def displacement_response(
     return displacements, changed @ radial
 
 
-class BeadResponse:
+class StructureCalibration:
     """Mean squared difference of two tray images against the mean displacement between them.
 
     Parameters

@@ -17,10 +17,11 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Species, Tray
     from nanorocks_ros.settings import PipelineSettings
 
-# Relative error of the mean speed of a mixture seen as one: fast light beads count too little.
+# Relative error of the mean speed of a mixture measured as one species: fast light beads count too
+# little.
 _UNKNOWN_MIXTURE = 0.25
-# Pictures that do not show every species, after which all beads are seen as one; and pictures
-# without colour in a row, after which one need not wait for it.
+# Pictures that do not show every species, after which all beads are measured together; and
+# pictures without colour in a row, after which colour is given up.
 _PATIENCE = 30
 # While another method measures, the noise is measured between two of so many pictures.
 _WATCHED = 10
@@ -29,8 +30,8 @@ _WATCHED = 10
 class StructureSpeed:
     """Measures the speed by the structure function, once the appearance of the beads is known.
 
-    A mixture is told apart by colour where there is one: the light beads of a mixture are the
-    fast ones, and a bead counts by its area and contrast when all are seen as one.
+    The species of a mixture are separated by colour where possible: the light beads are the fast
+    ones, and together each bead counts by its area and contrast.
 
     Parameters
     ----------
@@ -55,7 +56,7 @@ class StructureSpeed:
 
     def _forget_beads(self) -> None:
         self._images = SpeciesImages(self._tray, self._scale)
-        self._told_apart = False
+        self._separated = False
         self._waited = 0
         self._noise: list[NoiseMeter] = []
         self._speeds: SpeciesSpeeds | None = None
@@ -98,7 +99,7 @@ class StructureSpeed:
             return
         for meter, gray in zip(self._noise, self._shown(image), strict=False):
             if self._watched == 0:
-                meter.begin(gray)
+                meter.start_from(gray)
             else:
                 meter.push(gray)
 
@@ -107,14 +108,14 @@ class StructureSpeed:
         return self._estimates(self._speeds.flush()) if self._speeds is not None else ()
 
     def _shown(self, image: TrayImage) -> tuple[NDArray[np.uint8], ...]:
-        """An image of each species, or one of all; none while that is not decided."""
+        """An image of each species, or one of all beads; none while that is not decided."""
         if self._speeds is None and not self._learn_beads(image):
             return ()
-        if not self._told_apart:
+        if not self._separated:
             return (image.gray,)
         if image.color is not None:
             self._waited = 0
-            return self._images.of(image.color)
+            return self._images.images(image.color)
         self._flags |= Quality.GRAY_CAMERA
         self._waited += 1
         if self._waited > _PATIENCE:
@@ -122,22 +123,22 @@ class StructureSpeed:
         return ()
 
     def _learn_beads(self, image: TrayImage) -> bool:
-        """Decide whether species are told apart; False until the picture shows it."""
+        """Decide whether the species are separated; False until the picture shows it."""
         tray = self._tray
-        told_apart = image.color is not None and self._images.possible
-        if told_apart and image.color is not None and not self._images.learn(image.color):
+        separated = image.color is not None and self._images.possible
+        if separated and image.color is not None and not self._images.learn(image.color):
             self._waited += 1
             if self._waited <= _PATIENCE:
                 return False
-            told_apart = False
-        if told_apart or len(tray.species) == 1:
+            separated = False
+        if separated or len(tray.species) == 1:
             diameters = [species.diameter * self._scale for species in tray.species]
             counts = [species.count for species in tray.species]
             factors = [size_factor(species) for species in tray.species]
         else:
             diameters, counts = [tray.diameter * self._scale], [tray.count]
             factors = [(1.0, _UNKNOWN_MIXTURE)]
-        self._told_apart = told_apart
+        self._separated = separated
         self._waited = 0
         self._noise = [NoiseMeter() for _ in diameters]
         self._speeds = SpeciesSpeeds(self._settings, diameters, counts, factors)
@@ -151,7 +152,7 @@ class StructureSpeed:
 
     def _estimate(self, speed: PictureSpeed) -> SpeedEstimate:
         scale = self._scale
-        species = speed.species if self._told_apart else ()
+        species = speed.species if self._separated else ()
         out_of_range = Quality(0) if speed.in_range else Quality.UNCERTAIN
         return SpeedEstimate(
             stamp_ns=speed.stamp_ns,
@@ -170,12 +171,12 @@ class StructureSpeed:
 
 
 def size_factor(species: Species) -> tuple[float, float]:
-    """What a spread of sizes asks of the speed of a species: a factor, and its error.
+    """Factor for the speed of a species with a range of sizes, and its error.
 
     The squared difference of two images grows with the outline of a bead times its path, so it
-    tells <R v> / <R>. That is the mean speed when all are as fast; when all have the same energy,
-    v goes as R^-3/2 and the mean speed is more. Half way between, with half the difference as
-    the error.
+    gives <R v> / <R>. That is the mean speed when all beads are equally fast; when all have the
+    same energy, v goes as R^-3/2 and the mean speed is larger. The factor is half way between, its
+    error half the difference.
 
     Parameters
     ----------
