@@ -61,12 +61,12 @@ def test_the_estimates_of_a_first_cycle_compile_nothing_more():
     )
     for time in (3.0, 4.0, 5.0):
         fitter.push(rebound(time))
-    found = []
+    results = []
     for record in cooling(until=24.0):
         meter.push(record)
         if isinstance(record, SpeedEstimate):
-            found += fitter.push(record)
-    assert found[-1].rebounds == 3
-    assert found[-1].restitution == pytest.approx(0.9, abs=0.2)
+            results += fitter.push(record)
+    assert results[-1].rebounds == 3
+    assert results[-1].restitution == pytest.approx(0.9, abs=0.2)
     assert meter.of_cycle(1, 20 * NS) is not None
     assert compiled_for() == before

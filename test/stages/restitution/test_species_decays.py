@@ -48,14 +48,16 @@ def lawful(noise=0.02):
     speeds = [
         haff_speed(TIMES, *law) * (1.0 + noise * rng.normal(size=TIMES.size)) for law in LAWS
     ]
-    return [estimate(*one, noise) for one in zip(TIMES, *speeds, strict=True)]
+    return [estimate(*speed, noise) for speed in zip(TIMES, *speeds, strict=True)]
 
 
 def final_of(speeds, tray=TRAY, **values):
     stage = RestitutionEstimator(with_values(PipelineSettings(), values, 'test'), tray)
-    estimates = [one for speed in speeds for one in stage.push(speed)] + list(stage.flush())
-    (final,) = [one for one in estimates if one.status in (CorStatus.FINAL, CorStatus.NO_DECAY)]
-    live = [one for one in estimates if one.status is CorStatus.COOLING]
+    estimates = [record for speed in speeds for record in stage.push(speed)] + list(stage.flush())
+    (final,) = [
+        record for record in estimates if record.status in (CorStatus.FINAL, CorStatus.NO_DECAY)
+    ]
+    live = [record for record in estimates if record.status is CorStatus.COOLING]
     return final, live
 
 
@@ -63,16 +65,16 @@ def test_each_species_gets_its_own_law_in_the_final_estimate():
     final, _ = final_of(lawful())
     for name, (speed, time) in zip(('first', 'second'), LAWS, strict=True):
         for value, truth in (('initial_speed', speed), ('haff_time', time)):
-            found = getattr(final, f'{name}_species_{value}')
+            measured = getattr(final, f'{name}_species_{value}')
             error = getattr(final, f'{name}_species_{value}_error')
             assert 0.0 < error < 0.2 * truth
-            assert abs(found - truth) < 3.0 * error
+            assert abs(measured - truth) < 3.0 * error
 
 
 def test_live_estimates_do_not_take_the_time_for_it():
     _, live = final_of(lawful())
     assert live
-    assert all(math.isnan(getattr(one, name)) for one in live for name in NAMES)
+    assert all(math.isnan(getattr(record, name)) for record in live for name in NAMES)
 
 
 def test_a_species_that_is_not_known_leaves_the_other_alone():
@@ -97,9 +99,11 @@ def test_a_few_speeds_of_a_species_are_no_decay():
 
 def test_a_species_that_speeds_up_has_no_law():
     time = TIMES[TIMES > 1.75]
-    rising = [estimate(one, 1e-3 * (1.0 + 0.1 * one), 4e-3 / (1.0 + one)) for one in time]
-    found = species_decays(TRAY, time, rising, 8)
-    assert sorted(found) == sorted(name for name in NAMES if name.startswith('second'))
+    rising = [
+        estimate(instant, 1e-3 * (1.0 + 0.1 * instant), 4e-3 / (1.0 + instant)) for instant in time
+    ]
+    fields = species_decays(TRAY, time, rising, 8)
+    assert sorted(fields) == sorted(name for name in NAMES if name.startswith('second'))
 
 
 def test_a_tray_of_one_species_has_none():
@@ -112,22 +116,24 @@ def test_species_of_a_simulated_mixture_share_the_haff_time_but_not_the_speed(nu
     settings = SimulationSettings(
         tray=number, mean_speed=0.01, first_shake=0.0, frame_rate=5.0, seed=4
     )
-    species = np.repeat(np.arange(2), [one.count for one in tray.species])
+    species = np.repeat(np.arange(2), [kind.count for kind in tray.species])
     times = 0.2 * np.arange(1, 101)
     speeds = np.zeros((2, times.size))
     cycles = 12
     for run in range(cycles):
         for k, moment in enumerate(ShakenTray(settings, tray, run).moments(times.size + 1)):
-            each = np.hypot(*moment.velocities[:, :2].T)
+            projected = np.hypot(*moment.velocities[:, :2].T)
             if k:
-                speeds[:, k - 1] += [each[species == one].mean() / cycles for one in (0, 1)]
+                speeds[:, k - 1] += [projected[species == kind].mean() / cycles for kind in (0, 1)]
     late = times >= 1.75
-    rows = [estimate(*one, noise=0.01) for one in zip(times[late], *speeds[:, late], strict=True)]
-    found = species_decays(tray, times[late], rows, 8)
-    ratio = found['first_species_haff_time'] / found['second_species_haff_time']
+    rows = [
+        estimate(*speed, noise=0.01) for speed in zip(times[late], *speeds[:, late], strict=True)
+    ]
+    fields = species_decays(tray, times[late], rows, 8)
+    ratio = fields['first_species_haff_time'] / fields['second_species_haff_time']
     assert abs(math.log(ratio)) < 0.2
     light = 0 if number == 5 else 1
     fast, slow = (
-        found[f'{("first", "second")[k]}_species_initial_speed'] for k in (light, 1 - light)
+        fields[f'{("first", "second")[k]}_species_initial_speed'] for k in (light, 1 - light)
     )
     assert fast > 1.5 * slow

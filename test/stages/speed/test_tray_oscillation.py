@@ -46,8 +46,8 @@ def test_noise_is_no_swing():
     meter = TrayOscillation()
     for time in np.arange(0.0, 6.0, 1 / 30):
         meter.push(image(time, tuple(1e-4 * random.standard_normal(2))))
-    found = [meter.speed(estimate(time)) for time in np.arange(0.5, 5.5, 0.5)]
-    assert np.mean(found) < 2e-5
+    results = [meter.speed(estimate(time)) for time in np.arange(0.5, 5.5, 0.5)]
+    assert np.mean(results) < 2e-5
 
 
 def test_a_tray_that_was_not_followed_has_no_speed():
