@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
-from nanorocks_ros.pipeline.tray_measurement import Measured, TrayMeasurement
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement, TrayRecord
 from nanorocks_ros.records import (
     Autocorrelation,
     BodyEstimate,
@@ -107,9 +107,9 @@ class TrayStages:
             *self.clusters.flush(),
         )
 
-    def _estimates(self, measured: Iterable[Measured]) -> list[Measured | CorEstimate]:
+    def _estimates(self, measured: Iterable[TrayRecord]) -> list[TrayRecord | CorEstimate]:
         """The records measured, each with the estimates that follow from it."""
-        records: list[Measured | CorEstimate] = []
+        records: list[TrayRecord | CorEstimate] = []
         for record in measured:
             records.append(record)
             if isinstance(record, SpeedEstimate | Rebound | PairCollision | Merge):

@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
 
 Event = Rebound | PairCollision | BodyEstimate | Merge
-Measured = SpeedEstimate | MotionMask | Tracks | Event
+TrayRecord = SpeedEstimate | MotionMask | Tracks | Event
 
 
-class TrayMeasurement(RestartingStage[TrayImage, Measured]):
+class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
     """Measures one tray: tracks, contacts and bodies, and the speed by every method needed.
 
     Speeds have the stamp of the middle of their window and come in order of time; those by the
@@ -79,7 +79,7 @@ class TrayMeasurement(RestartingStage[TrayImage, Measured]):
         self._area_speed = AreaSpeed(settings, tray)
         self._selector = SpeedSelector(settings.speed, self._track_speed.reliability)
 
-    def _process(self, record: TrayImage) -> tuple[Measured, ...]:
+    def _process(self, record: TrayImage) -> tuple[TrayRecord, ...]:
         self._cycles.push(record)
         image = self._cycles.counted(record)
         self._oscillation.push(image)
@@ -102,7 +102,7 @@ class TrayMeasurement(RestartingStage[TrayImage, Measured]):
         speeds += self._structure_speeds(image)
         return (*pictures, *self._selected(speeds), *self._reliable(events))
 
-    def flush(self) -> tuple[Measured, ...]:
+    def flush(self) -> tuple[TrayRecord, ...]:
         """Contacts and bodies of the last seconds, and speeds that were still held back."""
         self._track_speed.flush()
         speeds = self._structure_speed.flush() if self._selector.uses_structure else ()
