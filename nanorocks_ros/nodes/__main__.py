@@ -1,10 +1,10 @@
-"""``python -m nanorocks_ros.nodes NAME``: a node without an installed executable."""
+"""``python -m nanorocks_ros.nodes NAME``: starts a node without an installed executable."""
 
 from __future__ import annotations
 
 import sys
 
-from nanorocks_ros.nodes._run import NODES, run
+from nanorocks_ros.nodes.run import NODES, run
 
 if __name__ == '__main__':
     if len(sys.argv) < 2 or sys.argv[1] not in NODES:
