@@ -1,4 +1,7 @@
-"""Node: gray tray images, bodies and speeds in, estimates of the clusters out."""
+"""Node: gray tray images, bodies and speeds in, estimates of the clusters out.
+
+Tested by test/nodes/test_graph.py.
+"""
 
 from __future__ import annotations
 

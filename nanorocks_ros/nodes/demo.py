@@ -1,4 +1,7 @@
-"""The demonstration: every node in a process of its own, tray 1, live COR, and a figure."""
+"""The demonstration: every node in a process of its own, tray 1, live COR, and a figure.
+
+Run by `make demo`, not by a test.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Node: tray images in, mean projected speeds, contacts, bodies and motion masks out."""
+"""Node: tray images in, mean projected speeds, contacts, bodies and motion masks out.
+
+Tested by test/nodes/test_graph.py.
+"""
 
 from __future__ import annotations
 

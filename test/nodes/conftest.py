@@ -22,6 +22,7 @@ from rclpy.node import Node
 
 from nanorocks_ros.experiment.settings import SimulationSettings
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.simulation.film import film
 from nanorocks_ros.stages.warm_up import warm_up, warm_up_counting, warm_up_speed
 
@@ -170,3 +171,24 @@ def spun():
     executor.shutdown()
     node.destroy_node()
     rclpy.shutdown(context=context)
+
+
+@pytest.fixture
+def own_node(domain, monkeypatch):
+    """A NanorocksNode in this process, and a function that spins it until a condition holds."""
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    rclpy.init(args=[], domain_id=domain)
+    node = NanorocksNode('own')
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+
+    def spin_until(condition):
+        end = time.monotonic() + _PATIENCE_S
+        while not condition() and time.monotonic() < end:
+            executor.spin_once(timeout_sec=0.1)
+        assert condition()
+
+    yield node, spin_until
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.try_shutdown()

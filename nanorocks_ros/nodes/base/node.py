@@ -1,4 +1,7 @@
-"""What all nodes of the graph share: parameters, publishers, diagnostics, topic checks."""
+"""What all nodes of the graph share: parameters, publishers, diagnostics, topic checks.
+
+Tested by test/nodes/base/test_diagnostics.py.
+"""
 
 from __future__ import annotations
 

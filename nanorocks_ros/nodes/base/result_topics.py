@@ -1,4 +1,7 @@
-"""Which record is published on which topic."""
+"""Which record is published on which topic.
+
+Tested by test/nodes/base/test_publishing.py.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""One simulated tray as a source of frames, with the true state of its beads."""
+"""One simulated tray as a source of frames, with the true state of its beads.
+
+Tested by test/nodes/test_graph.py.
+"""
 
 from __future__ import annotations
 

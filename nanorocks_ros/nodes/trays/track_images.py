@@ -1,4 +1,7 @@
-"""Publishes images of the tracks of a tray, while somebody subscribes."""
+"""Publishes images of the tracks of a tray, while somebody subscribes.
+
+Tested by test/nodes/test_pipeline.py.
+"""
 
 from __future__ import annotations
 
