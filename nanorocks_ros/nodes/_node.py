@@ -35,39 +35,23 @@ from nanorocks_ros.nodes._shell import (
 from nanorocks_ros.nodes._watch import Watch
 from nanorocks_ros.records import (
     Autocorrelation,
-    BodyEstimate,
-    ClusterEstimate,
     CorEstimate,
-    GroundTruth,
-    Merge,
     MotionMask,
     Notice,
-    PairCollision,
-    Rebound,
     SpeedEstimate,
     TrayImage,
 )
 from nanorocks_ros.settings import rows, with_values
 from nanorocks_ros.wire import topics
+from nanorocks_ros.wire.products import ARRAY_TOPICS
 
-_ARRAYS = {
-    SpeedEstimate: topics.SPEED,
-    ClusterEstimate: topics.CLUSTER,
-    CorEstimate: topics.COR,
-    Rebound: topics.REBOUND,
-    PairCollision: topics.COLLISION,
-    BodyEstimate: topics.BODIES,
-    Merge: topics.MERGE,
-    GroundTruth: topics.TRUTH,
-}
 _IMAGES = {
     TrayImage: ((topics.GRAY, 'gray'), (topics.RECTIFIED, 'color')),
     MotionMask: ((topics.MOTION, 'mask'),),
     Autocorrelation: ((topics.AUTOCORRELATION, 'values'),),
 }
 RESULT_TOPICS = (
-    *_ARRAYS.values(),
-    topics.STATE,
+    *ARRAY_TOPICS.values(),
     topics.TRACKS,
     *(topic for both in _IMAGES.values() for topic, _ in both),
 )
@@ -275,9 +259,9 @@ class NanorocksNode(Node):
         """Publish what came out of a stage on the topics it belongs to."""
         if isinstance(record, Notice):
             self.get_logger().warning(record.text)
-        elif type(record) in _ARRAYS:
+        elif type(record) in ARRAY_TOPICS:
             message = array_message(record, epoch_ns)
-            self.send(_ARRAYS[type(record)], message, record.tray)
+            self.send(ARRAY_TOPICS[type(record)], message, record.tray)
         else:
             if isinstance(record, TrayImage):
                 self.send(topics.STATE, array_message(record.state(), epoch_ns), record.tray)

@@ -13,6 +13,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
+from nanorocks_ros.nodes._run import NODES
+
 PAGE = 'docs/reference/node_reference.md'
 _SAMPLE = 'bags/tray_1_sample'
 _NOTE = '<!-- Made by `make docs` from the nodes; change those instead. -->\n\n'
@@ -41,7 +43,6 @@ class _Kind(NamedTuple):
     remark: str = ''
 
 
-# `demo` starts all the others and has no topics of its own.
 _KINDS = (
     _Kind('simulator'),
     _Kind('simulator', ('whole_scene:=true',), 'with `whole_scene`'),
@@ -56,6 +57,8 @@ _KINDS = (
     _Kind('pipeline', ('source:=topic',), 'with `source:=topic`'),
     _Kind('pipeline', ('source:=bag', f'bag:={_SAMPLE}'), 'with `source:=bag`'),
 )
+# `demo` starts all the others and has no topics of its own.
+_OTHERS = tuple(_Kind(name) for name in NODES if name not in {'demo', *(k.name for k in _KINDS)})
 
 
 class _Asked(NamedTuple):
@@ -125,7 +128,7 @@ def page():
     """The page, from nodes that are started one after the other in this process."""
     text = _NOTE + _INTRODUCTION
     before = None
-    for kind in _KINDS:
+    for kind in (*_KINDS, *_OTHERS):
         asked = _ask(kind)
         if before is None or before.name != kind.name:
             known = ()

@@ -7,27 +7,19 @@ import math
 import re
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.records import (
-    BodyEstimate,
-    ClusterEstimate,
-    CorEstimate,
     CorRelation,
     CorStatus,
-    GroundTruth,
-    Merge,
-    PairCollision,
     Quality,
-    Rebound,
+    RecordType,
     SizeStatus,
-    SpeedEstimate,
     SpeedMethod,
     StickingStatus,
-    TrayState,
 )
 
 if TYPE_CHECKING:
@@ -35,30 +27,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from nanorocks_ros.records import ArrayRecord
+
 NS = 1_000_000_000
-ArrayRecord = (
-    SpeedEstimate
-    | ClusterEstimate
-    | CorEstimate
-    | GroundTruth
-    | TrayState
-    | Rebound
-    | PairCollision
-    | BodyEstimate
-    | Merge
-)
-RecordType = TypeVar(
-    'RecordType',
-    SpeedEstimate,
-    ClusterEstimate,
-    CorEstimate,
-    GroundTruth,
-    TrayState,
-    Rebound,
-    PairCollision,
-    BodyEstimate,
-    Merge,
-)
 
 _ENUMERATIONS = {
     'method': SpeedMethod,

@@ -30,6 +30,7 @@ from nanorocks_ros.records import (
     TrayState,
 )
 from nanorocks_ros.wire.array_layouts import from_array, layout, to_array
+from nanorocks_ros.wire.products import PRODUCTS
 
 DEFINITIONS = Path(__file__).parents[2] / 'msg_defs' / 'nanorocks_msgs' / 'msg'
 EPOCH = 1_700_000_000_000_000_000
@@ -178,8 +179,20 @@ RECORDS = (
     ),
 )
 
+# And one of every kind in the register.
+RECORDS += tuple(
+    from_array(
+        product.record,
+        np.ones(len(layout(product.record).fields)),
+        tray=1,
+        epoch_ns=EPOCH,
+        where='test',
+    )
+    for product in PRODUCTS
+)
 
-@pytest.mark.parametrize('record', RECORDS, ids=lambda one: type(one).__name__)
+
+@pytest.mark.parametrize('record', RECORDS, ids=lambda record: type(record).__name__)
 def test_a_record_comes_back_from_its_array_to_float32_rounding(record):
     values = to_array(record, EPOCH)
     assert values.dtype == np.float32
@@ -198,7 +211,7 @@ def test_a_record_comes_back_from_its_array_to_float32_rounding(record):
             assert after == pytest.approx(before, abs=200)
 
 
-@pytest.mark.parametrize('record', RECORDS, ids=lambda one: type(one).__name__)
+@pytest.mark.parametrize('record', RECORDS, ids=lambda record: type(record).__name__)
 def test_the_layout_is_the_message_definition_as_an_independent_parser_reads_it(record):
     name = type(record).__name__
     text = (DEFINITIONS / f'{name}.msg').read_text()
@@ -211,7 +224,7 @@ def test_the_layout_is_the_message_definition_as_an_independent_parser_reads_it(
     assert all(field.unit and field.doc for field in one.fields)
 
 
-@pytest.mark.parametrize('record', RECORDS, ids=lambda one: type(one).__name__)
+@pytest.mark.parametrize('record', RECORDS, ids=lambda record: type(record).__name__)
 def test_every_array_starts_with_time_and_cycle_and_holds_the_whole_record(record):
     names = [field.name for field in layout(type(record)).fields]
     assert names[:2] == ['time', 'cycle']

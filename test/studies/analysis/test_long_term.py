@@ -148,7 +148,7 @@ def test_speeds_measured_at_a_wrong_scale_are_no_peaks(tmp_path):
         *(speed(61.0 + k, 1, Quality.WRONG_SCALE | Quality.UNCERTAIN) for k in range(3)),
         *(speed(121.0 + k, 2, Quality.UNCERTAIN) for k in range(3)),
     ]
-    analysis = Analysis(epoch_ns=0, trays={1: TrayResults(speeds=speeds)})
+    analysis = Analysis(epoch_ns=0, trays={1: TrayResults(speeds)})
     write_results(analysis, tmp_path / 'results', Path('bag'), PipelineSettings())
     first, second = cycles_of(tmp_path / 'results', 1, SIZE_MEASURES[-1])
     assert math.isnan(first.peak_speed)

@@ -114,7 +114,7 @@ def test_what_the_analysis_writes_can_be_read(tmp_path):
         for k in range(3)
         for age, speed in LAW
     ]
-    analysis = Analysis(epoch_ns=epoch_ns, trays={1: TrayResults(speeds=speeds)})
+    analysis = Analysis(epoch_ns=epoch_ns, trays={1: TrayResults(speeds)})
     write_results(analysis, tmp_path / 'results', Path('bag'), PipelineSettings())
     curve = read_decay(tmp_path / 'results')
     assert curve.cycles == 2
