@@ -6,7 +6,7 @@ Each client keeps a `Cursor` of what it was told.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 from typing import Any
 
@@ -18,6 +18,7 @@ from nanorocks_ros.records import (
     SpeedEstimate,
 )
 from nanorocks_ros.wire.array_layouts import NS
+from nanorocks_ros.wire.flat_records import flat_names, flat_value
 from nanorocks_ros.wire.products import CURVES
 
 Row = list[float | None]
@@ -155,7 +156,7 @@ class TrayBoard:
         name = product.name
         self._stamps[name] = record.stamp_ns
         self.latest[name] = as_fields(record)
-        values = (_number(getattr(record, column)) for column in product.curve)
+        values = (_number(flat_value(record, column)) for column in product.curve)
         self.series[name].append([_number(record.stamp_ns / NS), *values])
 
     def _start_again(self, record: ArrayRecord, last_ns: int) -> None:
@@ -190,9 +191,9 @@ class TrayBoard:
     def _finish(self, record: CorEstimate) -> None:
         self.finals[record.cycle] = [
             record.cycle,
-            _number(record.restitution),
-            _number(record.restitution_lower),
-            _number(record.restitution_upper),
+            _number(record.restitution.value),
+            _number(record.restitution.lower),
+            _number(record.restitution.upper),
         ]
         self._finals_version += 1
         while len(self.finals) > _MOST_CYCLES:
@@ -232,19 +233,19 @@ class TrayBoard:
 
 
 def as_fields(record: ArrayRecord) -> dict[str, Any]:
-    """The numbers of a record by name, None where one is not known; states as words."""
+    """The numbers of a record by flat name, None where one is not known; states as words."""
     found: dict[str, Any] = {}
-    for one in fields(record):
-        value = getattr(record, one.name)
-        if one.name in _NOT_SHOWN:
+    for name in flat_names(type(record)):
+        if name in _NOT_SHOWN:
             continue
+        value = flat_value(record, name)
         if isinstance(value, IntFlag):
             value = value.names() if hasattr(value, 'names') else int(value)
         elif isinstance(value, IntEnum):
             value = value.name.lower()
         elif isinstance(value, float):
             value = _number(value)
-        found[one.name] = value
+        found[name] = value
     return found
 
 

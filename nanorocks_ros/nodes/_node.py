@@ -275,13 +275,13 @@ class NanorocksNode(Node):
             self.state[f'tray {record.tray} quality'] = ', '.join(record.quality.names()) or 'good'
         if isinstance(record, SpeedEstimate):
             method = record.method.name.lower().replace('_', ' ')
-            speed = f'{1e3 * record.mean_projected_speed:.3f} mm/s by {method}'
+            speed = f'{1e3 * record.mean_projected_speed.value:.3f} mm/s by {method}'
             if record.quality:
                 speed += f' ({", ".join(record.quality.names())})'
             self.state[f'tray {record.tray} speed'] = speed
         if isinstance(record, CorEstimate):
             name = f'tray {record.tray} COR'
-            self.state[name] = f'{record.restitution:.4f} {record.status.name.lower()}'
+            self.state[name] = f'{record.restitution.value:.4f} {record.status.name.lower()}'
 
     def tell_what_is_taken(self, inputs):
         """Offer `camera/taken` once all inputs are connected: then this node can be counted on.

@@ -59,7 +59,7 @@ class DemoNode(NanorocksNode):
         if len(self._records[GroundTruth]) % 15 == 0 and sys.stdout.isatty():
             seconds = (truth.stamp_ns - self._epoch.ns) / 1e9
             speeds = self._records[SpeedEstimate]
-            measured = f'{speeds[-1].mean_projected_speed * 1e3:5.2f}' if speeds else '  ...'
+            measured = f'{speeds[-1].mean_projected_speed.value * 1e3:5.2f}' if speeds else '  ...'
             print(f'\r{seconds:5.1f} s  mean speed {measured} mm/s ', end='', flush=True)
 
     def _print_cor(self, cor):
@@ -70,8 +70,8 @@ class DemoNode(NanorocksNode):
             print(f'\r{seconds:5.1f} s  the decay tells too little yet      ', flush=True)
             return
         print(
-            f'\r{seconds:5.1f} s  COR {cor.restitution:.4f} '
-            f'[{cor.restitution_lower:.4f}, {cor.restitution_upper:.4f}] '
+            f'\r{seconds:5.1f} s  COR {cor.restitution.value:.4f} '
+            f'[{cor.restitution.lower:.4f}, {cor.restitution.upper:.4f}] '
             f'{cor.status.name.lower()}{known}',
             flush=True,
         )
@@ -94,8 +94,8 @@ class DemoNode(NanorocksNode):
         )
         last = self._records[CorEstimate][-1]
         print(
-            f'walls {last.wall_restitution:.3f} [{last.wall_restitution_lower:.3f}, '
-            f"{last.wall_restitution_upper:.3f}]; the paper's closed form says "
+            f'walls {last.wall_restitution.value:.3f} [{last.wall_restitution.lower:.3f}, '
+            f"{last.wall_restitution.upper:.3f}]; the paper's closed form says "
             f'{last.paper_restitution:.3f}; see docs/method/restitution.md'
         )
         print(f'figure: {_FIGURE.resolve()}', flush=True)

@@ -14,6 +14,7 @@ from nanorocks_ros.records import (
     CorEstimate,
     CorRelation,
     CorStatus,
+    Measured,
     Merge,
     SpeedEstimate,
     SpeedMethod,
@@ -32,8 +33,7 @@ SPEED = SpeedEstimate(
     tray=5,
     cycle=1,
     cycle_start_ns=NS,
-    mean_projected_speed=1e-3,
-    mean_projected_speed_error=1e-5,
+    mean_projected_speed=Measured(1e-3, 1e-5),
     window=0.1,
     method=SpeedMethod.TRACKING,
 )
@@ -43,10 +43,8 @@ COR = CorEstimate(
     cycle=1,
     status=CorStatus.FINAL,
     relation=CorRelation.LIBRARY,
-    first_species_initial_speed=9e-3,
-    first_species_initial_speed_error=2e-4,
-    first_species_haff_time=2.5,
-    first_species_haff_time_error=0.125,
+    species_initial_speeds=(Measured(9e-3, 2e-4),),
+    species_haff_times=(Measured(2.5, 0.125),),
 )
 
 
