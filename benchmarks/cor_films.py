@@ -152,8 +152,8 @@ def _said(tray: Tray, cycle: Cycle) -> _Said | None:
     time = np.array(
         [(estimate.stamp_ns - shake_ns) / _NS - final.cooling_start for estimate in used]
     )
-    speed = np.array([estimate.mean_projected_speed for estimate in used])
-    error = np.array([estimate.mean_projected_speed_error for estimate in used])
+    speed = np.array([estimate.mean_projected_speed.value for estimate in used])
+    error = np.array([estimate.mean_projected_speed.error for estimate in used])
     true = np.array([_truth(cycle, estimate.stamp_ns / _NS, estimate.window) for estimate in used])
     ripe = [contact for contact in cycle.contacts if contact.stamp_ns <= last_ns - LATEST_NS]
     return _Said(

@@ -29,6 +29,7 @@ from nanorocks_ros.settings import (
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm, without_effects
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
+from nanorocks_ros.wire.flat_records import flat_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -202,11 +203,11 @@ def _ratios(found: list[SpeedEstimate], truth: np.ndarray) -> list[_Compared]:
             continue
         inside = np.abs(time - middle) <= 0.5 * estimate.window + 1e-6
         true, *species = (float(speed[inside].mean()) for speed in speeds)
-        each = (estimate.first_species_speed, estimate.second_species_speed)
+        each = tuple(flat_value(estimate, f'{name}_species_speed') for name in ('first', 'second'))
         compared.append(
             _Compared(
-                ratio=estimate.mean_projected_speed / true,
-                error=estimate.mean_projected_speed_error / true,
+                ratio=estimate.mean_projected_speed.value / true,
+                error=estimate.mean_projected_speed.error / true,
                 species=tuple(a / b for a, b in zip(each, species, strict=False)),
                 trusted=not estimate.quality,
                 quality=estimate.quality,

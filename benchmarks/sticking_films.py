@@ -218,7 +218,7 @@ def _cycle(one: Filmed, merges: Sequence[Merge], beads: int) -> StickingCycle:
         beads,
         merges,
         np.array([speed.stamp_ns for speed in speeds], dtype=np.int64),
-        np.array([speed.mean_projected_speed for speed in speeds]),
+        np.array([speed.mean_projected_speed.value for speed in speeds]),
         round(_SHAKE * _NS),
     )
 

@@ -109,8 +109,8 @@ def _method_as_json(found: BagSpeeds, tray: ComparedSpeeds, method: str) -> dict
     return {
         'time': [(speed.stamp_ns - found.epoch_ns) / 1e9 for speed in speeds],
         'cycle': [speed.cycle for speed in speeds],
-        'mean_projected_speed': _known(speed.mean_projected_speed for speed in speeds),
-        'mean_projected_speed_error': _known(speed.mean_projected_speed_error for speed in speeds),
+        'mean_projected_speed': _known(speed.mean_projected_speed.value for speed in speeds),
+        'mean_projected_speed_error': _known(speed.mean_projected_speed.error for speed in speeds),
         'window': [speed.window for speed in speeds],
         'method': [speed.method.name.lower() for speed in speeds],
         'quality': [speed.quality.names() for speed in speeds],

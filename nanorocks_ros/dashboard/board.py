@@ -13,8 +13,9 @@ from nanorocks_ros.dashboard.tray_board import TrayBoard
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from nanorocks_ros.dashboard.tray_board import Cursor, Shown
+    from nanorocks_ros.dashboard.tray_board import Cursor
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.records import ArrayRecord
 
 # Nodes and values of a node that are remembered: a page needs no more.
 _MOST_NODES, _MOST_VALUES = 64, 48
@@ -38,12 +39,12 @@ class Board:
         self._nodes: dict[str, dict[str, Any]] = {}
         self._nodes_version = 0
 
-    def take(self, record: Shown, now_s: float) -> None:
+    def take(self, record: ArrayRecord, now_s: float) -> None:
         """Note a result.
 
         Parameters
         ----------
-        record : SpeedEstimate, CorEstimate, ClusterEstimate or GroundTruth
+        record : any of `wire.products.CURVES`
         now_s : float, [s]
             Of a clock that never goes back.
         """

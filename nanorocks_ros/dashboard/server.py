@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
     from nanorocks_ros.dashboard.board import Board
-    from nanorocks_ros.dashboard.tray_board import Shown
+    from nanorocks_ros.records import ArrayRecord
     from nanorocks_ros.settings import DashboardSettings
 
 _MOST_CLIENTS = 64
@@ -140,7 +140,7 @@ class PageServer:
         """Show that a tray is there."""
         self._soon(self._board.expect, tray, time.monotonic())
 
-    def take(self, record: Shown) -> None:
+    def take(self, record: ArrayRecord) -> None:
         """Show a result."""
         self._soon(self._board.take, record, time.monotonic())
 

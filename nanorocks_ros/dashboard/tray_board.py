@@ -6,21 +6,21 @@ Each client keeps a `Cursor` of what it was told.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 from typing import Any
 
 from nanorocks_ros.records import (
-    ClusterEstimate,
+    ArrayRecord,
     CorEstimate,
     CorStatus,
     GroundTruth,
     SpeedEstimate,
 )
 from nanorocks_ros.wire.array_layouts import NS
+from nanorocks_ros.wire.flat_records import flat_names, flat_value
+from nanorocks_ros.wire.products import CURVES
 
-Measured = SpeedEstimate | CorEstimate | ClusterEstimate
-Shown = Measured | GroundTruth
 Row = list[float | None]
 
 # Points of a curve; at ten a second the longest cycle of the flight has 600.
@@ -29,22 +29,6 @@ MOST_POINTS = 4096
 _MOST_CYCLES = 200
 # The clock of a source that starts again; windows of one kind overlap by less.
 _BACK_NS = NS // 2
-_COLUMNS: dict[type, tuple[str, tuple[str, ...]]] = {
-    SpeedEstimate: ('speed', ('mean_projected_speed', 'mean_projected_speed_error')),
-    CorEstimate: (
-        'cor',
-        (
-            'restitution',
-            'restitution_lower',
-            'restitution_upper',
-            'wall_restitution',
-            'wall_restitution_lower',
-            'wall_restitution_upper',
-        ),
-    ),
-    ClusterEstimate: ('cluster', ('combined_size', 'combined_size_error')),
-    GroundTruth: ('truth', ('mean_projected_speed',)),
-}
 _NOT_SHOWN = {'stamp_ns', 'tray', 'cycle_start_ns'}
 
 
@@ -129,13 +113,13 @@ class TrayBoard:
     def __post_init__(self) -> None:
         self._clear()
 
-    def take(self, record: Shown, now_s: float) -> None:
+    def take(self, record: ArrayRecord, now_s: float) -> None:
         """Note a record."""
         self.version += 1
         if isinstance(record, GroundTruth):
             self._take_truth(record)
             return
-        name, _ = _COLUMNS[type(record)]
+        name = CURVES[type(record)].name
         # A merge that became known later ends the window where beads began to stick.
         ended = (
             isinstance(record, CorEstimate)
@@ -167,14 +151,15 @@ class TrayBoard:
             self.series['truth'].cut(-math.inf)
         self._note(truth)
 
-    def _note(self, record: Shown) -> None:
-        name, columns = _COLUMNS[type(record)]
+    def _note(self, record: ArrayRecord) -> None:
+        product = CURVES[type(record)]
+        name = product.name
         self._stamps[name] = record.stamp_ns
         self.latest[name] = as_fields(record)
-        values = (_number(getattr(record, column)) for column in columns)
+        values = (_number(flat_value(record, column)) for column in product.curve)
         self.series[name].append([_number(record.stamp_ns / NS), *values])
 
-    def _start_again(self, record: Measured, last_ns: int) -> None:
+    def _start_again(self, record: ArrayRecord, last_ns: int) -> None:
         """Forget what the source told before its clock went back from `last_ns`."""
         self.finals.clear()
         self._finals_version += 1
@@ -183,7 +168,7 @@ class TrayBoard:
             self._clear()
         self._begin(record)
 
-    def _begin(self, record: Measured) -> None:
+    def _begin(self, record: ArrayRecord) -> None:
         """Show the cycle of a record, with the truth since it began or, not known, since then."""
         truth, latest = self.series['truth'], self.latest.get('truth')
         stamp_ns = self._stamps.get('truth')
@@ -199,22 +184,22 @@ class TrayBoard:
     def _clear(self) -> None:
         self.start_ns = None
         self.serial += 1
-        self.series = {name: Series() for name, _ in _COLUMNS.values()}
+        self.series = {product.name: Series() for product in CURVES.values()}
         self.latest = {}
         self._stamps = {}
 
     def _finish(self, record: CorEstimate) -> None:
         self.finals[record.cycle] = [
             record.cycle,
-            _number(record.restitution),
-            _number(record.restitution_lower),
-            _number(record.restitution_upper),
+            _number(record.restitution.value),
+            _number(record.restitution.lower),
+            _number(record.restitution.upper),
         ]
         self._finals_version += 1
         while len(self.finals) > _MOST_CYCLES:
             del self.finals[min(self.finals)]
 
-    def _learn_start(self, record: Measured) -> None:
+    def _learn_start(self, record: ArrayRecord) -> None:
         if isinstance(record, SpeedEstimate) and record.cycle_start_ns is not None:
             self.start_ns = record.cycle_start_ns
         if self.start_ns is not None or not isinstance(record, CorEstimate):
@@ -247,20 +232,20 @@ class TrayBoard:
         return told
 
 
-def as_fields(record: Shown) -> dict[str, Any]:
-    """The numbers of a record by name, None where one is not known; states as words."""
+def as_fields(record: ArrayRecord) -> dict[str, Any]:
+    """The numbers of a record by flat name, None where one is not known; states as words."""
     found: dict[str, Any] = {}
-    for one in fields(record):
-        value = getattr(record, one.name)
-        if one.name in _NOT_SHOWN:
+    for name in flat_names(type(record)):
+        if name in _NOT_SHOWN:
             continue
+        value = flat_value(record, name)
         if isinstance(value, IntFlag):
             value = value.names() if hasattr(value, 'names') else int(value)
         elif isinstance(value, IntEnum):
             value = value.name.lower()
         elif isinstance(value, float):
             value = _number(value)
-        found[one.name] = value
+        found[name] = value
     return found
 
 

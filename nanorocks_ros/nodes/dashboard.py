@@ -16,20 +16,19 @@ from nanorocks_ros.dashboard.server import PageServer
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.nodes.trays.viewed_images import ViewedImages
-from nanorocks_ros.records import ClusterEstimate, CorEstimate, GroundTruth, SpeedEstimate
+from nanorocks_ros.records import GroundTruth
 from nanorocks_ros.settings import DashboardGraphSettings, DashboardSettings
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array
+from nanorocks_ros.wire.products import CURVES
 
 if TYPE_CHECKING:
     from std_msgs.msg import Float32MultiArray
 
     from nanorocks_ros.wire.topics import Topic
 
-_RESULTS = (
-    (topics.SPEED, SpeedEstimate),
-    (topics.COR, CorEstimate),
-    (topics.CLUSTER, ClusterEstimate),
+_RESULTS = tuple(
+    (product.topic, product.record) for product in CURVES.values() if product.measured
 )
 _TRAYS = range(1, 9)
 _DISCOVERY_S = 0.25

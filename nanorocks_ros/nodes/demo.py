@@ -76,7 +76,7 @@ class DemoNode(NanorocksNode):
         if len(self._truth) % _FRAMES_PER_LINE == 0 and sys.stdout.isatty():
             measured = '  ...'
             if self._speeds:
-                measured = f'{self._speeds[-1].mean_projected_speed * 1e3:5.2f}'
+                measured = f'{self._speeds[-1].mean_projected_speed.value * 1e3:5.2f}'
             seconds = self._seconds(truth.stamp_ns)
             print(f'\r{seconds:5.1f} s  mean speed {measured} mm/s ', end='', flush=True)
 
@@ -87,8 +87,8 @@ class DemoNode(NanorocksNode):
             return
         truth = f'  truth {self._truth[-1].restitution:g}' if self._truth else ''
         print(
-            f'\r{seconds:5.1f} s  COR {cor.restitution:.4f} '
-            f'[{cor.restitution_lower:.4f}, {cor.restitution_upper:.4f}] '
+            f'\r{seconds:5.1f} s  COR {cor.restitution.value:.4f} '
+            f'[{cor.restitution.lower:.4f}, {cor.restitution.upper:.4f}] '
             f'{cor.status.name.lower()}{truth}',
             flush=True,
         )
@@ -106,8 +106,8 @@ class DemoNode(NanorocksNode):
             [truth for truth in self._truth if truth.cycle == cycle],
         )
         print(
-            f'walls {final.wall_restitution:.3f} [{final.wall_restitution_lower:.3f}, '
-            f"{final.wall_restitution_upper:.3f}]; the paper's closed form says "
+            f'walls {final.wall_restitution.value:.3f} [{final.wall_restitution.lower:.3f}, '
+            f"{final.wall_restitution.upper:.3f}]; the paper's closed form says "
             f'{final.paper_restitution:.3f}; see docs/method/restitution.md'
         )
         print(f'figure: {_FIGURE.resolve()}', flush=True)

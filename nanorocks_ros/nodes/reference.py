@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.nodes.base.node import NanorocksNode
 
+from nanorocks_ros.nodes.run import NODES
+
 PAGE = 'docs/reference/node_reference.md'
 _SAMPLE = 'bags/tray_1_sample'
 _NOTE = '<!-- Made by `make docs` from the nodes; change those instead. -->\n\n'
@@ -45,7 +47,6 @@ class _Start(NamedTuple):
     remark: str = ''
 
 
-# `demo` starts all the others and has no topics of its own.
 _STARTS = (
     _Start('simulator'),
     _Start('simulator', ('whole_scene:=true',), 'with `whole_scene`'),
@@ -59,6 +60,10 @@ _STARTS = (
     _Start('pipeline', (), 'with `source:=simulator`, the default'),
     _Start('pipeline', ('source:=topic',), 'with `source:=topic`'),
     _Start('pipeline', ('source:=bag', f'bag:={_SAMPLE}'), 'with `source:=bag`'),
+)
+# `demo` starts all the others and has no topics of its own.
+_OTHER_STARTS = tuple(
+    _Start(name) for name in NODES if name not in {'demo', *(start.name for start in _STARTS)}
 )
 
 
@@ -137,7 +142,7 @@ def page() -> str:
     text = _NOTE + _INTRODUCTION
     last_name = ''
     shown_parameters: tuple[str, ...] = ()
-    for start in _STARTS:
+    for start in (*_STARTS, *_OTHER_STARTS):
         interface = _interface_of(start)
         if start.name != last_name:
             shown_parameters = ()

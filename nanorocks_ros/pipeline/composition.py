@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.records import (
+    ArrayRecord,
     Autocorrelation,
     BodyEstimate,
     ClusterEstimate,
@@ -33,20 +34,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.view import View
     from nanorocks_ros.settings import PipelineSettings
 
-Result = (
-    TrayImage
-    | MotionMask
-    | SpeedEstimate
-    | Tracks
-    | Rebound
-    | PairCollision
-    | BodyEstimate
-    | Merge
-    | ClusterEstimate
-    | Autocorrelation
-    | CorEstimate
-    | Notice
-)
+Result = TrayImage | MotionMask | Tracks | Autocorrelation | ArrayRecord | Notice
 
 
 class Wanted(NamedTuple):

@@ -72,9 +72,11 @@ def test_the_page_shows_what_the_topic_says(graph, look):
 
     def agrees():
         cor = cors[-1]
-        interval = f'[{cor.restitution_lower:.3f}, {cor.restitution_upper:.3f}]'
+        interval = f'[{cor.restitution.lower:.3f}, {cor.restitution.upper:.3f}]'
         shown = text_of(page, '#cor')
-        return f'{cor.restitution:.3f} {interval}' in shown and cor.status is CorStatus.COOLING
+        return (
+            f'{cor.restitution.value:.3f} {interval}' in shown and cor.status is CorStatus.COOLING
+        )
 
     graph.until(agrees)
     late = look(url)

@@ -7,7 +7,13 @@ import numpy as np
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.physics.haff_law import haff_speed
 from nanorocks_ros.physics.sticking_rates import slow_contacts
-from nanorocks_ros.records import BodyEstimate, Merge, SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import (
+    BodyEstimate,
+    Measured,
+    Merge,
+    SpeedEstimate,
+    SpeedMethod,
+)
 
 NS = 1_000_000_000
 TRAY = load_trays()[1]
@@ -24,8 +30,7 @@ def speed(time, value, cycle, start):
         tray=1,
         cycle=cycle,
         cycle_start_ns=round(start * NS),
-        mean_projected_speed=value,
-        mean_projected_speed_error=0.02 * value,
+        mean_projected_speed=Measured(value, 0.02 * value),
         window=0.1,
         method=SpeedMethod.TRACKING,
     )

@@ -89,12 +89,12 @@ class Diagnostics:
             self.values[f'tray {record.tray} quality'] = quality
         if isinstance(record, SpeedEstimate):
             method = record.method.name.lower().replace('_', ' ')
-            speed = f'{1e3 * record.mean_projected_speed:.3f} mm/s by {method}'
+            speed = f'{1e3 * record.mean_projected_speed.value:.3f} mm/s by {method}'
             if record.quality:
                 speed += f' ({", ".join(record.quality.names())})'
             self.values[f'tray {record.tray} speed'] = speed
         if isinstance(record, CorEstimate):
-            cor = f'{record.restitution:.4f} {record.status.name.lower()}'
+            cor = f'{record.restitution.value:.4f} {record.status.name.lower()}'
             self.values[f'tray {record.tray} COR'] = cor
 
     def publish(self, missing_publishers: Sequence[str]) -> None:

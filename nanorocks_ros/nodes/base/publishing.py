@@ -9,7 +9,7 @@ from rclpy.duration import Duration
 from rclpy.qos import QoSPolicyKind
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from nanorocks_ros.nodes.base.result_topics import ARRAY_TOPICS, IMAGE_TOPICS
+from nanorocks_ros.nodes.base.result_topics import IMAGE_TOPICS
 from nanorocks_ros.nodes.base.ros_messages import (
     array_message,
     image_message,
@@ -18,6 +18,7 @@ from nanorocks_ros.nodes.base.ros_messages import (
 )
 from nanorocks_ros.records import Notice, TrayImage
 from nanorocks_ros.wire import topics
+from nanorocks_ros.wire.products import ARRAY_TOPICS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -1,36 +1,13 @@
-"""Which record is published on which topic.
+"""Records that are published as images, and all topics of results.
 
 Tested by test/nodes/base/test_publishing.py.
 """
 
 from __future__ import annotations
 
-from nanorocks_ros.records import (
-    Autocorrelation,
-    BodyEstimate,
-    ClusterEstimate,
-    CorEstimate,
-    GroundTruth,
-    Merge,
-    MotionMask,
-    PairCollision,
-    Rebound,
-    SpeedEstimate,
-    TrayImage,
-)
+from nanorocks_ros.records import Autocorrelation, MotionMask, TrayImage
 from nanorocks_ros.wire import topics
-
-ARRAY_TOPICS: dict[type, topics.Topic] = {
-    SpeedEstimate: topics.SPEED,
-    ClusterEstimate: topics.CLUSTER,
-    CorEstimate: topics.COR,
-    Rebound: topics.REBOUND,
-    PairCollision: topics.COLLISION,
-    BodyEstimate: topics.BODIES,
-    Merge: topics.MERGE,
-    GroundTruth: topics.TRUTH,
-}
-"""Records that travel as arrays."""
+from nanorocks_ros.wire.products import ARRAY_TOPICS
 
 IMAGE_TOPICS: dict[type, tuple[tuple[topics.Topic, str], ...]] = {
     TrayImage: ((topics.GRAY, 'gray'), (topics.RECTIFIED, 'color')),
@@ -41,7 +18,6 @@ IMAGE_TOPICS: dict[type, tuple[tuple[topics.Topic, str], ...]] = {
 
 RESULT_TOPICS = (
     *ARRAY_TOPICS.values(),
-    topics.STATE,
     topics.TRACKS,
     *(topic for pairs in IMAGE_TOPICS.values() for topic, _ in pairs),
 )

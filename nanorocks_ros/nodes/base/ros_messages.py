@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.lens import Camera
-    from nanorocks_ros.records import BeadsTruth
-    from nanorocks_ros.wire.array_layouts import ArrayRecord
+    from nanorocks_ros.records import ArrayRecord, BeadsTruth
     from nanorocks_ros.wire.topics import Topic
 
 NS = 1_000_000_000

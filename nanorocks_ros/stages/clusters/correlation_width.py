@@ -20,6 +20,7 @@ from nanorocks_ros.records import (
     UNKNOWN,
     Autocorrelation,
     ClusterEstimate,
+    MeasuredInterval,
     Notice,
     SizeStatus,
     TrayImage,
@@ -166,10 +167,7 @@ class ClusterAutocorrelator:
             axes_ratio=region.axes_ratio,
             direction=region.direction,
             breadth=area / inner if inner > 0.0 else UNKNOWN,
-            cluster_size=size.size,
-            cluster_size_error=size.error,
-            cluster_size_lower=size.lower,
-            cluster_size_upper=size.upper,
+            cluster_size=MeasuredInterval(size.size, size.error, size.lower, size.upper),
             size_status=size.status,
         )
 

@@ -103,9 +103,9 @@ class StickingMeter:
             cycle.start_ns = record.cycle_start_ns
             cycle.wrong_scale |= bool(record.quality & Quality.WRONG_SCALE)
             # Before the first shaking event there may be hours, and no cycle.
-            if cycle.start_ns is not None and np.isfinite(record.mean_projected_speed):
+            if cycle.start_ns is not None and np.isfinite(record.mean_projected_speed.value):
                 cycle.stamps_ns.append(record.stamp_ns)
-                cycle.speeds.append(record.mean_projected_speed)
+                cycle.speeds.append(record.mean_projected_speed.value)
         # Of earlier cycles nothing more is asked, once the next is on its way.
         for number in [one for one in self._cycles if one < record.cycle - 1]:
             del self._cycles[number]

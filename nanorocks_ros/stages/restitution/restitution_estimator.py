@@ -24,6 +24,7 @@ from nanorocks_ros.records import (
 from nanorocks_ros.stages.contacts.cycle_contacts import ContactsOfCycle
 from nanorocks_ros.stages.preprocess.shake_detection import NS
 from nanorocks_ros.stages.restitution.restitution_methods import (
+    UNDETERMINED,
     Decay,
     LibraryReading,
     PaperReading,
@@ -157,7 +158,7 @@ class HaffFitter:
 
     def _driven(self, speed: SpeedEstimate) -> bool:
         """Whether the tray still swings too fast for the gas in it to cool freely."""
-        calm = self._settings.calm_share * speed.mean_projected_speed
+        calm = self._settings.calm_share * speed.mean_projected_speed.value
         return speed.tray_speed > calm
 
     def _start_ns(self, first: SpeedEstimate) -> int:
@@ -196,8 +197,7 @@ class HaffFitter:
                 cycle=self._cycle,
                 status=CorStatus.UNDETERMINED,
                 relation=self._reading.relation,
-                restitution_lower=0.0,
-                restitution_upper=1.0,
+                restitution=UNDETERMINED,
                 samples=len(self._samples),
             ),
         )
@@ -209,8 +209,8 @@ class HaffFitter:
         shake_ns, start_ns = last.cycle_start_ns or 0, self._start_ns(self._samples[0])
         decay = Decay(
             time=np.array([(sample.stamp_ns - start_ns) / NS for sample in self._samples]),
-            speed=np.array([sample.mean_projected_speed for sample in self._samples]),
-            error=np.array([sample.mean_projected_speed_error for sample in self._samples]),
+            speed=np.array([sample.mean_projected_speed.value for sample in self._samples]),
+            error=np.array([sample.mean_projected_speed.error for sample in self._samples]),
             of_grains=self._grains
             and any(sample.method is SpeedMethod.STRUCTURE_FUNCTION for sample in self._samples),
         )
@@ -228,7 +228,8 @@ class HaffFitter:
             fields = _nothing(CorStatus.NO_DECAY)
         if status is CorStatus.FINAL:
             few = self._settings.fewest_samples
-            fields.update(species_decays(self._tray, decay.time, self._samples, few))
+            decays = species_decays(self._tray, decay.time, self._samples, few)
+            fields['species_initial_speeds'], fields['species_haff_times'] = decays
         if fields.get('tension', 0.0) > _TENSE:
             quality |= Quality.INCONSISTENT
         return (
@@ -248,9 +249,9 @@ class HaffFitter:
 
 
 def _nothing(status: CorStatus) -> dict[str, Any]:
-    return {'status': status, 'restitution_lower': 0.0, 'restitution_upper': 1.0}
+    return {'status': status, 'restitution': UNDETERMINED}
 
 
 def _usable(speed: SpeedEstimate) -> bool:
-    value, error = speed.mean_projected_speed, speed.mean_projected_speed_error
+    value, error = speed.mean_projected_speed.value, speed.mean_projected_speed.error
     return math.isfinite(value) and math.isfinite(error) and value > 0.0 and error > 0.0

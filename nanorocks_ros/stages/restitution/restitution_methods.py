@@ -17,7 +17,13 @@ from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
 from nanorocks_ros.inference.posterior import Posterior, check_walls, posterior_of, tables_of
 from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
-from nanorocks_ros.records import CorRelation, CorStatus
+from nanorocks_ros.records import (
+    UNKNOWN_MEASURED,
+    CorRelation,
+    CorStatus,
+    Interval,
+    Measured,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,11 +35,9 @@ if TYPE_CHECKING:
 
 # With less known than that, nothing is: anything from 0 to 1 has a deviation of 0.29.
 _LEAST_KNOWN = 0.2
-_UNKNOWN = {
-    'status': CorStatus.UNDETERMINED,
-    'restitution_lower': 0.0,
-    'restitution_upper': 1.0,
-}
+UNDETERMINED = Interval(lower=0.0, upper=1.0)
+"""The restitution of a cycle that does not determine it: any."""
+_UNKNOWN = {'status': CorStatus.UNDETERMINED, 'restitution': UNDETERMINED}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,13 +109,12 @@ class PaperReading:
             self.evidence = self.evidence + own if self.evidence else own
         mean = self.mean_of(self.evidence) if self.evidence else None
         return {
-            'restitution': value,
-            'restitution_lower': lower,
-            'restitution_upper': upper,
+            'restitution': Interval(value, lower, upper),
             'paper_restitution': value,
             'reduced_chi_square': fit.reduced_chi_square,
-            'mean_restitution': mean.restitution if mean else math.nan,
-            'mean_restitution_error': mean.restitution_error if mean else math.nan,
+            'mean_restitution': (
+                Measured(mean.restitution, mean.restitution_error) if mean else UNKNOWN_MEASURED
+            ),
             **_haff_fields(fit),
         }
 
@@ -165,7 +168,7 @@ class LibraryReading:
         half = 0.5 * settings.cooling.probability
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
         self.evidence: Evidence | None = None
-        self._mean_so_far: dict[str, float] = {}
+        self._mean_so_far: dict[str, Measured] = {}
 
     def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate.
@@ -213,7 +216,7 @@ class LibraryReading:
 
     def _mean(
         self, likelihood: DecayLikelihood, contacts: ContactTerms, *, final: bool
-    ) -> dict[str, float]:
+    ) -> dict[str, Measured]:
         """The mean of what all finished cycles together say; a final one is among them."""
         if not final:
             return self._mean_so_far
@@ -221,10 +224,8 @@ class LibraryReading:
         self.evidence = self.evidence + own if self.evidence else own
         mean = self.mean_of(self.evidence)
         self._mean_so_far = {
-            'mean_restitution': mean.restitution,
-            'mean_restitution_error': mean.restitution_error,
-            'mean_wall_restitution': mean.wall_restitution,
-            'mean_wall_restitution_error': mean.wall_restitution_error,
+            'mean_restitution': Measured(mean.restitution, mean.restitution_error),
+            'mean_wall_restitution': Measured(mean.wall_restitution, mean.wall_restitution_error),
         }
         return self._mean_so_far
 
@@ -249,7 +250,7 @@ class LibraryReading:
             )
         posterior = self._posterior(decay.integrated(), contacts)
         error, wall_error = np.sqrt(np.diag(posterior.covariance)).tolist()
-        known = _known(posterior, self._ends)
+        restitution, wall_restitution = _intervals(posterior, self._ends)
         return MeanRestitution(
             cycles=evidence.cycles,
             restitution=posterior.mean[0],
@@ -259,14 +260,13 @@ class LibraryReading:
             tension=posterior.tension,
             rebounds=contacts.rebounds,
             collisions=contacts.collisions,
-            **{
-                f'{name}_{end}': known[f'{name}_{end}']
-                for name in ('restitution', 'wall_restitution')
-                for end in ('lower', 'upper')
-            },
+            restitution_lower=restitution.lower,
+            restitution_upper=restitution.upper,
+            wall_restitution_lower=wall_restitution.lower,
+            wall_restitution_upper=wall_restitution.upper,
         )
 
-    def _speeds(self, decay: Decay, *, final: bool) -> dict[str, float]:
+    def _speeds(self, decay: Decay, *, final: bool) -> dict[str, Any]:
         """Speed at the shaking event, and Haff time; with errors once the cycle is over."""
         if final:
             with suppress(FitError):
@@ -280,34 +280,34 @@ class LibraryReading:
         slope, offset = (float(one) for one in np.polyfit(decay.time, 1.0 / decay.speed, 1))
         falling = slope > 0.0 and offset > 0.0
         return {
-            'initial_speed': 1.0 / offset if falling else math.nan,
-            'haff_time': offset / slope if falling else math.nan,
+            'initial_speed': Measured(1.0 / offset if falling else math.nan),
+            'haff_time': Measured(offset / slope if falling else math.nan),
             'paper_restitution': _by_paper(max(slope, 0.0), self._tray),
         }
 
 
-def _known(posterior: Posterior, ends: NDArray[np.float64]) -> dict[str, float]:
+def _intervals(posterior: Posterior, ends: NDArray[np.float64]) -> tuple[Interval, Interval]:
+    """The restitution of two beads, and of beads and walls."""
     lower, value, upper = (float(quantile) for quantile in posterior.quantiles(ends))
     wall_lower, wall, wall_upper = (float(quantile) for quantile in posterior.wall_quantiles(ends))
+    return Interval(value, lower, upper), Interval(wall, wall_lower, wall_upper)
+
+
+def _known(posterior: Posterior, ends: NDArray[np.float64]) -> dict[str, Any]:
+    restitution, wall_restitution = _intervals(posterior, ends)
     spread = posterior.covariance
     product = math.sqrt(spread[0, 0] * spread[1, 1])
     return {
-        'restitution': value,
-        'restitution_lower': lower,
-        'restitution_upper': upper,
-        'wall_restitution': wall,
-        'wall_restitution_lower': wall_lower,
-        'wall_restitution_upper': wall_upper,
+        'restitution': restitution,
+        'wall_restitution': wall_restitution,
         'correlation': float(spread[0, 1]) / product if product > 0.0 else 0.0,
     }
 
 
-def _haff_fields(fit: HaffFit) -> dict[str, float]:
+def _haff_fields(fit: HaffFit) -> dict[str, Measured]:
     return {
-        'initial_speed': fit.initial_speed,
-        'initial_speed_error': fit.initial_speed_error,
-        'haff_time': fit.haff_time,
-        'haff_time_error': fit.haff_time_error,
+        'initial_speed': Measured(fit.initial_speed, fit.initial_speed_error),
+        'haff_time': Measured(fit.haff_time, fit.haff_time_error),
     }
 
 

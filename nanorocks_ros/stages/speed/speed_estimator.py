@@ -150,7 +150,7 @@ class SpeedEstimator:
 
 def _judged(record: SpeedEstimate) -> SpeedEstimate:
     """The same, and flagged where it says itself that it may be off by more than 20 %."""
-    speed, error = record.mean_projected_speed, record.mean_projected_speed_error
+    speed, error = record.mean_projected_speed.value, record.mean_projected_speed.error
     if error <= _CERTAIN * abs(speed) or abs(speed) + error <= _REST:
         return record
     # Also what is not known at all.

@@ -5,7 +5,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.records import Quality, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.records import (
+    Measured,
+    Quality,
+    SpeedEstimate,
+    SpeedMethod,
+    TrayImage,
+)
 from nanorocks_ros.stages.preprocess.shake_detection import NS, CycleFollower, NoiseMeter
 from nanorocks_ros.stages.speed.species_images import SpeciesImages
 from nanorocks_ros.stages.speed.species_speeds import MeanMotion, MeanMotions
@@ -138,12 +144,13 @@ class StructureSpeed:
             tray=self._tray.number,
             cycle=motion.cycle,
             cycle_start_ns=motion.cycle_start_ns,
-            mean_projected_speed=motion.speed / scale,
-            mean_projected_speed_error=motion.error / scale,
+            mean_projected_speed=Measured(motion.speed / scale, motion.error / scale),
             window=motion.window_ns / NS,
             method=SpeedMethod.STRUCTURE_FUNCTION,
             quality=self._flags | out_of_range,
-            **SpeedEstimate.by_species([(speed / scale, error / scale) for speed, error in known]),
+            species_speeds=tuple(
+                Measured(speed / scale, error / scale) for speed, error in known[:2]
+            ),
         )
 
 

@@ -13,8 +13,9 @@ from nanorocks_ros.experiment.colours import hue_of
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.quantiles import middle
 from nanorocks_ros.records import (
-    UNKNOWN,
+    UNKNOWN_MEASURED,
     BodyEstimate,
+    Measured,
     Merge,
     PairCollision,
     Quality,
@@ -173,13 +174,13 @@ class TrackSpeed:
             return []
         self._last_ns = mean.stamp_ns
         species = [
-            (one.mean_projected_speed, one.mean_projected_speed_error)
+            Measured(one.mean_projected_speed, one.mean_projected_speed_error)
             if one
-            else (UNKNOWN, UNKNOWN)
+            else UNKNOWN_MEASURED
             for one in each
         ]
         self._followed.append(min(one.share if one else 0.0 for one in each))
-        speeds = np.array([speed for speed, _ in species])
+        speeds = np.array([speed.value for speed in species])
         self._steps.append(self._longest_step(speeds, np.diff(series.stamps)))
         self._usually_followed = middle(self._followed)
         self._usual_step = middle(self._steps)
@@ -196,12 +197,13 @@ class TrackSpeed:
                 tray=self._tray.number,
                 cycle=shakes.cycle,
                 cycle_start_ns=shakes.cycle_start_ns,
-                mean_projected_speed=mean.mean_projected_speed,
-                mean_projected_speed_error=mean.mean_projected_speed_error,
+                mean_projected_speed=Measured(
+                    mean.mean_projected_speed, mean.mean_projected_speed_error
+                ),
                 window=mean.window,
                 method=SpeedMethod.TRACKING,
                 quality=flags,
-                **SpeedEstimate.by_species(species),
+                species_speeds=tuple(species[:2]),
             )
         ]
 

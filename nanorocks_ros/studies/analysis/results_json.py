@@ -7,11 +7,38 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.records import ClusterEstimate, CorEstimate, CorStatus
 from nanorocks_ros.wire.array_layouts import NS, layout
+from nanorocks_ros.wire.flat_records import flat_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from nanorocks_ros.records import ArrayRecord
     from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
+
+
+# Elements of the arrays, under the same names in the object.
+_SPEEDS = (
+    'mean_projected_speed',
+    'mean_projected_speed_error',
+    'first_species_speed',
+    'second_species_speed',
+)
+_RESTITUTIONS = (
+    *('initial_speed', 'initial_speed_error', 'haff_time', 'haff_time_error'),
+    *('restitution', 'restitution_lower', 'restitution_upper'),
+    *('wall_restitution', 'wall_restitution_lower', 'wall_restitution_upper'),
+    *('correlation', 'paper_restitution'),
+    *('mean_restitution', 'mean_restitution_error'),
+    *('mean_wall_restitution', 'mean_wall_restitution_error'),
+)
+_SPECIES_DECAYS = tuple(
+    field.name for field in layout(CorEstimate).fields if '_species_' in field.name
+)
+
+
+def _elements(record: ArrayRecord, names: Iterable[str]) -> dict[str, float | None]:
+    """Elements of the array of a record, None where one is not known."""
+    return {name: _known(flat_value(record, name)) for name in names}
 
 
 def _known(value: float) -> float | None:
@@ -93,12 +120,9 @@ def _tray_as_json(analysis: Analysis, results: TrayResults, *, series: bool) -> 
 def _series_as_json(results: TrayResults, epoch_ns: int) -> dict[str, Any]:
     return {
         'time': [(speed.stamp_ns - epoch_ns) / NS for speed in results.speeds],
-        'mean_projected_speed': [_known(speed.mean_projected_speed) for speed in results.speeds],
-        'mean_projected_speed_error': [
-            _known(speed.mean_projected_speed_error) for speed in results.speeds
-        ],
-        'first_species_speed': [_known(speed.first_species_speed) for speed in results.speeds],
-        'second_species_speed': [_known(speed.second_species_speed) for speed in results.speeds],
+        **{
+            name: [_known(flat_value(speed, name)) for speed in results.speeds] for name in _SPEEDS
+        },
         'method': [speed.method.name.lower() for speed in results.speeds],
         'quality': [speed.quality.names() for speed in results.speeds],
     }
@@ -132,34 +156,13 @@ def _cycle_as_json(
     return {
         'cycle': cor.cycle,
         'start': start,
-        'initial_speed': _known(cor.initial_speed),
-        'initial_speed_error': _known(cor.initial_speed_error),
-        'haff_time': _known(cor.haff_time),
-        'haff_time_error': _known(cor.haff_time_error),
-        'restitution': _known(cor.restitution),
-        'restitution_lower': _known(cor.restitution_lower),
-        'restitution_upper': _known(cor.restitution_upper),
-        'wall_restitution': _known(cor.wall_restitution),
-        'wall_restitution_lower': _known(cor.wall_restitution_lower),
-        'wall_restitution_upper': _known(cor.wall_restitution_upper),
-        'correlation': _known(cor.correlation),
-        'paper_restitution': _known(cor.paper_restitution),
-        'mean_restitution': _known(cor.mean_restitution),
-        'mean_restitution_error': _known(cor.mean_restitution_error),
-        'mean_wall_restitution': _known(cor.mean_wall_restitution),
-        'mean_wall_restitution_error': _known(cor.mean_wall_restitution_error),
+        **_elements(cor, _RESTITUTIONS),
         'rebounds': cor.rebounds,
         'collisions': cor.collisions,
         'tension': _known(cor.tension),
         'quality': int(cor.quality),
-        'window_start': _known(cor.window_start),
-        'window_end': _known(cor.window_end),
-        'cooling_start': _known(cor.cooling_start),
-        **{
-            name: _known(getattr(cor, name))
-            for name in (field.name for field in layout(CorEstimate).fields)
-            if '_species_' in name
-        },
+        **_elements(cor, ('window_start', 'window_end', 'cooling_start')),
+        **_elements(cor, _SPECIES_DECAYS),
         'relation': cor.relation.name.lower(),
         'status': cor.status.name.lower(),
         'reduced_chi_square': _known(cor.reduced_chi_square),
@@ -173,15 +176,15 @@ def _clusters_as_json(last: ClusterEstimate | None) -> dict[str, Any]:
     if last is None:
         return dict.fromkeys(('cluster_size', 'bodies', 'onset', 'sticking_speed'))
     return {
-        'cluster_size': _known(last.combined_size),
-        'cluster_size_error': _known(last.combined_size_error),
-        'bodies': _known(last.bodies),
-        'bodies_error': _known(last.bodies_error),
+        'cluster_size': _known(last.combined_size.value),
+        'cluster_size_error': _known(last.combined_size.error),
+        'bodies': _known(last.bodies.value),
+        'bodies_error': _known(last.bodies.error),
         'onset': _known(last.onset),
         'sticking_status': last.sticking_status.name.lower(),
-        'sticking_speed': _known(last.sticking_speed),
-        'sticking_speed_lower': _known(last.sticking_speed_lower),
-        'sticking_speed_upper': _known(last.sticking_speed_upper),
+        'sticking_speed': _known(last.sticking_speed.value),
+        'sticking_speed_lower': _known(last.sticking_speed.lower),
+        'sticking_speed_upper': _known(last.sticking_speed.upper),
     }
 
 

@@ -244,14 +244,14 @@ def _pairs(
         if not (moving and beside) or speed.stamp_ns - half < last_end:
             continue
         last_end = speed.stamp_ns + half
-        if not np.isfinite(speed.mean_projected_speed):
+        if not np.isfinite(speed.mean_projected_speed.value):
             full += 1
             continue
         pairs.append(
             SpeedPair(
                 stamp_ns=speed.stamp_ns,
-                area_speed=speed.mean_projected_speed,
-                area_speed_error=speed.mean_projected_speed_error,
+                area_speed=speed.mean_projected_speed.value,
+                area_speed_error=speed.mean_projected_speed.error,
                 manual_speed=near.mean_projected_speed,
                 manual_speed_error=near.mean_projected_speed_error,
                 beads=near.beads,

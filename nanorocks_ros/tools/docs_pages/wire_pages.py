@@ -11,17 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import settings as st
-from nanorocks_ros.records import (
-    BodyEstimate,
-    ClusterEstimate,
-    CorEstimate,
-    GroundTruth,
-    Merge,
-    PairCollision,
-    Rebound,
-    SpeedEstimate,
-    TrayState,
-)
 from nanorocks_ros.tools.viewer_layouts.foxglove import foxglove
 from nanorocks_ros.tools.viewer_layouts.plotjuggler import plotjuggler
 from nanorocks_ros.tools.viewer_layouts.rviz import rviz
@@ -29,21 +18,11 @@ from nanorocks_ros.tools.viewer_layouts.viewers_page import viewers_page
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import layout
 from nanorocks_ros.wire.bead_truth import beads_layout
+from nanorocks_ros.wire.products import PRODUCTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-_RECORDS = (
-    SpeedEstimate,
-    ClusterEstimate,
-    CorEstimate,
-    Rebound,
-    PairCollision,
-    BodyEstimate,
-    Merge,
-    GroundTruth,
-    TrayState,
-)
 _NOTE = '<!-- Made by `make docs` from the code; change that instead. -->\n\n'
 _GROUPS = (
     (
@@ -122,8 +101,8 @@ def topics_page() -> str:
         '`time` counts from. Read from `msg_defs/nanorocks_msgs/msg/`, which also builds as an '
         'interface package.\n'
     )
-    for record in _RECORDS:
-        one = layout(record)
+    for product in PRODUCTS:
+        one = layout(product.record)
         text += f'\n## {one.name}\n\n{one.doc}\n\n'
         text += _table(
             ('element', 'field', 'unit', 'meaning'),

@@ -9,20 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.records import BodyEstimate, ClusterEstimate, CorEstimate, SpeedEstimate
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import layout
+from nanorocks_ros.wire.products import PRODUCTS
 
 if TYPE_CHECKING:
-    from nanorocks_ros.wire.array_layouts import ArrayRecord
     from nanorocks_ros.wire.topics import Topic
 
-_RECORDS: dict[Topic, type[ArrayRecord]] = {
-    topics.SPEED: SpeedEstimate,
-    topics.CLUSTER: ClusterEstimate,
-    topics.BODIES: BodyEstimate,
-    topics.COR: CorEstimate,
-}
+_RECORDS = {product.topic: product.record for product in PRODUCTS}
 _BLUE, _RED, _GREEN, _GRAY = '#1f77b4', '#d62728', '#2ca02c', '#7f7f7f'
 _LINE, _BAND = 2.0, 1.0
 

@@ -53,7 +53,7 @@ def test_a_recording_of_the_simulator_gives_the_same_speeds_again(graph, tmp_pat
     assert again.epoch_ns == epoch.sec * 10**9 + epoch.nanosec
     times = [(speed.stamp_ns - again.epoch_ns) / 1e9 for speed in again.trays[1].speeds]
     assert times == pytest.approx(live[:, 0].tolist(), abs=1e-3)
-    speeds = [speed.mean_projected_speed for speed in again.trays[1].speeds]
+    speeds = [speed.mean_projected_speed.value for speed in again.trays[1].speeds]
     # The recording holds JPEGs, the pipeline saw the frames before.
     moving = live[:, 0] > 2.0
     assert np.mean(np.array(speeds)[moving]) == pytest.approx(np.mean(live[moving, 3]), rel=0.03)
@@ -105,7 +105,10 @@ def test_a_player_without_pace_loses_nothing_on_its_way_into_a_recording(graph, 
     assert epoch.sec * 10**9 + epoch.nanosec == source.start_ns
     live = np.array([message.data for message in recorded(bag, topics.SPEED)])
     again = np.array(
-        [speed.mean_projected_speed for speed in analyse(path, PipelineSettings()).trays[1].speeds]
+        [
+            speed.mean_projected_speed.value
+            for speed in analyse(path, PipelineSettings()).trays[1].speeds
+        ]
     )
     np.testing.assert_array_equal(live[:, 3], again[: len(live)].astype(np.float32))
     assert len(again) - len(live) <= 1

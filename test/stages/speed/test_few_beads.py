@@ -48,8 +48,8 @@ def test_of_one_or_two_beads_there_is_a_speed_and_nothing_confident_else(beads):
     assert any(isinstance(one, SpeedEstimate) for one in found)
     assert not any(isinstance(one, Merge) for one in found)
     for one in found:
-        if isinstance(one, CorEstimate) and not math.isnan(one.restitution):
-            assert one.restitution_lower <= one.restitution <= one.restitution_upper
+        if isinstance(one, CorEstimate) and not math.isnan(one.restitution.value):
+            assert one.restitution.lower <= one.restitution.value <= one.restitution.upper
         if isinstance(one, ClusterEstimate):
             assert not one.bodies > beads
             assert one.sticking_status in (StickingStatus.UNKNOWN, StickingStatus.NO_MERGE)
@@ -78,8 +78,8 @@ def test_of_an_empty_tray_nothing_is_said():
     assert clusters
     for cluster in clusters:
         assert cluster.size_status is SizeStatus.NOTHING
-        assert math.isnan(cluster.combined_size)
-        assert math.isnan(cluster.bodies)
+        assert math.isnan(cluster.combined_size.value)
+        assert math.isnan(cluster.bodies.value)
         assert cluster.sticking_status is StickingStatus.UNKNOWN
     assert not any(isinstance(one, Merge) for one in found)
-    assert all(math.isnan(one.restitution) for one in found if isinstance(one, CorEstimate))
+    assert all(math.isnan(one.restitution.value) for one in found if isinstance(one, CorEstimate))

@@ -126,7 +126,7 @@ def test_each_bag_has_the_results_it_has_alone_and_a_tray_what_all_cycles_say(do
     alone = analyse(films[1], PipelineSettings())
     (own,) = (Path(bag['results']) for bag in found['bags'] if bag['bag'].endswith('/run_2'))
     speeds = read_columns(own / 'tray_1_speed.csv', ('mean_projected_speed',))
-    expected = [speed.mean_projected_speed for speed in alone.trays[1].speeds]
+    expected = [speed.mean_projected_speed.value for speed in alone.trays[1].speeds]
     assert speeds['mean_projected_speed'] == pytest.approx(expected, rel=1e-6)
     # Of a single recording its own running mean; of two of them, more than of one.
     batch = [

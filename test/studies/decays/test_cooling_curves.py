@@ -11,7 +11,11 @@ from decays import simulated_table, write_rows
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.csv_tables import write_csv
-from nanorocks_ros.records import SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import (
+    Measured,
+    SpeedEstimate,
+    SpeedMethod,
+)
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
 from nanorocks_ros.studies.analysis.results_folder import write_results
@@ -106,15 +110,14 @@ def test_what_the_analysis_writes_can_be_read(tmp_path):
             tray=1,
             cycle=k,
             cycle_start_ns=epoch_ns + 60 * k * NS if k else None,
-            mean_projected_speed=speed,
-            mean_projected_speed_error=1e-4,
+            mean_projected_speed=Measured(speed, 1e-4),
             window=0.3,
             method=SpeedMethod.TRACKING,
         )
         for k in range(3)
         for age, speed in LAW
     ]
-    analysis = Analysis(epoch_ns=epoch_ns, trays={1: TrayResults(speeds=speeds)})
+    analysis = Analysis(epoch_ns=epoch_ns, trays={1: TrayResults(speeds)})
     write_results(analysis, tmp_path / 'results', Path('bag'), PipelineSettings())
     curve = read_decay(tmp_path / 'results')
     assert curve.cycles == 2

@@ -9,7 +9,12 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
-from nanorocks_ros.records import CorEstimate, CorRelation, CorStatus
+from nanorocks_ros.records import (
+    CorEstimate,
+    CorRelation,
+    CorStatus,
+    Interval,
+)
 from nanorocks_ros.tools.docs_pages.wire_pages import FILES
 from nanorocks_ros.tools.viewer_layouts.foxglove import foxglove
 from nanorocks_ros.tools.viewer_layouts.plotjuggler import plotjuggler
@@ -68,9 +73,7 @@ def test_the_element_that_is_plotted_holds_the_restitution():
         cycle=1,
         status=CorStatus.FINAL,
         relation=CorRelation.LIBRARY,
-        restitution=0.875,
-        restitution_lower=0.75,
-        restitution_upper=0.9375,
+        restitution=Interval(0.875, 0.75, 0.9375),
     )
     values = to_array(record, 0)
     found = {

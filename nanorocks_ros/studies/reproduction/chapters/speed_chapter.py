@@ -115,7 +115,7 @@ def _draw_ratios(path: Path, found: ComparedSpeeds, cycle: int) -> None:
         if not speeds:
             continue
         true = found.true_speeds(speeds)
-        ratio = np.array([speed.mean_projected_speed for speed in speeds]) / true
+        ratio = np.array([speed.mean_projected_speed.value for speed in speeds]) / true
         axes.plot(_MM * true, ratio, marker, color=colour, ms=3, alpha=0.6, label=_NAMES[method])
     axes.axhline(1.0, color='0.5', lw=1)
     axes.set(xscale='log', yscale='log', xlabel='true mean projected speed [mm/s]',
