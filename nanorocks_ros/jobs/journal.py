@@ -13,7 +13,8 @@ import numpy as np
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.folder_lock import LOCK, hold_folder
-from nanorocks_ros.outputs.npz_archive import Arrays, read_archive, write_archive, write_whole
+from nanorocks_ros.outputs.atomic_files import write_whole
+from nanorocks_ros.outputs.npz_archive import Arrays, read_archive, write_archive
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

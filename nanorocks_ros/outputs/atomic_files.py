@@ -1,4 +1,4 @@
-"""Files a command is asked to write: looked at before the work, complete or absent after it."""
+"""Output files: checked before the work, written complete or not at all."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.errors import ConfigurationError, NanorocksError, RecordingError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -70,23 +70,26 @@ def _check_place(path: Path, *, folder: bool, force: bool) -> None:
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """Give a place to write a file, which gets its name when all of it is there.
+def whole_file(path: Path, error_type: type[NanorocksError] = RecordingError) -> Iterator[Path]:
+    """Write a file under a temporary name and rename it once it is complete.
 
     Parameters
     ----------
     path : Path
-        A file there is replaced.
+        An existing file is replaced.
+    error_type : type of NanorocksError
+        Raised when the file cannot be written.
 
     Yields
     ------
     Path
-        Where to write; with the same ending. Gone afterwards, whatever happens.
+        Temporary file to write, in the same folder and with the same suffix. It is deleted when
+        the block raises.
 
     Raises
     ------
-    RecordingError
-        When the file cannot be written.
+    NanorocksError
+        Of `error_type`, when the file cannot be written.
     """
     part = path.with_name(f'.{path.stem}.part{path.suffix}')
     try:
@@ -99,8 +102,20 @@ def whole_file(path: Path) -> Iterator[Path]:
             with suppress(OSError):
                 part.unlink(missing_ok=True)
     except OSError as error:
-        raise RecordingError(
+        raise error_type(
             str(path),
             f'cannot be written ({error.strerror or error})',
             'make room, or write elsewhere',
         ) from error
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write bytes to a file, complete or not at all.
+
+    Raises
+    ------
+    RecordingError
+        When the file cannot be written.
+    """
+    with whole_file(path) as part:
+        part.write_bytes(content)

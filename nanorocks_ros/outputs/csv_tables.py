@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import csv
-import os
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.outputs.atomic_files import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -38,22 +37,11 @@ def write_csv(
         When the file cannot be written, or a row has another length.
     """
     path = Path(path)
-    part = path.with_name(f'.{path.name}.part')
     header = [f'{field} [{unit}]' for field, unit in zip(fields, units, strict=True)]
-    try:
-        try:
-            with part.open('w', encoding='utf-8', newline='') as stream:
-                table = csv.writer(stream, lineterminator='\n')
-                table.writerow(header)
-                table.writerows(_checked(path, rows, len(fields)))
-            os.replace(part, path)
-        finally:
-            with suppress(OSError):
-                part.unlink(missing_ok=True)
-    except OSError as error:
-        raise RecordingError(
-            str(path), f'cannot be written ({error.strerror})', 'pass a writable folder'
-        ) from error
+    with whole_file(path) as part, part.open('w', encoding='utf-8', newline='') as stream:
+        table = csv.writer(stream, lineterminator='\n')
+        table.writerow(header)
+        table.writerows(_checked(path, rows, len(fields)))
 
 
 def _checked(

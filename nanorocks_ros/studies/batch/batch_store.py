@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.folder_lock import hold_folder
-from nanorocks_ros.outputs.npz_archive import write_whole
+from nanorocks_ros.outputs.atomic_files import write_whole
 from nanorocks_ros.outputs.safe_text import shown
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.settings import rows

@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.errors import NanorocksError, RecordingError, UnwritableError
-from nanorocks_ros.outputs.npz_archive import Arrays, write_archive, write_whole
+from nanorocks_ros.outputs.atomic_files import write_whole
+from nanorocks_ros.outputs.npz_archive import Arrays, write_archive
 from nanorocks_ros.outputs.safe_text import shown
 from nanorocks_ros.recordings.bag.fingerprint import FileState, content_hash, file_states
 from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleSummary, cycles_of
