@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.outputs.json_values import finite_or_none
 
 if TYPE_CHECKING:
     import argparse
@@ -117,7 +118,7 @@ def as_json(calibration: Calibration, fit: PlateFit | None) -> dict[str, Any]:
         'r': list(info.r),
         'p': list(info.p),
         'pixels_per_metre': calibration.pixels_per_metre,
-        'residual_px': None if math.isnan(residual) else residual,
+        'residual_px': finite_or_none(residual),
         'largest_bend_px': largest_bend(calibration),
         'trays': {str(number): list(region) for number, region in calibration.regions.items()},
     }

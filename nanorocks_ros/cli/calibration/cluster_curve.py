@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.outputs.json_values import finite_or_none
+
 if TYPE_CHECKING:
     import argparse
 
@@ -99,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _values(curve: ClusterCurve) -> dict[str, Any]:
     return {
-        'largest': None if math.isnan(curve.largest) else curve.largest,
+        'largest': finite_or_none(curve.largest),
         'sizes': [math.exp(one) for one in curve.log_size],
         'readings': curve.reading.tolist(),
         'weight': curve.weight,

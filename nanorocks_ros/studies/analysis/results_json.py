@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.records import ClusterEstimate, CorEstimate, CorStatus
 from nanorocks_ros.wire.array_layouts import NS, layout
 
@@ -12,10 +12,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
@@ -93,12 +89,18 @@ def _tray_as_json(analysis: Analysis, results: TrayResults, *, series: bool) -> 
 def _series_as_json(results: TrayResults, epoch_ns: int) -> dict[str, Any]:
     return {
         'time': [(speed.stamp_ns - epoch_ns) / NS for speed in results.speeds],
-        'mean_projected_speed': [_known(speed.mean_projected_speed) for speed in results.speeds],
-        'mean_projected_speed_error': [
-            _known(speed.mean_projected_speed_error) for speed in results.speeds
+        'mean_projected_speed': [
+            finite_or_none(speed.mean_projected_speed) for speed in results.speeds
         ],
-        'first_species_speed': [_known(speed.first_species_speed) for speed in results.speeds],
-        'second_species_speed': [_known(speed.second_species_speed) for speed in results.speeds],
+        'mean_projected_speed_error': [
+            finite_or_none(speed.mean_projected_speed_error) for speed in results.speeds
+        ],
+        'first_species_speed': [
+            finite_or_none(speed.first_species_speed) for speed in results.speeds
+        ],
+        'second_species_speed': [
+            finite_or_none(speed.second_species_speed) for speed in results.speeds
+        ],
         'method': [speed.method.name.lower() for speed in results.speeds],
         'quality': [speed.quality.names() for speed in results.speeds],
     }
@@ -132,37 +134,37 @@ def _cycle_as_json(
     return {
         'cycle': cor.cycle,
         'start': start,
-        'initial_speed': _known(cor.initial_speed),
-        'initial_speed_error': _known(cor.initial_speed_error),
-        'haff_time': _known(cor.haff_time),
-        'haff_time_error': _known(cor.haff_time_error),
-        'restitution': _known(cor.restitution),
-        'restitution_lower': _known(cor.restitution_lower),
-        'restitution_upper': _known(cor.restitution_upper),
-        'wall_restitution': _known(cor.wall_restitution),
-        'wall_restitution_lower': _known(cor.wall_restitution_lower),
-        'wall_restitution_upper': _known(cor.wall_restitution_upper),
-        'correlation': _known(cor.correlation),
-        'paper_restitution': _known(cor.paper_restitution),
-        'mean_restitution': _known(cor.mean_restitution),
-        'mean_restitution_error': _known(cor.mean_restitution_error),
-        'mean_wall_restitution': _known(cor.mean_wall_restitution),
-        'mean_wall_restitution_error': _known(cor.mean_wall_restitution_error),
+        'initial_speed': finite_or_none(cor.initial_speed),
+        'initial_speed_error': finite_or_none(cor.initial_speed_error),
+        'haff_time': finite_or_none(cor.haff_time),
+        'haff_time_error': finite_or_none(cor.haff_time_error),
+        'restitution': finite_or_none(cor.restitution),
+        'restitution_lower': finite_or_none(cor.restitution_lower),
+        'restitution_upper': finite_or_none(cor.restitution_upper),
+        'wall_restitution': finite_or_none(cor.wall_restitution),
+        'wall_restitution_lower': finite_or_none(cor.wall_restitution_lower),
+        'wall_restitution_upper': finite_or_none(cor.wall_restitution_upper),
+        'correlation': finite_or_none(cor.correlation),
+        'paper_restitution': finite_or_none(cor.paper_restitution),
+        'mean_restitution': finite_or_none(cor.mean_restitution),
+        'mean_restitution_error': finite_or_none(cor.mean_restitution_error),
+        'mean_wall_restitution': finite_or_none(cor.mean_wall_restitution),
+        'mean_wall_restitution_error': finite_or_none(cor.mean_wall_restitution_error),
         'rebounds': cor.rebounds,
         'collisions': cor.collisions,
-        'tension': _known(cor.tension),
+        'tension': finite_or_none(cor.tension),
         'quality': int(cor.quality),
-        'window_start': _known(cor.window_start),
-        'window_end': _known(cor.window_end),
-        'cooling_start': _known(cor.cooling_start),
+        'window_start': finite_or_none(cor.window_start),
+        'window_end': finite_or_none(cor.window_end),
+        'cooling_start': finite_or_none(cor.cooling_start),
         **{
-            name: _known(getattr(cor, name))
+            name: finite_or_none(getattr(cor, name))
             for name in (field.name for field in layout(CorEstimate).fields)
             if '_species_' in name
         },
         'relation': cor.relation.name.lower(),
         'status': cor.status.name.lower(),
-        'reduced_chi_square': _known(cor.reduced_chi_square),
+        'reduced_chi_square': finite_or_none(cor.reduced_chi_square),
         'samples': cor.samples,
         **_clusters_as_json(clusters),
     }
@@ -173,15 +175,15 @@ def _clusters_as_json(last: ClusterEstimate | None) -> dict[str, Any]:
     if last is None:
         return dict.fromkeys(('cluster_size', 'bodies', 'onset', 'sticking_speed'))
     return {
-        'cluster_size': _known(last.combined_size),
-        'cluster_size_error': _known(last.combined_size_error),
-        'bodies': _known(last.bodies),
-        'bodies_error': _known(last.bodies_error),
-        'onset': _known(last.onset),
+        'cluster_size': finite_or_none(last.combined_size),
+        'cluster_size_error': finite_or_none(last.combined_size_error),
+        'bodies': finite_or_none(last.bodies),
+        'bodies_error': finite_or_none(last.bodies_error),
+        'onset': finite_or_none(last.onset),
         'sticking_status': last.sticking_status.name.lower(),
-        'sticking_speed': _known(last.sticking_speed),
-        'sticking_speed_lower': _known(last.sticking_speed_lower),
-        'sticking_speed_upper': _known(last.sticking_speed_upper),
+        'sticking_speed': finite_or_none(last.sticking_speed),
+        'sticking_speed_lower': finite_or_none(last.sticking_speed_lower),
+        'sticking_speed_upper': finite_or_none(last.sticking_speed_upper),
     }
 
 

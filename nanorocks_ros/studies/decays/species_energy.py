@@ -11,6 +11,7 @@ import numpy as np
 from nanorocks_ros.errors import FitError, RecordingError
 from nanorocks_ros.experiment.colours import COLOURS
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
+from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.physics.haff_law import granular_energy, haff_speed
 from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED
 from nanorocks_ros.studies.decays.cooling_curves import check_errors, mean_cycle
@@ -143,7 +144,7 @@ def species_values(found: Sequence[SpeciesEnergy]) -> dict[str, Any]:
             for energy in found
         ],
         'energy_ratio': ratio,
-        'energy_ratio_error': error if math.isfinite(error) else None,
+        'energy_ratio_error': finite_or_none(error),
     }
 
 

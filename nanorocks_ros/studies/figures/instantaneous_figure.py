@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -10,6 +9,7 @@ import numpy as np
 
 from nanorocks_ros.inference.decay.instantaneous_restitution import instantaneous_cor
 from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.physics.confined_theory import confined_gas
 from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED
 from nanorocks_ros.studies.decays.cooling_curves import check_errors, mean_cycle
@@ -183,10 +183,4 @@ def instantaneous_values(found: InstantaneousCor) -> dict[str, Any]:
         'local_restitution_lower': local.lower,
         'local_restitution_upper': local.upper,
     }
-    return {name: _known(array.tolist()) for name, array in arrays.items()}
-
-
-def _known(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_known(one) for one in value]
-    return value if math.isfinite(value) else None
+    return {name: json_values(array) for name, array in arrays.items()}
