@@ -15,7 +15,7 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError, NanorocksError
 from nanorocks_ros.jobs import dask_cluster as cluster_module
-from nanorocks_ros.jobs.tasks import Workers, as_finished, as_finished_apart, run_tasks
+from nanorocks_ros.jobs.tasks import Workers, as_completed, as_completed_isolated, run_tasks
 
 # Prints the number of the worker that runs it.
 WHO = 'sleep 0.05; echo $PPID'
@@ -54,7 +54,7 @@ def test_what_a_killed_worker_had_in_hand_is_done_by_another():
     killed = None
     found = {}
     tasks = {f'{k}': WHO for k in range(8)}
-    for key, pid in as_finished(subprocess.getoutput, tasks, Workers(processes=2)):
+    for key, pid in as_completed(subprocess.getoutput, tasks, Workers(processes=2)):
         found[key] = int(pid)
         if killed is None:
             killed = int(pid)
@@ -71,7 +71,7 @@ def test_a_task_that_kills_every_worker_is_given_up():
 def test_a_worker_that_dies_costs_what_it_had_in_hand_and_nothing_else():
     tasks = {'deadly': 'kill -9 $PPID', **{f'{k}': WHO for k in range(6)}}
     found, killed = {}, []
-    results = as_finished_apart(
+    results = as_completed_isolated(
         subprocess.getoutput, tasks, Workers(processes=2), lambda key, what: (key, what)
     )
     for key, result in results:
@@ -97,7 +97,7 @@ def test_workers_compute_with_one_thread_of_blas(monkeypatch):
 
 
 def test_work_that_is_not_wanted_any_more_is_stopped():
-    results = as_finished(time.sleep, {'short': 0.0, 'endless': 1e6}, Workers(processes=2))
+    results = as_completed(time.sleep, {'short': 0.0, 'endless': 1e6}, Workers(processes=2))
     assert next(results) == ('short', None)
     results.close()
     assert multiprocessing.active_children() == []
@@ -107,10 +107,10 @@ def test_workers_end_with_a_parent_that_is_killed(tmp_path):
     script = tmp_path / 'parent.py'
     script.write_text(
         'import subprocess\n'
-        'from nanorocks_ros.jobs.tasks import Workers, as_finished\n'
+        'from nanorocks_ros.jobs.tasks import Workers, as_completed\n'
         'if __name__ == "__main__":\n'
         '    tasks = {str(k): "sleep 0.05; echo $PPID" for k in range(10_000)}\n'
-        '    for _, pid in as_finished(subprocess.getoutput, tasks, Workers(processes=2)):\n'
+        '    for _, pid in as_completed(subprocess.getoutput, tasks, Workers(processes=2)):\n'
         '        print(pid, flush=True)\n'
     )
     parent = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True)
@@ -142,7 +142,7 @@ def test_a_cluster_gives_and_raises_the_same_until_its_scheduler_is_lost(cluster
     assert run_tasks(math.sqrt, NUMBERS, workers) == ROOTS
     with pytest.raises(ValueError, match='math domain error'):
         run_tasks(math.sqrt, {'good': 1.0, 'bad': -1.0}, workers)
-    results = as_finished(time.sleep, {f'{k}': 0.05 for k in range(400)}, workers)
+    results = as_completed(time.sleep, {f'{k}': 0.05 for k in range(400)}, workers)
     next(results)
     cluster.scheduler.kill()
     with pytest.raises(NanorocksError, match=r'tcp://.*the scheduler was lost; start it'):
@@ -151,7 +151,7 @@ def test_a_cluster_gives_and_raises_the_same_until_its_scheduler_is_lost(cluster
 
 def test_a_task_that_kills_every_worker_of_a_cluster_is_given_up(request, monkeypatch):
     monkeypatch.setenv('DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES', '0')
-    monkeypatch.setattr(cluster_module, '_MOST_TRIES', 2)
+    monkeypatch.setattr(cluster_module, '_MAX_SUBMISSIONS', 2)
     scheduler = request.getfixturevalue('scheduler')
     # Its nanny starts it anew.
     scheduler.add_worker('--nanny')
@@ -178,7 +178,7 @@ def test_a_cluster_without_workers_is_told_before_and_during_the_work(scheduler,
         workers.check()
     scheduler.add_worker()
     scheduler.await_workers()
-    results = as_finished(time.sleep, {f'{k}': 0.05 for k in range(400)}, workers)
+    results = as_completed(time.sleep, {f'{k}': 0.05 for k in range(400)}, workers)
     next(results)
     scheduler.workers[0].kill()
     with pytest.raises(NanorocksError, match=r'no workers for 1 s; .* dask worker tcp://'):

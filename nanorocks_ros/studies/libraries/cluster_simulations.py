@@ -9,8 +9,7 @@ import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.inference.cluster_size.cluster_curve import as_arrays, load_curves
-from nanorocks_ros.jobs.journal import Journal
-from nanorocks_ros.jobs.resumed_tasks import fill_journal
+from nanorocks_ros.jobs.resumed_tasks import fill_journal, resumed_journal
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.outputs.npz_archive import write_archive
 from nanorocks_ros.studies.libraries.cluster_films import ClusterPlan, samples_of_run
@@ -78,17 +77,13 @@ def build_curves(
         )
     workers = workers or Workers()
     workers.check()
-    folder = output.with_name(f'{output.name}.parts')
-    with Journal(folder, plan.question()) as journal:
+    with resumed_journal(output, plan.question(), notice) as journal:
         tasks = {str(run): _Run(plan=plan, run=run) for run in range(plan.runs)}
         fill_journal(journal, film_run, tasks, workers, progress)
-        for text in journal.notices:
-            (notice or (lambda text: None))(text)
         samples = [journal.read(str(run))[_SAMPLES] for run in range(plan.runs)]
         trays = {number: plan.cells[number] for number in plan.trays}
         arrays = as_arrays(trays, plan.level, np.concatenate(samples), plan.question())
         write_archive(output, arrays)
-        journal.delete()
     load_curves.cache_clear()
     return load_curves(str(output), packaged=False)
 

@@ -19,8 +19,7 @@ from nanorocks_ros.inference.decay.library_fit import (
     fit_library,
     node_of,
 )
-from nanorocks_ros.jobs.journal import Journal
-from nanorocks_ros.jobs.resumed_tasks import fill_journal
+from nanorocks_ros.jobs.resumed_tasks import fill_journal, resumed_journal
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.outputs.npz_archive import write_archive
 from nanorocks_ros.settings import SimulationSettings, with_values
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.inference.decay.decay_library import DecayLibrary
+    from nanorocks_ros.jobs.journal import Journal
     from nanorocks_ros.outputs.npz_archive import Arrays
 
 # Any speed would do: the decay is one function of speed times time.
@@ -129,14 +129,10 @@ def build_library(
         )
     workers = workers or Workers()
     workers.check()
-    folder = output.with_name(f'{output.name}.parts')
-    with Journal(folder, plan.question()) as journal:
+    with resumed_journal(output, plan.question(), notice) as journal:
         fill_journal(journal, cool_nodes, _tasks(plan), workers, progress)
-        for text in journal.notices:
-            (notice or (lambda text: None))(text)
         library = fit_library(plan.tray, _decays(plan, journal), plan.question())
-        library.save(lambda arrays: write_archive(output, arrays))
-        journal.delete()
+        write_archive(output, library.arrays())
     return library
 
 

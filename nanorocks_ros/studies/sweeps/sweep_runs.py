@@ -13,7 +13,8 @@ import numpy as np
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.journal import Journal, difference
-from nanorocks_ros.jobs.tasks import Workers, as_finished
+from nanorocks_ros.jobs.resumed_tasks import parts_folder
+from nanorocks_ros.jobs.tasks import Workers, as_completed
 from nanorocks_ros.studies.sweeps.sweep_parts import (
     COUNTS,
     SPEEDS,
@@ -36,11 +37,6 @@ if TYPE_CHECKING:
 
 # A part of more numbers than this is a burden to send.
 _MOST_NUMBERS = 2_000_000
-
-
-def parts_folder(output: Path) -> Path:
-    """Where the finished parts of a sweep lie until it is complete."""
-    return output.with_name(f'{output.name}.parts')
 
 
 def sweep(
@@ -138,7 +134,7 @@ class _Work:
         self._progress = progress
 
     def run(self, workers: Workers, notice: Callable[[str], None]) -> None:
-        missing = missing_runs(self._plan, self._journal.good_keys())
+        missing = missing_runs(self._plan, self._journal.intact_keys())
         for text in self._journal.notices:
             notice(text)
         self.done = self._plan.total_runs - sum(one.size for one in missing)
@@ -157,7 +153,7 @@ class _Work:
         missing = missing_runs(self._plan, self._journal.keys())
         size = _task_size(self._plan, sum(one.size for one in missing), seconds, workers)
         tasks = {one.key: one for piece in missing for one in divided(piece, size)}
-        with closing(as_finished(cool, tasks, workers)) as results:
+        with closing(as_completed(cool, tasks, workers)) as results:
             for key, part in results:
                 self._keep(tasks[key].first, part)
 

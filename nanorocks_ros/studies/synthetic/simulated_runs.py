@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.experiment.trays import Species, Tray
-from nanorocks_ros.jobs.tasks import Workers, as_finished
+from nanorocks_ros.jobs.tasks import Workers, as_completed
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.engine.gas import MOST_FOR_SCAN, EventCounts, HardSphereGas
 from nanorocks_ros.simulation.initial_state import resting_beads, rules_of
@@ -72,7 +72,7 @@ def simulate(
         plan.check_events(len(runs[0].events) * plan.runs)
         if (time.perf_counter() - start) * (plan.runs - 1) < _WORTH_PROCESSES:
             workers = replace(workers, processes=1)
-    with closing(as_finished(_work, _tasks(plan, len(runs), workers), workers)) as results:
+    with closing(as_completed(_work, _tasks(plan, len(runs), workers), workers)) as results:
         for _, some in results:
             runs.extend(some)
             report(len(runs) / plan.runs)

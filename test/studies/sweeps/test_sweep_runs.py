@@ -12,6 +12,7 @@ import pytest
 from nanorocks_ros.errors import ConfigurationError, RecordingError, SimulationError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.jobs.journal import Journal
+from nanorocks_ros.jobs.resumed_tasks import parts_folder
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.outputs.npz_archive import read_archive, write_archive
 from nanorocks_ros.settings import SimulationSettings
@@ -19,7 +20,7 @@ from nanorocks_ros.simulation.ensemble import cooling_runs
 from nanorocks_ros.studies.sweeps.sweep_parts import COUNTS, RunRange, cool
 from nanorocks_ros.studies.sweeps.sweep_plan import sweep_plan
 from nanorocks_ros.studies.sweeps.sweep_result import CURVES, Sweep
-from nanorocks_ros.studies.sweeps.sweep_runs import parts_folder, sweep
+from nanorocks_ros.studies.sweeps.sweep_runs import sweep
 
 SETTINGS = SimulationSettings(seed=7)
 AXES = {'restitution': (0.7, 0.8, 0.9), 'wall_restitution': (0.9, 0.99)}
