@@ -69,7 +69,8 @@ def test_a_task_that_kills_every_worker_is_given_up():
 
 
 def test_a_worker_that_dies_costs_what_it_had_in_hand_and_nothing_else():
-    tasks = {'deadly': 'kill -9 $PPID', **{f'{k}': WHO for k in range(6)}}
+    # So many that the worker of task 2 has another one to do.
+    tasks = {'deadly': 'kill -9 $PPID', **{f'{k}': WHO for k in range(30)}}
     found, killed = {}, []
     results = as_completed_isolated(
         subprocess.getoutput, tasks, Workers(processes=2), lambda key, what: (key, what)
@@ -171,7 +172,7 @@ def test_workers_of_another_version_are_refused(scheduler, tmp_path):
 
 
 def test_a_cluster_without_workers_is_told_before_and_during_the_work(scheduler, monkeypatch):
-    for name in ('_PATIENCE', '_LOOK', '_WORKERS_BACK'):
+    for name in ('_CONNECT_TIMEOUT', '_CHECK_INTERVAL', '_NEW_WORKER_TIMEOUT'):
         monkeypatch.setattr(cluster_module, name, 1.0)
     workers = Workers(scheduler=scheduler.address)
     with pytest.raises(NanorocksError, match=r'no workers for 1 s; .* dask worker tcp://'):
