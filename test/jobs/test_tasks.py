@@ -187,7 +187,7 @@ def test_a_cluster_without_workers_is_told_before_and_during_the_work(scheduler,
 
 
 def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):
-    monkeypatch.setattr(cluster_module, '_PATIENCE', 1.0)
+    monkeypatch.setattr(cluster_module, '_CONNECT_TIMEOUT', 1.0)
     # Bound, but nobody listens; and somebody who listens, but says nothing.
     with socket.socket() as deaf, socket.create_server(('127.0.0.1', 0)) as mute:
         deaf.bind(('127.0.0.1', 0))
