@@ -62,15 +62,15 @@ class Journal:
             write_whole(path, question.encode())
             return
         try:
-            found = path.read_text(encoding='utf-8')
+            earlier = path.read_text(encoding='utf-8')
         except (OSError, UnicodeDecodeError) as error:
             raise RecordingError(
                 str(path), 'cannot be read', 'delete the folder, or pass another --output'
             ) from error
-        if found != question:
+        if earlier != question:
             raise RecordingError(
                 str(self.folder),
-                f'belongs to another job ({difference(found, question)})',
+                f'belongs to another job ({difference(earlier, question)})',
                 'delete the folder, or pass another --output',
             )
 
@@ -176,15 +176,15 @@ class _DamagedError(RecordingError):
     """A part is damaged."""
 
 
-def difference(found: str, wanted: str) -> str:
+def difference(actual: str, wanted: str) -> str:
     """The entries in which two JSON objects differ, as text.
 
     Parameters
     ----------
-    found, wanted : str
+    actual, wanted : str
     """
     try:
-        left, right = json.loads(found), json.loads(wanted)
+        left, right = json.loads(actual), json.loads(wanted)
     except ValueError:
         return 'its question cannot be read'
     if not (isinstance(left, dict) and isinstance(right, dict)):
@@ -192,8 +192,8 @@ def difference(found: str, wanted: str) -> str:
     left, right = _flat(left), _flat(right)
     names = [name for name in {**left, **right} if left.get(name) != right.get(name)]
     shown = [f'{name}: {_short(left.get(name))}, not {_short(right.get(name))}' for name in names]
-    more = f' and {len(shown) - 3} more' if len(shown) > 3 else ''
-    return '; '.join(shown[:3]) + more
+    remainder = f' and {len(shown) - 3} more' if len(shown) > 3 else ''
+    return '; '.join(shown[:3]) + remainder
 
 
 def _flat(tree: dict[str, Any], prefix: str = '') -> dict[str, Any]:

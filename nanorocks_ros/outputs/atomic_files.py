@@ -16,41 +16,41 @@ if TYPE_CHECKING:
 def check_outputs(
     files: Mapping[str, Path], kinds: Mapping[str, tuple[str, ...]], *, force: bool = False
 ) -> None:
-    """Refuse files that could not be written in the end, before hours of work.
+    """Raise for files that could not be written, before hours of work.
 
     Parameters
     ----------
     files : mapping of str to Path
-        By the flag that asked for them.
+        Files by the flag that names them.
     kinds : mapping of str to tuple of str
-        Endings that a flag accepts; a flag that is not listed names a new folder.
+        Suffixes that a flag accepts; a flag that is not listed names a new folder.
     force : bool
-        Whether files (not folders) that exist may be replaced.
+        Whether existing files (not folders) may be replaced.
 
     Raises
     ------
     ConfigurationError
-        For an ending that is not known, or two flags with the same file.
+        For an unknown suffix, or two flags with the same file.
     RecordingError
-        For a file that exists, or cannot be made where it should.
+        For a file that exists, or cannot be created.
     """
-    seen: dict[Path, str] = {}
+    flags: dict[Path, str] = {}
     for flag, path in files.items():
         if flag in kinds and path.suffix not in kinds[flag]:
             raise ConfigurationError(
                 flag, f'{path} ends in none of {", ".join(kinds[flag])}', 'name such a file'
             )
-        place = path.resolve()
-        if place in seen:
+        target = path.resolve()
+        if target in flags:
             raise ConfigurationError(
-                flag, f'names the file of {seen[place]}, {path}', 'name another'
+                flag, f'names the file of {flags[target]}, {path}', 'name another'
             )
-        seen[place] = flag
+        flags[target] = flag
     for flag, path in files.items():
-        _check_place(path, folder=flag not in kinds, force=force)
+        _check_target(path, folder=flag not in kinds, force=force)
 
 
-def _check_place(path: Path, *, folder: bool, force: bool) -> None:
+def _check_target(path: Path, *, folder: bool, force: bool) -> None:
     if os.path.lexists(path) and (folder or path.is_dir()):
         raise RecordingError(str(path), 'exists already and is not overwritten', 'name another')
     if os.path.lexists(path) and not force:

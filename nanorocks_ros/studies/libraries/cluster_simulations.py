@@ -1,4 +1,4 @@
-"""Curves from autocorrelations to cluster sizes: films, kept, resumed, and made into one file."""
+"""Cluster curves from simulated films: run in parallel, resumed, written to a file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.outputs.npz_archive import Arrays
 
 _SAMPLES = 'samples'
-_FEWEST_RUNS = 8
+_MIN_RUNS = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,20 +40,20 @@ def build_curves(
     progress: Callable[[int, int], None] | None = None,
     notice: Callable[[str], None] | None = None,
 ) -> Mapping[str, ClusterCurve]:
-    """Film clusters that grow, and write the curves of their trays.
+    """Film growing clusters, and write the cluster curves of their trays.
 
     Parameters
     ----------
     plan : ClusterPlan
     output : Path
-        ``.npz``; finished runs are kept in the folder ``OUTPUT.parts`` until it is written, and
-        the same call goes on from there.
+        ``.npz``; finished runs are kept in the folder ``OUTPUT.parts`` until it is written, so
+        that the same call resumes an interrupted one.
     workers : Workers, optional
         By default processes on all cores.
     progress : callable, optional
-        Called with the runs done and the runs there are.
+        Called with the number of finished runs and the number of runs.
     notice : callable, optional
-        Called with what the user should know, one line each.
+        Called with one line of text for each damaged part.
 
     Returns
     -------
@@ -71,9 +71,9 @@ def build_curves(
     KeyboardInterrupt
         Ctrl-C; its text says what is kept.
     """
-    if plan.runs < _FEWEST_RUNS:
+    if plan.runs < _MIN_RUNS:
         raise ConfigurationError(
-            '--runs', f'{plan.runs}', f'give {_FEWEST_RUNS} or more: each has one sticking speed'
+            '--runs', f'{plan.runs}', f'give {_MIN_RUNS} or more: each has one sticking speed'
         )
     workers = workers or Workers()
     workers.check()

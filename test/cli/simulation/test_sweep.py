@@ -131,7 +131,7 @@ def test_files_that_cannot_be_used_are_told(tmp_path, capsys):
     output = tmp_path / 'a.npz'
     output.write_text('mine')
     assert main(['sweep', *SMALL, '-o', str(output)]) == 1
-    assert 'a.npz: exists and is no sweep of ours; delete it' in capsys.readouterr().err
+    assert 'a.npz: exists and holds no sweep; delete it' in capsys.readouterr().err
     missing = ['--figure', 'a.png', '--reference', str(tmp_path / 'no.csv')]
     assert main(['sweep', *SMALL, *GRID, '-o', str(tmp_path / 'b.npz'), *missing]) == 1
     assert 'no.csv: cannot be read (No such file or directory)' in capsys.readouterr().err

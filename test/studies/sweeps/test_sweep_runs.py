@@ -183,7 +183,7 @@ def test_the_file_of_another_sweep_is_not_overwritten(tmp_path):
     with pytest.raises(RecordingError, match=r'a.npz: holds another sweep \(runs: 2, not 20\);'):
         sweep(PLAN, output, HERE)
     output.write_text('mine')
-    with pytest.raises(RecordingError, match='exists and is no sweep of ours; delete it, or'):
+    with pytest.raises(RecordingError, match='exists and holds no sweep; delete it, or'):
         sweep(PLAN, output, HERE)
     assert output.read_text() == 'mine'
 
