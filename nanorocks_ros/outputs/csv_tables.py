@@ -1,4 +1,4 @@
-"""Tables of results as CSV files."""
+"""Tables as CSV files: names with units in the header, then numbers."""
 
 from __future__ import annotations
 
@@ -42,6 +42,32 @@ def write_csv(
         table = csv.writer(stream, lineterminator='\n')
         table.writerow(header)
         table.writerows(_checked(path, rows, len(fields)))
+
+
+def read_csv(path: Path) -> tuple[list[str], list[list[str]]]:
+    """Read a table that `write_csv` wrote, or one like it.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    names : list of str, (n_fields,)
+        Without units.
+    rows : list of list of str
+        Blank lines are left out.
+
+    Raises
+    ------
+    OSError
+        When the file cannot be read.
+    ValueError, csv.Error
+        When it is empty, or is not text in UTF-8 separated by commas.
+    """
+    with path.open(encoding='utf-8', newline='') as stream:
+        header, *rows = [row for row in csv.reader(stream) if row]
+    return [name.split('[')[0].strip() for name in header], rows
 
 
 def _checked(
