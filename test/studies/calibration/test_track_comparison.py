@@ -12,7 +12,7 @@ from nanorocks_ros.experiment.view import View
 from nanorocks_ros.records import Tracks
 from nanorocks_ros.studies.calibration.manual_tracks import ManualTracks
 from nanorocks_ros.studies.calibration.track_comparison import (
-    Place,
+    MarkedBeads,
     compare_tracks,
     manual_reference,
 )
@@ -44,7 +44,7 @@ def _tracks(frames, ids=(0, 1, 2), shift=(0.0, 0.0), displacement=(0.0, 0.0)):
 
 def _reference(tracks):
     return {
-        one.stamp_ns: Place(ids=one.ids.astype(np.int64), positions=one.positions)
+        one.stamp_ns: MarkedBeads(ids=one.ids.astype(np.int64), positions=one.positions)
         for one in tracks
     }
 

@@ -71,7 +71,7 @@ def test_what_is_kept_changes_no_number():
 
 
 def test_files_do_not_depend_on_the_workers(tmp_path, monkeypatch):
-    monkeypatch.setattr(simulated_runs, '_WORTH_PROCESSES', 0.0)
+    monkeypatch.setattr(simulated_runs, '_MIN_SECONDS_FOR_PROCESSES', 0.0)
     plan = plan_of(duration=0.5, runs=5, kept=['trajectory'])
     contents = []
     for processes in (1, 2):
@@ -123,7 +123,7 @@ def test_more_numbers_than_memory_may_hold_are_refused():
 
 
 def test_more_events_than_memory_may_hold_are_refused(monkeypatch):
-    monkeypatch.setattr(simulated_plan, 'MOST_EVENTS', 20)
+    monkeypatch.setattr(simulated_plan, 'MAX_EVENTS', 20)
     with pytest.raises(SimulationError, match=r'more than the 20 events.*shorter --duration'):
         simulate(plan_of(kept=['events']), HERE)
     simulate(plan_of(), HERE)
