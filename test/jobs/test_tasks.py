@@ -18,7 +18,7 @@ from nanorocks_ros.jobs import dask_cluster as cluster_module
 from nanorocks_ros.jobs.tasks import Workers, as_completed, as_completed_isolated, run_tasks
 
 # Prints the number of the worker that runs it.
-WHO = 'sleep 0.05; echo $PPID'
+ECHO_PID = 'sleep 0.05; echo $PPID'
 NUMBERS = {f'number {k}': float(k) for k in range(12)}
 ROOTS = [math.sqrt(number) for number in NUMBERS.values()]
 
@@ -33,11 +33,11 @@ def alive(pid):
 
 @pytest.mark.parametrize('processes', [1, 2, None])
 def test_results_come_in_the_order_of_the_tasks(processes):
-    told = []
+    reported = []
     workers = Workers(processes=processes)
-    found = run_tasks(math.sqrt, NUMBERS, workers, lambda *numbers: told.append(numbers))
-    assert found == ROOTS
-    assert told == [(k, 12) for k in range(1, 13)]
+    results = run_tasks(math.sqrt, NUMBERS, workers, lambda *numbers: reported.append(numbers))
+    assert results == ROOTS
+    assert reported == [(k, 12) for k in range(1, 13)]
 
 
 def test_no_tasks_are_no_work():
@@ -52,15 +52,15 @@ def test_what_a_task_raises_is_raised(processes):
 
 def test_what_a_killed_worker_had_in_hand_is_done_by_another():
     killed = None
-    found = {}
-    tasks = {f'{k}': WHO for k in range(8)}
+    pids = {}
+    tasks = {f'{k}': ECHO_PID for k in range(8)}
     for key, pid in as_completed(subprocess.getoutput, tasks, Workers(processes=2)):
-        found[key] = int(pid)
+        pids[key] = int(pid)
         if killed is None:
             killed = int(pid)
             os.kill(killed, signal.SIGKILL)
-    assert set(found) == set(tasks)
-    assert len(set(found.values()) - {killed}) >= 1
+    assert set(pids) == set(tasks)
+    assert len(set(pids.values()) - {killed}) >= 1
 
 
 def test_a_task_that_kills_every_worker_is_given_up():
@@ -70,22 +70,22 @@ def test_a_task_that_kills_every_worker_is_given_up():
 
 def test_a_worker_that_dies_costs_what_it_had_in_hand_and_nothing_else():
     # So many that the worker of task 2 has another one to do.
-    tasks = {'deadly': 'kill -9 $PPID', **{f'{k}': WHO for k in range(30)}}
-    found, killed = {}, []
+    tasks = {'deadly': 'kill -9 $PPID', **{f'{k}': ECHO_PID for k in range(30)}}
+    outputs, killed = {}, []
     results = as_completed_isolated(
-        subprocess.getoutput, tasks, Workers(processes=2), lambda key, what: (key, what)
+        subprocess.getoutput, tasks, Workers(processes=2), lambda key, reason: (key, reason)
     )
     for key, result in results:
-        found[key] = result
+        outputs[key] = result
         if key == '2':
             # With nothing in hand, or with the next.
             killed.append(int(result))
             os.kill(killed[0], signal.SIGKILL)
-    assert set(found) == set(tasks)
-    name, what = found.pop('deadly')
+    assert set(outputs) == set(tasks)
+    name, reason = outputs.pop('deadly')
     assert name == 'deadly'
-    assert 'was killed' in what
-    lost = [one for one in found.values() if not isinstance(one, str)]
+    assert 'was killed' in reason
+    lost = [output for output in outputs.values() if not isinstance(output, str)]
     assert len(lost) <= 1
     assert multiprocessing.active_children() == []
 
@@ -162,10 +162,10 @@ def test_a_task_that_kills_every_worker_of_a_cluster_is_given_up(request, monkey
 
 
 def test_workers_of_another_version_are_refused(scheduler, tmp_path):
-    other = tmp_path / 'other' / 'nanorocks_ros'
-    other.mkdir(parents=True)
-    (other / '__init__.py').write_text('__version__ = "0.0.0"\n')
-    scheduler.add_worker('--no-nanny', PYTHONPATH=str(other.parent))
+    other_package = tmp_path / 'other' / 'nanorocks_ros'
+    other_package.mkdir(parents=True)
+    (other_package / '__init__.py').write_text('__version__ = "0.0.0"\n')
+    scheduler.add_worker('--no-nanny', PYTHONPATH=str(other_package.parent))
     scheduler.await_workers()
     with pytest.raises(NanorocksError, match=r'is 0\.0\.0 on 1 of 1 workers .* same version'):
         run_tasks(math.sqrt, NUMBERS, Workers(scheduler=scheduler.address))
@@ -191,8 +191,8 @@ def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):
     # Bound, but nobody listens; and somebody who listens, but says nothing.
     with socket.socket() as deaf, socket.create_server(('127.0.0.1', 0)) as mute:
         deaf.bind(('127.0.0.1', 0))
-        for one in (deaf, mute):
-            address = f'tcp://127.0.0.1:{one.getsockname()[1]}'
+        for server in (deaf, mute):
+            address = f'tcp://127.0.0.1:{server.getsockname()[1]}'
             with pytest.raises(NanorocksError, match=f'{address}: no Dask scheduler answers'):
                 Workers(scheduler=address).check()
 

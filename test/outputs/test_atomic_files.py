@@ -67,7 +67,7 @@ def test_half_a_file_never_takes_its_place(tmp_path, end):
     with pytest.raises(end):
         write(path, b'half', end)
     assert path.read_bytes() == b'old'
-    assert [one.name for one in tmp_path.iterdir()] == ['a.npz']
+    assert [file.name for file in tmp_path.iterdir()] == ['a.npz']
 
 
 def test_the_system_says_why_it_cannot_be_written(tmp_path):
