@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-QUESTION, _FINGERPRINT = 'question.json', 'fingerprint'
+SPECIFICATION, _FINGERPRINT = 'question.json', 'fingerprint'
 _KEY = re.compile(r'[A-Za-z0-9][A-Za-z0-9_.-]*')
 
 
@@ -36,7 +36,7 @@ class Journal:
     ----------
     folder : Path
         Made when it does not exist.
-    question : str
+    specification : str
         JSON object with everything that the results depend on; it identifies the job.
 
     Raises
@@ -45,21 +45,21 @@ class Journal:
         When the folder cannot be used, is locked by another process, or belongs to another job.
     """
 
-    def __init__(self, folder: Path, question: str) -> None:
+    def __init__(self, folder: Path, specification: str) -> None:
         self.folder = folder
         self.notices: list[str] = []
-        self._fingerprint = hashlib.sha256(question.encode()).hexdigest()
+        self._fingerprint = hashlib.sha256(specification.encode()).hexdigest()
         self._lock: int | None = lock_folder(folder)
         try:
-            self._check_question(question)
+            self._check_specification(specification)
         except BaseException:
             self._unlock()
             raise
 
-    def _check_question(self, question: str) -> None:
-        path = self.folder / QUESTION
+    def _check_specification(self, specification: str) -> None:
+        path = self.folder / SPECIFICATION
         if not self.keys():
-            write_whole(path, question.encode())
+            write_whole(path, specification.encode())
             return
         try:
             earlier = path.read_text(encoding='utf-8')
@@ -67,10 +67,10 @@ class Journal:
             raise RecordingError(
                 str(path), 'cannot be read', 'delete the folder, or pass another --output'
             ) from error
-        if earlier != question:
+        if earlier != specification:
             raise RecordingError(
                 str(self.folder),
-                f'belongs to another job ({difference(earlier, question)})',
+                f'belongs to another job ({difference(earlier, specification)})',
                 'delete the folder, or pass another --output',
             )
 
@@ -148,7 +148,7 @@ class Journal:
         """Delete the parts and unlock the folder; it stays if it holds anything else."""
         for path in self._paths():
             path.unlink(missing_ok=True)
-        (self.folder / QUESTION).unlink(missing_ok=True)
+        (self.folder / SPECIFICATION).unlink(missing_ok=True)
         (self.folder / LOCK).unlink(missing_ok=True)
         with suppress(OSError):
             self.folder.rmdir()
@@ -186,9 +186,9 @@ def difference(actual: str, wanted: str) -> str:
     try:
         left, right = json.loads(actual), json.loads(wanted)
     except ValueError:
-        return 'its question cannot be read'
+        return 'its specification cannot be read'
     if not (isinstance(left, dict) and isinstance(right, dict)):
-        return 'its question cannot be read'
+        return 'its specification cannot be read'
     left, right = _flat(left), _flat(right)
     names = [name for name in {**left, **right} if left.get(name) != right.get(name)]
     shown = [f'{name}: {_short(left.get(name))}, not {_short(right.get(name))}' for name in names]

@@ -26,7 +26,7 @@ def parts_folder(output: Path) -> Path:
 
 @contextmanager
 def resumed_journal(
-    output: Path, question: str, notice: Callable[[str], None] | None = None
+    output: Path, specification: str, notice: Callable[[str], None] | None = None
 ) -> Iterator[Journal]:
     """Open the journal of an output; delete it when the block ends without an exception.
 
@@ -34,7 +34,7 @@ def resumed_journal(
     ----------
     output : Path
         The journal lies in `parts_folder` of it.
-    question : str
+    specification : str
         See `Journal`.
     notice : callable, optional
         Called with one line of text for each damaged part, which is deleted.
@@ -49,7 +49,7 @@ def resumed_journal(
     RecordingError
         When the folder cannot be used, or holds the parts of another job.
     """
-    with Journal(parts_folder(output), question) as journal:
+    with Journal(parts_folder(output), specification) as journal:
         journal.intact_keys()
         if notice is not None:
             for text in journal.notices:

@@ -92,7 +92,9 @@ def run(options: argparse.Namespace) -> int:
     found = {number: curves[curve_key(cells[number])] for number in numbers}
     if options.json:
         shown = {str(number): _values(curve) for number, curve in found.items()}
-        print(json.dumps({'output': str(output), 'trays': shown, **json.loads(plan.question())}))
+        print(
+            json.dumps({'output': str(output), 'trays': shown, **json.loads(plan.specification())})
+        )
         return 0
     for number, curve in found.items():
         print(f'tray {number}: {_sentence(curve)}')

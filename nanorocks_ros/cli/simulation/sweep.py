@@ -227,13 +227,13 @@ def _as_json(found: Sweep) -> dict[str, Any]:
     from nanorocks_ros.studies.sweeps.sweep_parts import COUNTS
     from nanorocks_ros.studies.sweeps.sweep_result import CURVES
 
-    asked = json.loads(found.question)
+    specification = json.loads(found.specification)
     curves = {name: getattr(found, name) for name in CURVES}
     return {
         'axes': {axis.name: list(axis.values) for axis in found.axes},
         'runs': found.runs,
-        'seed': asked['settings']['seed'],
-        'version': asked['version'],
+        'seed': specification['settings']['seed'],
+        'version': specification['version'],
         'time': found.times.tolist(),
         **{name: json_values(curve) for name, curve in curves.items()},
         **{name: getattr(found, name).tolist() for name in COUNTS},

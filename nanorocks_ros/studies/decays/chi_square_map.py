@@ -90,7 +90,7 @@ def chi_square(sweep: Sweep, curve: SpeedCurve, *, scaled: bool = False) -> NDAr
 
 
 def _sticky(sweep: Sweep) -> bool:
-    settings = json.loads(sweep.question)['settings']
+    settings = json.loads(sweep.specification)['settings']
     names = ('sticking_speed', 'wall_sticking_speed')
     return any(settings[name] > 0.0 for name in names) or any(
         axis.name in names for axis in sweep.axes

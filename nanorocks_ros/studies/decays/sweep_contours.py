@@ -64,7 +64,7 @@ def contours(sweep: Sweep, curve: SpeedCurve) -> tuple[Contour, ...]:
         Empty where the closed forms do not hold: other axes, beads that stick or are rough, a
         tray too dense, or a curve that does not fall.
     """
-    plan = json.loads(sweep.question)
+    plan = json.loads(sweep.specification)
     settings = plan['settings']
     names = {axis.name for axis in sweep.axes}
     other_name = next(iter(names - {_BEADS}), '')

@@ -140,7 +140,7 @@ def _mark(axes: Axes, sweep: Sweep, values: NDArray[np.float64], curve: SpeedCur
 
 def _held(sweep: Sweep) -> str:
     """Tray and walls, where they do not vary."""
-    settings = json.loads(sweep.question)['settings']
+    settings = json.loads(sweep.specification)['settings']
     names = {'tray': 'tray', 'wall_restitution': 'walls'}
     varied = {axis.name for axis in sweep.axes}
     held = [f'{text} {settings[name]:g}' for name, text in names.items() if name not in varied]

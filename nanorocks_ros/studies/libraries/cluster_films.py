@@ -90,7 +90,7 @@ class ClusterPlan:
     strengths: tuple[float, float] = (0.0, 1.5)
     moments: int = len(TIMES)
 
-    def question(self) -> str:
+    def specification(self) -> str:
         """Everything that the curves depend on, as a JSON object."""
         keys = {str(number): json.loads(curve_key(self.cells[number])) for number in self.trays}
         return json.dumps(

@@ -77,12 +77,12 @@ def build_curves(
         )
     workers = workers or Workers()
     workers.check()
-    with resumed_journal(output, plan.question(), notice) as journal:
+    with resumed_journal(output, plan.specification(), notice) as journal:
         tasks = {str(run): _Run(plan=plan, run=run) for run in range(plan.runs)}
         fill_journal(journal, film_run, tasks, workers, progress)
         samples = [journal.read(str(run))[_SAMPLES] for run in range(plan.runs)]
         trays = {number: plan.cells[number] for number in plan.trays}
-        arrays = as_arrays(trays, plan.level, np.concatenate(samples), plan.question())
+        arrays = as_arrays(trays, plan.level, np.concatenate(samples), plan.specification())
         write_archive(output, arrays)
     load_curves.cache_clear()
     return load_curves(str(output), packaged=False)

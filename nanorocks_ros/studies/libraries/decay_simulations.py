@@ -63,7 +63,7 @@ class LibraryPlan:
     runs: int
     seed: int = 1
 
-    def question(self) -> str:
+    def specification(self) -> str:
         """Everything that the library depends on, as a JSON object."""
         return json.dumps(
             {
@@ -129,9 +129,9 @@ def build_library(
         )
     workers = workers or Workers()
     workers.check()
-    with resumed_journal(output, plan.question(), notice) as journal:
+    with resumed_journal(output, plan.specification(), notice) as journal:
         fill_journal(journal, cool_nodes, _tasks(plan), workers, progress)
-        library = fit_library(plan.tray, _decays(plan, journal), plan.question())
+        library = fit_library(plan.tray, _decays(plan, journal), plan.specification())
         write_archive(output, library.arrays())
     return library
 

@@ -125,7 +125,7 @@ class SweepPlan:
         offset = 0 if self.common_random_numbers else point << 32
         return [offset + run for run in range(first, last)]
 
-    def question(self) -> str:
+    def specification(self) -> str:
         """Everything that the result depends on, as a JSON object."""
         return json.dumps(
             {

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 CURVES = ('mean_speed', 'mean_speed_error', 'mean_projected_speed', 'mean_projected_speed_error')
 _RUNS = ('run_mean_speed', 'run_mean_projected_speed')
-_QUESTION, _TIMES, _AXIS = 'question', 'times', 'axis_'
+_SPECIFICATION, _TIMES, _AXIS = 'question', 'times', 'axis_'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,7 @@ class Sweep:
         Since the shaking event.
     runs : int
         Runs at every point.
-    question : str
+    specification : str
         JSON object with everything that the numbers depend on: version, settings with the seed,
         axes, times, runs, trays.
     mean_speed, mean_projected_speed : ndarray (*grid, n_times), [m/s]
@@ -56,7 +56,7 @@ class Sweep:
     axes: tuple[Axis, ...]
     times: NDArray[np.float64]
     runs: int
-    question: str
+    specification: str
     mean_speed: NDArray[np.float64]
     mean_speed_error: NDArray[np.float64]
     mean_projected_speed: NDArray[np.float64]
@@ -90,8 +90,10 @@ class Sweep:
             When the file cannot be written.
         """
         axes = {f'{_AXIS}{axis.name}': np.array(axis.values) for axis in self.axes}
-        question = np.array(self.question)
-        write_archive(path, {_QUESTION: question, **axes, _TIMES: self.times, **self._arrays()})
+        specification = np.array(self.specification)
+        write_archive(
+            path, {_SPECIFICATION: specification, **axes, _TIMES: self.times, **self._arrays()}
+        )
 
     @classmethod
     def load(cls, path: Path) -> Sweep:
@@ -104,16 +106,16 @@ class Sweep:
         """
         arrays = read_archive(path)
         try:
-            question = str(arrays[_QUESTION])
-            asked = json.loads(question)
+            specification = str(arrays[_SPECIFICATION])
+            plan = json.loads(specification)
             axes = tuple(
-                Axis(name=name, values=tuple(values)) for name, values in asked['axes'].items()
+                Axis(name=name, values=tuple(values)) for name, values in plan['axes'].items()
             )
             sweep = cls(
                 axes=axes,
                 times=arrays[_TIMES],
-                runs=asked['runs'],
-                question=question,
+                runs=plan['runs'],
+                specification=specification,
                 **{name: arrays[name] for name in (*CURVES, *COUNTS)},
                 **{name: arrays[name] for name in _RUNS if name in arrays},
             )

@@ -86,7 +86,7 @@ def sweep(
     workers.check()
     with nullcontext() if output else TemporaryDirectory(prefix='nanorocks_sweep.') as scratch:
         folder = parts_folder(output) if output else Path(str(scratch))
-        with Journal(folder, plan.question()) as journal:
+        with Journal(folder, plan.specification()) as journal:
             work = _MissingRuns(plan, journal, progress or (lambda done, total: None))
             try:
                 work.run(workers, notice or (lambda text: None))
@@ -114,8 +114,8 @@ def _existing_result(plan: SweepPlan, output: Path) -> Sweep | None:
         existing = Sweep.load(output)
     except RecordingError as error:
         raise RecordingError(str(output), 'exists and holds no sweep', remedy) from error
-    if existing.question != plan.question():
-        text = difference(existing.question, plan.question())
+    if existing.specification != plan.specification():
+        text = difference(existing.specification, plan.specification())
         raise RecordingError(str(output), f'holds another sweep ({text})', remedy)
     if plan.keep_runs and existing.run_mean_speed is None:
         raise RecordingError(str(output), 'holds no single runs', remedy)
@@ -210,7 +210,7 @@ def assemble(plan: SweepPlan, journal: Journal) -> Sweep:
         axes=plan.axes,
         times=np.array(plan.times),
         runs=plan.runs,
-        question=plan.question(),
+        specification=plan.specification(),
         **arrays,
     )
 

@@ -45,7 +45,7 @@ def test_a_sweep_prints_curves_and_writes_them(tmp_path, capsys):
         np.testing.assert_array_equal(printed[name], getattr(sweep, name))
     total = int(sweep.pair_collisions.sum() + sweep.wall_collisions.sum())
     assert printed['events'] == total > 0
-    assert json.loads(sweep.question)['settings']['mean_speed'] == 0.01
+    assert json.loads(sweep.specification)['settings']['mean_speed'] == 0.01
     with table.open(newline='') as stream:
         lines = list(csv.DictReader(stream))
     assert len(lines) == 3 * 2 * 3

@@ -41,7 +41,7 @@ def assert_same(actual, expected):
     for name in (*CURVES, *COUNTS, 'times'):
         np.testing.assert_array_equal(getattr(actual, name), getattr(expected, name), strict=True)
     assert actual.axes == expected.axes
-    assert actual.question == expected.question
+    assert actual.specification == expected.specification
 
 
 def interrupted(output, *, after, plan=PLAN):
@@ -147,9 +147,9 @@ def test_what_is_saved_is_read_back(tmp_path, straight):
     assert_same(loaded, straight)
     np.testing.assert_array_equal(loaded.run_mean_speed, straight.run_mean_speed)
     assert not parts_folder(path).exists()
-    asked = json.loads(loaded.question)
-    assert asked['settings']['seed'] == 7
-    assert asked['axes'] == {name: list(values) for name, values in AXES.items()}
+    specification = json.loads(loaded.specification)
+    assert specification['settings']['seed'] == 7
+    assert specification['axes'] == {name: list(values) for name, values in AXES.items()}
     with np.load(path) as plain:
         assert plain['axis_restitution'].tolist() == [0.7, 0.8, 0.9]
 
@@ -255,7 +255,7 @@ def test_a_damaged_part_is_told_and_made_again(tmp_path, straight):
 def test_a_folder_in_use_is_refused(tmp_path):
     output = tmp_path / 'a.npz'
     folder = parts_folder(output)
-    with Journal(folder, PLAN.question()) as journal:
+    with Journal(folder, PLAN.specification()) as journal:
         journal.write('0-1', cool(RunRange(plan=PLAN, first=0, last=1)))
         with pytest.raises(RecordingError, match=r'a.npz.parts: is in use by another process'):
             sweep(PLAN, output, HERE)
