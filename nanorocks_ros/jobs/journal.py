@@ -13,7 +13,7 @@ import numpy as np
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.folder_lock import LOCK, lock_folder
-from nanorocks_ros.outputs.atomic_files import write_whole
+from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.npz_archive import Arrays, read_archive, write_archive
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class Journal:
     def _check_specification(self, specification: str) -> None:
         path = self.folder / SPECIFICATION
         if not self.keys():
-            write_whole(path, specification.encode())
+            write_bytes(path, specification.encode())
             return
         try:
             earlier = path.read_text(encoding='utf-8')

@@ -70,7 +70,7 @@ def _check_target(path: Path, *, folder: bool, force: bool) -> None:
 
 
 @contextmanager
-def whole_file(path: Path, error_type: type[NanorocksError] = RecordingError) -> Iterator[Path]:
+def atomic_file(path: Path, error_type: type[NanorocksError] = RecordingError) -> Iterator[Path]:
     """Write a file under a temporary name and rename it once it is complete.
 
     Parameters
@@ -109,7 +109,7 @@ def whole_file(path: Path, error_type: type[NanorocksError] = RecordingError) ->
         ) from error
 
 
-def write_whole(path: Path, content: bytes) -> None:
+def write_bytes(path: Path, content: bytes) -> None:
     """Write bytes to a file, complete or not at all.
 
     Raises
@@ -117,5 +117,5 @@ def write_whole(path: Path, content: bytes) -> None:
     RecordingError
         When the file cannot be written.
     """
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_bytes(content)

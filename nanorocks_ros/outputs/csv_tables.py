@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -38,7 +38,7 @@ def write_csv(
     """
     path = Path(path)
     header = [f'{field} [{unit}]' for field, unit in zip(fields, units, strict=True)]
-    with whole_file(path) as part, part.open('w', encoding='utf-8', newline='') as stream:
+    with atomic_file(path) as part, part.open('w', encoding='utf-8', newline='') as stream:
         table = csv.writer(stream, lineterminator='\n')
         table.writerow(header)
         table.writerows(_checked(path, rows, len(fields)))

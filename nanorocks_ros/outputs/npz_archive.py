@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import NanorocksError, RecordingError
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -55,7 +55,7 @@ def write_archive(
         Of `error_type`, when the file cannot be written.
     """
     # A stream, since numpy appends .npz to names that end otherwise.
-    with whole_file(path, error_type) as part, part.open('wb') as stream:
+    with atomic_file(path, error_type) as part, part.open('wb') as stream:
         np.savez(stream, **dict(arrays))  # type: ignore[arg-type]  # a name is never allow_pickle
 
 

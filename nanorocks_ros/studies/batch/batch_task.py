@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.errors import NanorocksError, RecordingError, UnwritableError
-from nanorocks_ros.outputs.atomic_files import write_whole
+from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.outputs.npz_archive import Arrays, write_archive
 from nanorocks_ros.outputs.safe_text import shown
@@ -158,7 +158,7 @@ def _analysed(task: BagTask) -> BagOutcome:
         for number, tray in summary['trays'].items():
             tray['by_cycle'] = _cycles(folder, int(number))
         write_archive(folder / EVIDENCE, _evidence(analysis))
-        write_whole(folder / SUMMARY, json.dumps(summary, allow_nan=False).encode())
+        write_bytes(folder / SUMMARY, json.dumps(summary, allow_nan=False).encode())
 
     write_results(analysis, task.folder, task.path, task.settings, more=more)
     return replace(_outcome(summary, files), frames=analysis.frames)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 
 mpl.use('Agg')
 from matplotlib.figure import Figure
@@ -44,7 +44,7 @@ def area_figure(path: Path, fits: Mapping[int, AreaFit]) -> None:
     panels = figure.subplots(1, len(fits), squeeze=False)[0]
     for axes, (number, fit) in zip(panels, sorted(fits.items()), strict=True):
         _draw(axes, number, fit)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=_DPI)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,5 +48,5 @@ def write_parameters(path: Path, fit: AreaFit, settings: PipelineSettings, remar
         '    speed:',
         *(f'      {name}: {value}' for name, value in values.items()),
     ]
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_text('\n'.join(lines) + '\n', encoding='utf-8')

@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 
 from nanorocks_ros.inference.decay.instantaneous_restitution import instantaneous_cor
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.physics.confined_theory import confined_gas
 from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED
@@ -85,7 +85,7 @@ def instantaneous_figure(
         + (f'mean over {len(cycles)} cycles' if len(cycles) > 1 else 'one cycle'),
         fontsize=10,
     )
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
     return cor
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.outputs.json_values import finite_or_none, json_values
 
 mpl.use('Agg')
@@ -80,7 +80,7 @@ def long_term_figure(path: Path, campaign: Campaign) -> None:
     cors.set_xlabel('cycle')
     cors.set_xlim(0.5, campaign.places + 0.5)
     cors.xaxis.set_major_locator(MaxNLocator(integer=True))
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
 
 

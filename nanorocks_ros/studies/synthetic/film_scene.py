@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 
 from nanorocks_ros import __version__
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.recordings.bag.offered_topics import offered
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import (
@@ -96,8 +96,7 @@ class SceneRecorder:
         """
         moment = self._film().at(self.frames - 1, START_NS)
         _, content = cv2.imencode('.png', moment.frame.image, [cv2.IMWRITE_PNG_COMPRESSION, 9])
-        with whole_file(path) as part:
-            part.write_bytes(content.tobytes())
+        write_bytes(path, content.tobytes())
 
     def into_video(self, path: Path, progress: Progress) -> None:
         """Write a video.

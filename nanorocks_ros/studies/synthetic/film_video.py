@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros import __version__
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.recordings.film.pyav import pyav
 from nanorocks_ros.simulation.tray_camera.tray_film import film
 from nanorocks_ros.simulation.tray_camera.tray_renderer import RIM
@@ -132,7 +132,7 @@ def images_into_video(
         When the video cannot be written.
     """
     kind = _h264 if path.suffix == '.mp4' else _motion_jpeg
-    with whole_file(path) as part, kind(part, settings) as write:
+    with atomic_file(path) as part, kind(part, settings) as write:
         for done, image in enumerate(images, start=1):
             write(image)
             progress(done, frames)

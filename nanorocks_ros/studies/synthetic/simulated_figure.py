@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.studies.synthetic.simulated_plan import shown_times
 
 mpl.use('Agg')
@@ -65,7 +65,7 @@ def simulated_figure(path: Path, simulated: SimulatedRuns) -> None:
     trays = panels[0].subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     _draw_trays(trays, simulated, shown_indices)
     _draw_decay(panels[1].subplots(), simulated, shown_indices)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.outputs.parquet import Column, write_parquet
 from nanorocks_ros.simulation.initial_state import stock
 
@@ -131,7 +131,7 @@ def _bead_arrays(simulated: SimulatedRuns) -> dict[str, Callable[[], Any]]:
 
 def _write_arrays(path: Path, arrays: dict[str, Callable[[], Any]]) -> None:
     """Write an ``.npz`` file that ``numpy.load`` reads, the same bytes for the same arrays."""
-    with whole_file(path) as part, zipfile.ZipFile(part, 'w') as archive:
+    with atomic_file(path) as part, zipfile.ZipFile(part, 'w') as archive:
         for name, make in arrays.items():
             # A `ZipInfo` made from the name alone has no date.
             member = zipfile.ZipInfo(f'{name}.npy')
