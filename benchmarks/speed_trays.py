@@ -18,7 +18,7 @@ import numpy as np
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import View
-from nanorocks_ros.jobs.worker_processes import finished_in_processes
+from nanorocks_ros.jobs.worker_processes import run_in_processes
 from nanorocks_ros.records import Frame, Quality, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.settings import (
     PipelineSettings,
@@ -94,7 +94,7 @@ def report() -> None:
     # The longest first, so that no process is left with one at the end.
     longest_first = sorted(tasks, key=lambda one: -one.seconds * (1 + one.effects))
     named = {str(task): task for task in longest_first}
-    found = dict(finished_in_processes(_compared, named, _PROCESSES))
+    found = dict(run_in_processes(_compared, named, _PROCESSES))
     for effects in (False, True):
         _print(effects, [found[str(task)] for task in tasks if task.effects is effects])
 

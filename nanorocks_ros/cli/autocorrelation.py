@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
@@ -71,10 +72,7 @@ def run(options: argparse.Namespace) -> int:
 def _print(found: BagClusters, *, as_json: bool) -> None:
     ends = {number: _end(tray) for number, tray in found.trays.items()}
     if as_json:
-        shown = {
-            str(number): {name: _known(value) for name, value in end.items()}
-            for number, end in ends.items()
-        }
+        shown = {str(number): json_values(end) for number, end in ends.items()}
         print(json.dumps({'cycle': found.cycle, 'trays': shown}, allow_nan=False))
         return
     for number, end in ends.items():
@@ -111,7 +109,3 @@ def _end(tray: CycleClusters) -> dict[str, Any]:
         'paper_onset': tray.paper_onset(),
         'true_onset': tray.true_onset(),
     }
-
-
-def _known(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value

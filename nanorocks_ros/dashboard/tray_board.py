@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 from typing import Any
 
+from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.records import (
     ArrayRecord,
     CorEstimate,
@@ -251,4 +252,4 @@ def as_fields(record: ArrayRecord) -> dict[str, Any]:
 
 def _number(value: float) -> float | None:
     # Stamps in seconds need the milliseconds, up to a day.
-    return float(f'{value:.9g}') if math.isfinite(value) else None
+    return finite_or_none(float(f'{value:.9g}'))

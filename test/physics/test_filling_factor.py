@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hexagonal_discs import hexagonal_patch
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from scipy.spatial import ConvexHull, QhullError
@@ -19,9 +20,7 @@ from nanorocks_ros.physics.filling_factor import (
     PAPER_CLUSTER_SIZES,
     PAPER_COMPACTION,
     RANDOM_CLOSE_PACKING,
-    SQUARE_LAYER,
     filling_of_height,
-    hexagonal_patch,
     hull_area,
     layer_filling,
     least_hull_area,
@@ -50,10 +49,9 @@ def test_the_numbers_of_the_paper_are_those_printed():
         assert PAPER['table3_clusters']['rows'][str(tray)][1] == size
 
 
-def test_a_hexagonal_layer_fills_0_605_and_a_square_one_0_524():
-    # One bead in its cell: a hexagon of inner radius R, a square of side 2R, both 2R high.
+def test_a_hexagonal_layer_fills_0_605():
+    # One bead in its cell: a hexagon of inner radius R, 2R high.
     assert pytest.approx(VOLUME / (2 * math.sqrt(3) * R**2 * 2 * R)) == HEXAGONAL_LAYER
-    assert pytest.approx(VOLUME / (2 * R) ** 3) == SQUARE_LAYER
     assert pytest.approx(0.6046, abs=5e-5) == HEXAGONAL_LAYER
 
 
@@ -188,7 +186,6 @@ def test_turning_moving_and_scaling_a_cluster_changes_nothing():
         lambda: paper_cluster_filling(3, VOLUME, math.nan, R),
         lambda: hull_area(np.zeros((2, 3)), np.full(2, R)),
         lambda: hull_area(np.array([[math.inf, 0.0]]), np.array([R])),
-        lambda: hexagonal_patch(0, R),
         lambda: filling_of_height(np.array([R]), 1e-6, -1.0),
     ],
 )

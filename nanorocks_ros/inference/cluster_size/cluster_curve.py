@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import json
 import math
-import zipfile
 from functools import lru_cache
-from importlib import resources
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.inference.calibration_archives import load_archive
 from nanorocks_ros.inference.cluster_size.curve_fit import fit_curve
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -84,24 +83,16 @@ def load_curves(name: str, *, packaged: bool) -> Mapping[str, ClusterCurve]:
     ConfigurationError
         When it cannot be read.
     """
-    remedy = 'make it again with `nanorocks cluster-curve`'
-    source: Any = resources.files(__package__).joinpath(name) if packaged else Path(name)
-    try:
-        with source.open('rb') as stream, np.load(stream, allow_pickle=False) as arrays:
-            return _curves(arrays)
-    except FileNotFoundError as error:
-        raise ConfigurationError(
-            name, 'there is no such calibration of cluster sizes', remedy
-        ) from error
-    except OSError as error:
-        raise ConfigurationError(name, f'cannot be read ({error.strerror})', remedy) from error
-    except (ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
-        raise ConfigurationError(
-            name, 'is damaged, or no calibration of cluster sizes', remedy
-        ) from error
+    return load_archive(
+        name,
+        __package__ if packaged else None,
+        _curves_from_arrays,
+        kind='calibration of cluster sizes',
+        command='nanorocks cluster-curve',
+    )
 
 
-def _curves(arrays: Mapping[str, NDArray[Any]]) -> dict[str, ClusterCurve]:
+def _curves_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, ClusterCurve]:
     if int(arrays['format']) != _FORMAT:
         raise ValueError('of another release')
     samples, level = arrays['samples'], float(arrays['level'])

@@ -16,19 +16,18 @@ first, so that near zero loss the rate rises steeply.
 from __future__ import annotations
 
 import json
-import zipfile
 from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
-from importlib import resources
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.inference.calibration_archives import load_archive
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Mapping
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -129,20 +128,15 @@ class DecayLibrary:
             found[:, k] -= np.log1p(rate * distance)
         return found
 
-    def save(self, write: Callable[[dict[str, NDArray[Any]]], None]) -> None:
-        """Hand the arrays to something that writes them into an ``.npz`` file."""
-        arrays: dict[str, NDArray[Any]] = {
-            name: np.asarray(getattr(self, name)) for name in _ARRAYS
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Arrays of the library file, by name."""
+        return {
+            **{name: np.asarray(getattr(self, name)) for name in _ARRAYS},
+            'covariance': self.covariance.astype(np.float32),
+            'format': np.array(_FORMAT),
+            'tray': np.array(self.tray),
+            'made_by': np.array(self.made_by),
         }
-        arrays['covariance'] = self.covariance.astype(np.float32)
-        write(
-            {
-                **arrays,
-                'format': np.array(_FORMAT),
-                'tray': np.array(self.tray),
-                'made_by': np.array(self.made_by),
-            }
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -240,7 +234,7 @@ def library_of(tray: Tray, path: str | Path = '') -> DecayLibrary:
     ConfigurationError
         When it cannot be read, or was made for another tray.
     """
-    library = load_library(str(path) or f'tray_{tray.number}.npz', packaged=not path)
+    library = load_library(str(path) or f'libraries/tray_{tray.number}.npz', packaged=not path)
     if library.tray != tray_key(tray):
         where = str(path) or f'tray {tray.number}'
         raise ConfigurationError(
@@ -267,35 +261,24 @@ def load_library(name: str, *, packaged: bool) -> DecayLibrary:
     ConfigurationError
         When it cannot be read.
     """
-    remedy = 'make it again with `nanorocks library`'
-    try:
-        if packaged:
-            source = resources.files(__package__).joinpath('libraries', name)
-            with source.open('rb') as stream:
-                arrays = _arrays(stream)
-        else:
-            with Path(name).open('rb') as stream:
-                arrays = _arrays(stream)
-    except FileNotFoundError as error:
-        raise ConfigurationError(name, 'there is no such decay library', remedy) from error
-    except OSError as error:
-        raise ConfigurationError(name, f'cannot be read ({error.strerror})', remedy) from error
-    except (ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
-        raise ConfigurationError(name, 'is damaged, or no decay library', remedy) from error
+    return load_archive(
+        name,
+        __package__ if packaged else None,
+        _library_from_arrays,
+        kind='decay library',
+        command='nanorocks library',
+    )
+
+
+def _library_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> DecayLibrary:
+    if int(arrays['format']) != _FORMAT or len(arrays['coefficients']) != term_count():
+        raise ValueError('of another release')
     return DecayLibrary(
         tray=str(arrays['tray']),
         made_by=str(arrays['made_by']),
         misfit=float(arrays['misfit']),
-        **{one: arrays[one].astype(np.float64) for one in _ARRAYS if one != 'misfit'},
+        **{name: arrays[name].astype(np.float64) for name in _ARRAYS if name != 'misfit'},
     )
-
-
-def _arrays(stream: Any) -> dict[str, NDArray[Any]]:
-    with np.load(stream, allow_pickle=False) as found:
-        arrays = {name: found[name] for name in (*_ARRAYS, 'format', 'tray', 'made_by')}
-    if int(arrays['format']) != _FORMAT or len(arrays['coefficients']) != term_count():
-        raise ValueError('of another release')
-    return arrays
 
 
 def term_count() -> int:

@@ -60,10 +60,6 @@ class Line(NamedTuple):
         """Place at a time, (2,), [m]."""
         return self.place + self.velocity * (time - self.time)
 
-    def variance_at(self, time: float) -> float:
-        """Variance of a coordinate of that place, [m^2]."""
-        return self.place_variance + self.velocity_variance * (time - self.time) ** 2
-
 
 @compiled
 def _chi_square(sums: NDArray[np.float64], first: int, end: int) -> float:
@@ -212,8 +208,3 @@ def when_met(lines: NDArray[np.float64]) -> tuple[float, float, float]:
         time += step
         error, chi_square = 1.0 / math.sqrt(bottom), max(rest - top * step, 0.0)
     return time, error, chi_square
-
-
-def meeting(pairs: list[tuple[Line, Line]]) -> Meeting:
-    """The instant at which the lines before and after agree best on where the beads are."""
-    return Meeting(*when_met(np.array([[before.row, after.row] for before, after in pairs])))

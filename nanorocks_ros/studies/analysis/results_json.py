@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.records import ClusterEstimate, CorEstimate, CorStatus
 from nanorocks_ros.wire.array_layouts import NS, layout
 from nanorocks_ros.wire.flat_records import flat_value
@@ -38,11 +38,7 @@ _SPECIES_DECAYS = tuple(
 
 def _elements(record: ArrayRecord, names: Iterable[str]) -> dict[str, float | None]:
     """Elements of the array of a record, None where one is not known."""
-    return {name: _known(flat_value(record, name)) for name in names}
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    return {name: finite_or_none(flat_value(record, name)) for name in names}
 
 
 def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
@@ -121,7 +117,8 @@ def _series_as_json(results: TrayResults, epoch_ns: int) -> dict[str, Any]:
     return {
         'time': [(speed.stamp_ns - epoch_ns) / NS for speed in results.speeds],
         **{
-            name: [_known(flat_value(speed, name)) for speed in results.speeds] for name in _SPEEDS
+            name: [finite_or_none(flat_value(speed, name)) for speed in results.speeds]
+            for name in _SPEEDS
         },
         'method': [speed.method.name.lower() for speed in results.speeds],
         'quality': [speed.quality.names() for speed in results.speeds],
@@ -159,13 +156,13 @@ def _cycle_as_json(
         **_elements(cor, _RESTITUTIONS),
         'rebounds': cor.rebounds,
         'collisions': cor.collisions,
-        'tension': _known(cor.tension),
+        'tension': finite_or_none(cor.tension),
         'quality': int(cor.quality),
         **_elements(cor, ('window_start', 'window_end', 'cooling_start')),
         **_elements(cor, _SPECIES_DECAYS),
         'relation': cor.relation.name.lower(),
         'status': cor.status.name.lower(),
-        'reduced_chi_square': _known(cor.reduced_chi_square),
+        'reduced_chi_square': finite_or_none(cor.reduced_chi_square),
         'samples': cor.samples,
         **_clusters_as_json(clusters),
     }
@@ -176,15 +173,15 @@ def _clusters_as_json(last: ClusterEstimate | None) -> dict[str, Any]:
     if last is None:
         return dict.fromkeys(('cluster_size', 'bodies', 'onset', 'sticking_speed'))
     return {
-        'cluster_size': _known(last.combined_size.value),
-        'cluster_size_error': _known(last.combined_size.error),
-        'bodies': _known(last.bodies.value),
-        'bodies_error': _known(last.bodies.error),
-        'onset': _known(last.onset),
+        'cluster_size': finite_or_none(last.combined_size.value),
+        'cluster_size_error': finite_or_none(last.combined_size.error),
+        'bodies': finite_or_none(last.bodies.value),
+        'bodies_error': finite_or_none(last.bodies.error),
+        'onset': finite_or_none(last.onset),
         'sticking_status': last.sticking_status.name.lower(),
-        'sticking_speed': _known(last.sticking_speed.value),
-        'sticking_speed_lower': _known(last.sticking_speed.lower),
-        'sticking_speed_upper': _known(last.sticking_speed.upper),
+        'sticking_speed': finite_or_none(last.sticking_speed.value),
+        'sticking_speed_lower': finite_or_none(last.sticking_speed.lower),
+        'sticking_speed_upper': finite_or_none(last.sticking_speed.upper),
     }
 
 

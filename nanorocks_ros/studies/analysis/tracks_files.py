@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros import __version__
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.outputs.parquet import Column, write_parquet
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def write_tracks(path: Path, found: TrackedBag) -> None:
     if path.suffix == '.parquet':
         write_parquet(path, COLUMNS, _pieces(found), _provenance(found))
         return
-    with whole_file(path) as part, part.open('w', encoding='utf-8', newline='') as stream:
+    with atomic_file(path) as part, part.open('w', encoding='utf-8', newline='') as stream:
         units = ', '.join(f'{column.name} [{column.unit}]' for column in COLUMNS if column.unit)
         stream.write(f'# {units}\n')
         writer = csv.writer(stream, lineterminator='\n')

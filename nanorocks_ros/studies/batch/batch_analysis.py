@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.jobs.tasks import as_finished_apart
+from nanorocks_ros.jobs.tasks import as_completed_isolated
 from nanorocks_ros.outputs.safe_text import shown
 from nanorocks_ros.pipeline.composition import Pipeline
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
@@ -201,7 +201,7 @@ def _run(store: BatchStore, tasks: dict[str, BagTask], workers: Workers, watcher
     def lost(name: str, what: str) -> BagOutcome:
         return BagOutcome(state=FAILED, reason=f'{shown(tasks[name].path)}: {what}')
 
-    with closing(as_finished_apart(analyse_bag, ordered, workers, lost)) as outcomes:
+    with closing(as_completed_isolated(analyse_bag, ordered, workers, lost)) as outcomes:
         for name, outcome in outcomes:
             store.finish(name, outcome)
             if outcome.state == UNWRITTEN:

@@ -9,7 +9,7 @@ import matplotlib as mpl
 import numpy as np
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.studies.decays.cooling_curves import read_cycles
 
@@ -69,7 +69,7 @@ def decays_figure(path: Path, folders: Sequence[Path], trays: Sequence[TrayMeans
     for axes in panels[max(len(found) - columns, 0) : len(found)]:
         axes.set_xlabel('time since the shaking event [s]')
         axes.tick_params(labelbottom=True)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
     return True
 

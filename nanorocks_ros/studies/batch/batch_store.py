@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.jobs.folder_lock import hold_folder
-from nanorocks_ros.outputs.npz_archive import write_whole
+from nanorocks_ros.jobs.folder_lock import lock_folder
+from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.safe_text import shown
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.settings import rows
@@ -86,7 +86,7 @@ class BatchStore:
         self.entries: dict[Path, Entry] = {}
         self._by_task: dict[str, Entry] = {}
         self._check_place()
-        self._lock = hold_folder(self.folder, _MARK)
+        self._lock = lock_folder(self.folder, _MARK)
         try:
             self._known = self._read()
             for name in (BAGS, _NOTES):
@@ -226,7 +226,7 @@ class BatchStore:
             'settings': {row.name: row.default for row in rows(self._settings)},
             'bags': [_as_json(entry) for entry in {**self._known, **self.entries}.values()],
         }
-        write_whole(self.folder / MANIFEST, json.dumps(content, indent=1).encode())
+        write_bytes(self.folder / MANIFEST, json.dumps(content, indent=1).encode())
 
     def _read(self) -> dict[Path, Entry]:
         path = self.folder / MANIFEST

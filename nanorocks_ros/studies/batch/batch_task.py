@@ -13,7 +13,9 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.errors import NanorocksError, RecordingError, UnwritableError
-from nanorocks_ros.outputs.npz_archive import Arrays, write_archive, write_whole
+from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.outputs.json_values import json_values
+from nanorocks_ros.outputs.npz_archive import Arrays, write_archive
 from nanorocks_ros.outputs.safe_text import shown
 from nanorocks_ros.recordings.bag.fingerprint import FileState, content_hash, file_states
 from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleSummary, cycles_of
@@ -156,7 +158,7 @@ def _analysed(task: BagTask) -> BagOutcome:
         for number, tray in summary['trays'].items():
             tray['by_cycle'] = _cycles(folder, int(number))
         write_archive(folder / EVIDENCE, _evidence(analysis))
-        write_whole(folder / SUMMARY, json.dumps(summary, allow_nan=False).encode())
+        write_bytes(folder / SUMMARY, json.dumps(summary, allow_nan=False).encode())
 
     write_results(analysis, task.folder, task.path, task.settings, more=more)
     return replace(_outcome(summary, files), frames=analysis.frames)
@@ -219,19 +221,12 @@ def _cycles(folder: Path, tray: int) -> dict[str, list[dict[str, Any]]]:
     for measure in SIZE_MEASURES:
         cycles = cycles_of(folder, tray, measure)
         if measure is SIZE_MEASURES[-1] or _any_size(cycles):
-            found[measure.column] = [_finite(cycle) for cycle in cycles]
+            found[measure.column] = [json_values(asdict(cycle)) for cycle in cycles]
     return found
 
 
 def _any_size(cycles: list[CycleSummary]) -> bool:
     return any(np.isfinite(cycle.cluster_size) for cycle in cycles)
-
-
-def _finite(cycle: CycleSummary) -> dict[str, Any]:
-    return {
-        name: None if isinstance(value, float) and not np.isfinite(value) else value
-        for name, value in asdict(cycle).items()
-    }
 
 
 def _evidence(analysis: Analysis) -> Arrays:

@@ -6,13 +6,12 @@ import math
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from nanorocks_ros.errors import FitError, RecordingError
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.inference.cycle_likelihoods import Evidence
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
 from nanorocks_ros.numerics.sample_mean import mean_of
+from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.outputs.npz_archive import read_archive
 from nanorocks_ros.pipeline.composition import TrayStages, trays_of
 from nanorocks_ros.records import Quality
@@ -287,30 +286,26 @@ def means_as_json(one: TrayMeans) -> dict[str, Any]:
     values = asdict(mean) if mean is not None else {}
     for name in names:
         unknown = mean is None or (vague and name in ('restitution', 'restitution_error'))
-        found[name] = None if unknown else _known(values[name])
+        found[name] = None if unknown else finite_or_none(float(values[name]))
     found |= {
         'cycles_read': mean.cycles if mean else 0,
-        'tension': _known(mean.tension) if mean else None,
+        'tension': finite_or_none(mean.tension) if mean else None,
         'rebounds': mean.rebounds if mean else 0,
         'collisions': mean.collisions if mean else 0,
     }
     sticking = one.sticking
     found |= {
         'sticking_status': sticking.status.name.lower() if sticking else None,
-        'sticking_speed': _known(sticking.sticking_speed) if sticking else None,
-        'sticking_speed_lower': _known(sticking.lower) if sticking else None,
-        'sticking_speed_upper': _known(sticking.upper) if sticking else None,
+        'sticking_speed': finite_or_none(sticking.sticking_speed) if sticking else None,
+        'sticking_speed_lower': finite_or_none(sticking.lower) if sticking else None,
+        'sticking_speed_upper': finite_or_none(sticking.upper) if sticking else None,
         'merges': sticking.merges if sticking else None,
     }
     for name, value in one.means.items():
         found |= {
-            f'mean_{name}': _known(value.mean),
-            f'mean_{name}_error': _known(value.error),
-            f'{name}_scatter': _known(value.scatter),
+            f'mean_{name}': finite_or_none(value.mean),
+            f'mean_{name}_error': finite_or_none(value.error),
+            f'{name}_scatter': finite_or_none(value.scatter),
             f'{name}_cycles': value.cycles,
         }
     return found
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

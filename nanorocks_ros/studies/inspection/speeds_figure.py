@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.studies.inspection.speed_comparison import AUTO, METHODS
 from nanorocks_ros.wire.array_layouts import NS
 
@@ -74,7 +74,7 @@ def speeds_figure(path: Path, found: BagSpeeds, cycle: int) -> None:
     for axes in rows[-1]:
         axes.set_xlabel(f'time {since} [s]')
     rows[0, 0].legend(frameon=False, fontsize=8)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=_DPI)
 
 

@@ -1,4 +1,4 @@
-"""What is generated: the pages on the wire, on parameters and viewers, and the viewers' layouts.
+"""Pages of the documentation that are generated: topics and array layouts, parameters.
 
 ``python -m nanorocks_ros.tools.docs_pages.wire_pages`` writes them; a test fails when they are
 stale.
@@ -11,10 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import settings as st
-from nanorocks_ros.tools.viewer_layouts.foxglove import foxglove
-from nanorocks_ros.tools.viewer_layouts.plotjuggler import plotjuggler
-from nanorocks_ros.tools.viewer_layouts.rviz import rviz
-from nanorocks_ros.tools.viewer_layouts.viewers_page import viewers_page
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import layout
 from nanorocks_ros.wire.bead_truth import beads_layout
@@ -171,10 +167,6 @@ def _range(row: st.SettingRow) -> str:
 FILES = {
     'docs/reference/topics.md': topics_page,
     'docs/reference/parameters.md': parameters_page,
-    'docs/use/viewers.md': lambda: _NOTE + viewers_page(),
-    'foxglove/nanorocks.json': foxglove,
-    'rviz/nanorocks.rviz': rviz,
-    'plotjuggler/nanorocks.xml': plotjuggler,
 }
 
 

@@ -272,7 +272,7 @@ def test_a_worker_that_is_killed_costs_its_own_bag_and_no_other(tiny, tmp_path):
     watcher = Watcher(when_begun=kill_one)
     batch, _ = batch_of(tmp_path / 'out', *bags, watcher=watcher, workers=2)
     (failure,) = batch.failed
-    assert 'was killed, for lack of memory perhaps' in failure.reason
+    assert 'was killed, perhaps for lack of memory' in failure.reason
     assert len(batch.results) == 1
 
 

@@ -45,9 +45,9 @@ def test_it_goes_through_the_speeds_and_its_intervals_hold_the_truth(cycles):
 
 
 def test_it_says_of_a_cycle_what_the_stage_says(cycles):
-    one = cycles[0]
+    cycle = cycles[0]
     stage = HaffFitter(PipelineSettings(), TRAY)
-    for time, speed in zip(one.times, one.speed, strict=True):
+    for time, speed in zip(cycle.times, cycle.speed, strict=True):
         stage.push(
             SpeedEstimate(
                 stamp_ns=round(time * NS),
@@ -62,7 +62,7 @@ def test_it_says_of_a_cycle_what_the_stage_says(cycles):
         if time > 19.95:
             break
     (final,) = stage.flush()
-    decay = library_decay(TRAY, [one], mean_cycle([one], 1.75, 20.0))
+    decay = library_decay(TRAY, [cycle], mean_cycle([cycle], 1.75, 20.0))
     assert decay.restitution[0] == pytest.approx(final.restitution.value, abs=2e-3)
     assert decay.wall_restitution[0] == pytest.approx(final.wall_restitution.value, abs=2e-3)
 
