@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from nanorocks_ros.outputs.safe_text import counted, shown
+from nanorocks_ros.outputs.safe_text import counted, printable
 
 
 @pytest.mark.parametrize(
@@ -20,7 +20,7 @@ from nanorocks_ros.outputs.safe_text import counted, shown
     ],
 )
 def test_control_characters_are_escaped(name, text):
-    assert shown(name) == text
+    assert printable(name) == text
 
 
 def test_a_noun_has_the_number_that_goes_with_its_count():
