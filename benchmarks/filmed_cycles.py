@@ -20,6 +20,7 @@ from benchmarks.drawn import varied
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.experiment.view import View
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
+from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.records import (
     Frame,
     PairCollision,
@@ -197,9 +198,7 @@ def _make(film: Film) -> None:
                 follow[record.tray].push(record)
     cycles = [follower.cycle(like[number], gases[number]) for number, follower in follow.items()]
     path = folder() / film.name
-    unfinished = path.with_suffix('.part')
-    unfinished.write_bytes(pickle.dumps(cycles))
-    unfinished.replace(path)
+    write_bytes(path, pickle.dumps(cycles))
 
 
 class _Follower:

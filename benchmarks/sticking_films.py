@@ -23,6 +23,7 @@ from nanorocks_ros.experiment.view import View
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
 from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
+from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.physics.paper_clusters import paper_onset
 from nanorocks_ros.physics.sticking_rates import slow_contacts
 from nanorocks_ros.pipeline.composition import TrayStages
@@ -253,9 +254,7 @@ def _make(task: tuple[int, bool]) -> None:
         for cell, values in found.items()
     ]
     path = folder() / _name(number, sticks=sticks)
-    unfinished = path.with_suffix('.part')
-    unfinished.write_bytes(pickle.dumps(kept))
-    unfinished.replace(path)
+    write_bytes(path, pickle.dumps(kept))
 
 
 def _film(cells: dict[int, Tray], gases: dict[int, SimulationSettings]) -> dict[int, dict]:

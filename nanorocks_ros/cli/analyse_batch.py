@@ -11,7 +11,7 @@ from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.outputs.safe_text import counted, shown
+from nanorocks_ros.outputs.safe_text import counted, printable
 
 if TYPE_CHECKING:
     import argparse
@@ -60,13 +60,15 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
     folder = Path(options.output)
     found = find_bags(options.bags)
     for text in found.left_out:
-        _notice(f'{shown(text)}; left out')
+        _notice(f'{printable(text)}; left out')
     for error in found.missing.values():
-        _notice(shown(str(error)))
+        _notice(printable(str(error)))
     if not found.bags:
         raise (
             ConfigurationError(
-                ', '.join(shown(bag) for bag in options.bags), 'name no recording', 'correct them'
+                ', '.join(printable(bag) for bag in options.bags),
+                'name no recording',
+                'correct them',
             )
             if not found.missing
             else next(iter(found.missing.values()))
@@ -82,7 +84,7 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
         print(json.dumps(_as_json(batch, together, folder, report), allow_nan=False))
     else:
         _print(batch, together)
-    _notice(f'results in {shown(folder)}, report in {shown(report)}')
+    _notice(f'results in {printable(folder)}, report in {printable(report)}')
     return _end(batch)
 
 
@@ -108,7 +110,7 @@ def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> di
         'bags': [
             {
                 'bag': result.name,
-                'results': shown(result.folder),
+                'results': printable(result.folder),
                 'same_as': result.twin or None,
                 **{key: result.summary[key] for key in shown_keys},
                 'trays': {
@@ -123,8 +125,8 @@ def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> di
             {'bag': failure.name, 'reason': failure.reason, 'analysed': failure.analysed}
             for failure in batch.failed
         ],
-        'results': shown(folder),
-        'report': shown(report),
+        'results': printable(folder),
+        'report': printable(report),
     }
 
 

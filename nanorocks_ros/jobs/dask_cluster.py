@@ -1,4 +1,7 @@
-"""Tasks on the workers of a running Dask cluster."""
+"""Tasks on the workers of a running Dask cluster.
+
+Tested in test_tasks.py.
+"""
 
 from __future__ import annotations
 

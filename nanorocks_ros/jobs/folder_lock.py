@@ -1,4 +1,7 @@
-"""A lock that lets one process at a time use a folder."""
+"""A lock that lets one process at a time use a folder.
+
+Tested in test_journal.py.
+"""
 
 from __future__ import annotations
 

@@ -17,6 +17,8 @@ from nanorocks_ros.errors import ConfigurationError
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Mapping
 
+    from nanorocks_ros.jobs.progress import Progress
+
 Argument = TypeVar('Argument')
 Result = TypeVar('Result')
 
@@ -159,7 +161,7 @@ def run_tasks(
     function: Callable[[Argument], Result],
     tasks: Mapping[str, Argument],
     workers: Workers,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> list[Result]:
     """Run tasks; return the results in the order of the tasks.
 

@@ -1,4 +1,7 @@
-"""Tasks in worker processes of this machine, which exit when their parent does."""
+"""Tasks in worker processes of this machine, which exit when their parent does.
+
+Tested in test_tasks.py.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Tables as Parquet files, where pyarrow is installed."""
+"""Tables as Parquet files, where pyarrow is installed.
+
+Tested in test_trajectory.py.
+"""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def shown(text: str | Path) -> str:
+def printable(text: str | Path) -> str:
     """Escape control characters, so that the text fits on one line of a terminal or page.
 
     Parameters

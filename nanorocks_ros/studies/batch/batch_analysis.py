@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.tasks import as_completed_isolated
-from nanorocks_ros.outputs.safe_text import shown
+from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.pipeline.composition import Pipeline
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.recordings.film.natural_sort import natural
@@ -199,7 +199,7 @@ def _run(store: BatchStore, tasks: dict[str, BagTask], workers: Workers, watcher
     ordered = {name: tasks[name] for name in sorted(tasks, key=lambda one: -sizes[one])}
 
     def lost(name: str, what: str) -> BagOutcome:
-        return BagOutcome(state=FAILED, reason=f'{shown(tasks[name].path)}: {what}')
+        return BagOutcome(state=FAILED, reason=f'{printable(tasks[name].path)}: {what}')
 
     with closing(as_completed_isolated(analyse_bag, ordered, workers, lost)) as outcomes:
         for name, outcome in outcomes:
@@ -233,7 +233,7 @@ def _kept(store: BatchStore) -> str:
 def _gathered(plan: BatchPlan, store: BatchStore) -> Batch:
     batch = Batch()
     for text, error in plan.bags.missing.items():
-        batch.failed.append(Failure(name=shown(text), reason=shown(str(error))))
+        batch.failed.append(Failure(name=printable(text), reason=printable(str(error))))
     entries = sorted(store.entries.values(), key=lambda one: natural(str(one.path)))
     found: list[tuple[Entry, dict[str, Any]]] = []
     for entry in entries:
@@ -245,12 +245,12 @@ def _gathered(plan: BatchPlan, store: BatchStore) -> Batch:
         if outcome.state != DONE or summary is None:
             reason = outcome.reason or f'{store.place(entry)}: its results are gone; try again'
             batch.failed.append(
-                Failure(name=shown(entry.path), reason=reason, analysed=summary is not None)
+                Failure(name=printable(entry.path), reason=reason, analysed=summary is not None)
             )
     found.sort(key=lambda one: one[1]['start_ns'])
     first: dict[str, str] = {}
     for entry, summary in found:
-        name = shown(entry.path)
+        name = printable(entry.path)
         # A film that was copied and imported twice is no second measurement either.
         twin = first.setdefault(summary.get('film') or summary['content'], name)
         batch.results.append(

@@ -16,7 +16,7 @@ from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.folder_lock import lock_folder
 from nanorocks_ros.outputs.atomic_files import write_bytes
-from nanorocks_ros.outputs.safe_text import shown
+from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.settings import rows
 from nanorocks_ros.studies.analysis.results_folder import SUMMARY
@@ -266,7 +266,7 @@ def _question(settings: PipelineSettings, image_topic: str) -> str:
 def _free_name(path: Path, taken: Iterable[str]) -> str:
     """The name of the recording, and a number where another recording has that name."""
     name = path.stem if path.suffix in {'.mcap', '.db3', '.bag'} else path.name
-    name = re.sub(r'[^\w.,+=@ -]', '_', shown(name)).strip('. ') or 'recording'
+    name = re.sub(r'[^\w.,+=@ -]', '_', printable(name)).strip('. ') or 'recording'
     name = name.encode()[:_LONGEST_NAME].decode(errors='ignore')
     number, found = 1, name
     while found.casefold() in taken:

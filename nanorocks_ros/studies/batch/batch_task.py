@@ -16,7 +16,7 @@ from nanorocks_ros.errors import NanorocksError, RecordingError, UnwritableError
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.outputs.npz_archive import Arrays, write_archive
-from nanorocks_ros.outputs.safe_text import shown
+from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.recordings.bag.fingerprint import FileState, content_hash, file_states
 from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleSummary, cycles_of
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, analyse
@@ -100,26 +100,26 @@ def analyse_bag(task: BagTask) -> BagOutcome:
     try:
         return _analysed(task)
     except UnwritableError as error:
-        return BagOutcome(state=UNWRITTEN, reason=shown(str(error)))
+        return BagOutcome(state=UNWRITTEN, reason=printable(str(error)))
     except NanorocksError as error:
-        return BagOutcome(state=FAILED, reason=shown(str(error)))
+        return BagOutcome(state=FAILED, reason=printable(str(error)))
     except MemoryError:
         return BagOutcome(
-            state=FAILED, reason=f'{shown(task.path)}: takes more memory than is left'
+            state=FAILED, reason=f'{printable(task.path)}: takes more memory than is left'
         )
     except OSError as error:
         return BagOutcome(
-            state=FAILED, reason=f'{shown(task.path)}: cannot be read ({error.strerror})'
+            state=FAILED, reason=f'{printable(task.path)}: cannot be read ({error.strerror})'
         )
     except Exception as error:
         # A fault of ours, or of a library, over one recording; the others know nothing of it.
         place = task.folder.with_name(f'{task.folder.name}.{TROUBLE}')
         with suppress(OSError):
             place.write_text(traceback.format_exc(), 'utf-8', 'backslashreplace')
-        what = shown(' '.join(f'{type(error).__name__}: {error}'.split()))
+        what = printable(' '.join(f'{type(error).__name__}: {error}'.split()))
         return BagOutcome(
             state=FAILED,
-            reason=f'{shown(task.path)}: cannot be analysed ({what}); please report {place}',
+            reason=f'{printable(task.path)}: cannot be analysed ({what}); please report {place}',
         )
     finally:
         with suppress(OSError):
@@ -202,12 +202,12 @@ def _summary(analysis: Analysis) -> dict[str, Any]:
     error = analysis.error
     return {
         **found,
-        'notices': [shown(notice) for notice in analysis.notices],
+        'notices': [printable(notice) for notice in analysis.notices],
         'state': DONE if error is None else PARTIAL,
-        'reason': '' if error is None else shown(str(error)),
+        'reason': '' if error is None else printable(str(error)),
         'start_ns': min(analysis.stamps_ns),
         'metadata': {
-            shown(key)[:_LONGEST]: shown(value)[:_LONGEST]
+            printable(key)[:_LONGEST]: printable(value)[:_LONGEST]
             for key, value in list(analysis.metadata.items())[:_MOST_ENTRIES]
         },
     }

@@ -18,12 +18,13 @@ from nanorocks_ros.studies.calibration.track_comparison import MarkedBeads, manu
 from nanorocks_ros.wire.array_layouts import NS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.records import TrayImage
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.calibration.manual_tracks import ManualTracks
@@ -73,7 +74,7 @@ def calibrate_area(
     *,
     first_frame: int = 0,
     image_topic: str = '',
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> AreaCalibration:
     """Fit the speed by the binarised area to the mean speed of manual tracks.
 

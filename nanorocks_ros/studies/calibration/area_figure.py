@@ -1,4 +1,7 @@
-"""Figure of a calibration of the binarised area: manual speeds over its speeds."""
+"""Figure of a calibration of the binarised area: manual speeds over its speeds.
+
+Tested in test_area_calibration.py.
+"""
 
 from __future__ import annotations
 

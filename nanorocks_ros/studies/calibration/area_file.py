@@ -1,4 +1,7 @@
-"""Parameter file of a calibration of the binarised area."""
+"""Parameter file of a calibration of the binarised area.
+
+Tested in test_area_calibration.py.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Lines of equal decay rate across the map of a sweep, by closed forms."""
+"""Lines of equal decay rate across the map of a sweep, by closed forms.
+
+Tested in test_chi_square_map.py.
+"""
 
 from __future__ import annotations
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from nanorocks_ros.inference.cluster_size.size_from_width import ClusterCurve
+    from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.outputs.npz_archive import Arrays
 
 _SAMPLES = 'samples'
@@ -37,7 +38,7 @@ def build_curves(
     plan: ClusterPlan,
     output: Path,
     workers: Workers | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     notice: Callable[[str], None] | None = None,
 ) -> Mapping[str, ClusterCurve]:
     """Film growing clusters, and write the cluster curves of their trays.

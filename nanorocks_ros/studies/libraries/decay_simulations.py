@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.inference.decay.decay_library import DecayLibrary
     from nanorocks_ros.jobs.journal import Journal
+    from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.outputs.npz_archive import Arrays
 
 # Arbitrary: the decay is a function of speed times time alone.
@@ -88,7 +89,7 @@ def build_library(
     plan: LibraryPlan,
     output: Path,
     workers: Workers | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     notice: Callable[[str], None] | None = None,
 ) -> DecayLibrary:
     """Simulate the decays of a tray and write its library.

@@ -1,4 +1,7 @@
-"""Runs of a sweep as tasks, and as parts of its result."""
+"""Runs of a sweep as tasks, and as parts of its result.
+
+Tested in test_sweep_runs.py.
+"""
 
 from __future__ import annotations
 

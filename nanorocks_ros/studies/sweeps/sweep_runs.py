@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.outputs.npz_archive import Arrays
     from nanorocks_ros.studies.sweeps.sweep_plan import SweepPlan
 
@@ -43,7 +44,7 @@ def sweep(
     plan: SweepPlan,
     output: Path | None = None,
     workers: Workers | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     notice: Callable[[str], None] | None = None,
 ) -> Sweep:
     """Simulate the cooling gas in many runs at every point of a grid.
@@ -125,9 +126,7 @@ def _existing_result(plan: SweepPlan, output: Path) -> Sweep | None:
 class _MissingRuns:
     """Runs the missing runs of a journal on workers."""
 
-    def __init__(
-        self, plan: SweepPlan, journal: Journal, progress: Callable[[int, int], None]
-    ) -> None:
+    def __init__(self, plan: SweepPlan, journal: Journal, progress: Progress) -> None:
         self.done = 0
         self._plan = plan
         self._journal = journal

@@ -1,4 +1,7 @@
-"""Film of a simulated tray as a bag: compressed camera images, epoch, truth."""
+"""Film of a simulated tray as a bag: compressed camera images, epoch, truth.
+
+Tested in test_simulated_runs.py.
+"""
 
 from __future__ import annotations
 

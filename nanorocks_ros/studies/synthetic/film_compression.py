@@ -1,4 +1,7 @@
-"""Compression of a simulated film: JPEG of given quality or size, or an H.264 stream."""
+"""Compression of a simulated film: JPEG of given quality or size, or an H.264 stream.
+
+Tested in test_film_scene.py.
+"""
 
 from __future__ import annotations
 

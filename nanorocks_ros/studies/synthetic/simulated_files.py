@@ -1,4 +1,7 @@
-"""Output files of simulated runs: checked before the simulation, written after it."""
+"""Output files of simulated runs: checked before the simulation, written after it.
+
+Tested in test_simulate.py.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Plan of simulated runs of a tray: settings, times, what is kept."""
+"""Plan of simulated runs of a tray: settings, times, what is kept.
+
+Tested in test_simulated_runs.py.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Simulated runs of a tray: decays, beads and collisions of each, and their means."""
+"""Simulated runs of a tray: decays, beads and collisions of each, and their means.
+
+Tested in test_simulated_runs.py.
+"""
 
 from __future__ import annotations
 

@@ -14,7 +14,6 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.jobs.journal import Journal
 from nanorocks_ros.jobs.resumed_tasks import parts_folder
 from nanorocks_ros.jobs.tasks import Workers
-from nanorocks_ros.outputs.npz_archive import read_archive, write_archive
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
 from nanorocks_ros.studies.sweeps.sweep_parts import COUNTS, RunRange, cool
@@ -282,91 +281,3 @@ def test_a_cluster_that_is_not_there_leaves_nothing_behind(tmp_path):
     with pytest.raises(ConfigurationError, match='no address'):
         sweep(PLAN, tmp_path / 'a.npz', Workers(scheduler='nowhere'))
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ('axes', 'message'),
-    [
-        ({'restitutoin': (0.5,)}, "no setting 'restitutoin'"),
-        ({'restitution': (0.5, math.nan)}, 'nan is not finite'),
-        ({'restitution': (0.5, 1.5)}, r'1.5 is outside \[0, 1\]'),
-        ({'restitution': (0.5, 0.5)}, 'holds a value twice; give each value once'),
-        ({'restitution': ()}, 'has no values; give one or more'),
-        ({'restitution': ('a',)}, "'a' is not a number"),
-        ({'tray': (1.5,)}, '1.5 is not a whole number'),
-        ({'tray': (9,)}, r'9 is outside \[1, 8\]'),
-        ({'restitution': np.linspace(0, 1, 2000), 'noise': np.linspace(0, 1, 2000)}, 'at most'),
-    ],
-)
-def test_axes_that_cannot_be_are_refused(axes, message):
-    with pytest.raises(ConfigurationError, match=message):
-        sweep_plan(SETTINGS, axes, TIMES, 2)
-
-
-@pytest.mark.parametrize('times', [(), (1.0, 1.0), (2.0, 1.0), (-1.0,), (math.nan,), ('a',)])
-def test_times_that_cannot_be_are_refused(times):
-    with pytest.raises(ConfigurationError, match=r'--times: .*give'):
-        sweep_plan(SETTINGS, {}, times, 2)
-
-
-@pytest.mark.parametrize('runs', [0, -1, 1.5, True, 2**40])
-def test_numbers_of_runs_that_cannot_be_are_refused(runs):
-    with pytest.raises(ConfigurationError, match=r'--runs: .*give a whole number'):
-        sweep_plan(SETTINGS, {}, TIMES, runs)
-
-
-def test_settings_that_cannot_be_are_refused():
-    with pytest.raises(ConfigurationError, match=r'noise: -1.0 is outside'):
-        sweep_plan(replace(SETTINGS, noise=-1.0), {}, TIMES, 2)
-
-
-def test_no_two_runs_share_a_number():
-    numbers = [number for point in range(6) for number in PLAN.run_numbers(point, 0, 20)]
-    assert len(set(numbers)) == 120
-
-
-@pytest.mark.parametrize('bits', [0xFF, 0x01, 0x08])
-def test_a_damaged_byte_is_found_wherever_it_is(tmp_path, bits):
-    path = tmp_path / 'a.npz'
-    write_archive(path, {'a': np.arange(3.0), 'b': np.array('text')})
-    content = path.read_bytes()
-    refused = 0
-    for k in range(len(content)):
-        path.write_bytes(content[:k] + bytes([content[k] ^ bits]) + content[k + 1 :])
-        try:
-            arrays_read = read_archive(path)
-        except RecordingError as error:
-            assert 'is damaged' in error.what  # noqa: PT017
-            refused += 1
-            continue
-        # A byte that holds nothing, such as the date, or one of a name.
-        if set(arrays_read) == {'a', 'b'}:
-            assert arrays_read['a'].tolist() == [0.0, 1.0, 2.0]
-            assert str(arrays_read['b']) == 'text'
-    assert refused > len(content) // 2
-
-
-@pytest.mark.parametrize('cut', [0, 1, 100, -1])
-def test_a_file_cut_short_is_refused(tmp_path, cut):
-    path = tmp_path / 'a.npz'
-    sweep(replace(PLAN, runs=1, axes=()), path, HERE)
-    path.write_bytes(path.read_bytes()[:cut])
-    with pytest.raises(RecordingError, match=r'a.npz: is damaged, or no .npz file'):
-        Sweep.load(path)
-
-
-def test_files_that_hold_no_sweep_are_refused(tmp_path):
-    path = tmp_path / 'a.npz'
-    with pytest.raises(RecordingError, match=r'cannot be read \(No such file or directory\)'):
-        Sweep.load(path)
-    write_archive(path, {'a': np.zeros(3)})
-    with pytest.raises(RecordingError, match='holds no sweep'):
-        Sweep.load(path)
-    np.save(tmp_path / 'single', np.zeros(3))
-    with pytest.raises(RecordingError, match='is damaged, or no'):
-        Sweep.load(tmp_path / 'single.npy')
-    sweep(replace(PLAN, runs=1, axes=()), tmp_path / 'b.npz', HERE)
-    arrays = read_archive(tmp_path / 'b.npz')
-    write_archive(path, {**arrays, 'mean_speed': np.zeros((2, 2))})
-    with pytest.raises(RecordingError, match='holds no sweep'):
-        Sweep.load(path)
