@@ -190,7 +190,9 @@ def _posterior(cycles: list[_Said], how: _From) -> Posterior:
     return posterior_of(
         tables,
         reduce(add, likelihoods).integrated(),
-        (walls, walls) if how.walls_known else (prior.wall_low, prior.wall_high),
+        (walls, walls)
+        if how.walls_known
+        else (prior.min_wall_restitution, prior.max_wall_restitution),
         of_beads=contacts.of_beads(prior.collision_bias),
         of_walls=contacts.of_walls(prior.rebound_bias),
     )

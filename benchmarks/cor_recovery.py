@@ -61,7 +61,7 @@ _EXACT = PriorSettings(
     diameter_error=0.0,
     count_error=0.0,
     anisotropy_spread=0.0,
-    start_spread=0.0,
+    speed_distribution_spread=0.0,
     scale_error=0.0,
     speed_bias=0.0,
 )
@@ -209,12 +209,14 @@ def _drawn_from_priors(case: _Range) -> tuple[str, str]:
         drawn = _Case(
             tray=case.tray,
             restitution=random.uniform(case.low, case.high),
-            wall=random.uniform(prior.wall_low, prior.wall_high),
+            wall=random.uniform(prior.min_wall_restitution, prior.max_wall_restitution),
         )
         there, values = varied(tray, drawn.wall, prior, random)
         (speed,) = _speeds(drawn, there, values, range(number, number + 1))
         likelihood = _likelihood(tables, camera, speed)
-        posterior = posterior_of(tables, likelihood, (prior.wall_low, prior.wall_high))
+        posterior = posterior_of(
+            tables, likelihood, (prior.min_wall_restitution, prior.max_wall_restitution)
+        )
         beads.append(posterior.quantiles(_LEVELS) - drawn.restitution)
         walls.append(posterior.wall_quantiles(_LEVELS) - drawn.wall)
     head = '| tray | beads | beads: bias | sd | covered 68 % | 95 % | half of a 68 % interval '

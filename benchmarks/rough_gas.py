@@ -194,7 +194,10 @@ def read_cycles(number, roughness, cycles):
     tables = tables_of(library, tray, prior)
     decays = [decay_likelihood(tables, times, speed, _ERROR * speed, camera) for speed in speeds]
     contacts = [_contacts(tray, settings, run) for run in range(cycles)]
-    together, walls = reduce(add, decays).integrated(), (prior.wall_low, prior.wall_high)
+    together, walls = (
+        reduce(add, decays).integrated(),
+        (prior.min_wall_restitution, prior.max_wall_restitution),
+    )
 
     def with_contacts(decay, found):
         return posterior_of(

@@ -90,7 +90,7 @@ def _posterior(tray: int, cycles: list[_Cycle], *, beads: bool, walls: bool) -> 
     return posterior_of(
         tables,
         decay.integrated(),
-        (prior.wall_low, prior.wall_high),
+        (prior.min_wall_restitution, prior.max_wall_restitution),
         of_beads=contacts.of_beads(prior.collision_bias) if beads else None,
         of_walls=contacts.of_walls(prior.rebound_bias) if walls else None,
     )

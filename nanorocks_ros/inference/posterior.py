@@ -98,7 +98,7 @@ def _spreads(tray: Tray, settings: PriorSettings) -> tuple[float, ...]:
         settings.diameter_error,
         settings.anisotropy_spread,
         count,
-        settings.start_spread,
+        settings.speed_distribution_spread,
     )
 
 
@@ -210,7 +210,7 @@ def check_walls(walls: tuple[float, float]) -> None:
     low, high = walls
     if not LOWEST_WALL <= low <= high <= 1.0:
         raise ConfigurationError(
-            'prior.wall_low, prior.wall_high',
+            'prior.min_wall_restitution, prior.max_wall_restitution',
             f'{low:g} to {high:g}',
             f'give a range within {LOWEST_WALL:g} to 1',
         )

@@ -50,10 +50,12 @@ def _sentence(name, declared):
 def _of_all_nodes():
     groups = [one for _, one in inspect.getmembers(settings, inspect.isclass)]
     names = {
-        row.name
+        name
         for group in groups
         if group.__module__.startswith(settings.__name__) and group.__name__.endswith('Settings')
         for row in settings.rows(group())
+        for name in (row.name, row.deprecated)
+        if name
     }
     return {prefix + name for prefix in _PREFIXES for name in names} | {'use_sim_time'}
 

@@ -47,7 +47,7 @@ from nanorocks_ros.records import (
     SpeedEstimate,
     TrayImage,
 )
-from nanorocks_ros.settings import rows, with_values
+from nanorocks_ros.settings import rows, with_current_names, with_values
 from nanorocks_ros.wire import topics
 
 _ARRAYS = {
@@ -130,6 +130,13 @@ class NanorocksNode(Node):
         Those that the node is built around, `fixed` and the trays, are read-only afterwards.
         """
         values = {}
+        where = f'node {self.get_name()}'
+        overrides = self._parameter_overrides
+        self._parameter_overrides, messages = with_current_names(
+            settings, overrides, where, prefix
+        )
+        for message in messages:
+            self.get_logger().warning(message)
         for row in rows(settings):
             name = prefix + row.name
             try:
@@ -143,7 +150,7 @@ class NanorocksNode(Node):
                 ) from error
             if isinstance(row.default, str) and not row.bounds.choices:
                 require_text(name, values[row.name])
-        checked = with_values(settings, values, f'node {self.get_name()}')
+        checked = with_values(settings, values, where)
         self._declared.update({prefix + row.name: row for row in rows(settings)})
         return checked
 

@@ -23,7 +23,7 @@ NOTHING_ELSE = PriorSettings(
     diameter_error=0.0,
     count_error=0.0,
     anisotropy_spread=0.0,
-    start_spread=0.0,
+    speed_distribution_spread=0.0,
 )
 TIMES = np.arange(1.75, 20.0, 0.25)
 NOISE = 0.02

@@ -73,13 +73,13 @@ def encounters(tray: Tray) -> float:
     return 0.5 * tray.count * encounter_rate(tray) * _CYCLE
 
 
-def largest_chance(tray: Tray, false_alarms: float) -> float:
+def largest_chance(tray: Tray, false_alarm_rate: float) -> float:
     """The chance of an encounter below which it is a body, at some rate of false alarms a cycle.
 
     Parameters
     ----------
     tray : Tray
-    false_alarms : float, 0 to 1
+    false_alarm_rate : float, 0 to 1
         Share of cycles without sticking in which any two beads are called a body.
 
     Raises
@@ -87,8 +87,8 @@ def largest_chance(tray: Tray, false_alarms: float) -> float:
     ConfigurationError
         When the rate is not between 0 and 1.
     """
-    if not 0.0 < false_alarms < 1.0:
+    if not 0.0 < false_alarm_rate < 1.0:
         raise ConfigurationError(
-            'bodies.false_alarms', f'{false_alarms!r}', 'give a rate between 0 and 1'
+            'bodies.false_alarm_rate', f'{false_alarm_rate!r}', 'give a rate between 0 and 1'
         )
-    return false_alarms / max(encounters(tray), 1.0)
+    return false_alarm_rate / max(encounters(tray), 1.0)

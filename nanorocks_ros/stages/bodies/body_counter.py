@@ -73,7 +73,7 @@ class BodyCounter:
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.bodies
         self._tray = tray
-        self._largest = largest_chance(tray, self._settings.false_alarms)
+        self._largest = largest_chance(tray, self._settings.false_alarm_rate)
         self._rate = encounter_rate(tray)
         self._alike = np.array([one.diameter_low == one.diameter_high for one in tray.species])
         self._pairs = Pairs(partial(chance, rate=self._rate))

@@ -128,7 +128,7 @@ class Preprocessor:
         self._suspects: frozenset[int] = frozenset()
         self._misplaced: frozenset[int] = frozenset()
         self._checks = FrameChecks(self._camera)
-        self._counter = ShakeCounter(speed.shortest_cycle)
+        self._counter = ShakeCounter(speed.min_cycle_duration)
         self._plate = PlateMeter(speed.shake_ratio, self._settings.shake_speed)
         self._crops = tuple(
             TrayCrop(
@@ -145,7 +145,7 @@ class Preprocessor:
     def _check_map(self, frame: Frame) -> tuple[Notice, ...]:
         """Whether the trays are where they should be: early on, and once more to be sure."""
         self._frames += 1
-        if self._frames not in _MAP_CHECKS or not self._settings.check_map:
+        if self._frames not in _MAP_CHECKS or not self._settings.check_tray_positions:
             return ()
         view = self._view or self._straight
         image = np.ascontiguousarray(frame.image).reshape(*frame.image.shape[:2], -1)

@@ -157,7 +157,7 @@ class HaffFitter:
 
     def _driven(self, speed: SpeedEstimate) -> bool:
         """Whether the tray still swings too fast for the gas in it to cool freely."""
-        calm = self._settings.calm_share * speed.mean_projected_speed
+        calm = self._settings.max_tray_to_bead_speed * speed.mean_projected_speed
         return speed.tray_speed > calm
 
     def _start_ns(self, first: SpeedEstimate) -> int:
@@ -175,7 +175,7 @@ class HaffFitter:
         return self._estimate(CorStatus.FINAL)
 
     def _update_due(self, stamp_ns: int) -> bool:
-        if len(self._samples) < self._settings.fewest_samples:
+        if len(self._samples) < self._settings.min_samples:
             return False
         last = self._last_update_ns
         interval = self._settings.update_interval * NS - _STAMP_ROUNDING_NS
@@ -203,7 +203,7 @@ class HaffFitter:
         )
 
     def _estimate(self, status: CorStatus) -> tuple[CorEstimate, ...]:
-        if len(self._samples) < self._settings.fewest_samples:
+        if len(self._samples) < self._settings.min_samples:
             return self._undetermined() if status is CorStatus.FINAL else ()
         last = self._samples[-1]
         shake_ns, start_ns = last.cycle_start_ns or 0, self._start_ns(self._samples[0])
@@ -227,7 +227,7 @@ class HaffFitter:
             # Nothing is known of the restitution then, and that is what is published.
             fields = _nothing(CorStatus.NO_DECAY)
         if status is CorStatus.FINAL:
-            few = self._settings.fewest_samples
+            few = self._settings.min_samples
             fields.update(species_decays(self._tray, decay.time, self._samples, few))
         if fields.get('tension', 0.0) > _TENSE:
             quality |= Quality.INCONSISTENT

@@ -160,7 +160,7 @@ class LibraryReading:
             True: (math.hypot(scale, known.grain_scale_error), known.grain_speed_bias),
         }
         self._biases = (known.collision_bias, known.rebound_bias)
-        self._walls = (known.wall_low, known.wall_high)
+        self._walls = (known.min_wall_restitution, known.max_wall_restitution)
         check_walls(self._walls)
         half = 0.5 * settings.cooling.probability
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])

@@ -98,7 +98,9 @@ def library_decay(
         likelihoods.append(decay_likelihood(tables, *decay, camera))
     together = reduce(add, likelihoods)
     integrated = together.integrated()
-    posterior = posterior_of(tables, integrated, (known.wall_low, known.wall_high))
+    posterior = posterior_of(
+        tables, integrated, (known.min_wall_restitution, known.max_wall_restitution)
+    )
     ends = np.array([0.5, 0.5 - _HALF, 0.5 + _HALF])
     beads, walls = posterior.quantiles(ends), posterior.wall_quantiles(ends)
     late = curve.times >= first - 1e-9

@@ -27,12 +27,12 @@ def test_the_chance_is_not_below_that_of_gaussian_velocities_that_nothing_distur
     assert chance(way, half, 0.0) == pytest.approx(7.0 * stayed, rel=0.1)
 
 
-def test_false_alarms_are_shared_out_among_all_encounters_of_a_cycle():
+def test_false_alarm_rate_are_shared_out_among_all_encounters_of_a_cycle():
     tray = load_trays()[3]
     assert largest_chance(tray, 0.01) * encounters(tray) == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize('rate', [0.0, 1.0, float('nan')])
-def test_a_rate_of_false_alarms_that_is_none_is_refused(rate):
-    with pytest.raises(ConfigurationError, match='false_alarms'):
+def test_a_rate_of_false_alarm_rate_that_is_none_is_refused(rate):
+    with pytest.raises(ConfigurationError, match='false_alarm_rate'):
         largest_chance(load_trays()[1], rate)

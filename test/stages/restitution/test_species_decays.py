@@ -92,7 +92,7 @@ def test_a_few_speeds_of_a_species_are_no_decay():
         for k, speed in enumerate(speeds)
     ]
     assert math.isnan(final_of(few)[0].first_species_haff_time)
-    assert final_of(few, **{'cooling.fewest_samples': 4})[0].first_species_haff_time > 0.0
+    assert final_of(few, **{'cooling.min_samples': 4})[0].first_species_haff_time > 0.0
 
 
 def test_a_species_that_speeds_up_has_no_law():
