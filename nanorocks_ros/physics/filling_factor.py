@@ -24,9 +24,8 @@ if TYPE_CHECKING:
 HEXAGONAL_AREA = math.pi / math.sqrt(12.0)
 # A sphere fills 2/3 of the cylinder around it.
 SPHERE_IN_CYLINDER = 2.0 / 3.0
-# Of the volume of a flat layer of equal beads: in hexagonal and in square order.
+# Of the volume of a flat layer of equal beads in hexagonal order.
 HEXAGONAL_LAYER = SPHERE_IN_CYLINDER * HEXAGONAL_AREA
-SQUARE_LAYER = math.pi / 6.0
 # Of equal beads in three dimensions, what the paper compares with ([B19] section 3.2.3).
 RANDOM_CLOSE_PACKING = 0.64
 # (ff_end - ff_onset) / ff_onset by tray, [B19] section 3.2.3 and fig. 10; the filling factors
@@ -154,53 +153,10 @@ def hull_area(places: NDArray[np.float64], radii: NDArray[np.float64]) -> float:
     return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
 
 
-def least_hull_area(beads: int, radius: float, perimeter: float) -> float:
-    """The least area of the convex hull of equal discs that don't overlap, [m^2].
-
-    It follows that two and more beads in a flat layer never fill as much as `HEXAGONAL_LAYER`
-    of the hull, whatever their order.
-
-    Parameters
-    ----------
-    beads : int, >= 1
-    radius : float, [m]
-    perimeter : float, [m]
-        Of the hull.
-
-    References
-    ----------
-    Groemer 1960, Math. Z. 73, 285: 2 sqrt(3) (n - 1) + p (1 - sqrt(3)/2) + pi (sqrt(3) - 1) for
-    discs of radius 1.
-    """
-    check_positive(beads=beads, radius=radius, perimeter=perimeter)
-    root = math.sqrt(3.0)
-    area = (
-        2.0 * root * (beads - 1) + (1.0 - 0.5 * root) * perimeter / radius + math.pi * (root - 1.0)
-    )
-    return area * radius**2
-
-
-def hexagonal_patch(beads: int, radius: float) -> NDArray[np.float64]:
-    """Places of equal discs in hexagonal order, those nearest to the centre of one, (n, 2), [m].
-
-    Raises
-    ------
-    ConfigurationError
-        For no disc, or a radius that is not positive and finite.
-    """
-    check_positive(beads=beads, radius=radius)
-    rings = math.ceil(math.sqrt(beads)) + 1
-    i, j = (one.ravel() for one in np.mgrid[-rings : rings + 1, -rings : rings + 1])
-    x, y = 2.0 * radius * (i + 0.5 * j), math.sqrt(3.0) * radius * j
-    # Rounded, so that those equally near are taken in order round the centre.
-    nearest = np.lexsort((np.arctan2(y, x), np.round((x**2 + y**2) / radius**2)))
-    return np.column_stack((x, y))[nearest[:beads]]
-
-
 def _radii(radii: NDArray[np.float64]) -> NDArray[np.float64]:
-    found = np.atleast_1d(np.asarray(radii, dtype=np.float64))
-    if found.ndim != 1 or found.size == 0:
-        raise ConfigurationError('radii', f'shape {found.shape}', 'give one for each bead')
-    if not (np.isfinite(found).all() and (found > 0.0).all()):
-        raise ConfigurationError('radii', f'{found.min()!r} is one', 'give positive numbers')
-    return found
+    values = np.atleast_1d(np.asarray(radii, dtype=np.float64))
+    if values.ndim != 1 or values.size == 0:
+        raise ConfigurationError('radii', f'shape {values.shape}', 'give one for each bead')
+    if not (np.isfinite(values).all() and (values > 0.0).all()):
+        raise ConfigurationError('radii', f'{values.min()!r}', 'give positive numbers')
+    return values

@@ -80,31 +80,6 @@ def contact_value(filling: float) -> float:
     return (1.0 - 0.5 * filling) / (1.0 - filling) ** 3
 
 
-def kinetic_collision_rate(mean_speed: float, diameter: float, number_density: float) -> float:
-    """Collisions of one bead per second, sqrt(2) pi d^2 n g <v>.
-
-    Parameters
-    ----------
-    mean_speed : float, [m/s], > 0
-        In space.
-    diameter : float, [m], > 0
-    number_density : float, [1/m^3], > 0
-
-    Raises
-    ------
-    ConfigurationError
-        When a value is not positive and finite, or the gas too dense.
-
-    References
-    ----------
-    Enskog; Chapman, Cowling 1970, chapter 16.
-    """
-    check_positive(mean_speed=mean_speed)
-    crowding = contact_value(filling_factor(diameter, number_density))
-    cross_section = math.pi * diameter**2
-    return math.sqrt(2.0) * cross_section * number_density * crowding * mean_speed
-
-
 def kinetic_decay_rate(restitution: float, diameter: float, number_density: float) -> float:
     """1 / (v0 tau) [1/m] of the mean projected speed: (4/pi) (sqrt(2)/6) (1 - e^2) pi d^2 n g.
 

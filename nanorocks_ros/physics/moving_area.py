@@ -39,13 +39,6 @@ def moving_area(displacement: NDArray[np.float64] | float, radius: float) -> NDA
     return np.asarray(4.0 * radius**2 * (np.arcsin(u) + u * np.sqrt(1.0 - u * u)))
 
 
-def taylor_moving_area(
-    displacement: NDArray[np.float64] | float, radius: float
-) -> NDArray[np.float64]:
-    """The same area for displacements well below the radius, 4 R dx ([B19] eq. 2)."""
-    return 4.0 * radius * np.asarray(displacement, dtype=np.float64)
-
-
 def mean_moving_area(
     mean_displacement: NDArray[np.float64] | float, radius: float
 ) -> NDArray[np.float64]:

@@ -122,7 +122,7 @@ class PriorSettings:
     speed_distribution_spread: float = setting(
         1.0,
         'standard deviation of the shape of the speed distribution after a shaking event; shape '
-        '1: uniform, -1: Maxwellian, 0: half way',
+        '-1: uniform, 0: half way, 1: Maxwellian',
         deprecated='start_spread',
         low=0.0,
         high=2.0,

@@ -19,7 +19,6 @@ from nanorocks_ros.physics.moving_area import (
     mean_displacement,
     mean_moving_area,
     moving_area,
-    taylor_moving_area,
 )
 from nanorocks_ros.physics.paper_formulas import (
     paper_instantaneous_restitution,
@@ -83,7 +82,13 @@ def test_values_that_are_not_positive_and_finite_are_named(bad):
 )
 def test_the_moving_area_is_equation_1(row):
     assert moving_area(row['dx'], 1.0) == pytest.approx(row['A'], abs=1e-12)
-    assert taylor_moving_area(row['dx'], 1.0) == pytest.approx(row['4Rdx'])
+
+
+@pytest.mark.parametrize(
+    'row', PAPER['eq1_geometry']['checks']['rows'], ids=lambda r: str(r['dx'])
+)
+def test_the_taylor_form_is_equation_2(row):
+    assert mean_displacement(row['4Rdx'], 1.0, 'taylor') == pytest.approx(row['dx'])
 
 
 def test_the_moving_area_saturates_at_two_discs():
