@@ -18,10 +18,11 @@ from benchmarks.contacts import contacts_of, true_tracks
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.contacts.contact_estimate import contact_estimate
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.decay.instantaneous_restitution import local_slopes
-from nanorocks_ros.inference.posterior import posterior_of, tables_of
+from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.physics.paper_formulas import (
     RELATIVE_TO_MEAN_SPEED,
     paper_instantaneous_restitution,

@@ -9,30 +9,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
-from scipy.signal import savgol_filter
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL, NUISANCES, UNITS, count_step
-from nanorocks_ros.inference.decay.decay_likelihood import DecayTables
+from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL
+from nanorocks_ros.inference.decay.decay_tables import BEAD_POWER, WALL_POWER
 from nanorocks_ros.numerics.splines import spline_basis
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.inference.decay.decay_library import DecayLibrary
+    from nanorocks_ros.inference.decay.decay_likelihood import DecayTables
     from nanorocks_ros.inference.likelihood_1d import SingleTerm
-    from nanorocks_ros.settings import PriorSettings
 
-# Places of the grid along each restitution, closer towards 1: evenly spaced in the powers below of
-# 1 - restitution, in which likelihoods are smooth.
-_PLACES, _WALL_PLACES = 35, 15
-_POWER, _WALL_POWER = 1.0 / 1.5, 0.5
+# Points of the fine grid along each restitution.
 _FINE, _WALL_FINE = 241, 121
 # Less likely places than exp(-this) of the best are not looked at.
 _DEPTH = 18.0
@@ -42,102 +35,6 @@ _COMPRESSION = 200.0
 # Where nothing is lost there is no decay to compare with: that corner of the grid is taken as so
 # much less likely than the likelier of its neighbours, lest a spline swing around it.
 _CORNER = 10.0
-# Cells of ln t over which curves of the library are smoothed.
-_SMOOTH_CELLS = 9
-
-
-@lru_cache(maxsize=16)
-def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> DecayTables:
-    """The library at the grid of restitutions, with the spread of what is not known exactly.
-
-    Parameters
-    ----------
-    library : DecayLibrary
-    tray : Tray
-    settings : PriorSettings
-        Its spreads.
-    """
-    restitution = 1.0 - np.linspace(1.0, 0.0, _PLACES) ** (1.0 / _POWER)
-    wall = 1.0 - (1.0 - LOWEST_WALL) * np.linspace(1.0, 0.0, _WALL_PLACES) ** (1.0 / _WALL_POWER)
-    beads, walls = (one.ravel() for one in np.meshgrid(restitution, wall, indexing='ij'))
-    mean = _smooth(library.log_speed(beads, walls))
-    slopes = [_floor_and_lid(library, beads, walls, settings.floor_lid_spread)]
-    for number, spread in enumerate(_spreads(tray, settings)):
-        change = np.zeros((beads.size, len(NUISANCES)))
-        change[:, number] = UNITS[number]
-        high = library.log_speed(beads, walls, None, change)
-        low = library.log_speed(beads, walls, None, -change)
-        slopes.append(0.5 * (high - low) * spread / UNITS[number])
-    corners, shares = _corners(library, beads, walls)
-    return DecayTables(
-        decays=library,
-        restitution=restitution,
-        wall_restitution=wall,
-        mean=mean,
-        slopes=_smooth(np.stack(slopes, axis=1)),
-        corners=corners,
-        shares=shares,
-    )
-
-
-def _smooth(curves: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Curves of the library without the noise of its runs.
-
-    Their slopes tell how far amplitude and scale make up for each other. Where the speed falls as
-    1/t they nearly do, and noise of 0.01 from cell to cell would decide.
-    """
-    return np.asarray(savgol_filter(curves, _SMOOTH_CELLS, 3, axis=-1))
-
-
-def _spreads(tray: Tray, settings: PriorSettings) -> tuple[float, ...]:
-    """One standard deviation of each of `NUISANCES`."""
-    counted = all(one.mass is None for one in tray.species)
-    count = settings.count_error / count_step(tray) if counted else 1.0
-    return (
-        settings.height_error,
-        settings.diameter_error,
-        settings.anisotropy_spread,
-        count,
-        settings.speed_distribution_spread,
-    )
-
-
-def _floor_and_lid(
-    library: DecayLibrary,
-    beads: NDArray[np.float64],
-    walls: NDArray[np.float64],
-    spread: float,
-) -> NDArray[np.float64]:
-    """Change of ln f when floor and lid take more than the side walls, by exp(spread)."""
-    if spread == 0.0:
-        return np.zeros((beads.size, library.distances.size))
-    more, less = (1.0 - (1.0 - walls) * math.exp(one) for one in (spread, -spread))
-    high = library.log_speed(beads, walls, np.maximum(more, LOWEST_WALL - 0.05))
-    return np.asarray(0.5 * (high - library.log_speed(beads, walls, less)))
-
-
-def _corners(
-    library: DecayLibrary, beads: NDArray[np.float64], walls: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Where each place lies among those of the covariance."""
-    falling = -library.covariance_restitution
-    rising = library.covariance_wall
-    i, s = _cell(falling, -beads)
-    j, t = _cell(rising, walls)
-    width = rising.size
-    corners = np.stack(
-        [i * width + j, i * width + j + 1, (i + 1) * width + j, (i + 1) * width + j + 1], axis=1
-    )
-    shares = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=1)
-    return corners, shares
-
-
-def _cell(
-    axis: NDArray[np.float64], at: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    found = np.clip(np.searchsorted(axis, at, side='right') - 1, 0, axis.size - 2)
-    share = (at - axis[found]) / (axis[found + 1] - axis[found])
-    return found.astype(np.int64), np.clip(share, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -249,14 +146,14 @@ def posterior_of(
     less[-1, -1] = min(less[-1, -1], min(less[-2, -1], less[-1, -2]) + _CORNER)
     values = -_COMPRESSION * np.log1p(less / _COMPRESSION)
     surface = _Surface.through(
-        _even(tables.restitution, 0.0, _POWER),
-        _even(tables.wall_restitution, LOWEST_WALL, _WALL_POWER),
+        _even(tables.restitution, 0.0, BEAD_POWER),
+        _even(tables.wall_restitution, LOWEST_WALL, WALL_POWER),
         values,
     )
     box = (0.0, 1.0, *walls)
     for _ in range(3):
         beads, wall = _axes(*box)
-        pressed = surface.at(_even(beads, 0.0, _POWER), _even(wall, LOWEST_WALL, _WALL_POWER))
+        pressed = surface.at(_even(beads, 0.0, BEAD_POWER), _even(wall, LOWEST_WALL, WALL_POWER))
         fine = -_COMPRESSION * np.expm1(-pressed / _COMPRESSION)
         if of_beads is not None:
             fine += of_beads.at(beads)[:, np.newaxis]

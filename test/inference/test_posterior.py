@@ -9,10 +9,11 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.likelihood_1d import SingleTerm
-from nanorocks_ros.inference.posterior import posterior_of, tables_of
+from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
 

@@ -16,20 +16,13 @@ first, so that near zero loss the rate rises steeply.
 from __future__ import annotations
 
 import json
-import zipfile
 from dataclasses import asdict, dataclass
-from functools import cached_property, lru_cache
-from importlib import resources
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.errors import ConfigurationError
-
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
@@ -45,16 +38,6 @@ _CURVED = (0, 2)
 # Restitutions of walls that a library covers.
 LOWEST_WALL = 0.78
 _DEGREE, _WEIGHTED_DEGREE, _NUISANCE_DEGREE = 4, 3, 2
-_ARRAYS = (
-    'base',
-    'misfit',
-    'distances',
-    'coefficients',
-    'covariance_restitution',
-    'covariance_wall',
-    'covariance',
-)
-_FORMAT = 1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -128,21 +111,6 @@ class DecayLibrary:
             found[:, k] = design.terms(rate * distance) @ self.coefficients[:, k]
             found[:, k] -= np.log1p(rate * distance)
         return found
-
-    def save(self, write: Callable[[dict[str, NDArray[Any]]], None]) -> None:
-        """Hand the arrays to something that writes them into an ``.npz`` file."""
-        arrays: dict[str, NDArray[Any]] = {
-            name: np.asarray(getattr(self, name)) for name in _ARRAYS
-        }
-        arrays['covariance'] = self.covariance.astype(np.float32)
-        write(
-            {
-                **arrays,
-                'format': np.array(_FORMAT),
-                'tray': np.array(self.tray),
-                'made_by': np.array(self.made_by),
-            }
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,83 +187,6 @@ def tray_key(tray: Tray) -> str:
         for one in tray.species
     ]
     return json.dumps({'dimensions': tray.dimensions, 'species': species})
-
-
-def build_command(tray: Tray) -> str:
-    """What to type to get the library of a tray."""
-    return f'nanorocks library --tray {tray.number} -o tray_{tray.number}.npz'
-
-
-def library_of(tray: Tray, path: str | Path = '') -> DecayLibrary:
-    """The library of a tray: from a file, or the one that comes with the package.
-
-    Parameters
-    ----------
-    tray : Tray
-    path : str or Path
-        Empty: of the package.
-
-    Raises
-    ------
-    ConfigurationError
-        When it cannot be read, or was made for another tray.
-    """
-    library = load_library(str(path) or f'tray_{tray.number}.npz', packaged=not path)
-    if library.tray != tray_key(tray):
-        where = str(path) or f'tray {tray.number}'
-        raise ConfigurationError(
-            where,
-            f'the decay library is of a tray with other beads or sides than tray {tray.number}',
-            f'make one: {build_command(tray)}, and pass it as cooling.decay_library; or choose '
-            'cooling.relation paper',
-        )
-    return library
-
-
-@lru_cache(maxsize=16)
-def load_library(name: str, *, packaged: bool) -> DecayLibrary:
-    """A library from a file.
-
-    Parameters
-    ----------
-    name : str
-        Path, or name in the package.
-    packaged : bool
-
-    Raises
-    ------
-    ConfigurationError
-        When it cannot be read.
-    """
-    remedy = 'make it again with `nanorocks library`'
-    try:
-        if packaged:
-            source = resources.files(__package__).joinpath('libraries', name)
-            with source.open('rb') as stream:
-                arrays = _arrays(stream)
-        else:
-            with Path(name).open('rb') as stream:
-                arrays = _arrays(stream)
-    except FileNotFoundError as error:
-        raise ConfigurationError(name, 'there is no such decay library', remedy) from error
-    except OSError as error:
-        raise ConfigurationError(name, f'cannot be read ({error.strerror})', remedy) from error
-    except (ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
-        raise ConfigurationError(name, 'is damaged, or no decay library', remedy) from error
-    return DecayLibrary(
-        tray=str(arrays['tray']),
-        made_by=str(arrays['made_by']),
-        misfit=float(arrays['misfit']),
-        **{one: arrays[one].astype(np.float64) for one in _ARRAYS if one != 'misfit'},
-    )
-
-
-def _arrays(stream: Any) -> dict[str, NDArray[Any]]:
-    with np.load(stream, allow_pickle=False) as found:
-        arrays = {name: found[name] for name in (*_ARRAYS, 'format', 'tray', 'made_by')}
-    if int(arrays['format']) != _FORMAT or len(arrays['coefficients']) != term_count():
-        raise ValueError('of another release')
-    return arrays
 
 
 def term_count() -> int:

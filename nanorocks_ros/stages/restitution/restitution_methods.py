@@ -12,10 +12,11 @@ from scipy import special
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.cycle_likelihoods import Evidence, MeanRestitution
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
-from nanorocks_ros.inference.posterior import Posterior, check_walls, posterior_of, tables_of
+from nanorocks_ros.inference.posterior import Posterior, check_walls, posterior_of
 from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
 from nanorocks_ros.records import CorRelation, CorStatus
 

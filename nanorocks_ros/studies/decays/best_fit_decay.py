@@ -12,13 +12,14 @@ import numpy as np
 from scipy import optimize
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import (
     DecayLikelihood,
     DecayTables,
     decay_likelihood,
 )
-from nanorocks_ros.inference.posterior import posterior_of, tables_of
+from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:

@@ -12,6 +12,7 @@ import numpy as np
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.inference.decay.decay_library import NUISANCES, count_step, tray_key
+from nanorocks_ros.inference.decay.decay_library_file import library_arrays
 from nanorocks_ros.inference.decay.library_fit import (
     Decays,
     distances,
@@ -135,7 +136,7 @@ def build_library(
         for text in journal.notices:
             (notice or (lambda text: None))(text)
         library = fit_library(plan.tray, _decays(plan, journal), plan.question())
-        library.save(lambda arrays: write_archive(output, arrays))
+        write_archive(output, library_arrays(library))
         journal.delete()
     return library
 

@@ -10,7 +10,12 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.decay.decay_library import NUISANCES, library_of, load_library
+from nanorocks_ros.inference.decay.decay_library import NUISANCES
+from nanorocks_ros.inference.decay.decay_library_file import (
+    library_arrays,
+    library_of,
+    load_library,
+)
 from nanorocks_ros.inference.decay.library_fit import node_of
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
@@ -106,7 +111,7 @@ def test_a_file_that_is_none_is_told_and_how_it_is_made(tmp_path):
 def test_a_byte_that_changed_is_seen(tmp_path):
     path = tmp_path / 'mine.npz'
     library = library_of(TRAYS[1])
-    library.save(lambda arrays: np.savez(path, **arrays))
+    np.savez(path, **library_arrays(library))
     again = load_library(str(path), packaged=False)
     np.testing.assert_array_equal(again.coefficients, library.coefficients)
     content = bytearray(path.read_bytes())

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood, decay_likelihood
-from nanorocks_ros.inference.posterior import tables_of
+from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.settings import PriorSettings
 
 TRAY = load_trays()[1]
