@@ -51,22 +51,22 @@ class Evidence:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Everything as arrays, to be kept; derivatives to seven digits."""
-        found: dict[str, NDArray[Any]] = {
+        content: dict[str, NDArray[Any]] = {
             'cycles': np.array(self.cycles),
             'by_form': np.array(self.by_form, dtype=np.float64).reshape(-1, 2),
         }
         if self.decay is None or self.contacts is None:
-            return found
+            return content
         upper = np.triu_indices(self.decay.gradient.shape[-1])
         for prefix, part in (('decay', self.decay), ('contacts', self.contacts)):
             for field in fields(part):
-                found[f'{prefix}.{field.name}'] = np.asarray(getattr(part, field.name))
+                content[f'{prefix}.{field.name}'] = np.asarray(getattr(part, field.name))
         # The largest by far, and symmetric.
-        found['decay.information'] = self.decay.information[..., upper[0], upper[1]].astype(
+        content['decay.information'] = self.decay.information[..., upper[0], upper[1]].astype(
             np.float32
         )
-        found['decay.gradient'] = self.decay.gradient.astype(np.float32)
-        return found
+        content['decay.gradient'] = self.decay.gradient.astype(np.float32)
+        return content
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], where: str) -> Evidence:

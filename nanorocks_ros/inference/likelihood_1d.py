@@ -60,7 +60,7 @@ def _smeared(
     spread: float,
 ) -> NDArray[np.float64]:
     """Logarithm of the sum, over even places, of exp(logs) times a Gaussian around each node."""
-    found = np.empty(nodes.size)
+    smeared = np.empty(nodes.size)
     part = np.empty(fine.size)
     most = logs.max()
     step = fine[1] - fine[0]
@@ -78,5 +78,5 @@ def _smeared(
         for k in range(start, end):
             if part[k] > best - _LOST:
                 total += math.exp(part[k] - best)
-        found[i] = best + math.log(total)
-    return found
+        smeared[i] = best + math.log(total)
+    return smeared

@@ -189,7 +189,7 @@ class _Surface(NamedTuple):
     def at(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
         """On the grid of some places within the knots, (n_x, n_y)."""
         rows, columns = (
-            spline_basis(knots, one) for knots, one in zip(self.knots, (x, y), strict=True)
+            spline_basis(knots, points) for knots, points in zip(self.knots, (x, y), strict=True)
         )
         return np.asarray(rows @ self.coefficients @ columns.T)
 
@@ -221,18 +221,18 @@ def _axes(
 
 def _halves(n: int) -> NDArray[np.float64]:
     """The first and the last entry of an axis stand for half as much."""
-    found = np.ones(n)
-    found[[0, -1]] = 0.5
-    return found
+    weights = np.ones(n)
+    weights[[0, -1]] = 0.5
+    return weights
 
 
 def _likely(
     fine: NDArray[np.float64], beads: NDArray[np.float64], wall: NDArray[np.float64]
 ) -> tuple[float, float, float, float]:
     """The box around all places that are not beyond hope, and one more on each side."""
-    found = []
+    box = []
     for axis, other in ((beads, 1), (wall, 0)):
-        there = np.flatnonzero(fine.max(axis=other) > -_DEPTH)
-        first, last = max(there[0] - 1, 0), min(there[-1] + 1, axis.size - 1)
-        found += [float(axis[first]), float(axis[last])]
-    return found[0], found[1], found[2], found[3]
+        likely = np.flatnonzero(fine.max(axis=other) > -_DEPTH)
+        first, last = max(likely[0] - 1, 0), min(likely[-1] + 1, axis.size - 1)
+        box += [float(axis[first]), float(axis[last])]
+    return box[0], box[1], box[2], box[3]

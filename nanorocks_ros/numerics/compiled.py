@@ -91,17 +91,19 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
 def _stamp(module: str) -> tuple[tuple[str, int, int], ...]:
     """Name, time and size of a module and all of its package that it imports, also indirectly."""
     package = module.partition('.')[0]
-    found: dict[str, tuple[str, int, int]] = {}
-    left = [module]
-    while left:
-        name = left.pop()
+    stamps: dict[str, tuple[str, int, int]] = {}
+    pending = [module]
+    while pending:
+        name = pending.pop()
         path = getattr(sys.modules.get(name), '__file__', None)
-        if name in found or path is None:
+        if name in stamps or path is None:
             continue
         status = Path(path).stat()
-        found[name] = name, status.st_mtime_ns, status.st_size
-        left += [one for one in _imports(path) if one.partition('.')[0] == package]
-    return tuple(found[name] for name in sorted(found))
+        stamps[name] = name, status.st_mtime_ns, status.st_size
+        pending += [
+            imported for imported in _imports(path) if imported.partition('.')[0] == package
+        ]
+    return tuple(stamps[name] for name in sorted(stamps))
 
 
 @cache

@@ -31,18 +31,18 @@ def factorise(matrix: NDArray[np.float64]) -> float:
     for i in range(matrix.shape[0]):
         row = matrix[i]
         for j in range(0, i - 1, 2):
-            one, two = matrix[j], matrix[j + 1]
+            upper, lower = matrix[j], matrix[j + 1]
             a, b = row[j], row[j + 1]
             for k in range(j):
-                a -= row[k] * one[k]
-                b -= row[k] * two[k]
-            a *= one[j]
-            row[j], row[j + 1] = a, (b - a * two[j]) * two[j + 1]
+                a -= row[k] * upper[k]
+                b -= row[k] * lower[k]
+            a *= upper[j]
+            row[j], row[j + 1] = a, (b - a * lower[j]) * lower[j + 1]
         if i % 2 == 1:
-            one, a = matrix[i - 1], row[i - 1]
+            upper, a = matrix[i - 1], row[i - 1]
             for k in range(i - 1):
-                a -= row[k] * one[k]
-            row[i - 1] = a * one[i - 1]
+                a -= row[k] * upper[k]
+            row[i - 1] = a * upper[i - 1]
         rest = row[i]
         for k in range(i):
             rest -= row[k] * row[k]
@@ -58,28 +58,28 @@ def whiten(factor: NDArray[np.float64], columns: NDArray[np.float64], count: int
     """The first columns divided by a factor of `factorise`, in place; two side by side."""
     for first in range(0, count, 2):
         # An odd one at the end goes with itself.
-        one, two = columns[first], columns[min(first + 1, count - 1)]
+        column, next_column = columns[first], columns[min(first + 1, count - 1)]
         for i in range(factor.shape[0]):
             row = factor[i]
-            a, b = one[i], two[i]
+            a, b = column[i], next_column[i]
             for k in range(i):
-                a -= row[k] * one[k]
-                b -= row[k] * two[k]
-            one[i], two[i] = a * row[i], b * row[i]
+                a -= row[k] * column[k]
+                b -= row[k] * next_column[k]
+            column[i], next_column[i] = a * row[i], b * row[i]
 
 
 @compiled
 def integrate(
     gradients: NDArray[np.float64],
     informations: NDArray[np.float64],
-    found: NDArray[np.float64],
+    gains: NDArray[np.float64],
 ) -> None:
     """What the log likelihood gains by nuisances that may be off by one of their deviations each.
 
     Parameters
     ----------
     gradients, informations : ndarray (n_places, n_z), (n_places, n_z, n_z)
-    found : ndarray (n_places,)
+    gains : ndarray (n_places,)
         Filled in.
     """
     n = gradients.shape[1]
@@ -109,4 +109,4 @@ def integrate(
             product += gradients[place, i] * shift[i]
         # Far out the dependence is not linear, and could explain anything.
         share = min(1.0, _FARTHEST / max(farthest, _FARTHEST))
-        found[place] = (share - 0.5 * share**2) * product - 0.5 * log_determinant
+        gains[place] = (share - 0.5 * share**2) * product - 0.5 * log_determinant

@@ -70,11 +70,11 @@ def autocorrelation(image: NDArray[np.uint8] | NDArray[np.float32]) -> NDArray[n
     if variance <= 0.0:
         return np.zeros((rows, columns), dtype=np.float32)
     lags = np.arange(columns) - columns // 2
-    found = np.empty((rows, columns), dtype=np.float32)
-    found[rows // 2 :] = covariance[: rows - rows // 2, lags]
-    found[: rows // 2] = covariance[rows // 2 : 0 : -1, -lags]
-    found /= variance
-    return found
+    values = np.empty((rows, columns), dtype=np.float32)
+    values[rows // 2 :] = covariance[: rows - rows // 2, lags]
+    values[: rows // 2] = covariance[rows // 2 : 0 : -1, -lags]
+    values /= variance
+    return values
 
 
 def level_region(values: NDArray[np.float32], level: float) -> LevelRegion:

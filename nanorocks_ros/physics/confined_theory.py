@@ -89,10 +89,10 @@ class ConfinedGas:
         def unequal(logs: NDArray[np.float64]) -> NDArray[np.float64]:
             temperature = np.exp(logs).reshape(-1, 3)
             rates = self._log_rates(temperature, restitution, wall_restitution, width).ravel()
-            found: NDArray[np.float64] = rates - rates.mean()
+            differences: NDArray[np.float64] = rates - rates.mean()
             # One of these differences follows from the others; the scale is free.
-            found[0] = self.mean_projected_speed(temperature) - 1.0
-            return found
+            differences[0] = self.mean_projected_speed(temperature) - 1.0
+            return differences
 
         scale = self.mean_projected_speed(np.exp(start).reshape(-1, 3))
         solution = optimize.root(unequal, start - 2.0 * math.log(scale), tol=1e-10)
@@ -203,7 +203,7 @@ class ConfinedGas:
             atol=1e-8,
         )
         return np.array(
-            [self.mean_projected_speed(np.exp(one.reshape(-1, 3))) for one in course.y.T]
+            [self.mean_projected_speed(np.exp(logs.reshape(-1, 3))) for logs in course.y.T]
         )
 
     def mean_projected_speed(self, granular_temperature: NDArray[np.float64]) -> float:
@@ -239,8 +239,8 @@ class ConfinedGas:
 
     def _approach(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
         """Standard deviation of the relative velocity along each direction, (n, n, ...)."""
-        both = temperature[:, np.newaxis] + temperature
-        squares = np.einsum('abqi,abi->abq', self.contacts.squares, both)
+        sums = temperature[:, np.newaxis] + temperature
+        squares = np.einsum('abqi,abi->abq', self.contacts.squares, sums)
         spread: NDArray[np.float64] = np.sqrt(squares)
         return spread
 
@@ -267,8 +267,8 @@ class ConfinedGas:
 def _projected(temperature: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean of sqrt(vx^2 + vy^2) for each class; velocities normal, with two variances."""
     along, across = temperature[:, 0], temperature[:, 1]
-    found: NDArray[np.float64] = _MEAN * np.sqrt(along) * special.ellipe(1.0 - across / along)
-    return found
+    projected: NDArray[np.float64] = _MEAN * np.sqrt(along) * special.ellipe(1.0 - across / along)
+    return projected
 
 
 def confined_gas(tray: Tray, sizes: int = 3) -> ConfinedGas:

@@ -71,16 +71,16 @@ def bead_classes(tray: Tray, sizes: int = 3) -> BeadClasses:
     """
     nodes, weights = np.polynomial.legendre.leggauss(sizes)
     rows = []
-    for place, one in enumerate(tray.species):
-        half = 0.5 * (one.diameter_high - one.diameter_low)
-        wanted = zip(nodes, 0.5 * weights, strict=True) if half > 0.0 else ((0.0, 1.0),)
-        for node, weight in wanted:
-            diameter = one.diameter + half * node
-            mass = one.density * math.pi / 6.0 * diameter**3
-            rows.append((one.count * weight, diameter, mass, place))
-    counts, diameters, masses, species = np.array(rows).T
+    for place, species in enumerate(tray.species):
+        half = 0.5 * (species.diameter_high - species.diameter_low)
+        quadrature = zip(nodes, 0.5 * weights, strict=True) if half > 0.0 else ((0.0, 1.0),)
+        for node, weight in quadrature:
+            diameter = species.diameter + half * node
+            mass = species.density * math.pi / 6.0 * diameter**3
+            rows.append((species.count * weight, diameter, mass, place))
+    counts, diameters, masses, species_index = np.array(rows).T
     return BeadClasses(
-        counts=counts, diameters=diameters, masses=masses, species=species.astype(np.int64)
+        counts=counts, diameters=diameters, masses=masses, species=species_index.astype(np.int64)
     )
 
 
@@ -144,11 +144,11 @@ def contacts(beads: BeadClasses, dimensions: tuple[float, float, float]) -> Cont
 
 
 def _shared(
-    one: NDArray[np.float64], other: NDArray[np.float64], apart: NDArray[np.float64]
+    first: NDArray[np.float64], second: NDArray[np.float64], apart: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Length over which one centre can be, with the other so far apart from it."""
-    least = np.minimum(one, other)
-    return np.clip(np.minimum(least, 0.5 * (one + other) - np.abs(apart)), 0.0, None)
+    least = np.minimum(first, second)
+    return np.clip(np.minimum(least, 0.5 * (first + second) - np.abs(apart)), 0.0, None)
 
 
 def _spread(dimensions: int) -> NDArray[np.float64]:
@@ -190,13 +190,13 @@ def _volume(radius: float) -> float:
 def _overlaps(room: NDArray[np.float64], touch: NDArray[np.float64]) -> NDArray[np.float64]:
     """Probability that two beads thrown into the box overlap, (n, n)."""
     places = _ball(_spread(3))
-    found = np.empty_like(touch)
+    probability = np.empty_like(touch)
     for a, b in np.ndindex(touch.shape):
         shared = _shared(room[a], room[b], touch[a, b] * places).prod(axis=1)
-        found[a, b] = (
+        probability[a, b] = (
             _volume(float(touch[a, b])) * shared.mean() / (room[a].prod() * room[b].prod())
         )
-    return found
+    return probability
 
 
 def _wall_crowding(
@@ -210,7 +210,7 @@ def _wall_crowding(
     (n, n, 3): of each class, what each class adds, across each axis.
     """
     places = _ball(_spread(3))
-    found = np.zeros((*touch.shape, 3))
+    crowding = np.zeros((*touch.shape, 3))
     for a, c in np.ndindex(touch.shape):
         apart = touch[a, c] * places
         shared = _shared(room[a], room[c], apart)
@@ -221,8 +221,8 @@ def _wall_crowding(
             at_wall = (
                 _volume(float(touch[a, c])) * (inside * rest).mean() / (room[c].prod() * area)
             )
-            found[a, c, axis] = (beads.counts[c] - (a == c)) * (overlaps[a, c] - at_wall)
-    return found
+            crowding[a, c, axis] = (beads.counts[c] - (a == c)) * (overlaps[a, c] - at_wall)
+    return crowding
 
 
 def _pair_crowding(
@@ -234,7 +234,7 @@ def _pair_crowding(
     """The same for contacts of two beads, (n, n)."""
     points = _spread(5)
     directions, third = _sphere(points), _ball(points[:, [3, 4, 2]])
-    found = np.array(overlaps)
+    crowding = np.array(overlaps)
     for a, b in np.ndindex(touch.shape):
         apart = touch[a, b] * directions
         weight = _shared(room[a], room[b], apart).prod(axis=1).mean()
@@ -242,11 +242,11 @@ def _pair_crowding(
             others = beads.counts[c] - (a == c) - (b == c)
             if others <= 0.0:
                 continue
-            both = _kept_off(room[[a, b, c]], apart, third, (touch[a, c], touch[b, c]))
-            both += _kept_off(room[[b, a, c]], -apart, third, (touch[b, c], touch[a, c]))
-            kept = both / (weight * room[c].prod())
-            found[a, b] += others * (overlaps[a, c] + overlaps[b, c] - kept)
-    return found
+            volume = _kept_off(room[[a, b, c]], apart, third, (touch[a, c], touch[b, c]))
+            volume += _kept_off(room[[b, a, c]], -apart, third, (touch[b, c], touch[a, c]))
+            kept = volume / (weight * room[c].prod())
+            crowding[a, b] += others * (overlaps[a, c] + overlaps[b, c] - kept)
+    return crowding
 
 
 def _kept_off(
@@ -271,8 +271,8 @@ def _kept_off(
     low = np.maximum(np.maximum(-half[0], -half[1] - apart), -half[2] - offset)
     high = np.minimum(np.minimum(half[0], half[1] - apart), half[2] - offset)
     places = np.clip(high - low, 0.0, None).prod(axis=1)
-    both = ((offset - apart) ** 2).sum(axis=1) < reach[1] ** 2
-    return _volume(reach[0]) * float((places * (1.0 - 0.5 * both)).mean())
+    shared = ((offset - apart) ** 2).sum(axis=1) < reach[1] ** 2
+    return _volume(reach[0]) * float((places * (1.0 - 0.5 * shared)).mean())
 
 
 def _directions(

@@ -59,13 +59,13 @@ def propagated(relation: Callable[..., float], **inputs: Estimate | float) -> Es
     NanorocksError
         Whatever the relation raises, at the inputs or next to them.
     """
-    values = {k: one.value if isinstance(one, Estimate) else one for k, one in inputs.items()}
+    values = {k: item.value if isinstance(item, Estimate) else item for k, item in inputs.items()}
     variance = 0.0
-    for name, one in inputs.items():
-        if not isinstance(one, Estimate) or one.error == 0.0:
+    for name, item in inputs.items():
+        if not isinstance(item, Estimate) or item.error == 0.0:
             continue
-        step = _STEP * one.error
-        up = relation(**{**values, name: one.value + step})
-        down = relation(**{**values, name: one.value - step})
+        step = _STEP * item.error
+        up = relation(**{**values, name: item.value + step})
+        down = relation(**{**values, name: item.value - step})
         variance += ((up - down) / (2.0 * _STEP)) ** 2
     return Estimate(value=relation(**values), error=math.sqrt(variance))

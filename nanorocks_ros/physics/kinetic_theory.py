@@ -32,14 +32,14 @@ def filling_factor(diameter: float, number_density: float) -> float:
         When a value is not positive and finite, or the gas would be denser than a fluid can be.
     """
     check_positive(diameter=diameter, number_density=number_density)
-    found = math.pi / 6.0 * number_density * diameter**3
-    if found >= FREEZING:
+    filling = math.pi / 6.0 * number_density * diameter**3
+    if filling >= FREEZING:
         raise ConfigurationError(
             'number_density',
-            f'fills {found:.3g} of the volume',
+            f'fills {filling:.3g} of the volume',
             f'give less than {FREEZING}, where hard spheres freeze',
         )
-    return found
+    return filling
 
 
 def check_positive(**values: float) -> None:

@@ -153,8 +153,8 @@ class PaperEllipse:
     def restitution(self, wall_restitution: float) -> float:
         """Restitution between beads on the ellipse; NaN where it has none in [0, 1]."""
         square = 1.0 - (wall_restitution / self.wall_axis) ** 2
-        found = self.bead_axis * math.sqrt(square) if square >= 0.0 else math.nan
-        return found if found <= 1.0 else math.nan
+        restitution = self.bead_axis * math.sqrt(square) if square >= 0.0 else math.nan
+        return restitution if restitution <= 1.0 else math.nan
 
 
 def paper_wall_ellipse(
@@ -282,5 +282,7 @@ def paper_instantaneous_restitution(
     before, after = np.where(known, before, np.nan), np.where(known, after, np.nan)
     collisions = number_density * math.pi * diameter**2 * before * interval
     # At most what a float can hold: noise at rest has no bound.
-    found: NDArray[np.float64] = np.exp(np.minimum(np.log(after / before) / collisions, 700.0))
-    return found
+    restitution: NDArray[np.float64] = np.exp(
+        np.minimum(np.log(after / before) / collisions, 700.0)
+    )
+    return restitution

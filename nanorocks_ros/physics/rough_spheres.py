@@ -135,8 +135,8 @@ def temperature_ratio_course(
     high, low = _ends(rates)
     gone = np.exp(-_PER_COLLISION * rates.exchange * (high - low) * np.asarray(collisions))
     gone *= (start - high) / (start - low)
-    found: NDArray[np.float64] = (high - low * gone) / (1.0 - gone)
-    return found
+    temperature_ratio: NDArray[np.float64] = (high - low * gone) / (1.0 - gone)
+    return temperature_ratio
 
 
 def smooth_equivalent(restitution: float, tangential_restitution: float) -> float:

@@ -89,10 +89,10 @@ class SlowContacts:
         ConfigurationError
             For another measure.
         """
-        found = np.empty(speed.size)
+        sums = np.empty(speed.size)
         curve = self._log_curve(measure)
-        _sum_slower(np.log(speed), np.log(mean), weights, _LOG_SPEEDS, curve, found)
-        return found
+        _sum_slower(np.log(speed), np.log(mean), weights, _LOG_SPEEDS, curve, sums)
+        return sums
 
     def log_slower_sum(
         self, speed: NDArray[np.float64], mean: NDArray[np.float64], measure: str = 'normal'
@@ -154,30 +154,34 @@ def slow_contacts(
     """
     gas = confined_gas(tray)
     temperature = gas.cooling(restitution, wall_restitution).granular_temperature
-    both = temperature[:, np.newaxis] + temperature
+    sums = temperature[:, np.newaxis] + temperature
     squares = gas.contacts.squares
-    normal = np.einsum('abqi,abi->abq', squares, both)
-    tangential = 0.5 * (both.sum(axis=-1)[..., np.newaxis] - normal)
+    normal = np.einsum('abqi,abi->abq', squares, sums)
+    tangential = 0.5 * (sums.sum(axis=-1)[..., np.newaxis] - normal)
     counts = gas.beads.counts / gas.beads.counts.sum()
     # The mean approach speed counts those that come nearer: half of the mean modulus.
     rates = counts[:, np.newaxis, np.newaxis] * gas.contacts.pairs * np.sqrt(normal) * 0.5 * _MEAN
-    some = rates > 0.0
-    return SlowContacts(rates=rates[some], normal=normal[some], tangential=tangential[some])
+    approaching = rates > 0.0
+    return SlowContacts(
+        rates=rates[approaching], normal=normal[approaching], tangential=tangential[approaching]
+    )
 
 
 def _sum_of_exponentials(
-    value: NDArray[np.float64], one: NDArray[np.float64], other: NDArray[np.float64]
+    value: NDArray[np.float64], first: NDArray[np.float64], second: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Probability that the sum of two exponential numbers of these means is below a value.
 
     The square of a relative velocity is such a sum: along the line of centres, since fast beads
     meet more often, and across it, where there are two components.
     """
-    other = np.where(np.abs(other / one - 1.0) < _ALIKE, one * (1.0 + _ALIKE), other)
-    exact = (other * np.expm1(-value / other) - one * np.expm1(-value / one)) / (one - other)
+    second = np.where(np.abs(second / first - 1.0) < _ALIKE, first * (1.0 + _ALIKE), second)
+    exact = (second * np.expm1(-value / second) - first * np.expm1(-value / first)) / (
+        first - second
+    )
     # Where the difference would cancel.
-    small = 0.5 * value**2 / (one * other) * (1.0 - value * (1.0 / one + 1.0 / other) / 3.0)
-    return np.asarray(np.where(value < _SMALL * np.minimum(one, other), small, exact))
+    small = 0.5 * value**2 / (first * second) * (1.0 - value * (1.0 / first + 1.0 / second) / 3.0)
+    return np.asarray(np.where(value < _SMALL * np.minimum(first, second), small, exact))
 
 
 @compiled
@@ -187,7 +191,7 @@ def _sum_slower(
     weights: NDArray[np.float64],
     nodes: NDArray[np.float64],
     curve: NDArray[np.float64],
-    found: NDArray[np.float64],
+    sums: NDArray[np.float64],
 ) -> None:
     """Sum over mean speeds at each speed; all as logarithms, with a curve at even nodes."""
     step = (nodes[-1] - nodes[0]) / (nodes.size - 1)
@@ -200,4 +204,4 @@ def _sum_slower(
             cell = min(int(at), nodes.size - 2)
             value = curve[cell] + (at - cell) * (curve[cell + 1] - curve[cell])
             total += weights[k] * math.exp(value)
-        found[i] = total
+        sums[i] = total

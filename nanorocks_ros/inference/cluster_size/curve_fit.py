@@ -53,20 +53,20 @@ def fit_curve(
     log_breadth = np.log(seen[:, 3] / seen[:, 4])
     above = np.floor((log_size - math.log(_SINGLE)) / _BIN)
     bins = np.where(seen[:, 2] < _SINGLE, -1, above)
-    found = [bins == k for k in np.unique(bins) if (bins == k).sum() >= _FEWEST]
+    groups = [bins == k for k in np.unique(bins) if (bins == k).sum() >= _FEWEST]
     nodes, means, spreads = np.empty((3, 0))
     end, weight, least, breadths = 0, 0.0, Width(0.0, 0.0, 0.0), (0.0, math.inf)
     # Without pictures of single beads there is nothing to start from.
-    if found and bins[found[0]][0] < 0:
+    if groups and bins[groups[0]][0] < 0:
         weight = _weight(log_size, log_area, log_breadth)
         reading = log_breadth + weight * log_area
         nodes, means = _rising(
-            np.array([log_size[one].mean() for one in found]),
-            np.array([reading[one].mean() for one in found]),
-            np.array([one.sum() for one in found], dtype=np.float64),
+            np.array([log_size[group].mean() for group in groups]),
+            np.array([reading[group].mean() for group in groups]),
+            np.array([group.sum() for group in groups], dtype=np.float64),
         )
         nodes[0] = 0.0
-        single = seen[found[0]].min(axis=0)
+        single = seen[groups[0]].min(axis=0)
         least = Width(_SMALL * float(single[3]), 0.0, _FAINT * float(single[5]))
         breadths = (
             math.exp(log_breadth.min() - _OUTSIDE),
@@ -115,8 +115,8 @@ def _rising(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Places and values that rise strictly: neighbours that do not are taken together."""
     blocks: list[NDArray[np.float64]] = []
-    for one in np.column_stack((weights * places, weights * values, weights)):
-        blocks.append(one)
+    for block in np.column_stack((weights * places, weights * values, weights)):
+        blocks.append(block)
         while len(blocks) > 1 and blocks[-2][1] / blocks[-2][2] >= blocks[-1][1] / blocks[-1][2]:
             last = blocks.pop()
             blocks[-1] = blocks[-1] + last

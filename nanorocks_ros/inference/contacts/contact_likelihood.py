@@ -103,11 +103,11 @@ def rebound_table(
     # The speed of the wall is in both speeds, with opposite signs.
     variance = (grid * before) ** 2 + after**2 + ((1.0 + grid) * wall) ** 2
     square = (outgoing - grid * incoming) ** 2 / variance
-    other = outliers / (RANGE * incoming)
+    outlier_density = outliers / (RANGE * incoming)
     by_scale = []
     for scale in _ERROR_SCALES:
         density = np.exp(-0.5 * square / scale**2) / (_SQRT_2_PI * scale * np.sqrt(variance))
-        by_scale.append(np.log((1.0 - outliers) * density + other).sum(axis=0))
+        by_scale.append(np.log((1.0 - outliers) * density + outlier_density).sum(axis=0))
     return np.array(by_scale)
 
 
@@ -174,7 +174,7 @@ def pair_table(
     seen = SeenCollisions.of(collisions).with_errors(_PAIR_ERRORS)
     # In parts, so that memory does not grow with the number of collisions.
     parts = [
-        SeenCollisions(*(one[k : k + _AT_ONCE] for one in seen))
+        SeenCollisions(*(column[k : k + _AT_ONCE] for column in seen))
         for k in range(0, len(collisions), _AT_ONCE)
     ]
     limits = sticking_speed, outliers

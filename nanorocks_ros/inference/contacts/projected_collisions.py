@@ -76,7 +76,7 @@ class SeenCollisions(NamedTuple):
         across = np.column_stack([-normal[:, 1], normal[:, 0]])
         # A line of centres that is turned by its error mixes in the speed across it.
         turned = error / distance
-        slip = [np.sum(one * across, axis=1) * turned for one in (before, after)]
+        slip = [np.sum(velocity * across, axis=1) * turned for velocity in (before, after)]
         noise = [
             np.array([np.sum(getattr(collision, name) ** 2) for collision in collisions])
             for name in ('before_errors', 'after_errors')
@@ -139,12 +139,12 @@ def pairs_given(
     tilt, weight = tilt[:, likely], weight[:, likely]
     total = np.zeros((ratios.size, grid.size))
     for k in range(0, len(weight), _IN_CACHE):
-        some = slice(k, k + _IN_CACHE)
-        one = SeenCollisions(*(each[some] for each in seen))
-        density = _density(one, grid, ratios, tilt[0, :, np.newaxis], sticking_speed)
-        found = np.einsum('mh,rmhn->rmn', weight[some], density)
-        other = outliers / (RANGE * one.approach[:, np.newaxis])
-        total += np.log((1.0 - outliers) * found + other).sum(axis=1)
+        rows = slice(k, k + _IN_CACHE)
+        batch = SeenCollisions(*(column[rows] for column in seen))
+        densities = _density(batch, grid, ratios, tilt[0, :, np.newaxis], sticking_speed)
+        density = np.einsum('mh,rmhn->rmn', weight[rows], densities)
+        outlier_density = outliers / (RANGE * batch.approach[:, np.newaxis])
+        total += np.log((1.0 - outliers) * density + outlier_density).sum(axis=1)
     return total
 
 
@@ -163,22 +163,22 @@ def _density(
     """
     part = np.sqrt(1.0 - tilt**2)
     a, c, aa, cc, ac = (
-        one[:, None, None]
-        for one in (seen.approach, seen.parting, seen.approach_variance,
+        column[:, None, None]
+        for column in (seen.approach, seen.parting, seen.approach_variance,
                     seen.parting_variance, seen.covariance)
     )  # fmt: skip
     vertical = tilt**2 * ratios[:, None, None, None] * seen.temperature[:, None, None]
     gain = (1.0 + grid) * part
     left = gain * part - 1.0
     speed, speed_variance = part * a, part**2 * aa + vertical
-    both = gain * vertical
-    both += part * left * aa - part * ac
+    shared = gain * vertical
+    shared += part * left * aa - part * ac
     variance = gain**2 * vertical
     variance += left**2 * aa + cc - 2.0 * left * ac
     miss = c - (gain * speed - a)
-    share = both / variance
+    share = shared / variance
     given = speed + share * miss
-    share *= both
+    share *= shared
     given_variance = np.maximum(speed_variance - share, 0.0)
     density = np.exp(-0.5 * miss**2 / variance)
     density *= _mean_above(sticking_speed, given, given_variance)
@@ -193,13 +193,13 @@ def _mean_above(
     """Integral of x over a Gaussian density of x from the least x up; never quite 0."""
     spread = np.sqrt(variance) + _TINY
     ratio = (mean - least) / spread
-    found = np.empty(ratio.shape)
-    found[:] = mean
+    integral = np.empty(ratio.shape)
+    integral[:] = mean
     # Higher up there is nothing below the least.
     near = np.flatnonzero(ratio < _ALL_ABOVE)
     if near.size:
         x = ratio.ravel()[near]
         density = np.exp(-0.5 * np.minimum(x**2, 1e3)) / _SQRT_2_PI
-        found.ravel()[near] = found.ravel()[near] * ndtr(x) + spread.ravel()[near] * density
-    found += _TINY
-    return found
+        integral.ravel()[near] = integral.ravel()[near] * ndtr(x) + spread.ravel()[near] * density
+    integral += _TINY
+    return integral

@@ -139,10 +139,10 @@ def windowed_decay_rate(
     log_speed = np.log(gas.speeds(times, restitution, wall_restitution, start))
 
     def residual(logs: NDArray[np.float64]) -> NDArray[np.float64]:
-        found: NDArray[np.float64] = (
+        difference: NDArray[np.float64] = (
             log_speed - logs[0] + np.log1p(math.exp(logs[0] + logs[1]) * times)
         )
-        return found
+        return difference
 
     return math.exp(optimize.least_squares(residual, (log_speed[0], math.log(50.0))).x[1])
 

@@ -106,11 +106,11 @@ class DecayLibrary:
             np.zeros((np.size(restitution), len(NUISANCES))) if nuisances is None else nuisances,
         )
         rate = design.losses @ self.base
-        found = np.empty((rate.size, self.distances.size))
+        log_speed = np.empty((rate.size, self.distances.size))
         for k, distance in enumerate(self.distances):
-            found[:, k] = design.terms(rate * distance) @ self.coefficients[:, k]
-            found[:, k] -= np.log1p(rate * distance)
-        return found
+            log_speed[:, k] = design.terms(rate * distance) @ self.coefficients[:, k]
+            log_speed[:, k] -= np.log1p(rate * distance)
+        return log_speed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,8 +144,8 @@ def design_of(
     """The terms of the library; parameters as for `DecayLibrary.log_speed`."""
     losses = np.column_stack(
         [
-            1.0 - np.asarray(one, dtype=np.float64) ** 2
-            for one in (restitution, wall_restitution, floor_lid_restitution)
+            1.0 - np.asarray(values, dtype=np.float64) ** 2
+            for values in (restitution, wall_restitution, floor_lid_restitution)
         ]
     )
     pair, side = losses[:, 0], losses[:, 1]
@@ -156,7 +156,7 @@ def design_of(
     )
     factors = [pair**i * root**k for i, j, k in _powers(_NUISANCE_DEGREE) if j == 0]
     scaled = np.asarray(nuisances, dtype=np.float64) / UNITS
-    products = [factor * one for one in scaled.T for factor in factors]
+    products = [factor * values for values in scaled.T for factor in factors]
     simple = [pair**i * root**k for i, j, k in _powers(1) if j == 0]
     products += [factor * scaled[:, number] ** 2 for number in _CURVED for factor in simple]
     return Design(
@@ -177,20 +177,20 @@ def _powers(degree: int) -> list[tuple[int, int, int]]:
 
 def count_step(tray: Tray) -> int:
     """Beads by which the number of the most frequent ones is varied: 5 %, or one."""
-    return max(1, round(0.05 * max(one.count for one in tray.species)))
+    return max(1, round(0.05 * max(species.count for species in tray.species)))
 
 
 def tray_key(tray: Tray) -> str:
     """What decides how a tray cools, as a JSON object: its inside and its beads."""
     species = [
-        {name: value for name, value in asdict(one).items() if name not in ('material', 'mass')}
-        for one in tray.species
+        {name: value for name, value in asdict(kind).items() if name not in ('material', 'mass')}
+        for kind in tray.species
     ]
     return json.dumps({'dimensions': tray.dimensions, 'species': species})
 
 
 def term_count() -> int:
     """How many terms the functions of a library have at each distance."""
-    one = np.ones(1)
-    design = design_of(one, one, one, np.zeros((1, len(NUISANCES))))
+    ones = np.ones(1)
+    design = design_of(ones, ones, ones, np.zeros((1, len(NUISANCES))))
     return int(design.plain.shape[1] + design.weighted.shape[1])

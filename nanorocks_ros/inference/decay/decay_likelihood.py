@@ -106,18 +106,18 @@ class DecayLikelihood:
 
     def integrated(self) -> NDArray[np.float64]:
         """Log likelihood (n_places,) with the nuisances integrated over their Gaussian priors."""
-        each = np.empty(self.log_likelihood.shape)
+        log_likelihood = np.empty(self.log_likelihood.shape)
         n_z = self.gradient.shape[-1]
         integrate(
             np.ascontiguousarray(self.gradient).reshape(-1, n_z),
             np.ascontiguousarray(self.information).reshape(-1, n_z, n_z),
-            each.reshape(-1),
+            log_likelihood.reshape(-1),
         )
-        each += self.log_likelihood
-        if each.ndim == 1:
-            return np.asarray(each)
+        log_likelihood += self.log_likelihood
+        if log_likelihood.ndim == 1:
+            return np.asarray(log_likelihood)
         weight = np.exp(-0.5 * _SCALES**2)
-        return np.asarray(log_sum(each, weight / weight.sum()))
+        return np.asarray(log_sum(log_likelihood, weight / weight.sum()))
 
     def deviation_at(self, place: int) -> float:
         """Sum of the squares of the whitened residuals at a place, for the likeliest scale."""
@@ -153,27 +153,27 @@ def decay_likelihood(
     data = (log_time, log_speed, variance)
     # First with the covariance of each place, then at all of them with that of the best one: how
     # strongly the gas fluctuates is known too roughly to tell restitutions by.
-    some = slice(None, None, _EVERY)
-    corners, shares = tables.corners[some], tables.shares[some]
-    rough = _over(tables, data, cells, camera, (some, corners, shares), derivatives=False)
+    subset = slice(None, None, _EVERY)
+    corners, shares = tables.corners[subset], tables.shares[subset]
+    rough = _over(tables, data, cells, camera, (subset, corners, shares), derivatives=False)
     best = int(np.argmax(rough.log_likelihood)) * _EVERY
-    every = slice(None), tables.corners[best, np.newaxis], tables.shares[best, np.newaxis]
+    all_places = slice(None), tables.corners[best, np.newaxis], tables.shares[best, np.newaxis]
     scale, bias = camera
     if scale <= _WIDE:
-        return _over(tables, data, cells, camera, every)
-    each = [
+        return _over(tables, data, cells, camera, all_places)
+    likelihoods = [
         _over(
             tables,
             (log_time, log_speed - step * scale, variance),
             cells,
             (0.5 * scale, bias),
-            every,
+            all_places,
         )
         for step in _SCALES
     ]
     return DecayLikelihood(
         **{
-            name: np.stack([getattr(likelihood, name) for likelihood in each])
+            name: np.stack([getattr(likelihood, name) for likelihood in likelihoods])
             for name in ('log_likelihood', 'gradient', 'information', 'deviation')
         },
         samples=cells.size,
@@ -191,8 +191,8 @@ def _over(
 ) -> DecayLikelihood:
     """The likelihood at some places, with covariances between given corners, in given shares."""
     library = tables.decays
-    which, corners, shares = places
-    mean = tables.mean[which]
+    subset, corners, shares = places
+    mean = tables.mean[subset]
     n_z = tables.slopes.shape[1] + len(CAMERA_NUISANCES)
     numbers = np.empty((len(mean), 2))
     gradient = np.empty((len(mean) if derivatives else 0, n_z))
@@ -204,7 +204,7 @@ def _over(
         np.ascontiguousarray(corners),
         np.ascontiguousarray(shares),
         np.ascontiguousarray(mean),
-        np.ascontiguousarray(tables.slopes[which]),
+        np.ascontiguousarray(tables.slopes[subset]),
         np.array(camera),
         math.log(library.distances[0]),
         library.step,

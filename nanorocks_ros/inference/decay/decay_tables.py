@@ -40,7 +40,7 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
     """
     restitution = 1.0 - np.linspace(1.0, 0.0, _BEAD_NODES) ** (1.0 / BEAD_POWER)
     wall = 1.0 - (1.0 - LOWEST_WALL) * np.linspace(1.0, 0.0, _WALL_NODES) ** (1.0 / WALL_POWER)
-    beads, walls = (one.ravel() for one in np.meshgrid(restitution, wall, indexing='ij'))
+    beads, walls = (axis.ravel() for axis in np.meshgrid(restitution, wall, indexing='ij'))
     mean = _smooth(library.log_speed(beads, walls))
     slopes = [_floor_and_lid(library, beads, walls, settings.floor_lid_spread)]
     for number, spread in enumerate(_spreads(tray, settings)):
@@ -72,7 +72,7 @@ def _smooth(curves: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _spreads(tray: Tray, settings: PriorSettings) -> tuple[float, ...]:
     """One standard deviation of each of `NUISANCES`."""
-    counted = all(one.mass is None for one in tray.species)
+    counted = all(species.mass is None for species in tray.species)
     count = settings.count_error / count_step(tray) if counted else 1.0
     return (
         settings.height_error,
@@ -92,7 +92,7 @@ def _floor_and_lid(
     """Change of ln f when floor and lid take more than the side walls, by exp(spread)."""
     if spread == 0.0:
         return np.zeros((beads.size, library.distances.size))
-    more, less = (1.0 - (1.0 - walls) * math.exp(one) for one in (spread, -spread))
+    more, less = (1.0 - (1.0 - walls) * math.exp(logarithm) for logarithm in (spread, -spread))
     high = library.log_speed(beads, walls, np.maximum(more, LOWEST_WALL - 0.05))
     return np.asarray(0.5 * (high - library.log_speed(beads, walls, less)))
 
@@ -116,6 +116,6 @@ def _corners(
 def _cell(
     axis: NDArray[np.float64], at: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    found = np.clip(np.searchsorted(axis, at, side='right') - 1, 0, axis.size - 2)
-    share = (at - axis[found]) / (axis[found + 1] - axis[found])
-    return found.astype(np.int64), np.clip(share, 0.0, 1.0)
+    cell = np.clip(np.searchsorted(axis, at, side='right') - 1, 0, axis.size - 2)
+    share = (at - axis[cell]) / (axis[cell + 1] - axis[cell])
+    return cell.astype(np.int64), np.clip(share, 0.0, 1.0)

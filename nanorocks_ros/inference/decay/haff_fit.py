@@ -149,12 +149,12 @@ def _best(data: Decay, start: float) -> NDArray[np.float64]:
     unusual = np.abs(first.x[1:3] - data.usual) > _UNUSUAL
     if not unusual.any() and first.x[0] > _LOG_HAFF_TIME[0]:
         return np.asarray(first.x)
-    found = [first]
+    fits = [first]
     taus = np.log(_SPREAD_OF_TIMES * data.time[-1])
-    for kind in _KINDS_OF_NOISE:
-        starts = [np.array([one, *(data.usual + kind), 0.0]) for one in taus]
-        found.append(_lowest(data, min(starts, key=data.cost)))
-    return np.asarray(min(found, key=lambda one: float(one.fun)).x)
+    for noise in _KINDS_OF_NOISE:
+        starts = [np.array([log_tau, *(data.usual + noise), 0.0]) for log_tau in taus]
+        fits.append(_lowest(data, min(starts, key=data.cost)))
+    return np.asarray(min(fits, key=lambda log_tau: float(log_tau.fun)).x)
 
 
 def _lowest(data: Decay, start: NDArray[np.float64]) -> optimize.OptimizeResult:
@@ -181,8 +181,8 @@ def _degrees_of_freedom(data: Decay, best: NDArray[np.float64]) -> float:
     down = np.array([data.cost(best - shift) for shift in shifts])
     hessian = np.diag(up - 2.0 * centre + down)
     for i, j in itertools.combinations(range(len(shifts)), 2):
-        both = data.cost(best + shifts[i] + shifts[j]) - up[i] - up[j] + centre
-        hessian[i, j] = hessian[j, i] = both
+        mixed = data.cost(best + shifts[i] + shifts[j]) - up[i] - up[j] + centre
+        hessian[i, j] = hessian[j, i] = mixed
     slope = np.array(
         [
             0.5 * math.log(data.rate_variance(best + shift) / data.rate_variance(best - shift))

@@ -136,13 +136,13 @@ def local_slopes(
         Number of the window of each point, rising from 0; three points or more in each.
     """
     slowness = (2.0 - speeds / law) / law
-    found = []
+    slopes = []
     for number in range(int(windows[-1]) + 1):
         inside = windows == number
         weights = law[inside] ** 2 / (law[inside] ** 2).sum()
-        off = times[inside] - weights @ times[inside]
-        found.append(slowness[..., inside] @ (weights * off) / (weights @ off**2))
-    return np.stack(found, axis=-1)
+        centred = times[inside] - weights @ times[inside]
+        slopes.append(slowness[..., inside] @ (weights * centred) / (weights @ centred**2))
+    return np.stack(slopes, axis=-1)
 
 
 def instantaneous_cor(
@@ -258,9 +258,9 @@ def _table(gas: ConfinedGas, walls: float) -> tuple[NDArray[np.float64], NDArray
     """Rising decay rates [1/m] and the restitutions they stand for."""
     grid = np.linspace(1.0, _LOWEST, _STEPS)
     rates: list[float] = []
-    for one in grid:
+    for restitution in grid:
         try:
-            rate = gas.decay_rate(float(one), walls)
+            rate = gas.decay_rate(float(restitution), walls)
         except FitError:
             break
         if rates and rate <= rates[-1]:

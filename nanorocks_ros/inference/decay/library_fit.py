@@ -144,13 +144,13 @@ def _covariances(decays: Decays) -> NDArray[np.float64]:
     of_node = np.einsum('nrx,nry->nxy', deviation, deviation) / (runs - 1)
     across = _even(decays.restitution)
     up = (1.0 - decays.wall_restitution) / (1.0 - LOWEST_WALL)
-    found = np.empty((_COVARIANCE_RESTITUTION.size, _COVARIANCE_WALL.size, n_x, n_x))
+    covariance = np.empty((_COVARIANCE_RESTITUTION.size, _COVARIANCE_WALL.size, n_x, n_x))
     for i, restitution in enumerate(_even(_COVARIANCE_RESTITUTION)):
         for j, wall in enumerate((1.0 - _COVARIANCE_WALL) / (1.0 - LOWEST_WALL)):
             square = ((across - restitution) ** 2 + (up - wall) ** 2) / _REACH**2
             weight = np.exp(-0.5 * square)
-            found[i, j] = np.tensordot(weight / weight.sum(), of_node, axes=1)
-    return found
+            covariance[i, j] = np.tensordot(weight / weight.sum(), of_node, axes=1)
+    return covariance
 
 
 def _even(restitution: NDArray[np.float64]) -> NDArray[np.float64]:

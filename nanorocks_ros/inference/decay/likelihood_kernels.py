@@ -40,7 +40,7 @@ def evaluate(
     camera: NDArray[np.float64],
     first: float,
     step: float,
-    found: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    results: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
 ) -> None:
     """Fill in the likelihood at every place, for its best amplitude.
 
@@ -57,12 +57,12 @@ def evaluate(
     camera : ndarray (2,)
     first, step : float
         Logarithm of the first distance of the library, and from each to the next.
-    found : tuple of 3 ndarrays
+    results : tuple of 3 ndarrays
         Log likelihood and deviation, (n_places, 2); gradient, (n_places, n_z + 2), and
         information, (n_places, n_z + 2, n_z + 2): without entries where nobody asks for them.
     """
     log_time, log_speed, variance = data
-    numbers, gradients, informations = found
+    numbers, gradients, informations = results
     n = log_time.size
     n_z = slopes.shape[1] + camera.size
     mixed = np.empty(covariances.shape[1:])
@@ -90,9 +90,9 @@ def evaluate(
         best, cost = _best_amplitude(
             data, means[place], (first, step), factor, (amplitude, expected, spread), columns
         )
-        off = (best - expected) / spread
+        deviation = (best - expected) / spread
         if gradients.shape[0] == 0:
-            numbers[place, 1] = cost - off * off
+            numbers[place, 1] = cost - deviation * deviation
             numbers[place, 0] = -0.5 * (cost + log_determinant)
             continue
         _compare(log_time, log_speed, means[place], first, step, best, columns)
@@ -101,8 +101,10 @@ def evaluate(
         columns[n_z] = camera[0] * (columns[1] - 1.0)
         columns[n_z + 1] = camera[1] * (log_speed - middle)
         whiten(factor, columns, 2 + n_z)
-        _sum_up(columns, (off, spread), numbers[place], gradients[place], informations[place])
-        numbers[place, 0] -= 0.5 * (log_determinant + off * off)
+        _sum_up(
+            columns, (deviation, spread), numbers[place], gradients[place], informations[place]
+        )
+        numbers[place, 0] -= 0.5 * (log_determinant + deviation * deviation)
 
 
 @kernel
@@ -128,19 +130,19 @@ def _best_amplitude(
     for _ in range(_NEWTON_STEPS):
         _compare(log_time, log_speed, mean, first, step, amplitude, columns)
         whiten(factor, columns, 2)
-        off = (amplitude - expected) / spread
-        now = off * off
-        pull = -off / spread
+        deviation = (amplitude - expected) / spread
+        new_cost = deviation * deviation
+        pull = -deviation / spread
         stiffness = 1.0 / spread**2
         for i in range(log_time.size):
-            now += residual[i] ** 2
+            new_cost += residual[i] ** 2
             pull += residual[i] * slope[i]
             stiffness += slope[i] ** 2
-        if now > cost:
+        if new_cost > cost:
             # Too far: the mean is curved.
             change *= 0.3
         else:
-            cost, best = now, amplitude
+            cost, best = new_cost, amplitude
             change = min(max(pull / stiffness, -_LONGEST_STEP), _LONGEST_STEP)
         amplitude = best + change
         if abs(change) < _SMALL:
@@ -178,18 +180,18 @@ def _mix(
     corners: NDArray[np.int64],
     shares: NDArray[np.float64],
     part: tuple[int, int],
-    found: NDArray[np.float64],
+    covariance: NDArray[np.float64],
 ) -> None:
     """The covariance of the library between four corners, from one distance to another."""
-    one, two = covariances[corners[0]], covariances[corners[1]]
-    three, four = covariances[corners[2]], covariances[corners[3]]
+    first, second = covariances[corners[0]], covariances[corners[1]]
+    third, fourth = covariances[corners[2]], covariances[corners[3]]
     for i in range(part[0], part[1]):
         for j in range(part[0], part[1]):
-            found[i, j] = (
-                shares[0] * one[i, j]
-                + shares[1] * two[i, j]
-                + shares[2] * three[i, j]
-                + shares[3] * four[i, j]
+            covariance[i, j] = (
+                shares[0] * first[i, j]
+                + shares[1] * second[i, j]
+                + shares[2] * third[i, j]
+                + shares[3] * fourth[i, j]
             )
 
 
@@ -198,7 +200,7 @@ def _covariance(
     table: NDArray[np.float64],
     cells: NDArray[np.int64],
     offset: float,
-    found: NDArray[np.float64],
+    covariance: NDArray[np.float64],
 ) -> None:
     """Lower half of the covariance of data at some cells after an offset."""
     whole = math.floor(offset)
@@ -206,10 +208,10 @@ def _covariance(
     low = 1.0 - high
     for i in range(cells.size):
         row = max(whole + cells[i], 0)
-        here, next_one, into = table[row], table[row + 1], found[i]
+        row_below, row_above, target = table[row], table[row + 1], covariance[i]
         for j in range(i + 1):
             column = max(whole + cells[j], 0)
-            into[j] = low * here[column] + high * next_one[column + 1]
+            target[j] = low * row_below[column] + high * row_above[column + 1]
 
 
 @kernel
@@ -239,7 +241,7 @@ def _between(values: NDArray[np.float64], at: float) -> tuple[float, float]:
 
 @kernel
 def _look_up(
-    slopes: NDArray[np.float64], places: NDArray[np.float64], found: NDArray[np.float64]
+    slopes: NDArray[np.float64], places: NDArray[np.float64], changes: NDArray[np.float64]
 ) -> None:
     """Changes of ln f with nuisances, (n_z, n_x), between distances; (n_z, n)."""
     for i in range(places.size):
@@ -249,7 +251,7 @@ def _look_up(
         share = at - cell
         for z in range(slopes.shape[0]):
             value = slopes[z, cell]
-            found[z, i] = value + share * (slopes[z, cell + 1] - value)
+            changes[z, i] = value + share * (slopes[z, cell + 1] - value)
 
 
 @kernel
@@ -282,11 +284,11 @@ def _sum_up(
         for first in range(0, z + 1, 2):
             # Two side by side; an odd one at the end goes with itself.
             second = min(first + 1, z)
-            one, two = columns[2 + first], columns[2 + second]
+            column, next_column = columns[2 + first], columns[2 + second]
             a, b = -shared * gradient[first] / stiffness, -shared * gradient[second] / stiffness
             for i in range(n):
-                a += own[i] * one[i]
-                b += own[i] * two[i]
+                a += own[i] * column[i]
+                b += own[i] * next_column[i]
             information[z, first] = information[first, z] = a
             information[z, second] = information[second, z] = b
     for z in range(gradient.size):

@@ -38,8 +38,8 @@ def encounter_rate(tray: Tray) -> float:
 
     Discs that move at random over the floor; passing above counts as much as a collision.
     """
-    radii = 0.5 * np.array([one.diameter for one in tray.species])
-    counts = np.array([one.count for one in tray.species], dtype=np.float64)
+    radii = 0.5 * np.array([species.diameter for species in tray.species])
+    counts = np.array([species.count for species in tray.species], dtype=np.float64)
     reach = (counts @ (radii[:, None] + radii) @ counts) / counts.sum() ** 2
     room = math.prod(side - tray.diameter for side in tray.dimensions[:2])
     return float(2.0 * math.sqrt(2.0) * reach * max(counts.sum() - 1.0, 0.0) / room)

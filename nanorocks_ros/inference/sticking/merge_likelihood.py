@@ -111,85 +111,85 @@ class MergeRates:
         FitError
             For speeds or times that cannot be used.
         """
-        one = _first_part(_checked(cycle), self._fewest)
-        if one.times.size < 2 or one.bodies[0] <= 1.0:
-            return replace(self.nothing, merges=one.merges.size)
-        speeds = np.interp(one.merges, one.times, one.speeds)
+        usable = _first_part(_checked(cycle), self._fewest)
+        if usable.times.size < 2 or usable.bodies[0] <= 1.0:
+            return replace(self.nothing, merges=usable.merges.size)
+        speeds = np.interp(usable.merges, usable.times, usable.speeds)
         logs = self._contacts.log_slower_sum(self.speeds, speeds, self._measure)
         return MergeTerms(
             speeds=self.speeds,
-            merges=one.merges.size,
+            merges=usable.merges.size,
             exposed=True,
             logs=logs + np.log(speeds).sum(),
-            expected=self._expected_in(one),
+            expected=self._expected_in(usable),
         )
 
-    def _expected_in(self, one: StickingCycle) -> NDArray[np.float64]:
+    def _expected_in(self, cycle: StickingCycle) -> NDArray[np.float64]:
         """Merges expected at each sticking speed, (n,): an integral by the trapezoidal rule."""
-        if self._known is None or not _begins_with(one, self._known):
+        if self._known is None or not _begins_with(cycle, self._known):
             self._known, self._expected = None, np.zeros(_NODES)
         first = self._known.times.size - 1 if self._known is not None else 0
-        settled = int(np.searchsorted(one.times, one.times[-1] - _SETTLED))
+        settled = int(np.searchsorted(cycle.times, cycle.times[-1] - _SETTLED))
         if settled > first:
-            self._expected = self._expected + self._between(one, first, settled)
+            self._expected = self._expected + self._between(cycle, first, settled)
             self._known = replace(
-                one,
-                times=one.times[: settled + 1],
-                speeds=one.speeds[: settled + 1],
-                bodies=one.bodies[: settled + 1],
+                cycle,
+                times=cycle.times[: settled + 1],
+                speeds=cycle.speeds[: settled + 1],
+                bodies=cycle.bodies[: settled + 1],
             )
             first = settled
-        return self._expected + self._between(one, first, one.times.size - 1)
+        return self._expected + self._between(cycle, first, cycle.times.size - 1)
 
-    def _between(self, one: StickingCycle, first: int, last: int) -> NDArray[np.float64]:
+    def _between(self, cycle: StickingCycle, first: int, last: int) -> NDArray[np.float64]:
         """The part of the integral from one node to another."""
         part = slice(first, last + 1)
-        bodies, speeds = one.bodies[part], one.speeds[part]
-        halves = 0.5 * np.diff(one.times[part])
+        bodies, speeds = cycle.bodies[part], cycle.speeds[part]
+        halves = 0.5 * np.diff(cycle.times[part])
         width = np.append(halves, 0.0) + np.append(0.0, halves)
         # Bodies meet as beads do: pairs of them, at the speed of the beads.
         weights = width * 0.5 * bodies**2 / self._beads * speeds * (bodies > 1.0)
         return self._contacts.slower_sum(self.speeds, speeds, weights, self._measure)
 
 
-def _begins_with(one: StickingCycle, known: StickingCycle) -> bool:
-    n = known.times.size
+def _begins_with(cycle: StickingCycle, start: StickingCycle) -> bool:
+    n = start.times.size
     return (
-        np.array_equal(one.times[:n], known.times)
-        and np.array_equal(one.speeds[:n], known.speeds)
-        and np.array_equal(one.bodies[:n], known.bodies)
+        np.array_equal(cycle.times[:n], start.times)
+        and np.array_equal(cycle.speeds[:n], start.speeds)
+        and np.array_equal(cycle.bodies[:n], start.bodies)
     )
 
 
-def _first_part(one: StickingCycle, fewest: float) -> StickingCycle:
+def _first_part(cycle: StickingCycle, fewest: float) -> StickingCycle:
     """The cycle as long as there are enough bodies."""
-    used = one.bodies >= max(fewest, 1.0 + 1e-9)
+    used = cycle.bodies >= max(fewest, 1.0 + 1e-9)
     end = int(np.argmin(used)) if not used.all() else used.size
     if end == 0:
         nothing = np.empty(0)
-        return replace(one, times=nothing, speeds=nothing, bodies=nothing, merges=nothing)
-    last = one.times[end - 1] if end < used.size else np.inf
+        return replace(cycle, times=nothing, speeds=nothing, bodies=nothing, merges=nothing)
+    last = cycle.times[end - 1] if end < used.size else np.inf
     return replace(
-        one,
-        times=one.times[:end],
-        speeds=one.speeds[:end],
-        bodies=one.bodies[:end],
-        merges=one.merges[one.merges <= last],
+        cycle,
+        times=cycle.times[:end],
+        speeds=cycle.speeds[:end],
+        bodies=cycle.bodies[:end],
+        merges=cycle.merges[cycle.merges <= last],
     )
 
 
-def _checked(one: StickingCycle) -> StickingCycle:
-    sizes = {one.times.size, one.speeds.size, one.bodies.size}
-    if len(sizes) > 1 or not one.times.size:
+def _checked(cycle: StickingCycle) -> StickingCycle:
+    sizes = {cycle.times.size, cycle.speeds.size, cycle.bodies.size}
+    if len(sizes) > 1 or not cycle.times.size:
         raise FitError(
             'sticking',
-            f'{one.times.size} times, {one.speeds.size} speeds, {one.bodies.size} numbers',
+            f'{cycle.times.size} times, {cycle.speeds.size} speeds, {cycle.bodies.size} numbers',
             'give as many of each, one at least',
         )
-    if not (np.diff(one.times) >= 0.0).all():
+    if not (np.diff(cycle.times) >= 0.0).all():
         raise FitError('sticking', 'times that do not rise', 'sort them')
-    if not (np.isfinite(one.speeds).all() and (one.speeds > 0.0).all()):
+    if not (np.isfinite(cycle.speeds).all() and (cycle.speeds > 0.0).all()):
         raise FitError(
             'sticking', 'a speed that is not positive', 'leave out what is not known, or at rest'
         )
-    return one
+    return cycle

@@ -60,15 +60,15 @@ def sticking_cycle(
         The shaking event: until the first speed they are taken to be that.
     """
     end = (int(stamps_ns[-1]) - start_ns) / _NS
-    found = sorted((merge.stamp_ns - start_ns) / _NS for merge in merges if merge.joins)
-    inside = np.array([max(one, 0.0) for one in found if one <= end])
+    merge_times = sorted((merge.stamp_ns - start_ns) / _NS for merge in merges if merge.joins)
+    inside = np.array([max(time, 0.0) for time in merge_times if time <= end])
     known = np.concatenate([[0.0], (stamps_ns - start_ns) / _NS])
     # Bodies are constant between merges: both values of each are nodes of the integral.
     times = np.sort(np.concatenate([known, inside, np.nextafter(inside, np.inf)]))
-    fallen = np.searchsorted(inside, times, side='left')
+    merged = np.searchsorted(inside, times, side='left')
     return StickingCycle(
         times=times,
         speeds=np.interp(times, known[1:], speeds),
-        bodies=beads - fallen.astype(np.float64),
+        bodies=beads - merged.astype(np.float64),
         merges=inside,
     )

@@ -119,7 +119,7 @@ def _posterior(
     total /= total[-1]
     tail = 0.5 * (1.0 - probability)
     quantiles = (tail, 0.5, 1.0 - tail, probability, 1.0 - probability)
-    low, median, high, limit, least = (float(one) for one in np.interp(quantiles, total, grid))
+    low, median, high, limit, least = (float(value) for value in np.interp(quantiles, total, grid))
     if merges == 0:
         status, low, median, high = StickingStatus.NO_MERGE, 0.0, math.nan, limit
     elif likelihood[-1] > likelihood.max() - _UNLIMITED:
