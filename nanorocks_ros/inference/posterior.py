@@ -1,8 +1,8 @@
-"""The restitutions of beads and walls: what is known of both together, and of each.
+"""Joint posterior of the restitutions of beads and walls.
 
-The decay of the mean speed alone tells one combination of the two: along a valley a higher
-restitution of the beads makes up for a lower one of the walls. So the result is a probability
-over both, and what is said of one of them depends on what is known of the other: the prior.
+The decay of the mean speed alone determines one combination of the two: a higher restitution of
+the beads compensates a lower one of the walls. So the result is a probability over both, and the
+estimate of one depends on the prior of the other.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ if TYPE_CHECKING:
 
 # Points of the fine grid along each restitution.
 _FINE, _WALL_FINE = 241, 121
-# Less likely places than exp(-this) of the best are not looked at.
+# Points with a probability below exp(-this) of the maximum are left out.
 _DEPTH = 18.0
-# Beyond about so much less, log likelihoods are compressed before they are interpolated: next to
-# steep slopes a spline would swing.
+# Log likelihoods lower than the maximum by more than about this are compressed before the
+# interpolation: a spline overshoots next to steep slopes.
 _COMPRESSION = 200.0
-# Where nothing is lost there is no decay to compare with: that corner of the grid is taken as so
-# much less likely than the likelier of its neighbours, lest a spline swing around it.
+# The elastic corner of the grid has no decay to compare with. Its log likelihood is set this much
+# below its better neighbour, so that the spline does not overshoot.
 _CORNER = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Posterior:
-    """Probability of pairs of restitutions, on a grid that covers all that are likely.
+    """Probability of pairs of restitutions, on a grid that covers all likely values.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ class Posterior:
     probability : ndarray (n_c, n_w)
         Sums to 1.
     tension : float
-        Standard deviations by which what went into it disagrees: decay, rebounds and collisions;
-        0 where there was the decay alone.
+        Disagreement of decay, rebounds and collisions in standard deviations; 0 with the decay
+        alone.
     """
 
     restitution: NDArray[np.float64]
@@ -59,7 +59,7 @@ class Posterior:
 
     @property
     def mean(self) -> tuple[float, float]:
-        """Of both restitutions."""
+        """Means of both restitutions."""
         return (
             float(self.probability.sum(axis=1) @ self.restitution),
             float(self.probability.sum(axis=0) @ self.wall_restitution),
@@ -67,7 +67,7 @@ class Posterior:
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """Of both restitutions, (2, 2)."""
+        """Covariance of both restitutions, (2, 2)."""
         x = self.restitution - self.mean[0]
         y = self.wall_restitution - self.mean[1]
         p = self.probability
@@ -80,25 +80,25 @@ class Posterior:
         )
 
     def quantiles(self, probabilities: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Of the restitution of the beads, whatever the walls."""
+        """Quantiles of the bead restitution, marginalised over the walls."""
         return _quantiles(self.restitution, self.probability.sum(axis=1), probabilities)
 
     def wall_quantiles(self, probabilities: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Of the restitution of the walls, whatever the beads."""
+        """Quantiles of the wall restitution, marginalised over the beads."""
         return _quantiles(self.wall_restitution, self.probability.sum(axis=0), probabilities)
 
 
 def _quantiles(
     axis: NDArray[np.float64], weight: NDArray[np.float64], probabilities: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Each entry stands for the stretch half way to its neighbours."""
+    """Quantiles of a distribution whose entries extend half way to their neighbours."""
     edges = np.concatenate(([axis[0]], 0.5 * (axis[1:] + axis[:-1]), [axis[-1]]))
     below = np.concatenate(([0.0], np.cumsum(weight)))
     return np.asarray(np.interp(probabilities, below / below[-1], edges))
 
 
 def check_walls(walls: tuple[float, float]) -> None:
-    """Refuse a prior of the walls beyond what a library covers.
+    """Refuse a prior of the wall restitution outside the range of a library.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def posterior_of(
     of_beads: SingleTerm | None = None,
     of_walls: SingleTerm | None = None,
 ) -> Posterior:
-    """The posterior, with even priors.
+    """The posterior for flat priors.
 
     Parameters
     ----------
@@ -129,15 +129,15 @@ def posterior_of(
     log_likelihood : ndarray (n_places,)
         On the grid of the tables.
     walls : tuple of 2 floats
-        Lowest and highest restitution that the walls may have, each as likely; equal when it is
-        known. That of the beads may be anything from 0 to 1.
+        Ends of the flat prior of the wall restitution; equal if it is known. The prior of the
+        bead restitution is flat from 0 to 1.
     of_beads, of_walls : SingleTerm, optional
-        Further log likelihoods, of each of the two by itself.
+        Further log likelihoods of one restitution alone.
 
     Raises
     ------
     ConfigurationError
-        For walls outside what the library covers.
+        For a wall prior outside the range of the library.
     """
     check_walls(walls)
     shape = (tables.restitution.size, tables.wall_restitution.size)
@@ -163,7 +163,7 @@ def posterior_of(
         fine -= best
         box = _likely(fine, beads, wall)
     weight = np.exp(fine) * _halves(beads.size)[:, np.newaxis] * _halves(wall.size)
-    # By itself each of the terms could be as good as its own best.
+    # Without the decay each likelihood would reach its own maximum.
     apart = sum(float(term.log_likelihood.max()) for term in (of_beads, of_walls) if term)
     return Posterior(
         restitution=beads,
@@ -187,7 +187,7 @@ class _Surface(NamedTuple):
         return cls(spline.get_knots(), spline.get_coeffs().reshape(values.shape))
 
     def at(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """On the grid of some places within the knots, (n_x, n_y)."""
+        """Values on a grid of points within the knots, (n_x, n_y)."""
         rows, columns = (
             spline_basis(knots, points) for knots, points in zip(self.knots, (x, y), strict=True)
         )
@@ -195,10 +195,10 @@ class _Surface(NamedTuple):
 
 
 def _without_pits(less: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    """How much less likely places are, where along one restitution there is one best of them.
+    """Log likelihood below the maximum, made unimodal along one axis.
 
-    Where amplitude, scale and restitution make up for each other, noise of the library leaves
-    single places without the best of it, around which a spline would swing.
+    Where amplitude, scale and restitution compensate each other, noise of the library leaves
+    isolated pits, around which a spline overshoots.
     """
     before = np.minimum.accumulate(less, axis=axis)
     behind = np.flip(np.minimum.accumulate(np.flip(less, axis=axis), axis=axis), axis=axis)
@@ -206,7 +206,7 @@ def _without_pits(less: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
 
 
 def _even(restitution: NDArray[np.float64], low: float, power: float) -> NDArray[np.float64]:
-    """Where restitutions lie, from 0 for the lowest to 1, in what the grid is even in."""
+    """Coordinate in which the grid is evenly spaced, 0 at the lowest restitution, 1 at 1."""
     return np.asarray(1.0 - ((1.0 - restitution) / (1.0 - low)) ** power)
 
 
@@ -220,7 +220,7 @@ def _axes(
 
 
 def _halves(n: int) -> NDArray[np.float64]:
-    """The first and the last entry of an axis stand for half as much."""
+    """Weights of the trapezoidal rule: half at the first and the last entry."""
     weights = np.ones(n)
     weights[[0, -1]] = 0.5
     return weights
@@ -229,7 +229,7 @@ def _halves(n: int) -> NDArray[np.float64]:
 def _likely(
     fine: NDArray[np.float64], beads: NDArray[np.float64], wall: NDArray[np.float64]
 ) -> tuple[float, float, float, float]:
-    """The box around all places that are not beyond hope, and one more on each side."""
+    """Bounding box of all likely points, with one point more on each side."""
     box = []
     for axis, other in ((beads, 1), (wall, 0)):
         likely = np.flatnonzero(fine.max(axis=other) > -_DEPTH)

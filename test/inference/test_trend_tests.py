@@ -86,9 +86,9 @@ def test_trays_of_any_size_count_alike_and_may_have_gaps():
     sizes[0] *= 100.0
     sizes[1, ::3] = math.nan
     sizes[2, 45:47] = math.nan
-    (found,) = quiet_periods(sizes)
-    assert abs(found.first - 40) <= 1
-    assert abs(found.last - 51) <= 1
+    (period,) = quiet_periods(sizes)
+    assert abs(period.first - 40) <= 1
+    assert abs(period.last - 51) <= 1
 
 
 @pytest.mark.parametrize('sizes', [np.empty((0, 0)), np.ones((2, 40)), np.full((2, 9), math.nan)])

@@ -48,8 +48,8 @@ def test_a_curve_that_was_checked_carries_no_mark():
 
 def test_thresholds_at_masses_of_the_trays_are_as_computed_by_hand():
     # (4.94e-3 g / 3.3e-3 g)^(-5/18) cm/s, and for a bead of glass of 1.47 mg.
-    found = ALWAYS_BOUNCING.threshold(np.array([4.942772e-3, 1.466e-3]) * GRAM) / CENTIMETRE
-    assert found == pytest.approx([0.89385, 1.2527], rel=1e-3)
+    speeds = ALWAYS_BOUNCING.threshold(np.array([4.942772e-3, 1.466e-3]) * GRAM) / CENTIMETRE
+    assert speeds == pytest.approx([0.89385, 1.2527], rel=1e-3)
 
 
 @given(some.floats(1e-12, 1e-2), some.floats(1.1, 1e3))

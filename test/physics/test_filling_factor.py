@@ -88,8 +88,8 @@ def test_a_close_packed_layer_is_more_than_full_by_the_papers_formula():
     ],
 )
 def test_the_hull_of_discs_has_the_area_of_the_hull_of_centres_a_rim_and_a_disc(places, area):
-    found = hull_area(R * np.array(places, dtype=float), np.full(len(places), R))
-    assert found == pytest.approx(area * R**2, rel=3e-5)
+    area_of_hull = hull_area(R * np.array(places, dtype=float), np.full(len(places), R))
+    assert area_of_hull == pytest.approx(area * R**2, rel=3e-5)
 
 
 def test_a_disc_inside_another_adds_nothing_to_the_hull():
@@ -104,8 +104,8 @@ def test_the_hull_of_two_discs_of_different_size_is_a_belt_around_two_wheels():
     belt = (
         (math.pi / 2 + lean) * big**2 + (math.pi / 2 - lean) * small**2 + straight * (big + small)
     )
-    found = hull_area(np.array([[0.0, 0.0], [apart, 0.0]]), np.array([big, small]))
-    assert found == pytest.approx(belt, rel=3e-5)
+    area_of_hull = hull_area(np.array([[0.0, 0.0], [apart, 0.0]]), np.array([big, small]))
+    assert area_of_hull == pytest.approx(belt, rel=3e-5)
 
 
 @pytest.mark.parametrize('rings', [1, 2, 3])
@@ -153,8 +153,8 @@ def test_folding_a_chain_into_a_patch_raises_its_filling():
     bent = chain.copy()
     bent[4:] = chain[3] + 2 * R * np.column_stack((np.zeros(3), np.arange(1, 4)))
     fillings = [
-        layer_filling(np.full(n, R), hull_area(one, np.full(n, R)))
-        for one in (bent, chain, hexagonal_patch(n, R))
+        layer_filling(np.full(n, R), hull_area(places, np.full(n, R)))
+        for places in (bent, chain, hexagonal_patch(n, R))
     ]
     assert fillings == sorted(fillings)
     assert fillings[2] / fillings[0] > 1.5

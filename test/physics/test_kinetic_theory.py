@@ -63,8 +63,8 @@ def test_beads_lose_a_sixth_of_their_loss_in_each_collision():
 @given(some.floats(0.0, 0.999))
 def test_the_restitution_undoes_the_decay(restitution):
     rate = kinetic_decay_rate(restitution, DIAMETER, DENSITY)
-    found = kinetic_restitution(rate, DIAMETER, DENSITY).value
-    assert found == pytest.approx(restitution, abs=1e-7)
+    undone = kinetic_restitution(rate, DIAMETER, DENSITY).value
+    assert undone == pytest.approx(restitution, abs=1e-7)
 
 
 def test_errors_are_those_of_the_formula():

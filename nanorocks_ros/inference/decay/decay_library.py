@@ -1,10 +1,10 @@
-"""Simulated decays of one tray as smooth functions of the restitutions, to hold data against.
+"""Decay library: simulated decays of one tray as smooth functions of the restitutions.
 
 With constant restitution a gas that is k times as fast does the same things k times as fast, so
 v(t) = v0 f(v0 t) with one function f of a distance, [m]. The library holds the mean of ln f over
 many runs as a function of the restitution of the beads, of the side walls, and of floor and lid,
-with its derivatives to what is not known exactly (height, diameter, count, how the gas starts),
-and the covariance of ln f between distances, since a gas of a few beads does not follow the mean.
+with its derivatives by the nuisances (height, diameter, count, initial velocities), and the
+covariance of ln f between distances, since a gas of a few beads deviates from the mean.
 
 ln f is written as -ln(1 + rate x), which Haff's law would be, plus polynomials, some of them
 times 1 / (1 + rate x), at each of a series of distances x; rate is a rough one, linear in the
@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
 
-# What varies beside the restitutions, and the unit of each in the polynomials: height of the
+# Nuisance parameters, and the unit of each in the polynomials: height of the
 # tray, [m]; diameter of the most frequent beads, relative; logarithm of the factor on the first
-# vertical velocities; number of those beads, in steps of `count_step`; speeds even (-1) or
-# Maxwellian (1) at the start.
+# vertical velocities; number of those beads, in steps of `count_step`; uniform (-1) or
+# Maxwellian (1) speeds at the start.
 NUISANCES = ('height', 'diameter', 'anisotropy', 'count', 'start')
 UNITS = np.array([0.25e-3, 0.02, 0.7, 1.0, 1.0])
-# Those that matter to second order, too: without it the mean over them would pass for the middle.
+# Nuisances with a quadratic term as well, without which their mean effect would be missing.
 _CURVED = (0, 2)
-# Restitutions of walls that a library covers.
+# Lowest wall restitution of a library.
 LOWEST_WALL = 0.78
 _DEGREE, _WEIGHTED_DEGREE, _NUISANCE_DEGREE = 4, 3, 2
 
@@ -47,18 +47,18 @@ class DecayLibrary:
     Parameters
     ----------
     tray : str
-        What decides how a tray cools, see `tray_key`.
+        Its `tray_key`.
     made_by : str
         JSON: version, seed, nodes, runs.
     misfit : float
-        What the functions are off by in ln f, beyond the noise of the runs they were made from.
+        Error of the functions in ln f, beyond the noise of the runs they were fitted to.
     base : ndarray (3,), [1/m]
         Rough rates of decay for a full loss in a pair, at a side wall, at floor and lid.
     distances : ndarray (n_x,), [m]
         Evenly spaced in their logarithm: v0 t, with v0 the mean projected speed at the start.
     coefficients : ndarray (n_terms, n_x)
     covariance_restitution, covariance_wall : ndarray (n_c,), (n_w,)
-        Where the covariance is known; falling from 1, rising to 1.
+        Grid of the covariance; falling from 1, rising to 1.
     covariance : ndarray (n_c, n_w, n_x, n_x)
         Of ln f between runs.
     """
@@ -75,7 +75,7 @@ class DecayLibrary:
 
     @cached_property
     def step(self) -> float:
-        """Of the logarithm of the distances."""
+        """Step of the logarithm of the distances."""
         return float(np.log(self.distances[-1] / self.distances[0]) / (self.distances.size - 1))
 
     def log_speed(
@@ -91,9 +91,9 @@ class DecayLibrary:
         ----------
         restitution, wall_restitution : ndarray (n,), 0 to 1
         floor_lid_restitution : ndarray (n,), optional
-            As the side walls where not given.
+            That of the side walls if not given.
         nuisances : ndarray (n, 5), optional
-            Deviations from the tray as it is listed, in SI units; see `NUISANCES`.
+            Deviations from the listed tray, in SI units; see `NUISANCES`.
 
         Returns
         -------
@@ -115,14 +115,14 @@ class DecayLibrary:
 
 @dataclass(frozen=True, kw_only=True)
 class Design:
-    """Where in the space of restitutions and nuisances the terms are to be taken.
+    """Terms of the library at points in the space of restitutions and nuisances.
 
     Parameters
     ----------
     losses : ndarray (n, 3)
         1 - restitution^2 of pairs, side walls, floor and lid.
     plain, weighted : ndarray (n, n_terms)
-        Terms as they are, and those that go with 1 / (1 + rate x).
+        Terms without and with the factor 1 / (1 + rate x).
     """
 
     losses: NDArray[np.float64]
@@ -176,12 +176,12 @@ def _powers(degree: int) -> list[tuple[int, int, int]]:
 
 
 def count_step(tray: Tray) -> int:
-    """Beads by which the number of the most frequent ones is varied: 5 %, or one."""
+    """Step of the number of the most frequent beads: 5 %, or one."""
     return max(1, round(0.05 * max(species.count for species in tray.species)))
 
 
 def tray_key(tray: Tray) -> str:
-    """What decides how a tray cools, as a JSON object: its inside and its beads."""
+    """Properties that determine the cooling of a tray, as a JSON object: inside and beads."""
     species = [
         {name: value for name, value in asdict(kind).items() if name not in ('material', 'mass')}
         for kind in tray.species
@@ -190,7 +190,7 @@ def tray_key(tray: Tray) -> str:
 
 
 def term_count() -> int:
-    """How many terms the functions of a library have at each distance."""
+    """Number of terms of a library at each distance."""
     ones = np.ones(1)
     design = design_of(ones, ones, ones, np.zeros((1, len(NUISANCES))))
     return int(design.plain.shape[1] + design.weighted.shape[1])

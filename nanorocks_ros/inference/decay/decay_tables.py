@@ -29,14 +29,14 @@ _SMOOTH_CELLS = 9
 
 @lru_cache(maxsize=16)
 def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> DecayTables:
-    """The library at the grid of restitutions, with the spread of what is not known exactly.
+    """The library on the grid of restitutions, with the effect of each nuisance.
 
     Parameters
     ----------
     library : DecayLibrary
     tray : Tray
     settings : PriorSettings
-        Its spreads.
+        Standard deviations of the nuisances.
     """
     restitution = 1.0 - np.linspace(1.0, 0.0, _BEAD_NODES) ** (1.0 / BEAD_POWER)
     wall = 1.0 - (1.0 - LOWEST_WALL) * np.linspace(1.0, 0.0, _WALL_NODES) ** (1.0 / WALL_POWER)
@@ -64,8 +64,8 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
 def _smooth(curves: NDArray[np.float64]) -> NDArray[np.float64]:
     """Curves of the library without the noise of its runs.
 
-    Their slopes tell how far amplitude and scale make up for each other. Where the speed falls as
-    1/t they nearly do, and noise of 0.01 from cell to cell would decide.
+    Their slopes determine how far amplitude and scale compensate each other. Where the speed falls
+    as 1/t they nearly do, so that noise of 0.01 from cell to cell would dominate.
     """
     return np.asarray(savgol_filter(curves, _SMOOTH_CELLS, 3, axis=-1))
 
@@ -89,7 +89,7 @@ def _floor_and_lid(
     walls: NDArray[np.float64],
     spread: float,
 ) -> NDArray[np.float64]:
-    """Change of ln f when floor and lid take more than the side walls, by exp(spread)."""
+    """Change of ln f when the loss at floor and lid is exp(spread) times that at the sides."""
     if spread == 0.0:
         return np.zeros((beads.size, library.distances.size))
     more, less = (1.0 - (1.0 - walls) * math.exp(logarithm) for logarithm in (spread, -spread))
@@ -100,7 +100,7 @@ def _floor_and_lid(
 def _corners(
     library: DecayLibrary, beads: NDArray[np.float64], walls: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Where each place lies among those of the covariance."""
+    """Corners of the covariance grid around each point, and their weights."""
     falling = -library.covariance_restitution
     rising = library.covariance_wall
     i, s = _cell(falling, -beads)

@@ -1,10 +1,8 @@
-"""How likely the mean speeds of a gas that cools are, for a Haff time and the noise of the gas.
+"""Likelihood of the mean speeds of a cooling gas, for a Haff time and the noise of the gas.
 
-The model and where it comes from stand in :mod:`nanorocks_ros.inference.decay.haff_fit`.
-A live graph
-fits each tray twice a second with hundreds of evaluations each, so one evaluation is one
-compiled call, with no exponential for the elements of the covariance: exp(-|s - s'|) is a ratio
-of (1 + t/tau).
+The model is derived in :mod:`nanorocks_ros.inference.decay.haff_fit`. A live graph fits each tray
+twice a second with hundreds of evaluations each, so one evaluation is one compiled call, without
+exponentials in the covariance: exp(-|s - s'|) is a ratio of (1 + t/tau).
 """
 
 from __future__ import annotations
@@ -31,7 +29,7 @@ if TYPE_CHECKING:
         NDArray[np.float64],
     ]
 
-# Spread of the logarithms of the strength q and of the quick part, about what is usual.
+# Prior standard deviations of the logarithms of the strength q and of the quick part.
 _SPREAD_STRENGTH, _SPREAD_QUICK = 0.5, 1.0
 # Step of the numerical derivative: the third root of the precision.
 _STEP = 6e-6
@@ -53,7 +51,7 @@ class Decay:
     inner_distance : ndarray (m,), [s]
         Mean time between two members of a group.
     usual : ndarray (2,)
-        Logarithms of the strength q and of the quick part that are usual for so many beads.
+        Prior means of the logarithms of the strength q and of the quick part.
     """
 
     time: NDArray[np.float64]
@@ -83,7 +81,7 @@ class Decay:
         return self.generalised(parameters)[0]
 
     def cost_and_slope(self, parameters: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        """The same and its derivatives by the parameters, (4,)."""
+        """The cost and its derivatives by the parameters, (4,)."""
         slope = np.empty(_PARAMETERS)
         return _cost_and_slope(parameters, slope, *self._arrays()), slope
 
@@ -115,7 +113,7 @@ def _cost_and_slope(
     inner_distance: NDArray[np.float64],
     usual: NDArray[np.float64],
 ) -> float:
-    """See `Decay.cost_and_slope`; by tau, on which all depends, it is done by differences."""
+    """See `Decay.cost_and_slope`; the derivative by tau, which enters everywhere, is numerical."""
     data = (time, starts, counts, log_speed, variance, inner_distance, usual)
     near = parameters.copy()
     step = _STEP * max(1.0, abs(parameters[0]))
@@ -183,7 +181,7 @@ def _columns(
     counts: NDArray[np.intp],
     log_speed: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """1 + t/tau of each group, (m,); and (3, m): by ln v0, by ln tau, what is to be explained."""
+    """1 + t/tau of each group, (m,); and (3, m): derivatives by ln v0 and ln tau, and the data."""
     tau = math.exp(log_tau)
     n = starts.size
     growth, columns = np.empty(n), np.ones((3, n))

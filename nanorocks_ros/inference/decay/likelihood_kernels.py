@@ -1,4 +1,4 @@
-"""The loops of `decay_likelihood`, compiled: place by place of the grid of restitutions."""
+"""Compiled loops of `decay_likelihood` over the points of the grid of restitutions."""
 
 from __future__ import annotations
 
@@ -16,15 +16,14 @@ if TYPE_CHECKING:
 ROUNDING = 1e-9
 _NEWTON_STEPS = 15
 _LONGEST_STEP, _SMALL = 0.5, 3e-3
-# Before anything is measured the gas is taken to have been faster at the shaking event than at the
-# first speed used by a factor of 1.6, give or take a factor of e, where that is within four
-# seconds of the event. What it did before a first speed that comes later is known the less the
-# later that is: both rise with the logarithm of that time.
+# Prior of the amplitude: the speed at the shaking event is 1.6 times the first speed used, with a
+# standard deviation of a factor of e, if that is within four seconds of the event. For a later
+# first speed both logarithms rise with that of its time.
 _AMPLITUDE_LEAD, _AMPLITUDE_SPREAD = 0.5, 1.0
 _EARLY, _LEAD_PER_LOG_TIME = math.log(4.0), 1.0
-# The search begins where the first speeds are matched, however fast the gas was.
+# The search starts from the amplitude that matches the first speeds; largest ln of it over them.
 _MOST_LEAD = 8.0
-# Speeds from which the amplitude is guessed.
+# Number of speeds for the initial amplitude.
 _FIRST_SPEEDS = 3
 
 
@@ -42,7 +41,7 @@ def evaluate(
     step: float,
     results: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
 ) -> None:
-    """Fill in the likelihood at every place, for its best amplitude.
+    """Compute the likelihood at every point of the grid, for its best amplitude.
 
     Parameters
     ----------
@@ -52,14 +51,14 @@ def evaluate(
         Bins of the data, counted from the first.
     covariances : ndarray (n_corners, n_x, n_x)
     corners, shares : ndarray (n_places or 1, 4)
-        One for all places, or one of each.
+        One for all points, or one for each.
     means, slopes : ndarray (n_places, n_x), (n_places, n_z, n_x)
     camera : ndarray (2,)
     first, step : float
-        Logarithm of the first distance of the library, and from each to the next.
+        Logarithm of the first distance of the library, and its step.
     results : tuple of 3 ndarrays
         Log likelihood and deviation, (n_places, 2); gradient, (n_places, n_z + 2), and
-        information, (n_places, n_z + 2, n_z + 2): without entries where nobody asks for them.
+        information, (n_places, n_z + 2, n_z + 2): empty if not needed.
     """
     log_time, log_speed, variance = data
     numbers, gradients, informations = results
@@ -116,9 +115,9 @@ def _best_amplitude(
     amplitudes: tuple[float, float, float],
     columns: NDArray[np.float64],
 ) -> tuple[float, float]:
-    """The likeliest ln a and what it costs, by Newton's method.
+    """The likeliest ln a and its cost, by Newton's method.
 
-    The amplitudes are that to begin with, the expected one and the spread of what is expected.
+    `amplitudes` are the initial ln a, and the mean and standard deviation of its prior.
     """
     log_time, log_speed, _ = data
     first, step = axis
@@ -139,7 +138,7 @@ def _best_amplitude(
             pull += residual[i] * slope[i]
             stiffness += slope[i] ** 2
         if new_cost > cost:
-            # Too far: the mean is curved.
+            # The step was too long: the mean is curved.
             change *= 0.3
         else:
             cost, best = new_cost, amplitude
@@ -158,7 +157,7 @@ def _matching(
     first: float,
     step: float,
 ) -> float:
-    """The amplitude with which the first speeds are the expected ones, if there is one."""
+    """The amplitude that matches the first speeds, if there is one."""
     n = min(_FIRST_SPEEDS, log_time.size)
     low, high = log_speed[0], log_speed[0] + _MOST_LEAD
     while high - low > _SMALL:
@@ -182,7 +181,7 @@ def _mix(
     part: tuple[int, int],
     covariance: NDArray[np.float64],
 ) -> None:
-    """The covariance of the library between four corners, from one distance to another."""
+    """Covariance of the library interpolated between four corners, in a range of distances."""
     first, second = covariances[corners[0]], covariances[corners[1]]
     third, fourth = covariances[corners[2]], covariances[corners[3]]
     for i in range(part[0], part[1]):
@@ -202,7 +201,7 @@ def _covariance(
     offset: float,
     covariance: NDArray[np.float64],
 ) -> None:
-    """Lower half of the covariance of data at some cells after an offset."""
+    """Lower half of the covariance of data in some cells, shifted by an offset."""
     whole = math.floor(offset)
     high = offset - whole
     low = 1.0 - high
@@ -233,7 +232,7 @@ def _compare(
 
 @kernel
 def _between(values: NDArray[np.float64], at: float) -> tuple[float, float]:
-    """Value and slope between two entries, straight on beyond the ends."""
+    """Linear interpolation and its slope, extrapolated beyond the ends."""
     cell = min(max(math.floor(at), 0), values.size - 2)
     slope = values[cell + 1] - values[cell]
     return values[cell] + (at - cell) * slope, slope
@@ -245,7 +244,7 @@ def _look_up(
 ) -> None:
     """Changes of ln f with nuisances, (n_z, n_x), between distances; (n_z, n)."""
     for i in range(places.size):
-        # Beyond its ends the library's slopes stay as they are there.
+        # Beyond the ends of the library its slopes are constant.
         at = min(max(places[i], 0.0), slopes.shape[1] - 1.0)
         cell = min(int(at), slopes.shape[1] - 2)
         share = at - cell
@@ -266,7 +265,7 @@ def _sum_up(
     n = columns.shape[1]
     off, spread = amplitude
     deviation = 0.0
-    # At the best amplitude there is no pull left, but where the mean has a kink or an end.
+    # At the best amplitude the gradient vanishes, except at kinks and ends of the mean.
     pull = -off / spread
     stiffness = 1.0 / spread**2
     for i in range(n):
@@ -279,10 +278,10 @@ def _sum_up(
         shared = 0.0
         for i in range(n):
             shared += with_amplitude[i] * own[i]
-        # Kept here until all of them are needed no more.
+        # Stored here until all of them have been used.
         gradient[z] = shared
         for first in range(0, z + 1, 2):
-            # Two side by side; an odd one at the end goes with itself.
+            # Two columns at a time; an odd last one is paired with itself.
             second = min(first + 1, z)
             column, next_column = columns[2 + first], columns[2 + second]
             a, b = -shared * gradient[first] / stiffness, -shared * gradient[second] / stiffness
@@ -296,7 +295,7 @@ def _sum_up(
         slope = 0.0
         for i in range(n):
             slope += residual[i] * own[i]
-        # What the amplitude would take over is no gain of a nuisance.
+        # The part that the amplitude can absorb is no gain of a nuisance.
         gradient[z] = slope - gradient[z] * pull / stiffness
     numbers[0] = -0.5 * deviation
     numbers[1] = deviation

@@ -1,7 +1,7 @@
-"""How improbable it is that two free beads stay beside each other by chance.
+"""Probability that two free beads stay side by side by chance.
 
-A camera sees beads in projection: any two may pass, or touch, and some do so slowly. What tells
-a body of two beads from that is how far beads of that gas would have come apart meanwhile.
+A camera sees beads in projection: any two may pass or touch, and some do so slowly. A body of two
+beads stays together while free beads of that gas would have separated.
 Derived in docs/method/clusters.md.
 """
 

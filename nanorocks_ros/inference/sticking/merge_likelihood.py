@@ -1,4 +1,4 @@
-"""What the merges of a cycle say of each of some sticking speeds, also while the cycle grows."""
+"""Likelihood of the merges of a cycle for a grid of sticking speeds, also of a growing cycle."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
     from nanorocks_ros.physics.sticking_rates import SlowContacts
 
-# Sticking speeds that are tried; they lie closer near 0.
+# Size of the grid of sticking speeds, which is denser near 0.
 _NODES = 600
 _HIGHEST = 0.03
 _LEAST_SHARE = 0.3
-# What is further back than this seldom changes, [s]: merges are known later than they happen.
+# Merges are reported late; those further back than this rarely change, [s].
 _SETTLED = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MergeTerms:
-    """The parts of a Poisson likelihood at some sticking speeds; those of cycles add up.
+    """Terms of a Poisson likelihood on a grid of sticking speeds; those of cycles add up.
 
     Parameters
     ----------
@@ -33,11 +33,11 @@ class MergeTerms:
         Sticking speeds, rising.
     merges : int
     exposed : bool
-        Whether there was anything that could have merged.
+        Whether there were bodies that could have merged.
     logs : ndarray (n,)
         Sum of the logarithms of the rates of the merges.
     expected : ndarray (n,)
-        Merges that were to be expected.
+        Expected number of merges.
     """
 
     speeds: NDArray[np.float64]
@@ -57,29 +57,30 @@ class MergeTerms:
 
 
 class MergeRates:
-    """The theory of one tray, held against its cycles.
+    """Merge rates of one tray by kinetic theory, compared with its cycles.
 
-    What was worked out for a cycle is kept: the same one, grown since, costs what is new in it.
+    The integral over a cycle is kept: if the same cycle has grown, only its new part is computed.
 
     Parameters
     ----------
     contacts : SlowContacts
         Of the tray.
     beads : int
-        In the tray.
+        Number in the tray.
     measure : 'normal' or 'total'
-        Which relative speed decides whether beads stick.
+        Relative speed that is compared with the sticking speed.
     highest : float, [m/s]
-        Of the sticking speeds that are tried.
+        Upper end of the grid of sticking speeds.
     least_share : float, 0 to 1
-        Of the beads; with fewer bodies, large ones, the theory of single beads says too little.
+        Smallest ratio of bodies to beads; with fewer, larger bodies the theory of single beads
+        does not hold.
 
     Attributes
     ----------
     speeds : ndarray (n,), [m/s]
-        Sticking speeds that are tried.
+        Grid of sticking speeds.
     nothing : MergeTerms
-        What no cycles say.
+        Likelihood of no cycles.
     """
 
     def __init__(
@@ -102,7 +103,7 @@ class MergeRates:
         self._expected = np.zeros(_NODES)
 
     def terms(self, cycle: StickingCycle) -> MergeTerms:
-        """What a cycle says.
+        """Likelihood of a cycle.
 
         Raises
         ------
@@ -125,7 +126,7 @@ class MergeRates:
         )
 
     def _expected_in(self, cycle: StickingCycle) -> NDArray[np.float64]:
-        """Merges expected at each sticking speed, (n,): an integral by the trapezoidal rule."""
+        """Expected merges at each sticking speed, (n,), by the trapezoidal rule."""
         if self._known is None or not _begins_with(cycle, self._known):
             self._known, self._expected = None, np.zeros(_NODES)
         first = self._known.times.size - 1 if self._known is not None else 0
@@ -147,7 +148,7 @@ class MergeRates:
         bodies, speeds = cycle.bodies[part], cycle.speeds[part]
         halves = 0.5 * np.diff(cycle.times[part])
         width = np.append(halves, 0.0) + np.append(0.0, halves)
-        # Bodies meet as beads do: pairs of them, at the speed of the beads.
+        # Bodies collide like beads: in pairs, at the speed of the beads.
         weights = width * 0.5 * bodies**2 / self._beads * speeds * (bodies > 1.0)
         return self._contacts.slower_sum(self.speeds, speeds, weights, self._measure)
 
@@ -162,7 +163,7 @@ def _begins_with(cycle: StickingCycle, start: StickingCycle) -> bool:
 
 
 def _first_part(cycle: StickingCycle, fewest: float) -> StickingCycle:
-    """The cycle as long as there are enough bodies."""
+    """The cycle up to the last time with enough bodies."""
     used = cycle.bodies >= max(fewest, 1.0 + 1e-9)
     end = int(np.argmin(used)) if not used.all() else used.size
     if end == 0:
@@ -190,6 +191,8 @@ def _checked(cycle: StickingCycle) -> StickingCycle:
         raise FitError('sticking', 'times that do not rise', 'sort them')
     if not (np.isfinite(cycle.speeds).all() and (cycle.speeds > 0.0).all()):
         raise FitError(
-            'sticking', 'a speed that is not positive', 'leave out what is not known, or at rest'
+            'sticking',
+            'a speed that is not positive',
+            'leave out unknown speeds and beads at rest',
         )
     return cycle

@@ -31,14 +31,15 @@ def gas(number):
 
 
 def test_a_late_window_sees_the_steady_decay():
-    found = windowed_decay_rate(gas(1), 0.9, 0.95, initial_speed=0.0055, window=(60.0, 120.0))
-    assert found == pytest.approx(gas(1).decay_rate(0.9, 0.95), rel=0.003)
+    result = windowed_decay_rate(gas(1), 0.9, 0.95, initial_speed=0.0055, window=(60.0, 120.0))
+    assert result == pytest.approx(gas(1).decay_rate(0.9, 0.95), rel=0.003)
 
 
 def test_energy_along_the_height_at_first_feeds_the_others():
     # What is kept along z is not lost to the beads, and comes back to the motion that is seen.
     rates = [
-        windowed_decay_rate(gas(1), 0.89, 0.99, **START, vertical=one) for one in (0.04, 1.0, 4.0)
+        windowed_decay_rate(gas(1), 0.89, 0.99, **START, vertical=vertical)
+        for vertical in (0.04, 1.0, 4.0)
     ]
     assert rates[0] > rates[1] > rates[2]
 
@@ -46,8 +47,8 @@ def test_energy_along_the_height_at_first_feeds_the_others():
 @pytest.mark.parametrize(('number', 'restitution', 'walls'), [(1, 0.8, 1.0), (3, 0.7, 0.97)])
 def test_the_restitution_undoes_the_decay_of_a_window(number, restitution, walls):
     rate = windowed_decay_rate(gas(number), restitution, walls, **START)
-    found = windowed_restitution(gas(number), rate, walls, **START)
-    assert found == pytest.approx(restitution, abs=1e-3)
+    result = windowed_restitution(gas(number), rate, walls, **START)
+    assert result == pytest.approx(restitution, abs=1e-3)
 
 
 def test_with_elastic_walls_the_way_to_the_steady_state_matters():
@@ -64,8 +65,8 @@ def test_with_elastic_walls_the_way_to_the_steady_state_matters():
         np.log(speed[1:]),
         p0=(speed[0], 30.0),
     )
-    found = windowed_restitution(gas(1), rate, 1.0, initial_speed=speed[0], window=window)
-    assert found == pytest.approx(0.8, abs=0.015)
+    result = windowed_restitution(gas(1), rate, 1.0, initial_speed=speed[0], window=window)
+    assert result == pytest.approx(0.8, abs=0.015)
     assert gas(1).restitution(rate, 1.0) < 0.78
 
 

@@ -56,10 +56,10 @@ def test_the_mean_decay_of_a_gas_that_was_not_in_it_is_that_of_the_library():
     speed = cooling_runs(settings, tray, np.concatenate(([0.0], x / 0.0055)), range(runs))
     projected = speed.mean_projected_speed
     along = np.log(speed.times[1:] * projected[:, :1])
-    found = np.mean(
+    measured = np.mean(
         [
-            np.interp(np.log(x), one, np.log(values[1:] / values[0]))
-            for one, values in zip(along, projected, strict=True)
+            np.interp(np.log(x), log_distance, np.log(values[1:] / values[0]))
+            for log_distance, values in zip(along, projected, strict=True)
         ],
         axis=0,
     )
@@ -71,7 +71,7 @@ def test_the_mean_decay_of_a_gas_that_was_not_in_it_is_that_of_the_library():
         )[0],
     )
     # Their ends are cut where a run was slow.
-    assert np.abs(found - expected)[3:-6].max() < 0.03
+    assert np.abs(measured - expected)[3:-6].max() < 0.03
 
 
 def test_more_is_lost_with_less_restitution():
@@ -85,9 +85,9 @@ def test_more_is_lost_with_less_restitution():
 def test_a_covariance_is_one():
     library = library_of(TRAYS[1])
     for row in library.covariance:
-        for one in row:
-            np.testing.assert_allclose(one, one.T, atol=1e-7)
-            assert np.linalg.eigvalsh(one).min() > -1e-6
+        for covariance in row:
+            np.testing.assert_allclose(covariance, covariance.T, atol=1e-7)
+            assert np.linalg.eigvalsh(covariance).min() > -1e-6
 
 
 def test_a_library_of_another_tray_is_refused_and_the_command_named(tmp_path):

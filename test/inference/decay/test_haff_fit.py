@@ -46,10 +46,10 @@ def test_an_exact_decay_gives_back_its_parameters(v0, tau):
 
 def test_the_result_does_not_depend_on_the_unit_of_speed():
     speed = fluctuating_decay(np.random.default_rng(3), 0.01, 0.02)
-    one = fit_haff(TIME, speed, 0.02 * speed, BEADS)
-    other = fit_haff(TIME, 1e3 * speed, 20.0 * speed, BEADS)
-    assert other.haff_time == pytest.approx(one.haff_time, rel=1e-4)
-    assert other.initial_speed == pytest.approx(1e3 * one.initial_speed, rel=1e-4)
+    fit = fit_haff(TIME, speed, 0.02 * speed, BEADS)
+    scaled = fit_haff(TIME, 1e3 * speed, 20.0 * speed, BEADS)
+    assert scaled.haff_time == pytest.approx(fit.haff_time, rel=1e-4)
+    assert scaled.initial_speed == pytest.approx(1e3 * fit.initial_speed, rel=1e-4)
 
 
 def coverage(fits, rate):

@@ -14,9 +14,9 @@ from nanorocks_ros.inference.sticking.chance_proximity import (
 
 
 def test_free_beads_are_the_less_likely_to_stay_the_further_they_would_have_gone():
-    found = chance(np.array([0.0, 1e-3, 2e-3, 4e-3]), 2e-5, encounter_rate(load_trays()[1]))
-    assert found[0] == 1.0
-    assert (np.diff(found) < 0.0).all()
+    probability = chance(np.array([0.0, 1e-3, 2e-3, 4e-3]), 2e-5, encounter_rate(load_trays()[1]))
+    assert probability[0] == 1.0
+    assert (np.diff(probability) < 0.0).all()
 
 
 def test_the_chance_is_not_below_that_of_gaussian_velocities_that_nothing_disturbs():

@@ -58,12 +58,12 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(measure):
 def test_many_cycles_tell_more_than_one_but_not_more_than_the_theory():
     rng = np.random.default_rng(2)
     cycles = [_cycle(rng, 3e-3) for _ in range(16)]
-    one, many, sure = (
+    single, many, sure = (
         sticking_estimate(part, CONTACTS, BEADS, rate_error=error)
         for part, error in ((cycles[:1], 0.1), (cycles, 0.1), (cycles, 1e-6))
     )
-    assert many.merges > 10 * one.merges
-    assert one.upper - one.lower > 2.0 * (many.upper - many.lower)
+    assert many.merges > 10 * single.merges
+    assert single.upper - single.lower > 2.0 * (many.upper - many.lower)
     assert many.upper - many.lower > 1.2 * (sure.upper - sure.lower)
     assert many.lower < 3e-3 < many.upper
 
@@ -72,12 +72,12 @@ def test_without_a_merge_there_is_an_upper_limit_that_falls_with_more_cycles():
     cycle = StickingCycle(
         times=TIMES, speeds=SPEEDS, bodies=np.full(TIMES.size, 15.0), merges=np.empty(0)
     )
-    one, many = (sticking_estimate([cycle] * n, CONTACTS, BEADS) for n in (1, 9))
-    assert one.status is many.status is StickingStatus.NO_MERGE
-    assert math.isnan(one.sticking_speed)
-    assert one.lower == many.lower == 0.0
+    single, many = (sticking_estimate([cycle] * n, CONTACTS, BEADS) for n in (1, 9))
+    assert single.status is many.status is StickingStatus.NO_MERGE
+    assert math.isnan(single.sticking_speed)
+    assert single.lower == many.lower == 0.0
     # So few contacts are so slow: their number goes with the square of the speed.
-    assert many.upper == pytest.approx(one.upper / 3.0, rel=0.1)
+    assert many.upper == pytest.approx(single.upper / 3.0, rel=0.1)
 
 
 def test_everything_stuck_at_the_start_says_nothing():
