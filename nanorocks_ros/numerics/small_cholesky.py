@@ -1,6 +1,6 @@
-"""Loops over small symmetric matrices, by their triangular factors; compiled.
+"""Cholesky factors of small symmetric matrices, compiled.
 
-For a few rows a call of LAPACK takes longer than the work.
+For a few rows the overhead of a LAPACK call exceeds the work.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from nanorocks_ros.numerics.compiled import compiled, kernel
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Beyond these a product could be too much for a double.
+# Beyond these limits a product could overflow or underflow.
 _LEAST, _MOST = 1e-150, 1e150
-# Standard deviations up to which a nuisance may be off.
+# Largest shift of a nuisance, in standard deviations.
 _FARTHEST = 4.0
 
 
 @kernel
 def factorise(matrix: NDArray[np.float64]) -> float:
-    """Cholesky factor in place, in the lower half, but 1 over its diagonal; ln of the determinant.
+    """Cholesky factor in the lower half, in place, with inverse diagonal; ln of the determinant.
 
-    Two of a row are worked out side by side: one alone would wait for itself at each term.
+    Two elements of a row are computed at a time: the sum of one alone would wait for each term.
     """
     log_determinant, product = 0.0, 1.0
     for i in range(matrix.shape[0]):
@@ -55,9 +55,9 @@ def factorise(matrix: NDArray[np.float64]) -> float:
 
 @kernel
 def whiten(factor: NDArray[np.float64], columns: NDArray[np.float64], count: int) -> None:
-    """The first columns divided by a factor of `factorise`, in place; two side by side."""
+    """Solve with a factor of `factorise` for the first columns, in place; two at a time."""
     for first in range(0, count, 2):
-        # An odd one at the end goes with itself.
+        # An odd last column is paired with itself.
         column, next_column = columns[first], columns[min(first + 1, count - 1)]
         for i in range(factor.shape[0]):
             row = factor[i]
@@ -74,7 +74,7 @@ def integrate(
     informations: NDArray[np.float64],
     gains: NDArray[np.float64],
 ) -> None:
-    """What the log likelihood gains by nuisances that may be off by one of their deviations each.
+    """Gain of the log likelihood by the integration over nuisances with unit Gaussian priors.
 
     Parameters
     ----------
@@ -107,6 +107,6 @@ def integrate(
                 shift[i] -= lower[k, i] * shift[k]
             farthest = max(farthest, abs(shift[i]))
             product += gradients[place, i] * shift[i]
-        # Far out the dependence is not linear, and could explain anything.
+        # Beyond that the dependence is not linear: the shift is limited.
         share = min(1.0, _FARTHEST / max(farthest, _FARTHEST))
         gains[place] = (share - 0.5 * share**2) * product - 0.5 * log_determinant

@@ -1,4 +1,4 @@
-"""Cubic splines that are needed for a few points at once, and soon others: compiled."""
+"""Cubic splines evaluated at a few points, compiled."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ORDER = 4
 
 @compiled
 def spline_slopes(nodes: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Derivatives at the nodes of the cubic spline without a knot at the last but one node.
+    """Derivatives at the nodes of the cubic spline with not-a-knot ends.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def spline_at(
     slopes: NDArray[np.float64],
     at: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The spline at some rising places, (m,); beyond the ends as next to them."""
+    """The spline at rising points, (m,), extrapolated beyond the ends."""
     interpolated = np.empty(at.size)
     cell = 0
     for k in range(at.size):
@@ -80,7 +80,7 @@ def spline_at(
 
 @compiled
 def spline_basis(knots: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The cubic B-splines of some knots at some places within them, (m, n_knots - 4)."""
+    """Cubic B-splines of some knots at points within them, (m, n_knots - 4)."""
     n = knots.size - _ORDER
     basis = np.zeros((at.size, n))
     part = np.empty(_ORDER)

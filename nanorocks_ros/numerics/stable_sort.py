@@ -1,4 +1,4 @@
-"""Stable sorting for compiled code: the same order with every version of every library."""
+"""Stable sort for compiled code, independent of the versions of libraries."""
 
 from __future__ import annotations
 

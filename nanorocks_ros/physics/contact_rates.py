@@ -1,4 +1,4 @@
-"""How often beads in a narrow box touch one another and the walls: geometry, and nothing else.
+"""Contact rates of beads in a narrow box, with each other and with the walls, by geometry.
 
 Beads of a gas without losses are spread evenly over all arrangements in which none overlap. Two
 beads thrown into the box at random touch along a direction k with the density
@@ -6,13 +6,13 @@ beads thrown into the box at random touch along a direction k with the density
     p_ab(k) = product over x, y, z of l_i(d_ab k_i) / (H_ai H_bi),
     l_i(r) = min(H_ai, H_bi, (H_ai + H_bi)/2 - |r|) or 0,      H_ai = L_i - d_a,
 
-exactly. The other beads make contacts more frequent, because beads that touch leave more room to
-the rest: to first order in the density by 1 + x_ab, x_ab being the volume from which the pair
-keeps others, less when touching than when apart, averaged over the box. Both are worked out
-numerically, with the walls. Higher orders are those of Carnahan and Starling's spheres at the
-density at which these have the same first order. A wall is met more often because beads next to it
-are pushed there by those they touch: by 1 + the first order times the contact value, as the
-pressure of a fluid is. Where the box is wide all of this is Enskog's theory.
+exactly. The other beads increase the rate, because beads that touch leave more room to the rest:
+to first order in the density by 1 + x_ab, where x_ab is the decrease of the volume excluded to the
+others when the pair touches, averaged over the box. Both are computed numerically, with the walls.
+Higher orders are those of Carnahan and Starling's spheres at the density with the same first
+order. Contacts with a wall increase because neighbours push beads against it: by 1 + the first
+order times the contact value, like the pressure of a fluid. In a wide box this is Enskog's
+theory.
 """
 
 from __future__ import annotations
@@ -31,28 +31,28 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
 
-# Points of the integrals over the box: rates of collision are good to 0.5 %.
+# Number of points of the integrals over the box: collision rates are accurate to 0.5 %.
 _POINTS = 4096
-# Directions in an octant, along z and around it.
+# Number of directions in an octant, along z and around it.
 _NODES = 12
 # First order of the contact value of spheres in the filling factor.
 _SPHERES = 2.5
-# Beyond, the first order says too little.
+# Above these values the first order is not accurate.
 _MOST_FILLING = 0.4
 _MOST_AT_WALLS = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeadClasses:
-    """Beads of a tray by size: all of one class are alike.
+    """Beads of a tray by size; those of a class are equal.
 
     Parameters
     ----------
     counts : ndarray (n,)
-        Need not be whole: a range of diameters is represented by a few.
+        Not whole numbers if a range of diameters is represented by a few.
     diameters, masses : ndarray (n,), [m], [kg]
     species : ndarray of int, (n,)
-        Place in the tray's list.
+        Index in `Tray.species`.
     """
 
     counts: NDArray[np.float64]
@@ -62,7 +62,7 @@ class BeadClasses:
 
 
 def bead_classes(tray: Tray, sizes: int = 3) -> BeadClasses:
-    """The beads of a tray; a range of diameters as so many of them, with Gaussian weights.
+    """Classes of the beads of a tray; a range of diameters by Gauss-Legendre nodes.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def bead_classes(tray: Tray, sizes: int = 3) -> BeadClasses:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contacts:
-    """Where beads of some classes touch in a box.
+    """Contact rates of bead classes in a box.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class Contacts:
 
 
 def contacts(beads: BeadClasses, dimensions: tuple[float, float, float]) -> Contacts:
-    """Contacts in a box.
+    """Contact rates in a box.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def contacts(beads: BeadClasses, dimensions: tuple[float, float, float]) -> Cont
 def _shared(
     first: NDArray[np.float64], second: NDArray[np.float64], apart: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Length over which one centre can be, with the other so far apart from it."""
+    """Length available to the first centre, with the second at a distance `apart`."""
     least = np.minimum(first, second)
     return np.clip(np.minimum(least, 0.5 * (first + second) - np.abs(apart)), 0.0, None)
 
@@ -188,7 +188,7 @@ def _volume(radius: float) -> float:
 
 
 def _overlaps(room: NDArray[np.float64], touch: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Probability that two beads thrown into the box overlap, (n, n)."""
+    """Probability that two beads at random positions in the box overlap, (n, n)."""
     places = _ball(_spread(3))
     probability = np.empty_like(touch)
     for a, b in np.ndindex(touch.shape):
@@ -205,9 +205,9 @@ def _wall_crowding(
     touch: NDArray[np.float64],
     overlaps: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """How much more probable contacts with walls are, to first order in the density.
+    """Relative increase of wall contacts to first order in the density, (n, n, 3).
 
-    (n, n, 3): of each class, what each class adds, across each axis.
+    For each class, the part of each other class, at the walls across each axis.
     """
     places = _ball(_spread(3))
     crowding = np.zeros((*touch.shape, 3))
@@ -231,7 +231,7 @@ def _pair_crowding(
     touch: NDArray[np.float64],
     overlaps: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The same for contacts of two beads, (n, n)."""
+    """Relative increase of contacts of two beads to first order in the density, (n, n)."""
     points = _spread(5)
     directions, third = _sphere(points), _ball(points[:, [3, 4, 2]])
     crowding = np.array(overlaps)
@@ -255,16 +255,17 @@ def _kept_off(
     third: NDArray[np.float64],
     reach: tuple[float, float],
 ) -> float:
-    """Volume that a bead keeps a third from, over all its places; it shares it with its partner.
+    """Mean volume excluded to a third bead by one of a pair; overlap is shared with the partner.
 
     Parameters
     ----------
     rooms : ndarray (3, 3), [m]
         Of the bead, its partner and the third.
     apart, third : ndarray (n, 3), [m], [1]
-        Where the partner is from the bead, and the third in units of the distance at contact.
+        Position of the partner relative to the bead, and of the third in units of the contact
+        distance.
     reach : tuple of 2 floats, [m]
-        Distances at contact of the third with the bead and with its partner.
+        Contact distances of the third with the bead and with its partner.
     """
     offset = reach[0] * third
     half = 0.5 * rooms

@@ -1,4 +1,4 @@
-"""A number with its error, and how the errors of inputs pass through a relation."""
+"""A number with its standard error, and propagation of errors to first order."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from nanorocks_ros.errors import ConfigurationError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-# Of an error: so small that only the slope counts, so large that rounding does not.
+# Step of the central differences, as a fraction of the error.
 _STEP = 0.05
 
 
@@ -44,7 +44,7 @@ class Estimate:
 def propagated(relation: Callable[..., float], **inputs: Estimate | float) -> Estimate:
     """The value of a relation at some inputs, with their errors to first order.
 
-    Slopes are central differences over a twentieth of each error; the inputs are taken for
+    Derivatives are central differences over a twentieth of each error; the inputs are
     independent.
 
     Parameters

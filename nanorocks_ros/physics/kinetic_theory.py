@@ -1,10 +1,10 @@
 """Kinetic theory of a gas of equal, smooth, inelastic spheres without walls.
 
 Valid for a homogeneous gas far from any wall: filling factors up to 0.3 (the contact value is
-good to 0.3 % there) and restitutions from 0.8 up, where the rate of cooling is good to 1 %; below,
-the correlations of beads about to meet slow it down by some per cent. Through the walls of the
-trays that were flown goes about half of the energy, so that what `kinetic_restitution` reads from
-their decays is far too low: use `confined` there.
+good to 0.3 % there) and restitutions from 0.8 up, where the cooling rate is good to 1 %; below,
+velocity correlations of colliding beads reduce it by some per cent. The walls of the trays of the
+flight take about half of the energy, so that `kinetic_restitution` is far too low for their
+decays: use `confined_theory` there.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ import math
 from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.physics.error_propagation import Estimate, propagated
 
-# Of the decay rate of the mean speed in space: sqrt(2)/6, from the integrals over Maxwell's
-# speeds.
+# Coefficient of the decay rate of the mean 3-D speed: sqrt(2)/6, from integrals over the Maxwell
+# distribution.
 HAFF_COEFFICIENT = math.sqrt(2.0) / 6.0
-# Mean projected speed over mean speed, directions even.
+# Ratio of mean projected to mean 3-D speed of an isotropic gas.
 PROJECTION = math.pi / 4.0
-# Above it the fluid freezes, and the equation of state ends.
+# Filling factor at which the fluid freezes, and the equation of state ends.
 FREEZING = 0.494
 
 
 def filling_factor(diameter: float, number_density: float) -> float:
-    """Part of the volume that beads fill: diameter [m], number density [1/m^3].
+    """Volume fraction of the beads: diameter [m], number density [1/m^3].
 
     Raises
     ------
@@ -43,7 +43,7 @@ def filling_factor(diameter: float, number_density: float) -> float:
 
 
 def check_positive(**values: float) -> None:
-    """Refuse what is not positive and finite, by its name.
+    """Refuse values that are not positive and finite, by their names.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def check_positive(**values: float) -> None:
 
 
 def check_restitution(**values: float) -> None:
-    """Refuse what is no restitution, by its name.
+    """Refuse restitutions outside [0, 1], by their names.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def kinetic_restitution(
     ConfigurationError
         When a value cannot be used.
     FitError
-        When the decay is faster than that of beads with a restitution of zero.
+        When the decay is faster than at a restitution of zero.
     """
     return propagated(
         _restitution, decay_rate=decay_rate, diameter=diameter, number_density=number_density
@@ -156,7 +156,7 @@ def _restitution(decay_rate: float, diameter: float, number_density: float) -> f
         raise FitError(
             'kinetic_restitution',
             f'1 - restitution^2 would be {loss:.3g}',
-            'this decay is faster than beads alone can make it; walls take part: use the '
+            'this decay is faster than collisions of beads allow; walls take part: use the '
             'confined theory',
         )
     return math.sqrt(1.0 - loss)
