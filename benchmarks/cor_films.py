@@ -194,8 +194,8 @@ def _posterior(cycles: list[_Said], how: _From) -> Posterior:
         (walls, walls)
         if how.walls_known
         else (prior.min_wall_restitution, prior.max_wall_restitution),
-        of_beads=contacts.of_beads(prior.collision_bias),
-        of_walls=contacts.of_walls(prior.rebound_bias),
+        bead_likelihood=contacts.bead_likelihood(prior.collision_bias),
+        wall_likelihood=contacts.wall_likelihood(prior.rebound_bias),
     )
 
 

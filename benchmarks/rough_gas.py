@@ -205,8 +205,8 @@ def read_cycles(number, roughness, cycles):
             tables,
             decay,
             walls,
-            of_beads=found.of_beads(prior.collision_bias),
-            of_walls=found.of_walls(prior.rebound_bias),
+            bead_likelihood=found.bead_likelihood(prior.collision_bias),
+            wall_likelihood=found.wall_likelihood(prior.rebound_bias),
         )
 
     each = [
@@ -232,7 +232,7 @@ def read_cycles(number, roughness, cycles):
 def _alone(contacts):
     """Restitutions of beads and walls by contacts alone; NaN without any."""
     found = []
-    for term in (contacts.of_beads(), contacts.of_walls()):
+    for term in (contacts.bead_likelihood(), contacts.wall_likelihood()):
         if term is None:
             found.append(math.nan)
         else:

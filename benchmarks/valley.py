@@ -92,8 +92,8 @@ def _posterior(tray: int, cycles: list[_Cycle], *, beads: bool, walls: bool) -> 
         tables,
         decay.integrated(),
         (prior.min_wall_restitution, prior.max_wall_restitution),
-        of_beads=contacts.of_beads(prior.collision_bias) if beads else None,
-        of_walls=contacts.of_walls(prior.rebound_bias) if walls else None,
+        bead_likelihood=contacts.bead_likelihood(prior.collision_bias) if beads else None,
+        wall_likelihood=contacts.wall_likelihood(prior.rebound_bias) if walls else None,
     )
 
 

@@ -20,7 +20,7 @@ _NOT_THERE = 'analyse the recording again'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Evidence:
+class CycleLikelihoods:
     """Likelihoods of some cycles of one tray, by the same relation.
 
     The nuisances of tray, camera and start are common to all cycles, so they do not average out:
@@ -41,8 +41,8 @@ class Evidence:
     contacts: ContactTerms | None = None
     by_form: tuple[tuple[float, float], ...] = ()
 
-    def __add__(self, other: Evidence) -> Evidence:
-        return Evidence(
+    def __add__(self, other: CycleLikelihoods) -> CycleLikelihoods:
+        return CycleLikelihoods(
             cycles=self.cycles + other.cycles,
             decay=self.decay + other.decay if self.decay and other.decay else None,
             contacts=self.contacts + other.contacts if self.contacts and other.contacts else None,
@@ -69,7 +69,7 @@ class Evidence:
         return content
 
     @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], where: str) -> Evidence:
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], where: str) -> CycleLikelihoods:
         """Likelihoods from the arrays of `arrays`.
 
         Parameters

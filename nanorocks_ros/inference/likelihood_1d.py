@@ -22,7 +22,7 @@ _LOST = 45.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SingleTerm:
+class Likelihood1D:
     """Log likelihood of one of the two restitutions, from rebounds or collisions.
 
     Parameters
@@ -40,7 +40,7 @@ class SingleTerm:
         slopes = spline_slopes(self.restitution, self.log_likelihood)
         return spline_at(self.restitution, self.log_likelihood, slopes, restitution)
 
-    def off_by(self, spread: float) -> SingleTerm:
+    def convolved(self, spread: float) -> Likelihood1D:
         """Convolution with a Gaussian: the likelihood with a common systematic error."""
         if spread == 0.0:
             return self
@@ -48,7 +48,7 @@ class SingleTerm:
         step = min(0.25 * spread, float(last - first) / _SMEARED)
         fine = np.arange(first, last + step, step)
         smeared = _smeared(fine, self.at(fine), self.restitution, spread)
-        return SingleTerm(restitution=self.restitution, log_likelihood=smeared)
+        return Likelihood1D(restitution=self.restitution, log_likelihood=smeared)
 
 
 @compiled

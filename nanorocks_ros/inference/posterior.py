@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.inference.decay.decay_likelihood import DecayTables
-    from nanorocks_ros.inference.likelihood_1d import SingleTerm
+    from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 
 # Points of the fine grid along each restitution.
 _FINE, _WALL_FINE = 241, 121
@@ -118,8 +118,8 @@ def posterior_of(
     log_likelihood: NDArray[np.float64],
     walls: tuple[float, float],
     *,
-    of_beads: SingleTerm | None = None,
-    of_walls: SingleTerm | None = None,
+    bead_likelihood: Likelihood1D | None = None,
+    wall_likelihood: Likelihood1D | None = None,
 ) -> Posterior:
     """The posterior for flat priors.
 
@@ -131,7 +131,7 @@ def posterior_of(
     walls : tuple of 2 floats
         Ends of the flat prior of the wall restitution; equal if it is known. The prior of the
         bead restitution is flat from 0 to 1.
-    of_beads, of_walls : SingleTerm, optional
+    bead_likelihood, wall_likelihood : Likelihood1D, optional
         Further log likelihoods of one restitution alone.
 
     Raises
@@ -155,21 +155,25 @@ def posterior_of(
         beads, wall = _axes(*box)
         pressed = surface.at(_even(beads, 0.0, BEAD_POWER), _even(wall, LOWEST_WALL, WALL_POWER))
         fine = -_COMPRESSION * np.expm1(-pressed / _COMPRESSION)
-        if of_beads is not None:
-            fine += of_beads.at(beads)[:, np.newaxis]
-        if of_walls is not None:
-            fine += of_walls.at(wall)
+        if bead_likelihood is not None:
+            fine += bead_likelihood.at(beads)[:, np.newaxis]
+        if wall_likelihood is not None:
+            fine += wall_likelihood.at(wall)
         best = float(fine.max())
         fine -= best
         box = _likely(fine, beads, wall)
     weight = np.exp(fine) * _halves(beads.size)[:, np.newaxis] * _halves(wall.size)
     # Without the decay each likelihood would reach its own maximum.
-    apart = sum(float(term.log_likelihood.max()) for term in (of_beads, of_walls) if term)
+    apart = sum(
+        float(term.log_likelihood.max()) for term in (bead_likelihood, wall_likelihood) if term
+    )
     return Posterior(
         restitution=beads,
         wall_restitution=wall,
         probability=weight / weight.sum(),
-        tension=math.sqrt(2.0 * max(apart - best, 0.0)) if of_beads or of_walls else 0.0,
+        tension=math.sqrt(2.0 * max(apart - best, 0.0))
+        if bead_likelihood or wall_likelihood
+        else 0.0,
     )
 
 

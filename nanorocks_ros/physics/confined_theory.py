@@ -87,7 +87,7 @@ class ConfinedGas:
         masses = self.beads.masses
         start = np.repeat(np.log(masses.mean() / masses), 3)
 
-        def unequal(logs: NDArray[np.float64]) -> NDArray[np.float64]:
+        def imbalance(logs: NDArray[np.float64]) -> NDArray[np.float64]:
             temperature = np.exp(logs).reshape(-1, 3)
             rates = self._log_rates(temperature, restitution, wall_restitution, width).ravel()
             differences: NDArray[np.float64] = rates - rates.mean()
@@ -96,7 +96,7 @@ class ConfinedGas:
             return differences
 
         scale = self.mean_projected_speed(np.exp(start).reshape(-1, 3))
-        solution = optimize.root(unequal, start - 2.0 * math.log(scale), tol=1e-10)
+        solution = optimize.root(imbalance, start - 2.0 * math.log(scale), tol=1e-10)
         if not solution.success:
             raise FitError(
                 'confined theory',

@@ -160,7 +160,7 @@ def smooth_equivalent(restitution: float, tangential_restitution: float) -> floa
     return math.sqrt(1.0 - 4.0 * (rates.loss - back))
 
 
-def spin_of(mean_projected_speed: float, diameter: float, ratio: float = 1.0) -> float:
+def rms_spin(mean_projected_speed: float, diameter: float, ratio: float = 1.0) -> float:
     """Root mean square spin of beads with a mean projected speed, [rad/s].
 
     Parameters

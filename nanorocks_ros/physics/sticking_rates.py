@@ -58,8 +58,10 @@ class SlowContacts:
         """All contacts of a bead per projected path length, kappa, [1/m]."""
         return float(self.rates.sum())
 
-    def slower_between(self, speed: ArrayLike, measure: str = 'normal') -> NDArray[np.float64]:
-        """`slower`, interpolated between nodes that are computed once.
+    def interpolated_rate_below(
+        self, speed: ArrayLike, measure: str = 'normal'
+    ) -> NDArray[np.float64]:
+        """`rate_below`, interpolated between nodes that are computed once.
 
         Raises
         ------
@@ -68,14 +70,14 @@ class SlowContacts:
         """
         return np.asarray(np.exp(np.interp(np.log(speed), _LOG_SPEEDS, self._log_curve(measure))))
 
-    def slower_sum(
+    def summed_rate_below(
         self,
         speed: NDArray[np.float64],
         mean: NDArray[np.float64],
         weights: NDArray[np.float64],
         measure: str = 'normal',
     ) -> NDArray[np.float64]:
-        """`slower_between` at some speeds, (n,), summed with weights over mean speeds.
+        """`interpolated_rate_below` at some speeds, (n,), summed with weights over mean speeds.
 
         Parameters
         ----------
@@ -94,19 +96,19 @@ class SlowContacts:
         _sum_slower(np.log(speed), np.log(mean), weights, _LOG_SPEEDS, curve, sums)
         return sums
 
-    def log_slower_sum(
+    def summed_log_rate_below(
         self, speed: NDArray[np.float64], mean: NDArray[np.float64], measure: str = 'normal'
     ) -> NDArray[np.float64]:
-        """Logarithm of `slower_between`, summed over mean speeds; parameters as `slower_sum`."""
+        """Logarithm of `interpolated_rate_below`, summed over mean speeds."""
         ratio = np.log(speed)[:, np.newaxis] - np.log(mean)
         return np.asarray(np.interp(ratio, _LOG_SPEEDS, self._log_curve(measure)).sum(axis=1))
 
     def _log_curve(self, measure: str) -> NDArray[np.float64]:
         if measure not in self._curves:
-            self._curves[measure] = np.log(self.slower(np.exp(_LOG_SPEEDS), measure))
+            self._curves[measure] = np.log(self.rate_below(np.exp(_LOG_SPEEDS), measure))
         return self._curves[measure]
 
-    def slower(self, speed: ArrayLike, measure: str = 'normal') -> NDArray[np.float64]:
+    def rate_below(self, speed: ArrayLike, measure: str = 'normal') -> NDArray[np.float64]:
         """Contacts per projected path length, [1/m], below a relative speed.
 
         Parameters

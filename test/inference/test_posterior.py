@@ -12,7 +12,7 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import tables_of
-from nanorocks_ros.inference.likelihood_1d import SingleTerm
+from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
@@ -94,16 +94,26 @@ def test_the_two_restitutions_lie_in_a_valley(exact):
 def test_what_else_is_known_of_one_restitution_tells_of_the_other(exact):
     (likelihood,) = likelihoods(exact, decays(0.89, 0.95, 1))
     grid = np.linspace(0.0, 1.0, 2001)
-    of_walls = SingleTerm(restitution=grid, log_likelihood=-0.5 * ((grid - 0.95) / 0.002) ** 2)
+    wall_likelihood = Likelihood1D(
+        restitution=grid, log_likelihood=-0.5 * ((grid - 0.95) / 0.002) ** 2
+    )
     free = posterior_of(exact, likelihood.integrated(), (0.8, 1.0))
-    constrained = posterior_of(exact, likelihood.integrated(), (0.8, 1.0), of_walls=of_walls)
+    constrained = posterior_of(
+        exact, likelihood.integrated(), (0.8, 1.0), wall_likelihood=wall_likelihood
+    )
     known = posterior_of(exact, likelihood.integrated(), (0.95, 0.95))
     assert constrained.covariance[1, 1] ** 0.5 == pytest.approx(0.002, rel=0.1)
     assert constrained.covariance[0, 0] < 0.25 * free.covariance[0, 0]
     assert constrained.mean[0] == pytest.approx(known.mean[0], abs=0.005)
-    of_beads = SingleTerm(restitution=grid, log_likelihood=-0.5 * ((grid - 0.89) / 0.01) ** 2)
+    bead_likelihood = Likelihood1D(
+        restitution=grid, log_likelihood=-0.5 * ((grid - 0.89) / 0.01) ** 2
+    )
     combined = posterior_of(
-        exact, likelihood.integrated(), (0.8, 1.0), of_beads=of_beads, of_walls=of_walls
+        exact,
+        likelihood.integrated(),
+        (0.8, 1.0),
+        bead_likelihood=bead_likelihood,
+        wall_likelihood=wall_likelihood,
     )
     assert combined.covariance[0, 0] ** 0.5 < 0.01
 

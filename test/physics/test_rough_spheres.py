@@ -10,10 +10,10 @@ import pytest
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.physics.rough_spheres import (
     SOLID_SPHERE,
+    rms_spin,
     rough_rates,
     rough_temperature_ratio,
     smooth_equivalent,
-    spin_of,
     temperature_ratio_course,
 )
 from nanorocks_ros.simulation.engine.collision_rules import CollisionRules
@@ -117,9 +117,9 @@ def test_a_bead_in_equipartition_turns_some_ninety_degrees_a_second_at_a_millime
     """Of a bead of 2 mm that flies at 1 mm/s in space: sqrt(5/2) rad/s."""
     rms = math.sqrt(3.0 * math.pi / 8.0)
     projected = 1e-3 * math.pi / 4.0 / rms
-    assert spin_of(projected, 0.002) == pytest.approx(math.sqrt(2.5))
-    assert math.degrees(spin_of(projected, 0.002)) == pytest.approx(90.6, abs=0.1)
-    assert spin_of(projected, 0.002, 0.25) == pytest.approx(0.5 * math.sqrt(2.5))
+    assert rms_spin(projected, 0.002) == pytest.approx(math.sqrt(2.5))
+    assert math.degrees(rms_spin(projected, 0.002)) == pytest.approx(90.6, abs=0.1)
+    assert rms_spin(projected, 0.002, 0.25) == pytest.approx(0.5 * math.sqrt(2.5))
 
 
 @pytest.mark.parametrize(
@@ -130,8 +130,8 @@ def test_a_bead_in_equipartition_turns_some_ninety_degrees_a_second_at_a_millime
         (lambda: rough_rates(0.9, math.nan), 'tangential_restitution: nan'),
         (lambda: rough_temperature_ratio(0.9, -1.0), 'smooth beads keep their spin'),
         (lambda: temperature_ratio_course(np.zeros(1), 0.9, 0.0, -1.0), 'start: -1.0'),
-        (lambda: spin_of(0.0, 0.002), 'mean_projected_speed: 0.0'),
-        (lambda: spin_of(0.001, 0.002, math.inf), 'ratio: inf'),
+        (lambda: rms_spin(0.0, 0.002), 'mean_projected_speed: 0.0'),
+        (lambda: rms_spin(0.001, 0.002, math.inf), 'ratio: inf'),
     ],
 )
 def test_what_cannot_be_is_refused(call, message):

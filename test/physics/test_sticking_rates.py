@@ -25,12 +25,12 @@ def test_beads_meet_as_often_per_way_as_in_the_simulated_tray():
 
 def test_all_contacts_are_slower_than_anything():
     for measure in ('normal', 'total'):
-        assert CONTACTS.slower(100.0, measure) == pytest.approx(CONTACTS.rate)
+        assert CONTACTS.rate_below(100.0, measure) == pytest.approx(CONTACTS.rate)
 
 
 def test_few_contacts_are_slow_and_fewer_by_their_whole_speed():
     speeds = np.geomspace(1e-5, 3.0, 60)
-    normal, total = (CONTACTS.slower(speeds, measure) for measure in ('normal', 'total'))
+    normal, total = (CONTACTS.rate_below(speeds, measure) for measure in ('normal', 'total'))
     assert (np.diff(normal) > 0.0).all()
     assert (np.diff(total) > 0.0).all()
     assert (total < normal).all()
@@ -43,13 +43,15 @@ def test_contacts_of_an_isotropic_gas_are_those_of_the_closed_form():
     single = replace(CONTACTS, rates=np.ones(1), normal=variance, tangential=variance)
     speed = 0.7
     x = speed**2 / (2.0 * 0.4)
-    assert single.slower(speed) == pytest.approx(1.0 - np.exp(-x))
-    assert single.slower(speed, 'total') == pytest.approx(1.0 - (1.0 + x) * np.exp(-x), rel=2e-3)
+    assert single.rate_below(speed) == pytest.approx(1.0 - np.exp(-x))
+    assert single.rate_below(speed, 'total') == pytest.approx(
+        1.0 - (1.0 + x) * np.exp(-x), rel=2e-3
+    )
 
 
 def test_another_measure_is_refused():
     with pytest.raises(ConfigurationError, match='tangential'):
-        CONTACTS.slower(1.0, 'tangential')
+        CONTACTS.rate_below(1.0, 'tangential')
 
 
 @pytest.mark.parametrize('measure', ['normal', 'total'])
@@ -57,16 +59,16 @@ def test_between_nodes_contacts_are_as_many_as_worked_out_for_that_speed(measure
     contacts = slow_contacts(load_trays()[3])
     speeds = np.geomspace(1e-3, 30.0, 97)
     for _ in range(2):
-        interpolated = contacts.slower_between(speeds, measure)
-        np.testing.assert_allclose(interpolated, contacts.slower(speeds, measure), rtol=1e-3)
+        interpolated = contacts.interpolated_rate_below(speeds, measure)
+        np.testing.assert_allclose(interpolated, contacts.rate_below(speeds, measure), rtol=1e-3)
 
 
 @pytest.mark.parametrize('measure', ['normal', 'total'])
 def test_sums_over_mean_speeds_are_those_of_the_single_ones(measure):
     speeds, means = np.geomspace(1e-9, 10.0, 40), np.geomspace(1e-4, 1e-2, 7)
     weights = np.linspace(0.5, 2.0, 7)
-    slower = CONTACTS.slower_between(speeds[:, np.newaxis] / means, measure)
-    sums = CONTACTS.slower_sum(speeds, means, weights, measure)
+    slower = CONTACTS.interpolated_rate_below(speeds[:, np.newaxis] / means, measure)
+    sums = CONTACTS.summed_rate_below(speeds, means, weights, measure)
     np.testing.assert_allclose(sums, slower @ weights, rtol=1e-11)
-    logs = CONTACTS.log_slower_sum(speeds, means, measure)
+    logs = CONTACTS.summed_log_rate_below(speeds, means, measure)
     np.testing.assert_allclose(logs, np.log(slower).sum(axis=1), rtol=1e-11)

@@ -15,8 +15,8 @@ from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.contacts.contact_estimate import checked_grid
 from nanorocks_ros.inference.contacts.projected_collisions import (
     RANGE,
-    SeenCollisions,
-    pairs_given,
+    ProjectedCollisions,
+    projected_log_likelihood,
 )
 from nanorocks_ros.numerics.log_sums import log_sum
 
@@ -170,10 +170,10 @@ def pair_table(
     _check_share(outliers)
     if not collisions:
         return np.zeros((len(vertical_ratios) * len(radius_errors), grid.size))
-    seen = SeenCollisions.of(collisions).with_errors(_PAIR_ERRORS)
+    seen = ProjectedCollisions.of(collisions).with_errors(_PAIR_ERRORS)
     # In batches, so that memory does not grow with the number of collisions.
     parts = [
-        SeenCollisions(*(column[k : k + _AT_ONCE] for column in seen))
+        ProjectedCollisions(*(column[k : k + _AT_ONCE] for column in seen))
         for k in range(0, len(collisions), _AT_ONCE)
     ]
     limits = sticking_speed, outliers
@@ -181,7 +181,9 @@ def pair_table(
     errors = radius_errors if seen.measured.any() else (0.0,)
     ratios = np.array(vertical_ratios, dtype=np.float64)
     by_error = [
-        np.sum([pairs_given(part, grid, ratios, error, limits) for part in parts], axis=0)
+        np.sum(
+            [projected_log_likelihood(part, grid, ratios, error, limits) for part in parts], axis=0
+        )
         for error in errors
     ]
     table = np.stack(by_error, axis=1).reshape(-1, grid.size)

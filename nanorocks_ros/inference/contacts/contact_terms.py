@@ -9,7 +9,7 @@ import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_likelihood import marginal, pair_table, rebound_table
 from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL
-from nanorocks_ros.inference.likelihood_1d import SingleTerm
+from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 from nanorocks_ros.records import PairCollision, Rebound
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class ContactTerms:
             beads=self.beads + other.beads,
         )
 
-    def of_walls(self, bias: float = 0.0) -> SingleTerm | None:
+    def wall_likelihood(self, bias: float = 0.0) -> Likelihood1D | None:
         """Log likelihood of the wall restitution from rebounds; None without rebounds.
 
         Parameters
@@ -72,12 +72,12 @@ class ContactTerms:
         """
         if not self.rebounds:
             return None
-        term = SingleTerm(restitution=_WALLS, log_likelihood=marginal(self.walls))
-        return term.off_by(bias)
+        term = Likelihood1D(restitution=_WALLS, log_likelihood=marginal(self.walls))
+        return term.convolved(bias)
 
-    def of_beads(self, bias: float = 0.0) -> SingleTerm | None:
-        """Log likelihood of the bead restitution from collisions, as `of_walls`."""
+    def bead_likelihood(self, bias: float = 0.0) -> Likelihood1D | None:
+        """Log likelihood of the bead restitution from collisions, as `wall_likelihood`."""
         if not self.collisions:
             return None
-        term = SingleTerm(restitution=_BEADS, log_likelihood=marginal(self.beads))
-        return term.off_by(bias)
+        term = Likelihood1D(restitution=_BEADS, log_likelihood=marginal(self.beads))
+        return term.convolved(bias)

@@ -32,7 +32,7 @@ _UNLIKELY = 1e-9
 _SQRT_2_PI = math.sqrt(2.0 * math.pi)
 
 
-class SeenCollisions(NamedTuple):
+class ProjectedCollisions(NamedTuple):
     """Collisions along the projected line of centres, arrays (m,).
 
     Parameters
@@ -63,7 +63,7 @@ class SeenCollisions(NamedTuple):
     temperature: NDArray[np.float64]
 
     @classmethod
-    def of(cls, collisions: Sequence[PairCollision]) -> SeenCollisions:
+    def of(cls, collisions: Sequence[PairCollision]) -> ProjectedCollisions:
         """Arrays of some collisions."""
         separation = np.array([collision.separation for collision in collisions])
         distance = np.hypot(*separation.T)
@@ -96,7 +96,7 @@ class SeenCollisions(NamedTuple):
             temperature=np.array([collision.temperatures.sum() for collision in collisions]),
         )
 
-    def with_errors(self, scale: float) -> SeenCollisions:
+    def with_errors(self, scale: float) -> ProjectedCollisions:
         """The collisions with all errors multiplied by a factor."""
         return self._replace(
             approach_variance=scale**2 * self.approach_variance,
@@ -107,7 +107,7 @@ class SeenCollisions(NamedTuple):
 
 
 def _tilts(
-    seen: SeenCollisions, radius_error: float
+    seen: ProjectedCollisions, radius_error: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Tilts (vertical components of the line of centres), (1, h), and their probabilities, (m, h).
 
@@ -125,8 +125,8 @@ def _tilts(
     return tilt, weight / weight.sum(axis=1)[:, None]
 
 
-def pairs_given(
-    seen: SeenCollisions,
+def projected_log_likelihood(
+    seen: ProjectedCollisions,
     grid: NDArray[np.float64],
     ratios: NDArray[np.float64],
     radius_error: float,
@@ -140,7 +140,7 @@ def pairs_given(
     total = np.zeros((ratios.size, grid.size))
     for k in range(0, len(weight), _IN_CACHE):
         rows = slice(k, k + _IN_CACHE)
-        batch = SeenCollisions(*(column[rows] for column in seen))
+        batch = ProjectedCollisions(*(column[rows] for column in seen))
         densities = _density(batch, grid, ratios, tilt[0, :, np.newaxis], sticking_speed)
         density = np.einsum('mh,rmhn->rmn', weight[rows], densities)
         outlier_density = outliers / (RANGE * batch.approach[:, np.newaxis])
@@ -149,7 +149,7 @@ def pairs_given(
 
 
 def _density(
-    seen: SeenCollisions,
+    seen: ProjectedCollisions,
     grid: NDArray[np.float64],
     ratios: NDArray[np.float64],
     tilt: NDArray[np.float64],

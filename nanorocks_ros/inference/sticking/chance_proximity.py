@@ -45,7 +45,7 @@ def encounter_rate(tray: Tray) -> float:
     return float(2.0 * math.sqrt(2.0) * reach * max(counts.sum() - 1.0, 0.0) / room)
 
 
-def chance(way: ArrayLike, tolerance: ArrayLike, rate: float) -> NDArray[np.float64]:
+def chance_probability(way: ArrayLike, tolerance: ArrayLike, rate: float) -> NDArray[np.float64]:
     """Probability that an encounter of two free beads looks like a body of two.
 
     Parameters
@@ -68,19 +68,19 @@ def chance(way: ArrayLike, tolerance: ArrayLike, rate: float) -> NDArray[np.floa
     return np.asarray(slow * np.exp(-_DISTURBED * rate * gone))
 
 
-def encounters(tray: Tray) -> float:
+def expected_encounters(tray: Tray) -> float:
     """Encounters of all beads between two shaking events, each pair's once."""
     return 0.5 * tray.count * encounter_rate(tray) * _CYCLE
 
 
-def largest_chance(tray: Tray, false_alarm_rate: float) -> float:
-    """The chance of an encounter below which it is a body, at some rate of false alarms a cycle.
+def max_chance_probability(tray: Tray, false_alarm_rate: float) -> float:
+    """Largest chance probability of a body, at a rate of false alarms per cycle.
 
     Parameters
     ----------
     tray : Tray
     false_alarm_rate : float, 0 to 1
-        Share of cycles without sticking in which any two beads are called a body.
+        Fraction of cycles without sticking in which a body is reported.
 
     Raises
     ------
@@ -91,4 +91,4 @@ def largest_chance(tray: Tray, false_alarm_rate: float) -> float:
         raise ConfigurationError(
             'bodies.false_alarm_rate', f'{false_alarm_rate!r}', 'give a rate between 0 and 1'
         )
-    return false_alarm_rate / max(encounters(tray), 1.0)
+    return false_alarm_rate / max(expected_encounters(tray), 1.0)

@@ -24,7 +24,7 @@ _SETTLED = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MergeTerms:
+class MergeLikelihood:
     """Terms of a Poisson likelihood on a grid of sticking speeds; those of cycles add up.
 
     Parameters
@@ -46,8 +46,8 @@ class MergeTerms:
     logs: NDArray[np.float64]
     expected: NDArray[np.float64]
 
-    def __add__(self, other: MergeTerms) -> MergeTerms:
-        return MergeTerms(
+    def __add__(self, other: MergeLikelihood) -> MergeLikelihood:
+        return MergeLikelihood(
             speeds=self.speeds,
             merges=self.merges + other.merges,
             exposed=self.exposed or other.exposed,
@@ -79,7 +79,7 @@ class MergeRates:
     ----------
     speeds : ndarray (n,), [m/s]
         Grid of sticking speeds.
-    nothing : MergeTerms
+    nothing : MergeLikelihood
         Likelihood of no cycles.
     """
 
@@ -96,13 +96,13 @@ class MergeRates:
         self._fewest = least_share * beads
         self.speeds = highest * (np.arange(1, _NODES + 1) / _NODES) ** 2
         nothing = np.zeros(_NODES)
-        self.nothing = MergeTerms(
+        self.nothing = MergeLikelihood(
             speeds=self.speeds, merges=0, exposed=False, logs=nothing, expected=nothing
         )
         self._known: StickingCycle | None = None
         self._expected = np.zeros(_NODES)
 
-    def terms(self, cycle: StickingCycle) -> MergeTerms:
+    def terms(self, cycle: StickingCycle) -> MergeLikelihood:
         """Likelihood of a cycle.
 
         Raises
@@ -116,8 +116,8 @@ class MergeRates:
         if usable.times.size < 2 or usable.bodies[0] <= 1.0:
             return replace(self.nothing, merges=usable.merges.size)
         speeds = np.interp(usable.merges, usable.times, usable.speeds)
-        logs = self._contacts.log_slower_sum(self.speeds, speeds, self._measure)
-        return MergeTerms(
+        logs = self._contacts.summed_log_rate_below(self.speeds, speeds, self._measure)
+        return MergeLikelihood(
             speeds=self.speeds,
             merges=usable.merges.size,
             exposed=True,
@@ -150,7 +150,7 @@ class MergeRates:
         width = np.append(halves, 0.0) + np.append(0.0, halves)
         # Bodies collide like beads: in pairs, at the speed of the beads.
         weights = width * 0.5 * bodies**2 / self._beads * speeds * (bodies > 1.0)
-        return self._contacts.slower_sum(self.speeds, speeds, weights, self._measure)
+        return self._contacts.summed_rate_below(self.speeds, speeds, weights, self._measure)
 
 
 def _begins_with(cycle: StickingCycle, start: StickingCycle) -> bool:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.inference.sticking.merge_likelihood import MergeRates, MergeTerms
+from nanorocks_ros.inference.sticking.merge_likelihood import MergeLikelihood, MergeRates
 from nanorocks_ros.numerics.log_sums import log_sum
 from nanorocks_ros.records import StickingStatus
 
@@ -74,7 +74,7 @@ def sticking_estimate(
     contacts, beads, measure, highest, least_share
         See `MergeRates`.
     rate_error, probability : float
-        See `estimate_by`.
+        See `sticking_estimate_of`.
 
     Raises
     ------
@@ -85,15 +85,17 @@ def sticking_estimate(
     """
     rates = MergeRates(contacts, beads, measure, highest=highest, least_share=least_share)
     terms = reduce(add, [rates.terms(cycle) for cycle in cycles], rates.nothing)
-    return estimate_by(terms, rate_error=rate_error, probability=probability)
+    return sticking_estimate_of(terms, rate_error=rate_error, probability=probability)
 
 
-def estimate_by(terms: MergeTerms, *, rate_error: float, probability: float) -> StickingEstimate:
+def sticking_estimate_of(
+    terms: MergeLikelihood, *, rate_error: float, probability: float
+) -> StickingEstimate:
     """Sticking speed from the likelihood of the merges.
 
     Parameters
     ----------
-    terms : MergeTerms
+    terms : MergeLikelihood
         Sum over all cycles.
     rate_error : float
         Standard deviation of the logarithm of a common error of all rates.

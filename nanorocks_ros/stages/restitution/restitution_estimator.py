@@ -33,7 +33,7 @@ from nanorocks_ros.stages.restitution.species_decays import species_decays
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.inference.cycle_likelihoods import Evidence, MeanRestitution
+    from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRestitution
     from nanorocks_ros.settings import PipelineSettings
 
 
@@ -81,11 +81,11 @@ class HaffFitter:
         self._reading: Reading = self._make_reading()
 
     @property
-    def evidence(self) -> Evidence | None:
+    def evidence(self) -> CycleLikelihoods | None:
         """What the cycles finished since time last went back say; None without any."""
         return self._reading.evidence
 
-    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+    def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
         """What cycles say together, also such of other recordings of the tray.
 
         Raises

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from pathlib import Path
 
-    from nanorocks_ros.inference.cycle_likelihoods import Evidence
+    from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
     from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
     from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.settings import PipelineSettings
@@ -67,7 +67,7 @@ class TrayResults:
     bodies: list[BodyEstimate] | Spool[BodyEstimate] = field(default_factory=list)
     merges: list[Merge] | Spool[Merge] = field(default_factory=list)
     truth: list[GroundTruth] = field(default_factory=list)
-    evidence: Evidence | None = None
+    evidence: CycleLikelihoods | None = None
     sticking: tuple[StickingCycle, ...] = ()
 
 

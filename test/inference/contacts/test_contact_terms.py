@@ -43,8 +43,8 @@ def test_its_nodes_are_close_enough_to_give_what_a_fine_grid_gives():
     pairs = [contact for contact in every if isinstance(contact, PairCollision)]
     walls = [contact for contact in every if isinstance(contact, Rebound)]
     for term, exact in (
-        (terms.of_beads(), pair_log_likelihood(pairs, FINE)),
-        (terms.of_walls(), rebound_log_likelihood(walls, FINE)),
+        (terms.bead_likelihood(), pair_log_likelihood(pairs, FINE)),
+        (terms.wall_likelihood(), rebound_log_likelihood(walls, FINE)),
     ):
         grid = FINE[term.restitution[0] <= FINE]
         estimate, expected = contact_estimate(grid, term.at(grid)), contact_estimate(FINE, exact)
@@ -55,13 +55,16 @@ def test_its_nodes_are_close_enough_to_give_what_a_fine_grid_gives():
 
 def test_without_contacts_nothing_is_said():
     terms = ContactTerms.of(())
-    assert terms.of_beads() is None
-    assert terms.of_walls() is None
+    assert terms.bead_likelihood() is None
+    assert terms.wall_likelihood() is None
 
 
 def test_what_all_contacts_may_be_off_by_adds_to_the_error_in_squares():
     terms = ContactTerms.of(contacts())
-    for term, bias, low in ((terms.of_beads, 0.02, 0.5), (terms.of_walls, 0.01, 0.8)):
+    for term, bias, low in (
+        (terms.bead_likelihood, 0.02, 0.5),
+        (terms.wall_likelihood, 0.01, 0.8),
+    ):
         grid = np.linspace(low, 1.0, 1001)
         sure, unsure = (contact_estimate(grid, term(value).at(grid)) for value in (0.0, bias))
         expected_error = np.hypot(sure.restitution_error, bias)

@@ -41,11 +41,11 @@ def cycle(until, *times):
 def test_terms_are_the_integral_of_the_rates_and_the_logarithms_of_those_of_the_merges():
     decay = cycle(50.0, 20.0, 31.5)
     terms = MergeRates(CONTACTS, BEADS).terms(decay)
-    slower = CONTACTS.slower_between(terms.speeds[:, np.newaxis] / decay.speeds)
+    slower = CONTACTS.interpolated_rate_below(terms.speeds[:, np.newaxis] / decay.speeds)
     rates = slower * decay.speeds * 0.5 * decay.bodies**2 / BEADS
     np.testing.assert_allclose(terms.expected, trapezoid(rates, decay.times), rtol=1e-12)
     speeds = np.interp(decay.merges, decay.times, decay.speeds)
-    slower = CONTACTS.slower_between(terms.speeds[:, np.newaxis] / speeds)
+    slower = CONTACTS.interpolated_rate_below(terms.speeds[:, np.newaxis] / speeds)
     np.testing.assert_allclose(terms.logs, np.log(slower * speeds).sum(axis=1), rtol=1e-12)
     assert terms.merges == 2
 

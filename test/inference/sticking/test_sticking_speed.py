@@ -24,7 +24,7 @@ START = 5_000_000_000
 def _cycle(rng, sticking_speed, measure='normal'):
     bodies, merges = np.empty(TIMES.size), []
     left = BEADS
-    rates = CONTACTS.slower(sticking_speed / SPEEDS, measure) * SPEEDS * 0.5 / BEADS
+    rates = CONTACTS.rate_below(sticking_speed / SPEEDS, measure) * SPEEDS * 0.5 / BEADS
     step = TIMES[1]
     for k, rate in enumerate(rates):
         bodies[k] = left
