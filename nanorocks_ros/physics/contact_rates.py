@@ -13,6 +13,8 @@ Higher orders are those of Carnahan and Starling's spheres at the density with t
 order. Contacts with a wall increase because neighbours push beads against it: by 1 + the first
 order times the contact value, like the pressure of a fluid. In a wide box this is Enskog's
 theory.
+
+Tested in test/physics/test_confined_theory.py.
 """
 
 from __future__ import annotations

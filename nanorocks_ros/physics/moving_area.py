@@ -1,4 +1,7 @@
-"""Area that a moving disc uncovers and covers, for the speed from binarised images."""
+"""Area that a moving disc uncovers and covers, for the speed from binarised images.
+
+Tested in test/physics/test_paper_formulas.py.
+"""
 
 from __future__ import annotations
 

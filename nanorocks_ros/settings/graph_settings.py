@@ -1,4 +1,7 @@
-"""Settings of the node graph: sources, playback, recording, live page."""
+"""Settings of the node graph: sources, playback, recording, live page.
+
+Tested in test/settings/test_setting_fields.py.
+"""
 
 from __future__ import annotations
 

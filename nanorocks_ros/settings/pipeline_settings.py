@@ -1,4 +1,7 @@
-"""Settings of the stages, from the camera frame to the restitution."""
+"""Settings of the stages, from the camera frame to the restitution.
+
+Tested in test/settings/test_setting_fields.py.
+"""
 
 from __future__ import annotations
 

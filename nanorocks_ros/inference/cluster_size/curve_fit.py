@@ -1,4 +1,7 @@
-"""Fit of the cluster curve, from autocorrelation width to cluster size, to simulated images."""
+"""Fit of the cluster curve, from autocorrelation width to cluster size, to simulated images.
+
+Tested in test/inference/cluster_size/test_cluster_curve.py.
+"""
 
 from __future__ import annotations
 

@@ -11,6 +11,8 @@ stick or not, and if all beads are connected its width is that of the tray. So t
 slowly with ln(size). Its mean over many simulated images is a rising curve, and the scatter of
 single images about it is the error of a size. The curve ends where that error exceeds a factor
 of three.
+
+Tested in test/inference/cluster_size/test_cluster_curve.py.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Restitution with its error from a log likelihood on a grid, for reports."""
+"""Restitution with its error from a log likelihood on a grid, for reports.
+
+Tested in test/inference/contacts/test_contact_likelihood.py.
+"""
 
 from __future__ import annotations
 

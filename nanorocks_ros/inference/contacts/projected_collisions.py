@@ -1,6 +1,8 @@
 """Likelihood of collisions in the projection of the camera.
 
 A tilted line of centres appears shortened, and so does the speed along it.
+
+Tested in test/inference/contacts/test_contact_likelihood.py.
 """
 
 from __future__ import annotations

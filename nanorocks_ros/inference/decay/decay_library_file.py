@@ -1,4 +1,7 @@
-"""Files of decay libraries: reading them, and the arrays they consist of."""
+"""Files of decay libraries: reading them, and the arrays they consist of.
+
+Tested in test/inference/decay/test_decay_library.py.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Fit of a decay library: smooth functions through simulated decays."""
+"""Fit of a decay library: smooth functions through simulated decays.
+
+Tested in test/inference/decay/test_decay_library.py.
+"""
 
 from __future__ import annotations
 

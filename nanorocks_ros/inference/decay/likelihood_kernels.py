@@ -1,4 +1,7 @@
-"""Compiled loops of `decay_likelihood` over the points of the grid of restitutions."""
+"""Compiled loops of `decay_likelihood` over the points of the grid of restitutions.
+
+Tested in test/inference/decay/test_decay_likelihood.py.
+"""
 
 from __future__ import annotations
 
