@@ -1,4 +1,4 @@
-"""Posterior of the restitutions: near the truth, as wide as it says, and wide where it must be."""
+"""Posterior of the restitutions: bias, coverage and width."""
 
 from __future__ import annotations
 
@@ -52,9 +52,7 @@ def likelihoods(tables, speeds, camera=(0.0, 0.0)):
 
 
 @pytest.mark.parametrize(('restitution', 'wall'), [(0.7, 0.95), (0.89, 0.99), (0.95, 0.9)])
-def test_intervals_cover_the_truth_as_often_as_they_say_when_the_walls_are_known(
-    exact, restitution, wall
-):
+def test_intervals_have_the_stated_coverage_for_known_walls(exact, restitution, wall):
     quantiles = np.array(
         [
             posterior_of(exact, likelihood.integrated(), (wall, wall)).quantiles(LEVELS)
@@ -91,7 +89,7 @@ def test_the_two_restitutions_lie_in_a_valley(exact):
     assert spread[0, 0] > 4.0 * known.covariance[0, 0]
 
 
-def test_what_else_is_known_of_one_restitution_tells_of_the_other(exact):
+def test_a_likelihood_of_one_restitution_narrows_the_other(exact):
     (likelihood,) = likelihoods(exact, decays(0.89, 0.95, 1))
     grid = np.linspace(0.0, 1.0, 2001)
     wall_likelihood = Likelihood1D(
@@ -118,7 +116,7 @@ def test_what_else_is_known_of_one_restitution_tells_of_the_other(exact):
     assert combined.covariance[0, 0] ** 0.5 < 0.01
 
 
-def test_what_is_not_known_of_the_tray_does_not_average_out(exact, uncertain):
+def test_nuisances_of_the_tray_do_not_average_out(exact, uncertain):
     speeds = decays(0.89, 0.97, 36)
     widths = {}
     for name, tables in (('exact', exact), ('uncertain', uncertain)):
@@ -133,7 +131,7 @@ def test_what_is_not_known_of_the_tray_does_not_average_out(exact, uncertain):
     assert widths['uncertain', 36] < widths['uncertain', 1]
 
 
-def test_a_few_speeds_say_next_to_nothing(uncertain):
+def test_a_few_speeds_give_a_wide_posterior(uncertain):
     speed = decays(0.89, 0.97, 1)[0, :8]
     likelihood = decay_likelihood(uncertain, TIMES[:8], speed, 0.3 * speed, (0.01, 0.01))
     posterior = posterior_of(uncertain, likelihood.integrated(), (0.8, 1.0))
@@ -164,7 +162,7 @@ def test_walls_beyond_the_library_are_refused(uncertain):
 
 
 @pytest.mark.parametrize('number', [6, 7, 8])
-def test_a_gas_that_is_seen_late_is_not_read_wrong_with_confidence(number):
+def test_a_gas_first_seen_late_has_an_interval_with_the_truth(number):
     tray = load_trays()[number]
     tables = tables_of(library_of(tray), tray, PriorSettings())
     place = int(np.argmin(abs(tables.restitution - 0.89))) * tables.wall_restitution.size + int(

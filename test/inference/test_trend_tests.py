@@ -33,7 +33,7 @@ def test_the_error_of_a_slope_is_what_slopes_scatter_by():
     assert np.mean(np.abs(slopes) < errors) == pytest.approx(0.68, abs=0.09)
 
 
-def test_values_that_are_not_known_are_left_out():
+def test_unknown_values_are_left_out():
     values = 1.0 + 0.5 * CYCLES
     values[10:20] = math.nan
     trend = robust_trend(CYCLES, values)
@@ -69,7 +69,7 @@ def test_periods_are_of_large_clusters_only():
     assert not quiet_periods(sizes)
 
 
-def test_independent_cycles_hold_periods_as_often_as_is_allowed():
+def test_independent_cycles_have_periods_at_the_false_alarm_rate():
     alarms = [bool(quiet_periods(noise(k), 0.05, orders=99, seed=k)) for k in range(200)]
     # 10 are expected; 21 or more in one of a thousand such tests.
     assert 1 <= sum(alarms) <= 20

@@ -11,7 +11,7 @@ from nanorocks_ros.numerics.small_cholesky import factorise, whiten
 
 @pytest.mark.parametrize('size', [1, 2, 3, 24, 25])
 @pytest.mark.parametrize('scale', [1.0, 1e-12, 1e12])
-def test_columns_are_divided_by_the_factor_of_cholesky(size, scale):
+def test_columns_are_whitened_by_the_cholesky_factor(size, scale):
     rng = np.random.default_rng(size)
     half = rng.normal(size=(size, 2 * size))
     matrix = scale * (half @ half.T)

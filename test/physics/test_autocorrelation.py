@@ -29,12 +29,12 @@ def naive_autocorrelation(image):
 
 
 @pytest.mark.parametrize('shape', [(16, 16), (17, 12), (9, 21), (2, 2), (1, 7), (8, 1)])
-def test_the_fast_autocorrelation_is_the_one_by_definition(shape):
+def test_the_fast_autocorrelation_equals_its_definition(shape):
     image = np.random.default_rng(2).integers(0, 256, shape, dtype=np.uint8)
     assert autocorrelation(image) == pytest.approx(naive_autocorrelation(image), abs=1e-5)
 
 
-def test_it_is_the_convolution_of_scipy_with_the_image_turned_round():
+def test_it_is_the_convolution_of_scipy_with_the_reversed_image():
     image = np.random.default_rng(3).integers(0, 256, (94, 200), dtype=np.uint8)
     deviation = image - image.mean()
     whole = fftconvolve(deviation, deviation[::-1, ::-1])

@@ -241,12 +241,12 @@ def test_outside_its_range_it_gives_no_number():
 
 
 @pytest.mark.parametrize('bad', [-0.1, 1.1, math.nan])
-def test_a_restitution_that_is_none_is_named(bad):
+def test_a_restitution_outside_0_to_1_is_named(bad):
     with pytest.raises(ConfigurationError, match='wall_restitution'):
         gas(1).decay_rate(0.9, bad)
 
 
-def test_a_tray_too_crowded_is_refused_with_the_remedy():
+def test_a_crowded_tray_is_refused_with_the_remedy():
     with pytest.raises(ConfigurationError, match='use the decay library'):
         confined_gas(wide_tray(0.02, count=900))
 

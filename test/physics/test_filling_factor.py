@@ -198,7 +198,7 @@ def test_turning_moving_and_scaling_a_cluster_changes_nothing():
         lambda: filling_of_height(np.array([R]), 1e-6, -1.0),
     ],
 )
-def test_what_is_no_cluster_is_refused_in_one_line(call):
+def test_wrong_clusters_are_refused_in_one_line(call):
     with pytest.raises(ConfigurationError) as caught:
         call()
     assert '\n' not in str(caught.value)

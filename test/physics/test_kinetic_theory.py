@@ -84,7 +84,7 @@ def test_a_decay_faster_than_beads_can_make_is_an_error():
 
 
 @pytest.mark.parametrize('bad', [-0.1, 1.1, math.nan])
-def test_a_restitution_that_is_none_is_refused(bad):
+def test_a_restitution_outside_0_to_1_is_refused(bad):
     with pytest.raises(ConfigurationError, match='from 0 to 1'):
         kinetic_decay_rate(bad, DIAMETER, DENSITY)
 

@@ -54,7 +54,7 @@ def test_the_onset_is_the_first_growth_after_the_shake():
     assert math.isnan(paper_onset(times, -times))
 
 
-def test_the_rule_fires_on_noise():
+def test_the_rule_triggers_on_noise():
     generator = np.random.default_rng(4)
     times = np.arange(0.0, 20.0, 0.2)
     fired = [paper_onset(times, 1.0 + 0.03 * generator.normal(size=100)) for _ in range(20)]

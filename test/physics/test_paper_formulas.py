@@ -107,7 +107,7 @@ def test_the_mean_area_is_the_average_over_rayleigh_displacements():
     assert mean_moving_area(0.7, 1.0) == pytest.approx(moving_area(drawn, 1.0).mean(), rel=2e-3)
 
 
-def test_a_saturated_area_says_nothing():
+def test_a_saturated_area_gives_no_displacement():
     assert math.isnan(mean_displacement(2 * math.pi * 1e-6, 1e-3, 'exact'))
 
 
@@ -172,7 +172,7 @@ def test_the_instantaneous_restitution_is_the_printed_formula():
     assert restitution == pytest.approx(ratio ** (30.0 / rate), rel=1e-12)
 
 
-def test_the_instantaneous_restitution_of_haffs_decay_is_another_one_than_haffs():
+def test_the_instantaneous_restitution_differs_from_that_of_haffs_law():
     # -ln e stands where 1 - e^2 does: 0.89 becomes exp(-(1 - 0.89^2)) = 0.812.
     n_sigma = TRAY.number_density * math.pi * TRAY.diameter**2
     speed, step = 0.01, 1e-4

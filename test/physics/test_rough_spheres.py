@@ -22,13 +22,13 @@ from nanorocks_ros.simulation.engine.gas import Beads, HardSphereGas
 ROUGH = [(0.89, -0.5), (0.89, 0.0), (0.7, 0.3), (0.5, 1.0), (1.0, 0.5)]
 
 
-def test_smooth_beads_lose_as_smooth_beads_do_and_turn_nothing():
+def test_smooth_beads_have_the_smooth_loss_and_no_rotation():
     rates = rough_rates(0.8, -1.0)
     assert (rates.loss, rates.exchange, rates.drain) == pytest.approx((0.09, 0.0, 0.0))
     assert smooth_equivalent(0.8, -1.0) == pytest.approx(0.8)
 
 
-def test_perfectly_rough_elastic_beads_share_evenly_and_lose_nothing():
+def test_perfectly_rough_elastic_beads_reach_equipartition_without_loss():
     rates = rough_rates(1.0, 1.0)
     assert rates.loss == pytest.approx(rates.exchange)
     assert rates.drain == pytest.approx(rates.exchange)
@@ -74,7 +74,7 @@ def test_the_course_follows_the_rates_and_ends_at_the_ratio(restitution, tangent
     assert end == pytest.approx(rough_temperature_ratio(restitution, tangential))
 
 
-def test_a_simulated_gas_comes_to_share_as_the_theory_says():
+def test_a_simulated_gas_reaches_the_temperature_ratio_of_the_theory():
     """864 beads, from no rotation; correlations that the theory leaves out cost some per cent."""
     side, cells = 1.0, 6
     corner = np.array([[0, 0, 0], [1, 1, 0], [1, 0, 1], [0, 1, 1]]) * 0.5
@@ -134,6 +134,6 @@ def test_a_bead_in_equipartition_turns_some_ninety_degrees_a_second_at_a_millime
         (lambda: rms_spin(0.001, 0.002, math.inf), 'ratio: inf'),
     ],
 )
-def test_what_cannot_be_is_refused(call, message):
+def test_values_outside_their_ranges_are_refused(call, message):
     with pytest.raises(ConfigurationError, match=message):
         call()

@@ -15,7 +15,7 @@ from nanorocks_ros.simulation.ensemble import cooling_runs
 CONTACTS = slow_contacts(load_trays()[1])
 
 
-def test_beads_meet_as_often_per_way_as_in_the_simulated_tray():
+def test_the_contact_rate_per_path_length_is_that_of_the_simulated_tray():
     settings = SimulationSettings(restitution=0.89, wall_restitution=0.97, mean_speed=0.01)
     times = np.linspace(0.0, 20.0, 401)
     runs = cooling_runs(settings, load_trays()[1], times, range(20))
@@ -23,12 +23,12 @@ def test_beads_meet_as_often_per_way_as_in_the_simulated_tray():
     assert CONTACTS.rate == pytest.approx(2.0 * runs.pair_collisions.sum() / (15 * way), rel=0.1)
 
 
-def test_all_contacts_are_slower_than_anything():
+def test_the_rate_below_an_infinite_speed_is_that_of_all_contacts():
     for measure in ('normal', 'total'):
         assert CONTACTS.rate_below(100.0, measure) == pytest.approx(CONTACTS.rate)
 
 
-def test_few_contacts_are_slow_and_fewer_by_their_whole_speed():
+def test_fewer_contacts_are_below_a_total_speed_than_below_a_normal_speed():
     speeds = np.geomspace(1e-5, 3.0, 60)
     normal, total = (CONTACTS.rate_below(speeds, measure) for measure in ('normal', 'total'))
     assert (np.diff(normal) > 0.0).all()
@@ -55,7 +55,7 @@ def test_another_measure_is_refused():
 
 
 @pytest.mark.parametrize('measure', ['normal', 'total'])
-def test_between_nodes_contacts_are_as_many_as_worked_out_for_that_speed(measure):
+def test_the_interpolated_rate_equals_the_exact_rate(measure):
     contacts = slow_contacts(load_trays()[3])
     speeds = np.geomspace(1e-3, 30.0, 97)
     for _ in range(2):
@@ -64,7 +64,7 @@ def test_between_nodes_contacts_are_as_many_as_worked_out_for_that_speed(measure
 
 
 @pytest.mark.parametrize('measure', ['normal', 'total'])
-def test_sums_over_mean_speeds_are_those_of_the_single_ones(measure):
+def test_sums_over_mean_speeds_equal_sums_of_single_rates(measure):
     speeds, means = np.geomspace(1e-9, 10.0, 40), np.geomspace(1e-4, 1e-2, 7)
     weights = np.linspace(0.5, 2.0, 7)
     slower = CONTACTS.interpolated_rate_below(speeds[:, np.newaxis] / means, measure)

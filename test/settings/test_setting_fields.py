@@ -27,7 +27,7 @@ def test_every_default_lies_in_its_own_range_and_is_documented(settings):
 
 
 @pytest.mark.parametrize('settings', ALL, ids=lambda settings: type(settings).__name__)
-def test_nan_and_negative_numbers_are_refused_wherever_a_number_is_wanted(settings):
+def test_nan_and_negative_numbers_are_refused_for_every_number(settings):
     numbers = [
         row
         for row in st.rows(settings)
@@ -48,7 +48,7 @@ def test_a_nested_value_is_replaced_and_nothing_else():
     assert changed.cooling == st.CoolingSettings()
 
 
-def test_a_whole_number_does_for_a_real_one_and_a_list_for_a_tuple():
+def test_a_whole_number_is_accepted_for_a_real_one_and_a_list_for_a_tuple():
     values = {'preprocess.pixels_per_metre': 13500, 'trays': [1.0, 3.0]}
     changed = st.with_values(st.PipelineSettings(), values, 'test')
     assert isinstance(changed.preprocess.pixels_per_metre, float)

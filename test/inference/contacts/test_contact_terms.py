@@ -1,4 +1,4 @@
-"""What contacts say, added up."""
+"""Log-likelihood tables of contacts add up."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def sum_of(first, *others):
     return total
 
 
-def test_a_sum_says_what_all_contacts_together_say():
+def test_tables_of_parts_add_up_to_the_table_of_all_contacts():
     every = contacts()
     whole = ContactTerms.of(every)
     parts = sum_of(every[:15], every[15:60], every[60:])
@@ -37,7 +37,7 @@ def test_a_sum_says_what_all_contacts_together_say():
     np.testing.assert_allclose(parts.beads, whole.beads, rtol=1e-9)
 
 
-def test_its_nodes_are_close_enough_to_give_what_a_fine_grid_gives():
+def test_the_nodes_give_the_same_estimate_as_a_fine_grid():
     every = contacts()
     terms = ContactTerms.of(every)
     pairs = [contact for contact in every if isinstance(contact, PairCollision)]
@@ -53,13 +53,13 @@ def test_its_nodes_are_close_enough_to_give_what_a_fine_grid_gives():
         assert estimate.restitution_error == pytest.approx(expected.restitution_error, rel=0.02)
 
 
-def test_without_contacts_nothing_is_said():
+def test_without_contacts_there_is_no_likelihood():
     terms = ContactTerms.of(())
     assert terms.bead_likelihood() is None
     assert terms.wall_likelihood() is None
 
 
-def test_what_all_contacts_may_be_off_by_adds_to_the_error_in_squares():
+def test_a_common_systematic_error_adds_in_quadrature():
     terms = ContactTerms.of(contacts())
     for term, bias, low in (
         (terms.bead_likelihood, 0.02, 0.5),

@@ -1,4 +1,4 @@
-"""Decay libraries: what they hold is what the gas does, and a wrong file is told."""
+"""Decay libraries agree with simulation, and a wrong file is refused."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def at_node(library, number):
 
 
 @pytest.mark.parametrize('tray', TRAYS.values(), ids=lambda tray: f'tray{tray.number}')
-def test_every_tray_has_a_library_and_a_node_made_anew_lies_on_it(tray):
+def test_every_tray_has_a_library_that_agrees_with_a_new_simulation_of_a_node(tray):
     library = library_of(tray)
     made = json.loads(library.made_by)
     plan = LibraryPlan(tray=tray, nodes=made['nodes'], runs=made['runs'], seed=made['seed'])
@@ -82,7 +82,7 @@ def test_more_is_lost_with_less_restitution():
     assert (np.diff(walls) > 0.0).all()
 
 
-def test_a_covariance_is_one():
+def test_covariances_are_symmetric_and_positive():
     library = library_of(TRAYS[1])
     for row in library.covariance:
         for covariance in row:
@@ -96,7 +96,7 @@ def test_a_library_of_another_tray_is_refused_and_the_command_named(tmp_path):
         library_of(tray)
 
 
-def test_a_file_that_is_none_is_told_and_how_it_is_made(tmp_path):
+def test_a_wrong_file_is_refused_and_the_command_named(tmp_path):
     path = tmp_path / 'mine.npz'
     with pytest.raises(ConfigurationError, match=r'no such decay library.*nanorocks library'):
         load_library(str(path), packaged=False)
@@ -108,7 +108,7 @@ def test_a_file_that_is_none_is_told_and_how_it_is_made(tmp_path):
         load_library(str(path), packaged=False)
 
 
-def test_a_byte_that_changed_is_seen(tmp_path):
+def test_a_changed_byte_is_detected(tmp_path):
     path = tmp_path / 'mine.npz'
     library = library_of(TRAYS[1])
     np.savez(path, **library_arrays(library))

@@ -1,4 +1,4 @@
-"""Likelihoods of decays, against the same worked out by hand, matrix by matrix."""
+"""Likelihoods of decays against the same with dense matrices."""
 
 from __future__ import annotations
 

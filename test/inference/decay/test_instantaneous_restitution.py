@@ -1,4 +1,4 @@
-"""Restitution against speed, and what noise makes of it."""
+"""Restitution against speed, and its bands of noise."""
 
 from __future__ import annotations
 

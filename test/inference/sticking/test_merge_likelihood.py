@@ -1,4 +1,4 @@
-"""What a cycle says of sticking speeds: by the integral itself, and while the cycle grows."""
+"""Likelihood of merges against the integral itself, and for a growing cycle."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def cycle(until, *times):
     return sticking_cycle(BEADS, merges(*times), STAMPS[used], SPEEDS[used], 0)
 
 
-def test_terms_are_the_integral_of_the_rates_and_the_logarithms_of_those_of_the_merges():
+def test_the_likelihood_has_the_integral_of_the_rates_and_their_logarithms_at_the_merges():
     decay = cycle(50.0, 20.0, 31.5)
     terms = MergeRates(CONTACTS, BEADS).terms(decay)
     slower = CONTACTS.interpolated_rate_below(terms.speeds[:, np.newaxis] / decay.speeds)
@@ -58,7 +58,7 @@ def test_terms_are_the_integral_of_the_rates_and_the_logarithms_of_those_of_the_
         [(30.0,), (31.0, 5.0), (8.0,), (32.0, 5.0, 31.0)],
     ],
 )
-def test_a_cycle_that_has_grown_says_what_it_says_at_once(steps):
+def test_a_growing_cycle_has_the_likelihood_of_the_whole_cycle(steps):
     growing = MergeRates(CONTACTS, BEADS)
     for until, *times in steps:
         terms, afresh = (
@@ -68,7 +68,7 @@ def test_a_cycle_that_has_grown_says_what_it_says_at_once(steps):
         np.testing.assert_array_equal(terms.logs, afresh.logs)
 
 
-def test_cycles_add_up_and_one_of_a_single_body_says_nothing():
+def test_cycles_add_up_and_a_single_body_does_not_contribute():
     rates = MergeRates(CONTACTS, BEADS)
     first, second = rates.terms(cycle(30.0, 20.0)), rates.terms(cycle(50.0))
     stuck = StickingCycle(

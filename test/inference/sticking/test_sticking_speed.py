@@ -1,4 +1,4 @@
-"""Sticking speeds from merges that are drawn as the likelihood says they come about."""
+"""Sticking speeds from merges drawn from the likelihood."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _cycle(rng, sticking_speed, measure='normal'):
 
 
 @pytest.mark.parametrize('measure', ['normal', 'total'])
-def test_the_interval_holds_the_truth_as_often_as_it_says(measure):
+def test_the_interval_has_the_stated_coverage(measure):
     rng = np.random.default_rng(1)
     estimates = [
         sticking_estimate(
@@ -55,7 +55,7 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(measure):
     )
 
 
-def test_many_cycles_tell_more_than_one_but_not_more_than_the_theory():
+def test_many_cycles_narrow_the_interval_down_to_the_error_of_the_theory():
     rng = np.random.default_rng(2)
     cycles = [_cycle(rng, 3e-3) for _ in range(16)]
     single, many, sure = (
@@ -80,7 +80,7 @@ def test_without_a_merge_there_is_an_upper_limit_that_falls_with_more_cycles():
     assert many.upper == pytest.approx(single.upper / 3.0, rel=0.1)
 
 
-def test_everything_stuck_at_the_start_says_nothing():
+def test_beads_that_all_stick_at_the_start_give_no_speed():
     cycle = StickingCycle(
         times=TIMES, speeds=SPEEDS, bodies=np.ones(TIMES.size), merges=np.empty(0)
     )
@@ -90,7 +90,7 @@ def test_everything_stuck_at_the_start_says_nothing():
     assert math.isnan(estimate.sticking_speed)
 
 
-def test_where_all_that_meet_stick_there_is_a_lower_limit_only():
+def test_if_all_colliding_bodies_stick_there_is_only_a_lower_limit():
     estimate = sticking_estimate(
         [_cycle(np.random.default_rng(3), 1.0)], CONTACTS, BEADS, highest=0.05
     )
@@ -111,7 +111,7 @@ def _merge(seconds, joins=True):
     )
 
 
-def test_a_cycle_is_made_of_merges_that_join_bodies_while_speeds_are_known():
+def test_a_cycle_has_the_merges_up_to_the_last_known_speed():
     stamps = START + np.arange(1, 11) * 1_000_000_000
     merges = [_merge(2.5), _merge(2.6, joins=False), _merge(4.0), _merge(11.0)]
     cycle = sticking_cycle(BEADS, merges, stamps, np.linspace(5e-3, 1e-3, 10), START)
