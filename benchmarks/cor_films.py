@@ -25,9 +25,10 @@ import numpy as np
 from benchmarks.filmed_cycles import Cycle, Film, load, make
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
-from nanorocks_ros.inference.posterior import Posterior, posterior_of, tables_of
+from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.posterior import Posterior, posterior_of
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.records import CorEstimate, CorStatus
 from nanorocks_ros.settings import PipelineSettings, PriorSettings, with_values
@@ -190,9 +191,11 @@ def _posterior(cycles: list[_Said], how: _From) -> Posterior:
     return posterior_of(
         tables,
         reduce(add, likelihoods).integrated(),
-        (walls, walls) if how.walls_known else (prior.wall_low, prior.wall_high),
-        of_beads=contacts.of_beads(prior.collision_bias),
-        of_walls=contacts.of_walls(prior.rebound_bias),
+        (walls, walls)
+        if how.walls_known
+        else (prior.min_wall_restitution, prior.max_wall_restitution),
+        bead_likelihood=contacts.bead_likelihood(prior.collision_bias),
+        wall_likelihood=contacts.wall_likelihood(prior.rebound_bias),
     )
 
 

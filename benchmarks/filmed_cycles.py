@@ -164,7 +164,7 @@ def _filled(
     for number, cell in cells.items():
         random = np.random.default_rng([film.number, number])
         pairs = random.uniform(*DRAWN_PAIRS)
-        walls = random.uniform(prior.wall_low, prior.wall_high)
+        walls = random.uniform(prior.min_wall_restitution, prior.max_wall_restitution)
         there[number], values = varied(cell, walls, prior, random)
         values |= {'restitution': pairs, 'wall_restitution': walls}
         gases[number] = with_values(common, values, 'benchmark')

@@ -195,8 +195,8 @@ def _link_ours(found: list[Detections], number: int, index: int) -> list[NDArray
     linker = Linker(
         tray.species[index].count,
         size,
-        settings.fastest * SCALE,
-        settings.longest_gap,
+        settings.max_speed * SCALE,
+        settings.memory,
         settings.window,
         0.0,
     )

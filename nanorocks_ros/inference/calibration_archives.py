@@ -1,6 +1,6 @@
 """Archives of simulated calibrations (decay libraries, cluster curves), as users name them.
 
-Tested in test_decay_library.py and test_cluster_curve.py.
+Tested by ``test/inference/decay/test_decay_library.py``.
 """
 
 from __future__ import annotations

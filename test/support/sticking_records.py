@@ -64,7 +64,7 @@ def cooling(cycle=1, start=0.0, seed=0, sticking=STICKING, until=40.0):
     bodies, found, step = float(TRAY.count), [], 0.1
     for time in np.arange(step, until, step):
         value = float(haff_speed(time, 8e-3, 4.0))
-        rate = 0.5 * bodies**2 / TRAY.count * value * float(contacts.slower(sticking / value))
+        rate = 0.5 * bodies**2 / TRAY.count * value * float(contacts.rate_below(sticking / value))
         if bodies > 1.0 and rng.uniform() < rate * step:
             bodies -= 1.0
             found.append(merge(start + time, cycle))

@@ -54,10 +54,12 @@ def _describe(name: str, declared: Iterable[str]) -> str:
 def _parameters_of_all_nodes() -> set[str]:
     groups = [group for _, group in inspect.getmembers(settings, inspect.isclass)]
     names = {
-        row.name
+        name
         for group in groups
         if group.__module__.startswith(settings.__name__) and group.__name__.endswith('Settings')
         for row in settings.rows(group())
+        for name in (row.name, row.deprecated)
+        if name
     }
     return {prefix + name for prefix in _PREFIXES for name in names} | {'use_sim_time'}
 

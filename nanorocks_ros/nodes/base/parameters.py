@@ -22,7 +22,7 @@ from nanorocks_ros.nodes.base.qos_overrides import (
     refuse_invalid_overrides,
     refuse_overrides_of_unknown_topics,
 )
-from nanorocks_ros.settings import rows, with_values
+from nanorocks_ros.settings import rows, with_current_names, with_values
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -80,11 +80,18 @@ class NodeParameters:
         ConfigurationError
             When a value has the wrong type or is out of range.
         """
+        where = f'node {self._node.get_name()}'
+        given = self._node._parameter_overrides
+        self._node._parameter_overrides, warnings = with_current_names(
+            settings, given, where, prefix
+        )
+        for warning in warnings:
+            self._node.get_logger().warning(warning)
         values = {
             row.name: self._declare_row(prefix + row.name, row, read_only=read_only)
             for row in rows(settings)
         }
-        checked = with_values(settings, values, f'node {self._node.get_name()}')
+        checked = with_values(settings, values, where)
         self._rows.update({prefix + row.name: row for row in rows(settings)})
         return checked
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.inference.sticking.chance_proximity import (
-    chance,
+    chance_probability,
     encounter_rate,
-    largest_chance,
+    max_chance_probability,
 )
 from nanorocks_ros.records import BodyEstimate, Merge
 from nanorocks_ros.stages.bodies.body_sizes import bodies_of, size_fields
@@ -73,10 +73,10 @@ class BodyCounter:
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.bodies
         self._tray = tray
-        self._largest = largest_chance(tray, self._settings.false_alarms)
+        self._largest = max_chance_probability(tray, self._settings.false_alarm_rate)
         self._rate = encounter_rate(tray)
         self._alike = np.array([one.diameter_low == one.diameter_high for one in tray.species])
-        self._pairs = Pairs(partial(chance, rate=self._rate))
+        self._pairs = Pairs(partial(chance_probability, rate=self._rate))
         self._first_ns = 0
         self._last_ns: int | None = None
         self._births = Births()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nanorocks_ros.inference.sticking.chance_proximity import chance
+from nanorocks_ros.inference.sticking.chance_proximity import chance_probability
 from nanorocks_ros.stages.bodies.bonds import Bond
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ class Companions:
         if time - row.start < _YOUNGEST:
             return False
         ranged = max(0.5 * float((row.high - row.low).max()), _LEAST_RANGE * row.tolerance)
-        return float(chance(row.way, ranged, self._rate)) < largest
+        return float(chance_probability(row.way, ranged, self._rate)) < largest
 
 
 def _begun(

@@ -129,7 +129,7 @@ class ClusterAutocorrelator:
 
     def _restart(self) -> None:
         speed = self._settings.speed
-        self._shakes = CycleFollower(speed.shake_ratio, speed.shortest_cycle)
+        self._shakes = CycleFollower(speed.shake_ratio, speed.min_cycle_duration)
         self._last_stamp_ns: int | None = None
         self._next_ns: int | None = None
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import NanorocksError
-from nanorocks_ros.inference.sticking.merge_likelihood import MergeRates, MergeTerms
+from nanorocks_ros.inference.sticking.merge_likelihood import MergeLikelihood, MergeRates
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
-from nanorocks_ros.inference.sticking.sticking_speed import StickingEstimate, estimate_by
+from nanorocks_ros.inference.sticking.sticking_speed import StickingEstimate, sticking_estimate_of
 from nanorocks_ros.physics.sticking_rates import slow_contacts
 from nanorocks_ros.records import BodyEstimate, Merge, Quality, SpeedEstimate
 from nanorocks_ros.stages.preprocess.shake_detection import NS
@@ -72,7 +72,7 @@ class StickingMeter:
             contacts = slow_contacts(tray)
             # Its curve is worked out now, while no image waits; a single bead has none.
             if contacts.rates.any():
-                contacts.slower_between(1.0, settings.sticking.measure)
+                contacts.interpolated_rate_below(1.0, settings.sticking.measure)
             self._make_rates = partial(MergeRates, contacts, tray.count, settings.sticking.measure)
         self._restart()
 
@@ -80,7 +80,7 @@ class StickingMeter:
         self._cycles = {0: _Cycle(0)}
         self._last_ns: int | None = None
         self._finished: dict[int, StickingCycle] = {}
-        self._terms: list[MergeTerms | None] = []
+        self._terms: list[MergeLikelihood | None] = []
         self._all: StickingEstimate | None = None
         self._rates = self._make_rates() if self._make_rates else None
 
@@ -190,19 +190,19 @@ class StickingMeter:
 
     def _terms_of(
         self, cycle: StickingCycle, rates: MergeRates | None = None
-    ) -> MergeTerms | None:
+    ) -> MergeLikelihood | None:
         """What a cycle says of each sticking speed; None where that cannot be told."""
         rates = rates or self._rates
         with suppress(NanorocksError):
             return rates.terms(cycle) if rates else None
         return None
 
-    def _estimate(self, terms: Sequence[MergeTerms | None]) -> StickingEstimate | None:
+    def _estimate(self, terms: Sequence[MergeLikelihood | None]) -> StickingEstimate | None:
         """By all of some cycles; None where one of them cannot be used."""
         known = [term for term in terms if term is not None]
         if len(known) < len(terms):
             return None
-        return estimate_by(
+        return sticking_estimate_of(
             reduce(add, known),
             rate_error=self._settings.rate_error,
             probability=self._settings.probability,

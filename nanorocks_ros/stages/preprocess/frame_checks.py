@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.numerics.quantiles import Quantile, middle
+from nanorocks_ros.numerics.quantiles import Quantile, median
 from nanorocks_ros.records import Notice, Quality
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ class FrameChecks:
         cut, least = 0, max(_FEWEST_ROWS, _HALF * height)
         for count, usual, history in ((filled, self._ends, 1), (same, self._same, _HISTORY)):
             # A scene without noise may well end in rows that are alike, frame after frame.
-            if count >= least and len(usual) >= history and count - middle(usual) >= least:
+            if count >= least and len(usual) >= history and count - median(usual) >= least:
                 cut = max(cut, count)
             usual.append(count)
         return int(height - cut)

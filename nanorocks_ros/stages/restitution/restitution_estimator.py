@@ -34,7 +34,7 @@ from nanorocks_ros.stages.restitution.species_decays import species_decays
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.inference.cycle_likelihoods import Evidence, MeanRestitution
+    from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRestitution
     from nanorocks_ros.settings import PipelineSettings
 
 
@@ -82,11 +82,11 @@ class HaffFitter:
         self._reading: Reading = self._make_reading()
 
     @property
-    def evidence(self) -> Evidence | None:
+    def evidence(self) -> CycleLikelihoods | None:
         """What the cycles finished since time last went back say; None without any."""
         return self._reading.evidence
 
-    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+    def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
         """What cycles say together, also such of other recordings of the tray.
 
         Raises
@@ -158,7 +158,7 @@ class HaffFitter:
 
     def _driven(self, speed: SpeedEstimate) -> bool:
         """Whether the tray still swings too fast for the gas in it to cool freely."""
-        calm = self._settings.calm_share * speed.mean_projected_speed.value
+        calm = self._settings.max_tray_to_bead_speed * speed.mean_projected_speed.value
         return speed.tray_speed > calm
 
     def _start_ns(self, first: SpeedEstimate) -> int:
@@ -176,7 +176,7 @@ class HaffFitter:
         return self._estimate(CorStatus.FINAL)
 
     def _update_due(self, stamp_ns: int) -> bool:
-        if len(self._samples) < self._settings.fewest_samples:
+        if len(self._samples) < self._settings.min_samples:
             return False
         last = self._last_update_ns
         interval = self._settings.update_interval * NS - _STAMP_ROUNDING_NS
@@ -203,7 +203,7 @@ class HaffFitter:
         )
 
     def _estimate(self, status: CorStatus) -> tuple[CorEstimate, ...]:
-        if len(self._samples) < self._settings.fewest_samples:
+        if len(self._samples) < self._settings.min_samples:
             return self._undetermined() if status is CorStatus.FINAL else ()
         last = self._samples[-1]
         shake_ns, start_ns = last.cycle_start_ns or 0, self._start_ns(self._samples[0])
@@ -227,7 +227,7 @@ class HaffFitter:
             # Nothing is known of the restitution then, and that is what is published.
             fields = _nothing(CorStatus.NO_DECAY)
         if status is CorStatus.FINAL:
-            few = self._settings.fewest_samples
+            few = self._settings.min_samples
             decays = species_decays(self._tray, decay.time, self._samples, few)
             fields['species_initial_speeds'], fields['species_haff_times'] = decays
         if fields.get('tension', 0.0) > _TENSE:

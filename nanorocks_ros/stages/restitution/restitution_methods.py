@@ -11,11 +11,12 @@ import numpy as np
 from scipy import special
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.inference.cycle_likelihoods import Evidence, MeanRestitution
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRestitution
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
-from nanorocks_ros.inference.posterior import Posterior, check_walls, posterior_of, tables_of
+from nanorocks_ros.inference.posterior import Posterior, check_walls, posterior_of
 from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
 from nanorocks_ros.records import (
     UNKNOWN_MEASURED,
@@ -63,12 +64,12 @@ class Reading(Protocol):
     """What a way to read decays does; it remembers the cycles that are finished."""
 
     relation: CorRelation
-    evidence: Evidence | None
+    evidence: CycleLikelihoods | None
 
     def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate; raises FitError where there is no decay."""
 
-    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+    def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
         """What all cycles of some evidence say together, those of other recordings, too."""
 
 
@@ -86,7 +87,7 @@ class PaperReading:
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._probability = settings.cooling.probability
         self._tray = tray
-        self.evidence: Evidence | None = None
+        self.evidence: CycleLikelihoods | None = None
 
     def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate; contacts are nothing that the paper uses.
@@ -105,7 +106,9 @@ class PaperReading:
             for rate in (fit.decay_rate, fit.decay_rate * spread, fit.decay_rate / spread)
         )
         if final:
-            own = Evidence(cycles=1, by_form=((value, (upper - lower) / (2.0 * quantile)),))
+            own = CycleLikelihoods(
+                cycles=1, by_form=((value, (upper - lower) / (2.0 * quantile)),)
+            )
             self.evidence = self.evidence + own if self.evidence else own
         mean = self.mean_of(self.evidence) if self.evidence else None
         return {
@@ -118,7 +121,7 @@ class PaperReading:
             **_haff_fields(fit),
         }
 
-    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+    def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
         """Mean and standard error by the scatter of the cycles; of one, its own error."""
         values, errors = np.array(evidence.by_form).T
         mean, error, freedom = float(values.mean()), float(errors[0]), math.inf
@@ -163,11 +166,11 @@ class LibraryReading:
             True: (math.hypot(scale, known.grain_scale_error), known.grain_speed_bias),
         }
         self._biases = (known.collision_bias, known.rebound_bias)
-        self._walls = (known.wall_low, known.wall_high)
+        self._walls = (known.min_wall_restitution, known.max_wall_restitution)
         check_walls(self._walls)
         half = 0.5 * settings.cooling.probability
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
-        self.evidence: Evidence | None = None
+        self.evidence: CycleLikelihoods | None = None
         self._mean_so_far: dict[str, Measured] = {}
 
     def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
@@ -210,8 +213,8 @@ class LibraryReading:
             self._tables,
             integrated,
             self._walls,
-            of_beads=contacts.of_beads(self._biases[0]),
-            of_walls=contacts.of_walls(self._biases[1]),
+            bead_likelihood=contacts.bead_likelihood(self._biases[0]),
+            wall_likelihood=contacts.wall_likelihood(self._biases[1]),
         )
 
     def _mean(
@@ -220,7 +223,7 @@ class LibraryReading:
         """The mean of what all finished cycles together say; a final one is among them."""
         if not final:
             return self._mean_so_far
-        own = Evidence(cycles=1, decay=likelihood, contacts=contacts)
+        own = CycleLikelihoods(cycles=1, decay=likelihood, contacts=contacts)
         self.evidence = self.evidence + own if self.evidence else own
         mean = self.mean_of(self.evidence)
         self._mean_so_far = {
@@ -229,7 +232,7 @@ class LibraryReading:
         }
         return self._mean_so_far
 
-    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+    def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
         """What the cycles say together: what is not known is the same in all of them.
 
         Raises

@@ -65,7 +65,7 @@ class SpeedEstimator:
 
     def _restart(self) -> None:
         speed = self._settings.speed
-        self._shakes = CycleFollower(speed.shake_ratio, speed.shortest_cycle)
+        self._shakes = CycleFollower(speed.shake_ratio, speed.min_cycle_duration)
         self._area = AreaSpeed(self._settings, self._tray)
         self._area.emit_speed = speed.method == 'binarised_area'
         self._structure = StructureSpeed(self._settings, self._tray)

@@ -11,7 +11,7 @@ import numpy as np
 
 from nanorocks_ros.experiment.colours import hue_of
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.numerics.quantiles import middle
+from nanorocks_ros.numerics.quantiles import median
 from nanorocks_ros.records import (
     UNKNOWN_MEASURED,
     BodyEstimate,
@@ -182,8 +182,8 @@ class TrackSpeed:
         self._followed.append(min(one.share if one else 0.0 for one in each))
         speeds = np.array([speed.value for speed in species])
         self._steps.append(self._longest_step(speeds, np.diff(series.stamps)))
-        self._usually_followed = middle(self._followed)
-        self._usual_step = middle(self._steps)
+        self._usually_followed = median(self._followed)
+        self._usual_step = median(self._steps)
         flags, self._flags = self._flags, Quality(0)
         if mean.share < RELIABLE_SHARE:
             flags |= Quality.FEW_BEADS
@@ -213,7 +213,7 @@ class TrackSpeed:
 
     def _longest_step(self, speeds: NDArray[np.float64], intervals_ns: NDArray[np.int64]) -> float:
         """Way of a bead between two pictures over the distance to others, of the worst species."""
-        picture = middle(intervals_ns.tolist()) / NS
+        picture = median(intervals_ns.tolist()) / NS
         return float(np.max(np.nan_to_num(speeds) * picture / self._neighbours))
 
 

@@ -102,8 +102,8 @@ class Tracker:
         return Linker(
             species.count,
             (float(shape[1]), float(shape[0])),
-            self._settings.fastest * self._scale,
-            self._settings.longest_gap,
+            self._settings.max_speed * self._scale,
+            self._settings.memory,
             self._settings.window,
             self._systematic(species.material),
         )

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
-    from nanorocks_ros.inference.cycle_likelihoods import Evidence
+    from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
     from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
     from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.records import ArrayRecord, RecordType
@@ -57,7 +57,7 @@ class TrayResults:
 
     Attributes
     ----------
-    evidence : Evidence or None
+    evidence : CycleLikelihoods or None
         What the cycles say of the restitutions, so that cycles of other recordings can be added.
     sticking : tuple of StickingCycle
         What they say of the sticking speed.
@@ -74,7 +74,7 @@ class TrayResults:
             product.record: [] if spool_file is None else Spool(spool_file) for product in MEASURED
         }
         self.truth = truth or []
-        self.evidence: Evidence | None = None
+        self.evidence: CycleLikelihoods | None = None
         self.sticking: tuple[StickingCycle, ...] = ()
         for record in records:
             self.add(record)

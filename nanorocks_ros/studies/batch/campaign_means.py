@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nanorocks_ros.errors import FitError, RecordingError
 from nanorocks_ros.experiment.calibration_file import calibrated
-from nanorocks_ros.inference.cycle_likelihoods import Evidence
+from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
 from nanorocks_ros.numerics.sample_mean import mean_of
 from nanorocks_ros.outputs.json_values import finite_or_none
@@ -212,9 +212,9 @@ def _added_up(
     results: Sequence[BagResults],
     notices: list[str],
     progress: Callable[[int, int], None] | None,
-) -> tuple[dict[int, Evidence], dict[int, list[StickingCycle]]]:
+) -> tuple[dict[int, CycleLikelihoods], dict[int, list[StickingCycle]]]:
     """One recording after the other: never more than one of them in memory."""
-    evidence: dict[int, Evidence] = {}
+    evidence: dict[int, CycleLikelihoods] = {}
     sticking: dict[int, list[StickingCycle]] = {}
     for done, result in enumerate(results, start=1):
         try:
@@ -222,7 +222,7 @@ def _added_up(
             for number in map(int, result.summary['trays']):
                 own = _below(arrays, f'{number}/cor/')
                 if own:
-                    found = Evidence.from_arrays(own, str(result.folder / EVIDENCE))
+                    found = CycleLikelihoods.from_arrays(own, str(result.folder / EVIDENCE))
                     evidence[number] = evidence[number] + found if number in evidence else found
                 sticking.setdefault(number, []).extend(_sticking(arrays, number))
         except (RecordingError, FitError, ValueError) as error:

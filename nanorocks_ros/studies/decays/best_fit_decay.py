@@ -12,13 +12,14 @@ import numpy as np
 from scipy import optimize
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import (
     DecayLikelihood,
     DecayTables,
     decay_likelihood,
 )
-from nanorocks_ros.inference.posterior import posterior_of, tables_of
+from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
@@ -98,7 +99,9 @@ def library_decay(
         likelihoods.append(decay_likelihood(tables, *decay, camera))
     together = reduce(add, likelihoods)
     integrated = together.integrated()
-    posterior = posterior_of(tables, integrated, (prior.wall_low, prior.wall_high))
+    posterior = posterior_of(
+        tables, integrated, (prior.min_wall_restitution, prior.max_wall_restitution)
+    )
     ends = np.array([0.5, 0.5 - _HALF, 0.5 + _HALF])
     beads, walls = posterior.quantiles(ends), posterior.wall_quantiles(ends)
     cooling = curve.times >= first - 1e-9

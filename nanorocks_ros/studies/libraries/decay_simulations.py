@@ -12,6 +12,7 @@ import numpy as np
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.inference.decay.decay_library import NUISANCES, count_step, tray_key
+from nanorocks_ros.inference.decay.decay_library_file import library_arrays
 from nanorocks_ros.inference.decay.library_fit import (
     Decays,
     distances,
@@ -133,7 +134,7 @@ def build_library(
     with resumed_journal(output, plan.specification(), notice) as journal:
         fill_journal(journal, cool_nodes, _tasks(plan), workers, progress)
         library = fit_library(plan.tray, _decays(plan, journal), plan.specification())
-        write_archive(output, library.arrays())
+        write_archive(output, library_arrays(library))
     return library
 
 

@@ -18,6 +18,8 @@ def test_a_file_may_hold_what_other_nodes_read_but_no_name_that_none_has(monkeyp
     monkeypatch.setattr(sys, 'argv', ['bag_player', '--ros-args', '--params-file', 'all.yaml'])
     of_others = (
         'cooling.probability',
+        'tracking.fastest',
+        'tracking.fastest',
         'simulation.tray',
         'scene.noise',
         'dashboard_port',

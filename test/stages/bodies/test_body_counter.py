@@ -222,7 +222,7 @@ def test_one_bead_is_one_body():
 def test_fewer_false_alarms_are_paid_for_with_a_later_answer(sticky):
     known = []
     for rate in (1e-4, 0.01, 0.3):
-        settings = PipelineSettings(bodies=BodySettings(false_alarms=rate))
+        settings = PipelineSettings(bodies=BodySettings(false_alarm_rate=rate))
         _, merges = _counted([tracks for tracks, _ in sticky[:200]], settings=settings)
         known.append(merges[0].known_ns)
     assert known[0] > known[1] > known[2]

@@ -155,7 +155,11 @@ def test_a_tray_that_swings_to_the_end_gives_no_estimate():
 
 
 def test_walls_that_are_known_leave_the_beads_to_be_found():
-    known = {'prior.wall_low': 0.97, 'prior.wall_high': 0.97, 'prior.floor_lid_spread': 0.0}
+    known = {
+        'prior.min_wall_restitution': 0.97,
+        'prior.max_wall_restitution': 0.97,
+        'prior.floor_lid_spread': 0.0,
+    }
     *_, final = all_estimates(fitter(**known), simulated_cycle())
     *_, free = all_estimates(fitter(), simulated_cycle())
     assert final.wall_restitution.value == pytest.approx(0.97)
@@ -240,7 +244,7 @@ def test_the_mean_of_the_paper_is_over_the_final_estimates():
 
 
 def test_many_cycles_together_say_more():
-    stage = fitter(**{'prior.wall_low': 0.97, 'prior.wall_high': 0.97})
+    stage = fitter(**{'prior.min_wall_restitution': 0.97, 'prior.max_wall_restitution': 0.97})
     finals = []
     for cycle in range(1, 7):
         speeds = simulated_cycle(cycle, start=60.0 * (cycle - 1))
@@ -302,8 +306,11 @@ def test_the_asked_probability_widens_the_interval():
 
 
 def test_walls_the_wrong_way_round_are_refused_at_once():
-    with pytest.raises(ConfigurationError, match=r'prior.wall_low, prior.wall_high: 0.95 to 0.9'):
-        fitter(**{'prior.wall_low': 0.95, 'prior.wall_high': 0.9})
+    with pytest.raises(
+        ConfigurationError,
+        match=r'prior.min_wall_restitution, prior.max_wall_restitution: 0.95 to 0.9',
+    ):
+        fitter(**{'prior.min_wall_restitution': 0.95, 'prior.max_wall_restitution': 0.9})
 
 
 def half_width(estimate):

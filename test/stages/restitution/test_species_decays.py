@@ -93,7 +93,7 @@ def test_a_few_speeds_of_a_species_are_no_decay():
         for k, speed in enumerate(speeds)
     ]
     assert final_of(few)[0].species_haff_times[0] == UNKNOWN_MEASURED
-    final, _ = final_of(few, **{'cooling.fewest_samples': 4})
+    final, _ = final_of(few, **{'cooling.min_samples': 4})
     assert final.species_haff_times[0].value > 0.0
 
 

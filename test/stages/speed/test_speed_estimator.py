@@ -142,7 +142,7 @@ def test_a_transposed_film_gives_the_same_speeds(run):
 def test_half_the_time_between_frames_is_twice_the_speed(run):
     fast = [TrayImage(stamp_ns=one.stamp_ns // 2, tray=1, gray=one.gray) for one in run[0]]
     before = pushed(run[0])
-    after = pushed(fast, **{'speed.interval': 0.05, 'speed.shortest_cycle': 2.5})
+    after = pushed(fast, **{'speed.interval': 0.05, 'speed.min_cycle_duration': 2.5})
     by_stamp = {one.stamp_ns // 2: one.mean_projected_speed.value for one in before}
     both = [
         (by_stamp[stamp], one.mean_projected_speed.value)

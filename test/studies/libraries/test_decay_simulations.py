@@ -9,7 +9,8 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.decay.decay_library import load_library, tray_key
+from nanorocks_ros.inference.decay.decay_library import tray_key
+from nanorocks_ros.inference.decay.decay_library_file import load_library
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.studies.libraries.decay_simulations import LibraryPlan, build_library
 

@@ -195,7 +195,7 @@ class BeadDetector:
         sizes = max(1, int(np.ceil(np.log(high / low) / np.log(factor))))
         grains = 0.25 * np.pi * species.diameter**2 * species.count
         area = tray.dimensions[0] * tray.dimensions[1]
-        crowded = kind == GRAY and grains > self._settings.most_crowded * area
+        crowded = kind == GRAY and grains > self._settings.max_covered_fraction * area
         # Under chalk, what is left of a large bead may pass for a small one.
         least = _LEAST_SLIVER if self._dusty and high > _MANY_SIZES * low else 0.0
         spread = max((high - low) / np.sqrt(12.0), _SIZE_SPREAD_PX)
@@ -207,7 +207,7 @@ class BeadDetector:
             step=max(2 if low >= _COARSE_FROM_PX else 1, int(low / _SQUARES_PER_RADIUS)),
             most=0 if crowded else int(_SURPLUS * species.count) + 2,
             floor_weight=1 if self._dusty else _FLOOR_WEIGHT,
-            least_share=max(self._settings.least_area_seen, least),
+            least_share=max(self._settings.min_visible_fraction, least),
         )
 
 
