@@ -19,7 +19,6 @@ def test_a_file_may_hold_what_other_nodes_read_but_no_name_that_none_has(monkeyp
     of_others = (
         'cooling.probability',
         'tracking.fastest',
-        'tracking.fastest',
         'simulation.tray',
         'scene.noise',
         'dashboard_port',
