@@ -108,12 +108,12 @@ def is_loopback(host: str) -> bool:
         For a name without an address.
     """
     try:
-        found = socket.getaddrinfo(host or None, 0, flags=socket.AI_PASSIVE)
+        addresses = socket.getaddrinfo(host or None, 0, flags=socket.AI_PASSIVE)
     except (OSError, UnicodeError) as error:
         raise DashboardError(
             f'host {host!r}', 'has no address here', 'name one of this machine, or 127.0.0.1'
         ) from error
-    return all(_is_loopback_number(str(address[0])) for *_, address in found)
+    return all(_is_loopback_number(str(address[0])) for *_, address in addresses)
 
 
 def _same(given: str, right: str) -> bool:

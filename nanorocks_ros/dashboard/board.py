@@ -63,10 +63,10 @@ class Board:
     ) -> None:
         """Note what nodes say of themselves: name, level, text, and pairs of names and values."""
         for name, level, text, values in statuses:
-            shown = clean(name, _LONGEST_NAME)
-            if shown not in self._nodes and len(self._nodes) >= _MOST_NODES:
+            node = clean(name, _LONGEST_NAME)
+            if node not in self._nodes and len(self._nodes) >= _MOST_NODES:
                 continue
-            self._nodes[shown] = {
+            self._nodes[node] = {
                 'level': _LEVELS.get(level, 'error'),
                 'text': clean(text, _LONGEST_TEXT),
                 'values': [
@@ -84,17 +84,17 @@ class Board:
 
     def news(self, cursor: Cursor, now_s: float) -> dict[str, Any]:
         """What the cursor does not know yet, empty when there is nothing."""
-        told: dict[str, Any] = {}
+        news: dict[str, Any] = {}
         trays = {
             str(number): tray.news(number, cursor, now_s)
             for number, tray in sorted(self._trays.items())
             if cursor.trays.get(number) != (tray.serial, tray.version)
         }
         if trays:
-            told['trays'] = trays
+            news['trays'] = trays
         if cursor.nodes != self._nodes_version:
             cursor.nodes = self._nodes_version
-            told['nodes'] = [
+            news['nodes'] = [
                 {
                     'name': name,
                     **{key: value for key, value in node.items() if key != 'heard_s'},
@@ -102,7 +102,7 @@ class Board:
                 }
                 for name, node in sorted(self._nodes.items())
             ]
-        return told
+        return news
 
 
 def describe(tray: Tray | None) -> str:
@@ -110,14 +110,16 @@ def describe(tray: Tray | None) -> str:
     if tray is None:
         return ''
     kinds = []
-    for one in tray.species:
-        low, high = 1e3 * one.diameter_low, 1e3 * one.diameter_high
+    for species in tray.species:
+        low, high = 1e3 * species.diameter_low, 1e3 * species.diameter_high
         size = f'{low:.3g}' if low == high else f'{low:.3g} to {high:.3g}'
-        kinds.append(f'{one.count} {one.material} {size} mm')
+        kinds.append(f'{species.count} {species.material} {size} mm')
     return clean(', '.join(kinds) + (', with chalk' if tray.chalk else ''), _LONGEST_TEXT)
 
 
 def clean(text: str, longest: int) -> str:
     """A text from outside: cut, and without characters that turn or hide others."""
-    shown = ''.join(one if one.isprintable() else '\N{REPLACEMENT CHARACTER}' for one in text)
-    return shown if len(shown) <= longest else f'{shown[: longest - 1]}…'
+    printable = ''.join(
+        character if character.isprintable() else '\N{REPLACEMENT CHARACTER}' for character in text
+    )
+    return printable if len(printable) <= longest else f'{printable[: longest - 1]}…'

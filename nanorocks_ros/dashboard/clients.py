@@ -37,12 +37,12 @@ class Pictures:
 
     def newer(self, look: Look, than: int) -> tuple[int, bytes] | None:
         """The last picture with its number, if it is newer."""
-        found = self._latest.get(look)
-        return found if found is not None and found[0] > than else None
+        picture = self._latest.get(look)
+        return picture if picture is not None and picture[0] > than else None
 
     def keep(self, wanted: frozenset[Look]) -> None:
         """Forget what nobody looks at: it would be shown as if it were new."""
-        self._latest = {look: one for look, one in self._latest.items() if look in wanted}
+        self._latest = {look: picture for look, picture in self._latest.items() if look in wanted}
 
 
 class Client:
@@ -92,9 +92,9 @@ class Client:
 
     async def _step(self) -> bool:
         pictures = [
-            (look, found)
+            (look, picture)
             for look in sorted(self.looks)
-            if (found := self._pictures.newer(look, self._shown.get(look, 0)))
+            if (picture := self._pictures.newer(look, self._shown.get(look, 0)))
         ]
         news = self._board.news(self._cursor, time.monotonic())
         if not pictures and not news:
@@ -115,21 +115,21 @@ class Client:
         ValueError
             When our page would not say that.
         """
-        said = json.loads(text)
-        if not isinstance(said, dict):
+        message = json.loads(text)
+        if not isinstance(message, dict):
             raise ValueError('no object')
-        if type(seen := said.get('seen', 0)) is not int:
+        if type(seen := message.get('seen', 0)) is not int:
             raise ValueError('no number')
         self._seen = max(self._seen, min(seen, self._sent))
-        if 'look' in said:
-            self.looks = _looks(said['look'])
+        if 'look' in message:
+            self.looks = _looks(message['look'])
         self.changed.set()
 
 
-def _looks(said: Any) -> frozenset[Look]:
-    if said is None:
+def _looks(request: Any) -> frozenset[Look]:
+    if request is None:
         return frozenset()
-    tray, layers = said['tray'], said['layers']
+    tray, layers = request['tray'], request['layers']
     if type(tray) is not int or not 0 < tray <= _MOST_TRAYS or not isinstance(layers, list):
         raise ValueError('no tray with its layers')
     if any(layer not in LAYERS for layer in layers):

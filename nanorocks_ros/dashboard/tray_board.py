@@ -58,9 +58,9 @@ class Series:
         self.rows = [row for row in self.rows if row[0] is not None and row[0] >= time]
         self.generation += 1
 
-    def since(self, told: tuple[int, int]) -> tuple[int, list[Row]]:
+    def since(self, end: tuple[int, int]) -> tuple[int, list[Row]]:
         """Where new points begin, and the points."""
-        generation, count = told
+        generation, count = end
         first = count if generation == self.generation else 0
         return first, self.rows[first:]
 
@@ -212,7 +212,7 @@ class TrayBoard:
         """What the cursor does not know yet; the cursor knows it afterwards."""
         known_serial = cursor.trays.get(number, (0, 0))[0]
         cursor.trays[number] = (self.serial, self.version)
-        told: dict[str, Any] = {
+        news: dict[str, Any] = {
             'description': self.description,
             'cycle': self.cycle,
             'serial': self.serial,
@@ -222,19 +222,19 @@ class TrayBoard:
         }
         if cursor.finals.get(number) != self._finals_version:
             cursor.finals[number] = self._finals_version
-            told['finals'] = list(self.finals.values())
+            news['finals'] = list(self.finals.values())
         for name, series in self.series.items():
             known = cursor.series.get((number, name), (0, 0))
             first, rows = series.since(known if known_serial == self.serial else (-1, 0))
             cursor.series[number, name] = series.end
             if rows or known_serial != self.serial:
-                told[name] = {'from': first, 'rows': rows}
-        return told
+                news[name] = {'from': first, 'rows': rows}
+        return news
 
 
 def as_fields(record: ArrayRecord) -> dict[str, Any]:
     """The numbers of a record by flat name, None where one is not known; states as words."""
-    found: dict[str, Any] = {}
+    elements: dict[str, Any] = {}
     for name in flat_names(type(record)):
         if name in _NOT_SHOWN:
             continue
@@ -245,8 +245,8 @@ def as_fields(record: ArrayRecord) -> dict[str, Any]:
             value = value.name.lower()
         elif isinstance(value, float):
             value = _number(value)
-        found[name] = value
-    return found
+        elements[name] = value
+    return elements
 
 
 def _number(value: float) -> float | None:

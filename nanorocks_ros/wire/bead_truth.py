@@ -56,11 +56,11 @@ def beads_layout() -> BeadsLayout:
     """The layout of `BeadsTruth`, from its message definition."""
     text = resources.files(__package__).joinpath('msg', 'BeadsTruth.msg').read_text('utf-8')
     lines = [line.strip() for line in text.splitlines()]
-    found = [match.groups() for line in lines if (match := _FIELD.match(line))]
+    fields = [match.groups() for line in lines if (match := _FIELD.match(line))]
     return BeadsLayout(
         lines[0].removeprefix('# '),
-        tuple(LayoutField(*field[1:]) for field in found if not field[0]),
-        tuple(LayoutField(*field[1:]) for field in found if field[0]),
+        tuple(LayoutField(*field[1:]) for field in fields if not field[0]),
+        tuple(LayoutField(*field[1:]) for field in fields if field[0]),
     )
 
 

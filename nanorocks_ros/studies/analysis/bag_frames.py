@@ -159,7 +159,7 @@ class BagFrames:
             for name, info in self.reader.topics.items()
             if name.endswith('/truth') and info.type == topics.ARRAY and topics.tray_of(name)
         ]
-        found: dict[int, list[GroundTruth]] = {}
+        by_tray: dict[int, list[GroundTruth]] = {}
         refusals: list[RecordingError | FrameError] = []
         for message in self.reader.messages(names) if names else ():
             tray = topics.tray_of(message.topic) or 0
@@ -171,12 +171,12 @@ class BagFrames:
             except (FrameError, RecordingError) as error:
                 refusals.append(error)
             else:
-                found.setdefault(tray, []).append(record)
+                by_tray.setdefault(tray, []).append(record)
         if refusals:
             self.notices.append(
                 f'{len(refusals)} messages of the truth cannot be used, the first: {refusals[0]}'
             )
-        return found
+        return by_tray
 
 
 def _nanoseconds(time: Any) -> int:

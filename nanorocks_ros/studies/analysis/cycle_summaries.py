@@ -84,11 +84,11 @@ class CycleSummary:
 def size_measure(trays: Mapping[Path, tuple[int, ...]]) -> SizeMeasure:
     """The best measure of cluster size that all results have: folders, and their trays."""
 
-    def has(folder: Path, number: int, one: SizeMeasure) -> bool:
-        path = folder / f'tray_{number}_{one.table}.csv'
+    def has(folder: Path, number: int, measure_checked: SizeMeasure) -> bool:
+        path = folder / f'tray_{number}_{measure_checked.table}.csv'
         if not path.is_file():
             return False
-        values = read_columns(path, (), (one.column,)).get(one.column)
+        values = read_columns(path, (), (measure_checked.column,)).get(measure_checked.column)
         return values is not None and bool(np.isfinite(values).any())
 
     for measure in SIZE_MEASURES[:-1]:

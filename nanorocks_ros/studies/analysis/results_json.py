@@ -61,13 +61,13 @@ def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
     return list(latest.values())
 
 
-def _ended_by_merge(last: CorEstimate, one: CorEstimate) -> bool:
+def _ended_by_merge(last: CorEstimate, estimate: CorEstimate) -> bool:
     """Whether an earlier stamp is that of a merge, known later, which ended the cycle's window."""
     final = CorStatus.FINAL
     return (
-        one.cycle == last.cycle
+        estimate.cycle == last.cycle
         and last.status is not final
-        and one.status is not CorStatus.COOLING
+        and estimate.status is not CorStatus.COOLING
     )
 
 
@@ -132,14 +132,14 @@ def _ends_of_cycles(
     clusters: Iterable[ClusterEstimate],
 ) -> dict[int, list[tuple[int, ClusterEstimate]]]:
     """Of each cycle, and every time it was played: stamp of the first estimate, and the last."""
-    found: dict[int, list[tuple[int, ClusterEstimate]]] = {}
+    ends: dict[int, list[tuple[int, ClusterEstimate]]] = {}
     for cluster in clusters:
-        parts = found.setdefault(cluster.cycle, [])
+        parts = ends.setdefault(cluster.cycle, [])
         if parts and cluster.stamp_ns > parts[-1][1].stamp_ns:
             parts[-1] = parts[-1][0], cluster
         else:
             parts.append((cluster.stamp_ns, cluster))
-    return found
+    return ends
 
 
 def _end_of_cycle(
@@ -194,13 +194,13 @@ def _truth_as_json(
     truth = results.truth
     if not truth:
         return None
-    found: dict[str, Any] = {
-        'time': [(one.stamp_ns - analysis.epoch_ns) / NS for one in truth],
-        'mean_projected_speed': [one.mean_projected_speed for one in truth],
-        'bodies': [one.bodies for one in truth],
+    series_of_truth: dict[str, Any] = {
+        'time': [(frame.stamp_ns - analysis.epoch_ns) / NS for frame in truth],
+        'mean_projected_speed': [frame.mean_projected_speed for frame in truth],
+        'bodies': [frame.bodies for frame in truth],
     }
     return {
-        **(found if series else {}),
+        **(series_of_truth if series else {}),
         'restitution': truth[-1].restitution,
         'wall_restitution': truth[-1].wall_restitution,
         'sticking_speed': truth[-1].sticking_speed,

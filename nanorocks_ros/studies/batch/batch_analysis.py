@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.tasks import as_finished_apart
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.recordings.bag.find_bags import FoundBags
     from nanorocks_ros.settings import PipelineSettings
-    from nanorocks_ros.studies.batch.batch_task import BagTask
+    from nanorocks_ros.studies.batch.batch_task import BagSummary, BagTask
 
 # Of so many recordings the same is said one by one.
 _MOST_ALIKE = 3
@@ -74,7 +74,7 @@ class BagResults:
 
     name: str
     folder: Path
-    summary: dict[str, Any]
+    summary: BagSummary
     twin: str = ''
 
     @property
@@ -121,19 +121,19 @@ class Batch:
         return [result for result in self.results if not result.twin]
 
 
-def told(results: Sequence[BagResults]) -> list[str]:
-    """What is to be said of recordings, the same of many in one line."""
-    found: dict[str, list[BagResults]] = {}
+def merged_notes(results: Sequence[BagResults]) -> list[str]:
+    """The notes on recordings; a note on many of them becomes one line."""
+    by_note: dict[str, list[BagResults]] = {}
     for result in results:
         for text in result.notes:
-            what = text.removeprefix(result.name).lstrip(':/ ')
-            found.setdefault(what, []).append(result)
+            note = text.removeprefix(result.name).lstrip(':/ ')
+            by_note.setdefault(note, []).append(result)
     lines = []
-    for what, own in found.items():
+    for note, own in by_note.items():
         if len(own) > _MOST_ALIKE:
-            lines.append(f'{len(own)} recordings, such as {own[0].name}: {what}')
+            lines.append(f'{len(own)} recordings, such as {own[0].name}: {note}')
         else:
-            lines += [f'{one.name}: {what}' for one in own]
+            lines += [f'{result.name}: {note}' for result in own]
     return lines
 
 
@@ -196,10 +196,10 @@ def _run(store: BatchStore, tasks: dict[str, BagTask], workers: Workers, watcher
     sizes = {name: _size(task.path) for name, task in tasks.items()}
     watcher.begin(store, sizes, len(store.entries) - len(tasks))
     # The largest first, so that no worker is left alone with one in the end.
-    ordered = {name: tasks[name] for name in sorted(tasks, key=lambda one: -sizes[one])}
+    ordered = {name: tasks[name] for name in sorted(tasks, key=lambda name: -sizes[name])}
 
-    def lost(name: str, what: str) -> BagOutcome:
-        return BagOutcome(state=FAILED, reason=f'{shown(tasks[name].path)}: {what}')
+    def lost(name: str, reason: str) -> BagOutcome:
+        return BagOutcome(state=FAILED, reason=f'{shown(tasks[name].path)}: {reason}')
 
     with closing(as_finished_apart(analyse_bag, ordered, workers, lost)) as outcomes:
         for name, outcome in outcomes:
@@ -234,22 +234,22 @@ def _gathered(plan: BatchPlan, store: BatchStore) -> Batch:
     batch = Batch()
     for text, error in plan.bags.missing.items():
         batch.failed.append(Failure(name=shown(text), reason=shown(str(error))))
-    entries = sorted(store.entries.values(), key=lambda one: natural(str(one.path)))
-    found: list[tuple[Entry, dict[str, Any]]] = []
+    entries = sorted(store.entries.values(), key=lambda entry: natural(str(entry.path)))
+    analysed: list[tuple[Entry, BagSummary]] = []
     for entry in entries:
         outcome = entry.outcome
         there = outcome.state in (DONE, PARTIAL)
         summary = read_summary(store.place(entry)) if there else None
         if summary is not None:
-            found.append((entry, summary))
+            analysed.append((entry, summary))
         if outcome.state != DONE or summary is None:
             reason = outcome.reason or f'{store.place(entry)}: its results are gone; try again'
             batch.failed.append(
                 Failure(name=shown(entry.path), reason=reason, analysed=summary is not None)
             )
-    found.sort(key=lambda one: one[1]['start_ns'])
+    analysed.sort(key=lambda pair: pair[1]['start_ns'])
     first: dict[str, str] = {}
-    for entry, summary in found:
+    for entry, summary in analysed:
         name = shown(entry.path)
         # A film that was copied and imported twice is no second measurement either.
         twin = first.setdefault(summary.get('film') or summary['content'], name)

@@ -142,7 +142,7 @@ class BatchStore:
             What is left to do, by the name of the folder; those that are done and have not
             been touched since are not in it.
         """
-        taken = {one.folder.casefold(): path for path, one in self._known.items()}
+        taken = {entry.folder.casefold(): path for path, entry in self._known.items()}
         tasks: dict[str, BagTask] = {}
         for bag in bags:
             path = bag.absolute()
@@ -198,18 +198,18 @@ class BatchStore:
         entry.outcome = outcome
         if outcome.folder:
             entry.folder = outcome.folder
-            gone = [path for path, one in self._known.items() if one.folder == outcome.folder]
+            gone = [path for path, known in self._known.items() if known.folder == outcome.folder]
             for path in gone:
                 del self._known[path]
 
     def under_way(self) -> dict[str, tuple[int, int]]:
         """Frames done and in all of recordings that are being analysed, by folder."""
-        found = {}
+        frames = {}
         for note in (self.folder / _NOTES).glob('*'):
             with suppress(OSError, ValueError):
                 done, total = (int(word) for word in note.read_text('ascii').split())
-                found[note.name] = done, total
-        return found
+                frames[note.name] = done, total
+        return frames
 
     def write(self) -> None:
         """Write the manifest, those of earlier calls that are not part of this one included.
@@ -268,11 +268,11 @@ def _free_name(path: Path, taken: Iterable[str]) -> str:
     name = path.stem if path.suffix in {'.mcap', '.db3', '.bag'} else path.name
     name = re.sub(r'[^\w.,+=@ -]', '_', shown(name)).strip('. ') or 'recording'
     name = name.encode()[:_LONGEST_NAME].decode(errors='ignore')
-    number, found = 1, name
-    while found.casefold() in taken:
+    number, free = 1, name
+    while free.casefold() in taken:
         number += 1
-        found = f'{name}-{number}'
-    return found
+        free = f'{name}-{number}'
+    return free
 
 
 def _as_json(entry: Entry) -> dict[str, Any]:
@@ -287,19 +287,19 @@ def _as_json(entry: Entry) -> dict[str, Any]:
     }
 
 
-def _from_json(found: dict[str, Any]) -> Entry:
-    name = Path(found['folder']).name
+def _from_json(content: dict[str, Any]) -> Entry:
+    name = Path(content['folder']).name
     if not name:
         raise ValueError
     return Entry(
-        path=Path(found['bag']),
+        path=Path(content['bag']),
         folder=name,
         outcome=BagOutcome(
-            state=str(found['state']),
-            reason=str(found['reason']),
-            content=str(found['content']),
+            state=str(content['state']),
+            reason=str(content['reason']),
+            content=str(content['content']),
             files=tuple(
-                (str(a), int(b), int(c), int(d), int(e)) for a, b, c, d, e in found['files']
+                (str(a), int(b), int(c), int(d), int(e)) for a, b, c, d, e in content['files']
             ),
         ),
     )
