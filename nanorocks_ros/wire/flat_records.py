@@ -1,4 +1,4 @@
-"""Names of array elements and the values of records behind them, in both directions.
+"""Conversion between the values of records and named array elements.
 
 Records hold values (`Interval`, `Measured`), tuples per species and arrays per bead; an array of
 the wire is flat. ``restitution`` is the value of the interval of that name and
@@ -89,7 +89,7 @@ _ARRAY_PLACES = {
 
 @cache
 def flat_names(record_type: type[ArrayRecord]) -> dict[str, Place]:
-    """The places of all elements by name, but of those that are arrays."""
+    """The places of all elements by name, except elements of arrays."""
     places: dict[str, Place] = {}
     for field in fields(record_type):
         if field.type in _VALUE_TYPES:

@@ -66,7 +66,7 @@ class BagFrames:
 
     @property
     def where(self) -> str:
-        """What to call these frames in an error."""
+        """Name of the frames in an error message."""
         return f'{self.reader.path}: {self.topic}'
 
     def epoch_ns(self) -> int | None:
@@ -149,11 +149,11 @@ class BagFrames:
             except FrameError as error:
                 yield message, error
             except RecordingError as error:
-                # Of the others nothing is known to be wrong.
+                # The other frames may be intact.
                 yield message, FrameError(error.where, error.what, error.do)
 
     def truth(self, epoch_ns: int) -> dict[int, list[GroundTruth]]:
-        """What the simulator knew, by tray; empty for a real recording."""
+        """The recorded truth of a simulation, by tray; empty for a real recording."""
         names = [
             name
             for name, info in self.reader.topics.items()

@@ -1,4 +1,4 @@
-"""The tray images of a bag: its frames, preprocessed, for whoever looks at images offline."""
+"""The tray images of a bag: its frames, preprocessed."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class BagImages:
 
     @property
     def notices(self) -> list[str]:
-        """What the user should hear about, once the frames have been read."""
+        """Notices for the user, complete once the frames have been read."""
         notices = [*self.bag.reader.notices, *self._notices]
         if self.refused is not None:
             notices.append(str(self.refused))

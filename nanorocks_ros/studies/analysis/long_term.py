@@ -71,7 +71,7 @@ class Campaign:
 
 
 def read_campaign(folders: Sequence[Path], false_alarms: float = 0.01) -> Campaign:
-    """Everything that results of `nanorocks analyse` say cycle by cycle.
+    """The cycles in results of `nanorocks analyse`, with trends.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
     passes = 0
     last: CorEstimate | None = None
     for cor in cors:
-        # Time went back: cycles are counted from 1 again, and are others.
+        # Time went back: cycles are counted from 1 again.
         if last is not None and cor.stamp_ns < last.stamp_ns and not _ended_by_merge(last, cor):
             passes += 1
         last = cor
@@ -145,7 +145,7 @@ def _ends_of_cycles(
 def _end_of_cycle(
     parts: Sequence[tuple[int, ClusterEstimate]], cor: CorEstimate
 ) -> ClusterEstimate | None:
-    """That of the same time, of a recording that was played twice."""
+    """The last estimate of the cycle, in the same pass of a recording that was played twice."""
     near = [last for first, last in parts if first <= cor.stamp_ns <= last.stamp_ns]
     return near[-1] if near else parts[-1][1] if parts else None
 
@@ -172,7 +172,7 @@ def _cycle_as_json(
 
 
 def _clusters_as_json(last: ClusterEstimate | None) -> dict[str, Any]:
-    """What is known of the clusters at the end of a cycle."""
+    """The clusters at the end of a cycle."""
     if last is None:
         return dict.fromkeys(('cluster_size', 'bodies', 'onset', 'sticking_speed'))
     return {

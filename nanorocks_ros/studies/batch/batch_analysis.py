@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.batch.batch_task import BagSummary, BagTask
 
-# Of so many recordings the same is said one by one.
+# A note on more recordings than this becomes one line.
 _MOST_ALIKE = 3
 
 
@@ -79,7 +79,7 @@ class BagResults:
 
     @property
     def notes(self) -> list[str]:
-        """What is to be said of it, one line each."""
+        """Notes on the recording, one line each."""
         same = [f'is the same as {self.twin}, and not counted'] if self.twin else []
         reason = [self.summary['reason']] if self.summary['reason'] else []
         return [*same, *reason, *self.summary['notices']]
@@ -103,7 +103,7 @@ class Failure:
 
 @dataclass(slots=True, kw_only=True)
 class Batch:
-    """What became of all recordings.
+    """The results of all recordings.
 
     Parameters
     ----------
@@ -138,16 +138,16 @@ def merged_notes(results: Sequence[BagResults]) -> list[str]:
 
 
 class Watcher(Protocol):
-    """Who is told how it goes."""
+    """Receives the progress of a batch."""
 
     def begin(self, store: BatchStore, sizes: dict[str, int], done: int) -> None:
-        """So many bytes of each recording, by folder, are left to do; so many are done."""
+        """Bytes to analyse per recording, by folder, and the number of finished recordings."""
 
     def finished(self, name: str, outcome: BagOutcome) -> None:
         """A recording is done, or failed."""
 
     def notice(self, text: str) -> None:
-        """One line of what the user should know."""
+        """A notice for the user, one line."""
 
 
 def run_batch(plan: BatchPlan, workers: Workers, watcher: Watcher) -> Batch:
@@ -173,7 +173,7 @@ def run_batch(plan: BatchPlan, workers: Workers, watcher: Watcher) -> Batch:
     KeyboardInterrupt
         Ctrl-C; its text says what is kept.
     """
-    # Before hours of work, and not once for every recording.
+    # Checked once, before hours of work.
     Pipeline(plan.settings, 'settings')
     workers.check()
     with BatchStore(plan.folder, plan.settings, plan.image_topic) as store:
@@ -186,7 +186,7 @@ def run_batch(plan: BatchPlan, workers: Workers, watcher: Watcher) -> Batch:
         except KeyboardInterrupt:
             raise KeyboardInterrupt(_kept(store)) from None
         finally:
-            # On a full disk what came before is the better message.
+            # On a full disk the earlier error is the better message.
             with suppress(RecordingError):
                 store.write()
         return _gathered(plan, store)
@@ -195,7 +195,7 @@ def run_batch(plan: BatchPlan, workers: Workers, watcher: Watcher) -> Batch:
 def _run(store: BatchStore, tasks: dict[str, BagTask], workers: Workers, watcher: Watcher) -> None:
     sizes = {name: _size(task.path) for name, task in tasks.items()}
     watcher.begin(store, sizes, len(store.entries) - len(tasks))
-    # The largest first, so that no worker is left alone with one in the end.
+    # The largest first, so that all workers finish at about the same time.
     ordered = {name: tasks[name] for name in sorted(tasks, key=lambda name: -sizes[name])}
 
     def lost(name: str, reason: str) -> BagOutcome:
@@ -205,7 +205,7 @@ def _run(store: BatchStore, tasks: dict[str, BagTask], workers: Workers, watcher
         for name, outcome in outcomes:
             store.finish(name, outcome)
             if outcome.state == UNWRITTEN:
-                # So would all others be, after as much work.
+                # The others would fail in the same way.
                 raise RecordingError(
                     str(store.folder),
                     f'cannot be written any more ({outcome.reason})',
@@ -251,7 +251,7 @@ def _gathered(plan: BatchPlan, store: BatchStore) -> Batch:
     first: dict[str, str] = {}
     for entry, summary in analysed:
         name = shown(entry.path)
-        # A film that was copied and imported twice is no second measurement either.
+        # A film that was imported twice counts once.
         twin = first.setdefault(summary.get('film') or summary['content'], name)
         batch.results.append(
             BagResults(

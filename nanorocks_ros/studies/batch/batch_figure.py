@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.decays.cooling_curves import CycleSpeeds
 
 _MM = 1e3
-# More lines than this show nothing more.
+# More lines than this cannot be distinguished.
 _MOST = 60
 _EDGES = np.geomspace(0.1, 600.0, 40)
 
@@ -75,14 +75,14 @@ def decays_figure(path: Path, folders: Sequence[Path], trays: Sequence[TrayMeans
 
 
 def _cycles(folders: Sequence[Path], tray: int) -> list[CycleSpeeds]:
-    """Evenly over all recordings, as many as can be told apart."""
+    """At most `_MOST` cycles, evenly over all recordings."""
     step = max(1, math.ceil(len(folders) / _MOST))
     cycles: list[CycleSpeeds] = []
     for folder in folders[::step]:
         try:
             cycles += read_cycles(folder / f'tray_{tray}_speed.csv')
         except RecordingError:
-            # Without a cycle of this tray.
+            # The recording has no cycle of this tray.
             continue
     return cycles[:: max(1, math.ceil(len(cycles) / _MOST))]
 

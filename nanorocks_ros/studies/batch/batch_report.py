@@ -1,4 +1,4 @@
-"""The report of a batch: one page, with its pictures in it."""
+"""The report of a batch: one HTML page with embedded figures."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _SHORTEST_DAY = 86_400 * 365
 def write_batch_report(
     path: Path, batch: Batch, together: Combined, settings: PipelineSettings
 ) -> None:
-    """Write what was analysed, what all cycles say, every cycle, and what failed.
+    """Write the report: recordings, means over all cycles, every cycle, failures.
 
     Parameters
     ----------
@@ -289,7 +289,7 @@ def _recording(result: BagResults) -> tuple[str, ...]:
 
 
 def _date(stamp_ns: int) -> str:
-    """In UTC; a clock that counts from its own start has no date."""
+    """Date in UTC; seconds for a clock that starts at 0."""
     seconds = stamp_ns / 1e9
     if seconds < _SHORTEST_DAY:
         return f'{seconds:.1f} s'
@@ -297,7 +297,7 @@ def _date(stamp_ns: int) -> str:
 
 
 def _metadata(results: Sequence[BagResults]) -> list[tuple[str, str]]:
-    """Entries of all recordings, with the value that most of them have."""
+    """Metadata of all recordings: the most frequent value of each entry."""
     values: dict[str, list[str]] = {}
     for result in results:
         for key, value in result.summary['metadata'].items():

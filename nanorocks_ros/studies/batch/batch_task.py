@@ -1,4 +1,4 @@
-"""One recording of a batch: analysed, and written into a folder that says what it is of."""
+"""One recording of a batch: its analysis, results and summary."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 TROUBLE = 'trouble.txt'
 DONE, PARTIAL, FAILED, UNWRITTEN = 'done', 'partial', 'failed', 'unwritten'
-# How far a recording has come is said so often, [s].
+# Interval of progress notes, [s].
 _NOTE = 1.0
 # Provenance kept of a recording: so many entries, each so long.
 _MOST_ENTRIES, _LONGEST = 100, 500
@@ -65,7 +65,7 @@ class BagTask:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BagOutcome:
-    """What became of it.
+    """The outcome of a task.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class BagSummary(TypedDict):
 
 def analyse_bag(task: BagTask) -> BagOutcome:
     """Analyse a recording and write its results, complete or not at all; it never raises."""
-    # The cores are busy with other recordings.
+    # Other recordings use the other cores.
     cv2.setNumThreads(1)
     try:
         return _analysed(task)
@@ -152,7 +152,7 @@ def analyse_bag(task: BagTask) -> BagOutcome:
             state=FAILED, reason=f'{shown(task.path)}: cannot be read ({error.strerror})'
         )
     except Exception as error:
-        # A fault of ours, or of a library, over one recording; the others know nothing of it.
+        # A bug shown by one recording must not end the others.
         place = task.folder.with_name(f'{task.folder.name}.{TROUBLE}')
         with suppress(OSError):
             place.write_text(traceback.format_exc(), 'utf-8', 'backslashreplace')
@@ -232,7 +232,7 @@ def _noting(note: Path) -> Any:
         now = time.monotonic()
         if now - last >= _NOTE:
             last = now
-            # Nobody's results depend on it.
+            # Progress is not essential.
             with suppress(OSError):
                 note.write_text(f'{done} {total}', 'ascii')
 
