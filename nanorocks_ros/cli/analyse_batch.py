@@ -105,14 +105,18 @@ def _end(batch: Batch) -> int:
 def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> dict[str, Any]:
     from nanorocks_ros.studies.batch.campaign_means import means_as_json
 
-    shown_keys = 'state', 'frames', 'frames_lost', 'seconds', 'complete', 'notices'
     return {
         'bags': [
             {
                 'bag': result.name,
                 'results': printable(result.folder),
                 'same_as': result.twin or None,
-                **{key: result.summary[key] for key in shown_keys},
+                'state': result.summary['state'],
+                'frames': result.summary['frames'],
+                'frames_lost': result.summary['frames_lost'],
+                'seconds': result.summary['seconds'],
+                'complete': result.summary['complete'],
+                'notices': result.summary['notices'],
                 'trays': {
                     number: {'cycles': tray['cycles'], 'truth': tray['truth']}
                     for number, tray in result.summary['trays'].items()
@@ -131,12 +135,12 @@ def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> di
 
 
 def _print(batch: Batch, together: Combined) -> None:
-    from nanorocks_ros.studies.batch.batch_analysis import told
+    from nanorocks_ros.studies.batch.batch_analysis import merged_notes
 
     frames = sum(result.summary['frames'] for result in batch.results)
     seconds = sum(result.summary['seconds'] for result in batch.results)
     print(f'{counted(len(batch.results), "recording")}, {frames} frames, {seconds:.0f} s')
-    for text in told(batch.results):
+    for text in merged_notes(batch.results):
         print(text)
     for number, tray in sorted(together.trays.items()):
         cycles, recordings = counted(tray.cycles, 'cycle'), counted(tray.recordings, 'recording')

@@ -1,6 +1,6 @@
-"""What passes between the stages: frozen values, SI units, one integer time stamp each.
+"""The records that pass between stages: frozen, SI units, one integer time stamp each.
 
-Estimates carry ``_error``, one standard error. NaN means "not known yet", never 0.
+Errors are one standard error. NaN means "not known yet", never 0.
 """
 
 from nanorocks_ros.records.array_record import ArrayRecord as ArrayRecord

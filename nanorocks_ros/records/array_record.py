@@ -1,4 +1,4 @@
-"""What all records have in common that are published as arrays."""
+"""The common fields of the records that are published as arrays."""
 
 from __future__ import annotations
 

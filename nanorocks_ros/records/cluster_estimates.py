@@ -105,7 +105,7 @@ class Autocorrelation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Merge:
-    """Two beads that stick to each other from some instant on.
+    """Two beads that stick to each other from an instant on.
 
     Parameters
     ----------
@@ -116,8 +116,8 @@ class Merge:
     tray, cycle : int
     tracks : ndarray of int32, (2,)
     joins : bool
-        Whether bodies became fewer by it; False for two beads of one body, or of one that only
-        seemed to be two.
+        Whether the merge made bodies fewer; False for two beads of the same body, or of a body
+        that only appeared as two.
     """
 
     stamp_ns: int

@@ -1,4 +1,4 @@
-"""Records to arrays and back. The layouts are read from ``msg_defs``, nowhere written twice."""
+"""Conversion of records to arrays and back, by the layouts in ``msg_defs``."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class LayoutField(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
-    """What the elements of one kind of array are.
+    """The elements of one kind of array.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def from_array(
     epoch_ns: int,
     where: str,
 ) -> RecordType:
-    """The record behind an array.
+    """The record of an array.
 
     Parameters
     ----------

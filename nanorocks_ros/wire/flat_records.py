@@ -1,4 +1,4 @@
-"""Names of array elements and the values of records behind them, in both directions.
+"""Conversion between the values of records and named array elements.
 
 Records hold values (`Interval`, `Measured`), tuples per species and arrays per bead; an array of
 the wire is flat. ``restitution`` is the value of the interval of that name and
@@ -89,7 +89,7 @@ _ARRAY_PLACES = {
 
 @cache
 def flat_names(record_type: type[ArrayRecord]) -> dict[str, Place]:
-    """The places of all elements by name, but of those that are arrays."""
+    """The places of all elements by name, except elements of arrays."""
     places: dict[str, Place] = {}
     for field in fields(record_type):
         if field.type in _VALUE_TYPES:
@@ -152,17 +152,17 @@ def nested_fields(
     dict of str to Interval, Measured, MeasuredInterval, tuple of Measured or ndarray
         Without trailing species of which nothing is known.
     """
-    found: dict[str, Value | tuple[Measured, ...] | NDArray[Any]] = {**_arrays(numbers)}
+    nested: dict[str, Value | tuple[Measured, ...] | NDArray[Any]] = {**_arrays(numbers)}
     for field in fields(record_type):
         if field.type in _VALUE_TYPES:
-            found[field.name] = _nested(field.name, _VALUE_TYPES[field.type], numbers)
+            nested[field.name] = _nested(field.name, _VALUE_TYPES[field.type], numbers)
         elif field.type == _VALUES_OF_SPECIES:
             base = field.name.removesuffix('s')
             values = [_nested(f'{ordinal}_{base}', Measured, numbers) for ordinal in _SPECIES]
             while values and math.isnan(values[-1].value) and math.isnan(values[-1].error):
                 values.pop()
-            found[field.name] = tuple(values)
-    return found
+            nested[field.name] = tuple(values)
+    return nested
 
 
 def _nested(name: str, value_type: type[ValueType], numbers: Mapping[str, float]) -> ValueType:
@@ -176,11 +176,11 @@ def _arrays(numbers: Mapping[str, float]) -> dict[str, NDArray[Any]]:
     for name, number in numbers.items():
         if place := _ARRAY_PLACES.get(name):
             elements.setdefault(place.field, {})[place.position] = number
-    found: dict[str, NDArray[Any]] = {}
+    arrays: dict[str, NDArray[Any]] = {}
     for field, by_index in elements.items():
         shape = tuple(1 + max(place) for place in zip(*by_index, strict=True))
         array = np.full(shape, np.nan)
         for index, number in by_index.items():
             array[index] = number
-        found[field] = array.astype(np.int32) if field in _INTEGERS else array
-    return found
+        arrays[field] = array.astype(np.int32) if field in _INTEGERS else array
+    return arrays

@@ -260,13 +260,13 @@ def analyse(
 def _empty(
     trays: Iterable[int], truth: Mapping[int, list[GroundTruth]], scratch: Path | None
 ) -> dict[int, TrayResults]:
-    """A place for the records of each tray."""
+    """Empty results of each tray."""
     file = None if scratch is None else SpoolFile(scratch)
     return {tray: TrayResults(truth=truth.get(tray), spool_file=file) for tray in trays}
 
 
 def _remarks(pipeline: Pipeline, where: str) -> list[str]:
-    """What the user should know of the frames as a whole."""
+    """Notices on the frames as a whole."""
     stage = pipeline.preprocessor
     remarks = []
     if stage.view is None:

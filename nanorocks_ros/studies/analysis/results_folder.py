@@ -47,7 +47,7 @@ _NEVER_NS = np.iinfo(np.int64).max
 
 
 def check_results_folder(folder: Path) -> Path:
-    """See before hours of work that results may go to a folder.
+    """Check, before hours of work, that a folder can take results.
 
     Returns
     -------
@@ -125,8 +125,8 @@ def write_results(
 
 
 def _keep_others(folder: Path, fresh: Path) -> None:
-    """Take over what somebody put beside earlier results: a figure, notes."""
-    # What an earlier analysis wrote, also that of a batch, would not belong to the new one.
+    """Keep files that a user put beside earlier results: a figure, notes."""
+    # Files of an earlier analysis, also of a batch, do not belong to the new results.
     table_names = '|'.join(product.name for product in MEASURED)
     tables = rf'tray_\d+_({table_names})\.({"|".join(FORMATS)})'
     names = map(re.escape, (RESULTS_MARK, BAG_NAME, SUMMARY, EVIDENCE))
@@ -193,7 +193,7 @@ def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> No
 
 
 def _in_order(records: Sequence[ArrayRecord]) -> Iterator[ArrayRecord]:
-    """By their stamps; in memory are only those that wait for earlier ones further on."""
+    """The records sorted by stamp; only records ahead of earlier ones are held in memory."""
     stamps = np.fromiter((record.stamp_ns for record in records), np.int64, len(records))
     # The earliest of those that come later.
     to_come = np.minimum.accumulate(np.append(stamps, _NEVER_NS)[::-1])[::-1][1:]

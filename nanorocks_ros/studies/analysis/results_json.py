@@ -47,7 +47,7 @@ def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
     passes = 0
     last: CorEstimate | None = None
     for cor in cors:
-        # Time went back: cycles are counted from 1 again, and are others.
+        # Time went back: cycles are counted from 1 again.
         if last is not None and cor.stamp_ns < last.stamp_ns and not _ended_by_merge(last, cor):
             passes += 1
         last = cor
@@ -57,13 +57,13 @@ def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
     return list(latest.values())
 
 
-def _ended_by_merge(last: CorEstimate, one: CorEstimate) -> bool:
+def _ended_by_merge(last: CorEstimate, estimate: CorEstimate) -> bool:
     """Whether an earlier stamp is that of a merge, known later, which ended the cycle's window."""
     final = CorStatus.FINAL
     return (
-        one.cycle == last.cycle
+        estimate.cycle == last.cycle
         and last.status is not final
-        and one.status is not CorStatus.COOLING
+        and estimate.status is not CorStatus.COOLING
     )
 
 
@@ -129,20 +129,20 @@ def _ends_of_cycles(
     clusters: Iterable[ClusterEstimate],
 ) -> dict[int, list[tuple[int, ClusterEstimate]]]:
     """Of each cycle, and every time it was played: stamp of the first estimate, and the last."""
-    found: dict[int, list[tuple[int, ClusterEstimate]]] = {}
+    ends: dict[int, list[tuple[int, ClusterEstimate]]] = {}
     for cluster in clusters:
-        parts = found.setdefault(cluster.cycle, [])
+        parts = ends.setdefault(cluster.cycle, [])
         if parts and cluster.stamp_ns > parts[-1][1].stamp_ns:
             parts[-1] = parts[-1][0], cluster
         else:
             parts.append((cluster.stamp_ns, cluster))
-    return found
+    return ends
 
 
 def _end_of_cycle(
     parts: Sequence[tuple[int, ClusterEstimate]], cor: CorEstimate
 ) -> ClusterEstimate | None:
-    """That of the same time, of a recording that was played twice."""
+    """The last estimate of the cycle, in the same pass of a recording that was played twice."""
     near = [last for first, last in parts if first <= cor.stamp_ns <= last.stamp_ns]
     return near[-1] if near else parts[-1][1] if parts else None
 
@@ -169,7 +169,7 @@ def _cycle_as_json(
 
 
 def _clusters_as_json(last: ClusterEstimate | None) -> dict[str, Any]:
-    """What is known of the clusters at the end of a cycle."""
+    """The clusters at the end of a cycle."""
     if last is None:
         return dict.fromkeys(('cluster_size', 'bodies', 'onset', 'sticking_speed'))
     return {
@@ -191,13 +191,13 @@ def _truth_as_json(
     truth = results.truth
     if not truth:
         return None
-    found: dict[str, Any] = {
-        'time': [(one.stamp_ns - analysis.epoch_ns) / NS for one in truth],
-        'mean_projected_speed': [one.mean_projected_speed for one in truth],
-        'bodies': [one.bodies for one in truth],
+    series_of_truth: dict[str, Any] = {
+        'time': [(frame.stamp_ns - analysis.epoch_ns) / NS for frame in truth],
+        'mean_projected_speed': [frame.mean_projected_speed for frame in truth],
+        'bodies': [frame.bodies for frame in truth],
     }
     return {
-        **(found if series else {}),
+        **(series_of_truth if series else {}),
         'restitution': truth[-1].restitution,
         'wall_restitution': truth[-1].wall_restitution,
         'sticking_speed': truth[-1].sticking_speed,

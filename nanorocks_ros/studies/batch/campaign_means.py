@@ -1,4 +1,4 @@
-"""What all cycles of all recordings of a batch say together, tray by tray."""
+"""Means and posteriors over all cycles of all recordings of a batch, per tray."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class TrayMeans:
 
 
 class CycleRow(NamedTuple):
-    """A cycle of a tray: name of its recording, and what is known of it."""
+    """A cycle of a tray: name of its recording, and its quantities."""
 
     recording: str
     tray: int
@@ -213,7 +213,7 @@ def _added_up(
     notices: list[str],
     progress: Callable[[int, int], None] | None,
 ) -> tuple[dict[int, CycleLikelihoods], dict[int, list[StickingCycle]]]:
-    """One recording after the other: never more than one of them in memory."""
+    """Add up the recordings one by one: only one is in memory."""
     evidence: dict[int, CycleLikelihoods] = {}
     sticking: dict[int, list[StickingCycle]] = {}
     for done, result in enumerate(results, start=1):
@@ -271,7 +271,7 @@ def _cycle(values: Mapping[str, Any]) -> CycleSummary:
 
 
 def means_as_json(one: TrayMeans) -> dict[str, Any]:
-    """What all cycles of a tray say, in SI; None where not known.
+    """Results of all cycles of a tray, in SI; None where not known.
 
     A restitution that is hardly known has an interval, but no value.
     """

@@ -98,33 +98,33 @@ def topics_page() -> str:
         'interface package.\n'
     )
     for product in PRODUCTS:
-        one = layout(product.record)
-        text += f'\n## {one.name}\n\n{one.doc}\n\n'
+        array = layout(product.record)
+        text += f'\n## {array.name}\n\n{array.doc}\n\n'
         text += _table(
             ('element', 'field', 'unit', 'meaning'),
             (
                 (str(index), f'`{field.name}`', field.unit, field.doc)
-                for index, field in enumerate(one.fields)
+                for index, field in enumerate(array.fields)
             ),
         )
-        if one.constants:
-            named = ', '.join(f'`{name}` = {value}' for name, value in one.constants.items())
+        if array.constants:
+            named = ', '.join(f'`{name}` = {value}' for name, value in array.constants.items())
             text += f'\nConstants: {named}.\n'
     return text + _beads_section()
 
 
 def _beads_section() -> str:
     """The array whose length is that of the list of beads."""
-    one = beads_layout()
-    head, row = len(one.head), len(one.bead)
-    text = f'\n## BeadsTruth\n\n{one.doc}\n\n'
+    array = beads_layout()
+    head, row = len(array.head), len(array.bead)
+    text = f'\n## BeadsTruth\n\n{array.doc}\n\n'
     text += (
         f'{head} elements (`layout.dim[0]`), then {row} for each bead (`dim[1]`: how many beads, '
         '`dim[2]`: the names); a bead keeps its row, which is its identity.\n\n'
     )
     fields = [
-        *((str(index), field) for index, field in enumerate(one.head)),
-        *((f'{head + index} + {row} i', field) for index, field in enumerate(one.bead)),
+        *((str(index), field) for index, field in enumerate(array.head)),
+        *((f'{head + index} + {row} i', field) for index, field in enumerate(array.bead)),
     ]
     return text + _table(
         ('element', 'field', 'unit', 'meaning'),
@@ -150,7 +150,7 @@ def parameters_page() -> str:
 
 def _default(value: st.Value) -> str:
     if isinstance(value, tuple):
-        return ', '.join(f'{one:g}' for one in value) or 'empty'
+        return ', '.join(f'{number:g}' for number in value) or 'empty'
     if isinstance(value, bool):
         return str(value).lower()
     return f'{value:g}' if isinstance(value, float) else str(value) or 'empty'

@@ -51,7 +51,7 @@ def test_of_one_or_two_beads_there_is_a_speed_and_nothing_confident_else(beads):
         if isinstance(one, CorEstimate) and not math.isnan(one.restitution.value):
             assert one.restitution.lower <= one.restitution.value <= one.restitution.upper
         if isinstance(one, ClusterEstimate):
-            assert not one.bodies > beads
+            assert not one.bodies.value > beads
             assert one.sticking_status in (StickingStatus.UNKNOWN, StickingStatus.NO_MERGE)
 
 
