@@ -77,12 +77,16 @@ class BodyCounter:
         self._rate = encounter_rate(tray)
         self._alike = np.array([one.diameter_low == one.diameter_high for one in tray.species])
         self._pairs = Pairs(partial(chance, rate=self._rate))
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all tracks and bodies; estimates that are held back are lost."""
         self._first_ns = 0
         self._last_ns: int | None = None
         self._births = Births()
-        self._restart(0)
+        self._start_cycle(0)
 
-    def _restart(self, cycle: int) -> None:
+    def _start_cycle(self, cycle: int) -> None:
         self._cycle = cycle
         self._births.next_cycle()
         self._pairs.clear()
@@ -113,12 +117,11 @@ class BodyCounter:
             starts all afresh.
         """
         if self._last_ns is not None and tracks.stamp_ns <= self._last_ns:
-            self._births = Births()
-            self._restart(cycle)
+            self.reset()
         found: tuple[BodyEstimate | Merge, ...] = ()
         if cycle != self._cycle:
             found = self.flush()
-            self._restart(cycle)
+            self._start_cycle(cycle)
         if not self._pictures:
             self._first_ns = tracks.stamp_ns
         self._last_ns = tracks.stamp_ns
@@ -167,7 +170,13 @@ class BodyCounter:
         return believed
 
     def flush(self) -> tuple[BodyEstimate, ...]:
-        """Counts of the instants for which nothing more will be known."""
+        """Give out the estimates that are held back, at the end of a cycle or a recording.
+
+        An estimate is held back for `bodies.delay`, so that merges found in that time count in
+        it. Here the merges found so far are all. Merges are not held back: `push` returns each
+        when it is found. Nothing is given out while tracks break off too often for bodies to be
+        told. Counting goes on with the next frame.
+        """
         left, self._waiting = list(self._waiting), deque()
         return () if self._unclear() else tuple(self._count(picture) for picture in left)
 

@@ -49,9 +49,10 @@ class ContactFinder:
 
     def __init__(self, tray: Tray) -> None:
         self._tray = tray
-        self._restart()
+        self.reset()
 
-    def _restart(self) -> None:
+    def reset(self) -> None:
+        """Forget all tracks; contacts that are held back are lost."""
         self._first_ns = 0
         self._last_ns: int | None = None
         self._histories = Histories(self._tray)
@@ -64,7 +65,7 @@ class ContactFinder:
         That is a second and a half later at most. A stamp that goes back starts all afresh.
         """
         if self._last_ns is not None and tracks.stamp_ns <= self._last_ns:
-            self._restart()
+            self.reset()
         if self._last_ns is None:
             self._first_ns = tracks.stamp_ns
         self._last_ns = tracks.stamp_ns
@@ -75,7 +76,12 @@ class ContactFinder:
         return tuple(found for kink in kinks for found in self._contact(kink))
 
     def flush(self) -> tuple[Rebound | PairCollision, ...]:
-        """The contacts whose flights afterwards end with the recording."""
+        """Give out the contacts that are held back, at the end of a recording.
+
+        A contact is held back until the flight after it ends, or is 48 places long. Here every
+        flight ends with the last frame: the contacts before flights of at least 4 places are
+        given out, as far as they pass the tests of `push`. Tracks that go on begin new flights.
+        """
         kinks = self._histories.flush()
         return tuple(found for kink in kinks for found in self._contact(kink))
 

@@ -135,8 +135,12 @@ class Histories:
         return kinks + self._finished(gone)
 
     def flush(self) -> list[Kink]:
-        """The kinks whose flights afterwards end with the recording."""
-        return self._finished(sorted(self._slots))
+        """End all flights: the kinks before them. Tracks that go on begin new flights."""
+        kinks = self._finished(sorted(self._slots))
+        # No track has a slot now: the next frame assigns new ones, even to the same tracks.
+        self._named = b'', b''
+        self._rows = np.empty(0, dtype=np.int64)
+        return kinks
 
     def _assigned(self, tracks: Tracks) -> list[int]:
         """Give each round bead a slot, and say which tracks are no more; few pictures differ."""

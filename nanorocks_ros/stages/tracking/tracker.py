@@ -49,9 +49,10 @@ class Tracker:
         self._scale = settings.preprocess.pixels_per_metre
         self._tray = tray
         self._expected = np.array([one.count for one in tray.species], dtype=np.int32)
-        self._restart()
+        self.reset()
 
-    def _restart(self) -> None:
+    def reset(self) -> None:
+        """Forget the tracks and the background: the next image is the first one."""
         self._detector = BeadDetector(self._settings, self._tray, self._scale)
         self._linkers: list[Linker] = []
         self._first_ns = 0
@@ -80,7 +81,7 @@ class Tracker:
         if image.color is None:
             return ()
         if self._last_ns is not None and image.stamp_ns <= self._last_ns:
-            self._restart()
+            self.reset()
         if not self._linkers:
             self._first_ns = image.stamp_ns
             self._linkers = [self._linker(one, image.gray.shape) for one in self._tray.species]
@@ -97,6 +98,10 @@ class Tracker:
             moved = replace(found, places=found.places + shift, place_errors=errors)
             self._next_number += linker.push(time, moved, shift, self._next_number)
         return (self._tracks(image, time, displacement),)
+
+    def flush(self) -> tuple[Tracks, ...]:
+        """Give out nothing: `push` returns the tracks of an image at once."""
+        return ()
 
     def _linker(self, species: Species, shape: tuple[int, ...]) -> Linker:
         return Linker(

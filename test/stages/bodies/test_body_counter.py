@@ -181,6 +181,38 @@ def test_a_stamp_that_goes_back_starts_afresh(sticky):
     assert [one.stamp_ns for one in runs[0]] == [one.stamp_ns for one in runs[1]]
 
 
+def test_flush_gives_the_estimates_of_the_last_instants(sticky):
+    counts, merges = _counted([tracks for tracks, _ in sticky])
+    last = [merge for merge in merges if merge.joins][-1]
+    counter = BodyCounter(PipelineSettings(), TRAY)
+    pushed = [
+        record
+        for tracks, _ in sticky
+        if tracks.stamp_ns <= last.known_ns
+        for record in counter.push(tracks, 1)
+    ]
+    before = [record for record in pushed if isinstance(record, BodyEstimate)]
+    # The merge itself is not held back; the estimates of the bodies it makes are.
+    merged = [record for record in pushed if isinstance(record, Merge)]
+    assert merged[-1].known_ns == last.known_ns
+    held_back = counter.flush()
+    assert held_back[0].stamp_ns > before[-1].stamp_ns
+    assert held_back[-1].stamp_ns > last.known_ns - 0.2 * NS
+    assert held_back[-1].bodies == counts[-1].bodies
+    assert counter.flush() == ()
+
+
+def test_reset_forgets_bodies_and_estimates(sticky):
+    counter = BodyCounter(PipelineSettings(), TRAY)
+    runs = []
+    for _ in range(2):
+        records = [record for tracks, _ in sticky for record in counter.push(tracks, 1)]
+        runs.append([record.stamp_ns for record in records])
+        counter.reset()
+        assert counter.flush() == ()
+    assert runs[0] == runs[1]
+
+
 def test_what_sticks_from_the_start_is_one_body_from_the_start():
     rng = np.random.default_rng(4)
     velocity = np.array([3e-3, 1e-3])

@@ -105,6 +105,52 @@ def test_the_same_tracks_give_the_same_contacts_again_after_going_back():
     assert [one.outgoing for one in again] == [first[0].outgoing]
 
 
+def test_flush_gives_a_rebound_that_the_end_of_the_tracks_follows():
+    # The bead touches the wall at frame 12; four places after it make the second flight.
+    records = list(tracks_of(bounced(TIMES, 4e-3, 0.9), jitter=0.02 * PIXEL))[:17]
+    finder = ContactFinder(TRAY)
+    assert [contact for record in records for contact in finder.push(record)] == []
+    (rebound,) = finder.flush()
+    assert isinstance(rebound, Rebound)
+    assert rebound.stamp_ns == pytest.approx(0.4e9, abs=0.01e9)
+    assert rebound.outgoing / rebound.incoming == pytest.approx(0.9, abs=0.03)
+    assert finder.flush() == ()
+
+
+def test_flush_gives_a_collision_that_the_end_of_the_tracks_follows():
+    records = list(tracks_of(_collision(0.0), jitter=0.02 * PIXEL))[:19]
+    finder = ContactFinder(TRAY)
+    assert [contact for record in records for contact in finder.push(record)] == []
+    (collision,) = finder.flush()
+    assert isinstance(collision, PairCollision)
+    assert sorted(collision.tracks.tolist()) == [0, 1]
+    assert collision.stamp_ns == pytest.approx(0.4e9, abs=0.01e9)
+
+
+def test_tracks_that_go_on_after_a_flush_begin_new_flights():
+    times = np.arange(90) / RATE
+    positions = bounced(times, 3e-3, 0.9, at=2.0)
+    records = list(tracks_of(positions, jitter=0.02 * PIXEL))
+    finder = ContactFinder(TRAY)
+    contacts = [contact for record in records[:30] for contact in finder.push(record)]
+    contacts += finder.flush()
+    assert contacts == []
+    contacts = [contact for record in records[30:] for contact in finder.push(record)]
+    (rebound,) = [*contacts, *finder.flush()]
+    assert rebound.stamp_ns == pytest.approx(2.0e9, abs=0.01e9)
+
+
+def test_reset_forgets_contacts_that_are_held_back():
+    records = list(tracks_of(bounced(TIMES, 4e-3, 0.9), jitter=0.02 * PIXEL))
+    finder = ContactFinder(TRAY)
+    for record in records:
+        finder.push(record)
+    finder.reset()
+    assert finder.flush() == ()
+    assert len([contact for record in records for contact in finder.push(record)]) == 0
+    assert len(finder.flush()) == 1
+
+
 def test_a_rebound_is_measured_past_the_wall_that_swings():
     omega = 2.0 * math.pi * 1.5
 

@@ -155,6 +155,18 @@ def test_the_same_pictures_give_the_same_tracks_and_a_stamp_that_goes_back_start
         np.testing.assert_array_equal(one.velocities, other.velocities)
 
 
+def test_a_tracker_that_is_reset_takes_an_earlier_image_for_the_first():
+    images = [image for image, _ in tray_film(3, 8)]
+    tracker = Tracker(pipeline_settings(3), load_trays()[3])
+    first = [tracker.push(image)[0] for image in images]
+    assert tracker.flush() == ()
+    tracker.reset()
+    again = [tracker.push(image)[0] for image in images]
+    for tracks, repeated in zip(first, again, strict=True):
+        np.testing.assert_array_equal(tracks.ids, repeated.ids)
+        np.testing.assert_array_equal(tracks.positions, repeated.positions)
+
+
 def test_a_gray_camera_gives_no_tracks():
     image, _ = next(tray_film(3, 1))
     tracker = Tracker(pipeline_settings(3), load_trays()[3])
