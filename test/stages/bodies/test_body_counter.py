@@ -66,7 +66,7 @@ def sticky():
     return list(_gas(5e-3, 12.0))
 
 
-def test_bodies_and_sizes_of_a_gas_that_sticks_are_those_that_it_has(sticky):
+def test_bodies_and_sizes_of_a_sticky_gas_agree_with_the_simulation(sticky):
     counts, _ = _estimates_and_merges([tracks for tracks, _ in sticky])
     truth = {tracks.stamp_ns: np.unique(b, return_counts=True)[1] for tracks, b in sticky}
     wrong = np.array([count.bodies - truth[count.stamp_ns].size for count in counts])
@@ -80,7 +80,7 @@ def test_bodies_and_sizes_of_a_gas_that_sticks_are_those_that_it_has(sticky):
     assert last.sizes.sum() == last.bodies
 
 
-def test_the_first_merge_is_dated_back_to_when_it_happened(sticky):
+def test_the_first_merge_has_the_time_of_the_simulated_one(sticky):
     counts, merges = _estimates_and_merges([tracks for tracks, _ in sticky])
     first = next(tracks.stamp_ns for tracks, b in sticky if np.unique(b).size < 15)
     assert min(merge.stamp_ns for merge in merges) == pytest.approx(first, abs=0.1 * NS)
@@ -97,7 +97,7 @@ def test_a_gas_without_sticking_has_no_merge_and_fifteen_bodies():
     assert not any(count.merged for count in counts)
 
 
-def test_beads_at_rest_beside_each_other_are_not_taken_for_a_body():
+def test_adjacent_beads_at_rest_are_no_body():
     rng = np.random.default_rng(2)
     columns, rows = np.meshgrid(np.arange(5), np.arange(3))
     positions = 2.0e-3 * np.column_stack([columns.ravel(), rows.ravel()]) + 2e-3
@@ -111,7 +111,7 @@ def test_beads_at_rest_beside_each_other_are_not_taken_for_a_body():
     assert counts[-1].weighted_size == 1.0
 
 
-def test_a_bead_of_a_body_that_is_lost_stays_in_it_and_comes_back_under_its_number(sticky):
+def test_an_occluded_bead_stays_in_its_body_and_keeps_its_number(sticky):
     _, merges = _estimates_and_merges([tracks for tracks, _ in sticky])
     lost = int(merges[0].tracks[1])
     from_ns, to_ns = merges[0].known_ns + 1 * NS, merges[0].known_ns + 4 * NS
@@ -137,7 +137,7 @@ def test_a_bead_of_a_body_that_is_lost_stays_in_it_and_comes_back_under_its_numb
     assert min(count.followed for count in counts) == 15
 
 
-def test_beads_that_are_never_seen_widen_the_error_and_numbers_are_those_of_all(sticky):
+def test_unseen_beads_widen_the_error_and_count_as_single_ones(sticky):
     frames = [
         _tracks(tracks.stamp_ns, tracks.positions[:12], tracks.velocities[:12])
         for tracks, _ in sticky[:60]
@@ -147,7 +147,7 @@ def test_beads_that_are_never_seen_widen_the_error_and_numbers_are_those_of_all(
     assert first.bodies_error > 0.5
 
 
-def test_a_body_that_comes_apart_is_two_again(sticky):
+def test_a_body_that_breaks_is_two_bodies(sticky):
     counts, merges = _estimates_and_merges([tracks for tracks, _ in sticky])
     pair = next(merge.tracks for merge in merges if merge.joins)
     alone = next(count for count in counts if count.clusters == 1.0).stamp_ns + 2 * NS
@@ -163,7 +163,7 @@ def test_a_body_that_comes_apart_is_two_again(sticky):
     assert parted[at].bodies > counts[at].bodies
 
 
-def test_a_shaking_event_sets_all_beads_apart(sticky):
+def test_a_shaking_event_separates_all_beads(sticky):
     counter = BodyCounter(PipelineSettings(), TRAY)
     for tracks, _ in sticky:
         counter.push(tracks, 1)
@@ -179,7 +179,7 @@ def test_a_shaking_event_sets_all_beads_apart(sticky):
     assert {(estimate.bodies, estimate.merged) for estimate in estimates} == {(15.0, False)}
 
 
-def test_a_stamp_that_goes_back_starts_afresh(sticky):
+def test_a_stamp_that_goes_back_resets_the_counter(sticky):
     counter = BodyCounter(PipelineSettings(), TRAY)
     runs = [
         [record for tracks, _ in sticky[:120] for record in counter.push(tracks, 1)]
@@ -220,7 +220,7 @@ def test_reset_forgets_bodies_and_estimates(sticky):
     assert runs[0] == runs[1]
 
 
-def test_what_sticks_from_the_start_is_one_body_from_the_start():
+def test_beads_that_stick_from_the_start_are_one_body_from_the_start():
     rng = np.random.default_rng(4)
     velocity = np.array([3e-3, 1e-3])
     columns, rows = np.meshgrid(np.arange(5), np.arange(3))
@@ -238,7 +238,7 @@ def test_what_sticks_from_the_start_is_one_body_from_the_start():
     assert counts[-1].first_merge_ns == merges[0].stamp_ns == 0
 
 
-def test_a_tray_in_which_nothing_is_seen_says_that_nothing_is_known():
+def test_an_empty_tray_has_unknown_estimates():
     nothing = np.empty((0, 2))
     counts, merges = _estimates_and_merges(
         [_tracks(int(k * NS / RATE), nothing, nothing) for k in range(60)]
@@ -260,7 +260,7 @@ def test_one_bead_is_one_body():
     assert {(estimate.bodies, estimate.bodies_error) for estimate in estimates} == {(1.0, 0.0)}
 
 
-def test_fewer_false_alarms_are_paid_for_with_a_later_answer(sticky):
+def test_fewer_false_alarms_delay_the_first_merge(sticky):
     known = []
     for rate in (1e-4, 0.01, 0.3):
         settings = PipelineSettings(bodies=BodySettings(false_alarms=rate))
@@ -289,14 +289,14 @@ def _doubled(frames, bead, start, shift):
         yield replace(tracks, ids=ids, positions=positions, **columns)
 
 
-def test_a_bead_that_is_found_twice_is_no_body():
+def test_a_double_detection_is_no_body():
     free = list(_gas(0.0, 8.0))
     for shift in (0.5e-3, 1.0e-3, 1.5e-3):
         _, merges = _estimates_and_merges(_doubled(free, 4, 60, shift))
         assert not merges
 
 
-def test_where_tracks_break_all_the_time_nothing_is_said(sticky):
+def test_no_estimate_is_made_while_tracks_break_often(sticky):
     frames = [tracks for tracks, _ in sticky]
     # Every track gets a new number every second.
     broken = [
@@ -311,7 +311,7 @@ def test_where_tracks_break_all_the_time_nothing_is_said(sticky):
     assert not [count for count in counts if count.stamp_ns > NS]
 
 
-def test_a_bead_that_comes_back_over_its_cluster_is_in_it_once_others_stick(sticky):
+def test_a_bead_that_reappears_at_its_cluster_is_part_of_it(sticky):
     frames = [tracks for tracks, _ in sticky]
     truth = np.unique(sticky[-1][1], return_counts=True)[1]
     counts, _ = _estimates_and_merges(frames)

@@ -41,9 +41,7 @@ def finder():
 
 
 @pytest.mark.parametrize(('speed', 'breaks'), [(0.0, False), (3e-3, True)])
-def test_a_track_that_jumps_within_its_cluster_stays_and_one_that_flies_off_does_not(
-    finder, speed, breaks
-):
+def test_a_jump_within_a_cluster_keeps_a_bond_and_a_drift_breaks_it(finder, speed, breaks):
     def motion(k):
         jumped = 6e-4 if k >= 20 else 0.0
         return [(0.0, 0.0), (1e-3 + jumped + speed * STEP * max(k - 20, 0), 0.0)]
@@ -53,7 +51,7 @@ def test_a_track_that_jumps_within_its_cluster_stays_and_one_that_flies_off_does
     assert broken == ([(0, 1)] if breaks else [])
 
 
-def test_a_pair_that_is_taken_in_is_followed_until_it_comes_apart(finder):
+def test_an_added_bond_is_tracked_until_it_breaks(finder):
     far = [(0.0, 0.0), (1.8e-3, 0.0)]
     finder.push(0.0, _beads(far), 1.0)
     finder.add_bonds(0.0, _beads(far), [Bond((0, 1), 0.0, (1.8e-3, 0.0), 4e-5)])

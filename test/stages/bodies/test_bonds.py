@@ -1,4 +1,4 @@
-"""Pairs of beads, frame by frame."""
+"""Bonds among pairs of beads that meet and separate."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.stages.bodies.bonds import BondFinder
-from nanorocks_ros.stages.bodies.touching_pairs import SeenBeads, touching_pairs
+from nanorocks_ros.stages.bodies.touching_pairs import SeenBeads
 
 RADIUS = 1e-3
 
@@ -25,7 +25,7 @@ def _beads(positions):
 
 
 @pytest.mark.parametrize('odd', [0, 1])
-def test_a_body_that_falls_apart_is_named_though_others_meet_meanwhile(odd):
+def test_a_broken_bond_is_reported_while_other_pairs_meet(odd):
     finder = BondFinder(lambda path, _: np.zeros_like(path))
     bonds, broken = [], []
     for number in range(60):
@@ -38,19 +38,3 @@ def test_a_body_that_falls_apart_is_named_though_others_meet_meanwhile(odd):
         broken += broken_now
     assert (2, 3) in bonds
     assert broken == [(2, 3)]
-
-
-def test_pairs_that_touch_are_those_found_one_by_one():
-    rng = np.random.default_rng(3)
-    beads = _beads(rng.uniform(0.0, 0.02, (60, 2)))
-    keys, first, second = touching_pairs(beads)
-    slack = 2.0 * np.sqrt(2.0) * 1e-6
-    expected = [
-        (i, j)
-        for i in range(60)
-        for j in range(i + 1, 60)
-        if np.hypot(*(beads.positions[j] - beads.positions[i])) < 1.03 * 2.0 * RADIUS + slack
-        and np.hypot(*(beads.positions[j] - beads.positions[i])) > -slack
-    ]
-    assert list(zip(first.tolist(), second.tolist(), strict=True)) == expected
-    assert (np.diff(keys) > 0).all()

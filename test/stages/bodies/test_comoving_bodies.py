@@ -44,13 +44,13 @@ def _bonds(drift, *, hidden):
     return bonds
 
 
-def test_bodies_that_move_as_one_are_one_where_a_bead_between_them_may_be_hidden():
+def test_comoving_bodies_are_one_if_a_hidden_bead_may_lie_between():
     first = _bonds(0.0, hidden=True)[0]
     assert first.ids == (1, 2)
     assert first.offset == pytest.approx((1.8e-3, 0.0), abs=5 * ERROR)
 
 
-def test_without_hidden_beads_bodies_that_do_not_touch_are_two():
+def test_comoving_bodies_that_do_not_touch_are_two_without_hidden_beads():
     assert not _bonds(0.0, hidden=False)
 
 
@@ -89,7 +89,7 @@ def _attached(frames, members):
     return attached
 
 
-def test_a_track_that_begins_at_a_body_is_of_it_until_it_is_apart_from_it():
+def test_a_track_that_begins_at_a_body_is_attached_until_it_moves_away():
     before = ([0, 1, 2], [(0.0, 0.0), (1e-3, 0.0), (9e-3, 0.0)])
     at_it = ([0, 1, 2, 7], [*before[1], (1.6e-3, 0.0)])
     apart = ([0, 1, 2, 7], [*before[1], (3e-3, 0.0)])
@@ -97,7 +97,7 @@ def test_a_track_that_begins_at_a_body_is_of_it_until_it_is_apart_from_it():
     assert attached == [(), ((7, 1),), ((7, 1),), (), ()]
 
 
-def test_a_track_that_was_there_before_or_begins_at_a_single_bead_is_its_own_body():
+def test_an_old_track_or_one_that_begins_at_a_single_bead_is_not_attached():
     before = ([0, 1], [(0.0, 0.0), (1e-3, 0.0)])
     later = ([0, 1, 7], [*before[1], (1.6e-3, 0.0)])
     assert _attached([later, later], {0, 1}) == [(), ()]

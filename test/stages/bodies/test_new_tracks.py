@@ -32,7 +32,7 @@ def push_frame(new_tracks, columns):
     new_tracks.push(tracks, ids)
 
 
-def test_a_bead_that_appears_over_another_is_the_same_one():
+def test_a_track_that_begins_on_another_is_a_double_detection():
     new_tracks = NewTracks()
     push_frame(new_tracks, {1: 2e-3, 2: 6e-3})
     push_frame(new_tracks, {1: 2e-3, 2: 6e-3, 3: 2.3e-3, 4: 9e-3})
@@ -41,7 +41,7 @@ def test_a_bead_that_appears_over_another_is_the_same_one():
     assert new_tracks.rate(2.0) == 1.0
 
 
-def test_who_was_there_in_the_cycle_before_is_known_and_so_is_who_is_one_bead():
+def test_tracks_and_double_detections_of_the_last_cycle_are_remembered():
     new_tracks = NewTracks()
     push_frame(new_tracks, {1: 2e-3, 2: 6e-3})
     push_frame(new_tracks, {1: 2e-3, 2: 6e-3, 3: 2.3e-3, 4: 9e-3, 5: 9.2e-3})

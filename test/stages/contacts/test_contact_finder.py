@@ -48,7 +48,7 @@ def _events(events, kind, time):
     return events[near & (events['kind'] == kind)]
 
 
-def test_every_rebound_found_is_a_collision_with_that_wall(gas):
+def test_every_rebound_is_a_simulated_collision_with_that_wall(gas):
     events, contacts = gas
     rebounds = [contact for contact in contacts if isinstance(contact, Rebound)]
     assert len(rebounds) > 15
@@ -73,7 +73,7 @@ def test_rebounds_return_the_restitution_of_the_wall_within_their_errors(gas):
     ) == pytest.approx(WALLS, abs=0.01)
 
 
-def test_every_collision_found_is_one_of_those_two_beads(gas):
+def test_every_collision_is_a_simulated_collision_of_those_two_beads(gas):
     events, contacts = gas
     pairs = [contact for contact in contacts if isinstance(contact, PairCollision)]
     assert len(pairs) > 15
@@ -85,7 +85,7 @@ def test_every_collision_found_is_one_of_those_two_beads(gas):
     assert wrong <= 1
 
 
-def test_collisions_keep_the_momentum_and_part_along_the_line_of_centres(gas):
+def test_collisions_conserve_momentum_and_separate_along_the_normal(gas):
     for contact in gas[1]:
         if isinstance(contact, PairCollision):
             lost = np.abs((contact.after - contact.before).sum(axis=0)).max()
@@ -109,7 +109,7 @@ def test_the_same_tracks_give_the_same_contacts_again_after_going_back():
     assert [contact.outgoing for contact in again] == [first[0].outgoing]
 
 
-def test_flush_gives_a_rebound_that_the_end_of_the_tracks_follows():
+def test_flush_gives_a_rebound_right_before_the_end_of_the_tracks():
     # The bead touches the wall at frame 12; four places after it make the second flight.
     records = list(tracks_of(bounced(TIMES, 4e-3, 0.9), jitter=0.02 * PIXEL))[:17]
     finder = ContactFinder(TRAY)
@@ -121,7 +121,7 @@ def test_flush_gives_a_rebound_that_the_end_of_the_tracks_follows():
     assert finder.flush() == ()
 
 
-def test_flush_gives_a_collision_that_the_end_of_the_tracks_follows():
+def test_flush_gives_a_collision_right_before_the_end_of_the_tracks():
     records = list(tracks_of(_collision(0.0), jitter=0.02 * PIXEL))[:19]
     finder = ContactFinder(TRAY)
     assert [contact for record in records for contact in finder.push(record)] == []
@@ -155,7 +155,7 @@ def test_reset_forgets_contacts_that_are_held_back():
     assert len(finder.flush()) == 1
 
 
-def test_a_rebound_is_measured_past_the_wall_that_swings():
+def test_a_rebound_is_measured_relative_to_the_swinging_wall():
     omega = 2.0 * math.pi * 1.5
 
     def wall(time):
@@ -185,7 +185,7 @@ def test_a_bead_that_is_hidden_at_the_wall_gives_no_rebound():
     assert _contacts_in(records) == []
 
 
-def test_a_bead_that_is_hidden_on_its_way_still_gives_its_rebound():
+def test_a_bead_that_is_hidden_during_a_flight_gives_its_rebound():
     records = list(tracks_of(bounced(TIMES, 4e-3, 0.9), jitter=0.02 * PIXEL))
     for hidden in (5, 20):
         records[hidden] = replace(records[hidden], seen=np.zeros(1, dtype=bool))
@@ -193,18 +193,18 @@ def test_a_bead_that_is_hidden_on_its_way_still_gives_its_rebound():
     assert rebound.outgoing / rebound.incoming == pytest.approx(0.9, abs=0.01)
 
 
-def test_a_bead_that_turns_sideways_at_the_wall_met_somebody_unseen():
+def test_a_tangential_change_of_velocity_at_the_wall_is_no_rebound():
     assert (
         _contacts_in(tracks_of(bounced(TIMES, 4e-3, 0.9, change=2e-3), jitter=0.02 * PIXEL)) == []
     )
 
 
-def test_a_bead_that_turns_far_from_walls_gives_no_rebound():
+def test_a_velocity_jump_far_from_walls_is_no_rebound():
     positions = bounced(TIMES, 4e-3, 0.9) + np.array((3e-3, 0.0))
     assert _contacts_in(tracks_of(positions, jitter=0.02 * PIXEL)) == []
 
 
-def test_another_bead_within_reach_spoils_a_rebound():
+def test_a_rebound_with_another_bead_within_reach_is_left_out():
     positions = bounced(TIMES, 4e-3, 0.9)
     for distance, expected in ((2.05e-3, 0), (4e-3, 1)):
         other = positions * (0.0, 1.0) + (1e-3, distance)
@@ -214,7 +214,7 @@ def test_another_bead_within_reach_spoils_a_rebound():
         assert len(contacts) == expected
 
 
-def test_grains_with_corners_are_left_out():
+def test_angular_grains_are_left_out():
     tray = load_trays()[8]
     assert _contacts_in(tracks_of(bounced(TIMES, 4e-3, 0.9), jitter=0.02 * PIXEL), tray) == []
 
@@ -240,7 +240,7 @@ def test_two_beads_that_meet_are_one_collision():
     assert collision.masses[0] == pytest.approx(1180.0 * math.pi / 6.0 * 8e-9)
 
 
-def test_a_collision_that_loses_momentum_met_somebody_unseen():
+def test_a_collision_that_loses_momentum_is_left_out():
     assert _contacts_in(tracks_of(_collision(1.5e-3), jitter=0.02 * PIXEL)) == []
 
 

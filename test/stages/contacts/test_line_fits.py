@@ -16,7 +16,7 @@ def _bent_path(times, at, before, after, seed=1):
     return positions + np.random.default_rng(seed).normal(0.0, ERROR, positions.shape)
 
 
-def test_the_break_of_a_bent_way_is_between_the_right_pictures():
+def test_the_break_of_a_bent_path_is_between_the_right_frames():
     times = np.arange(24) / 30.0
     for last in (3, 10, 20):
         positions = _bent_path(times, times[last] + 0.4 / 30.0, (3e-3, 1e-3), (-2e-3, 1e-3))
@@ -25,7 +25,7 @@ def test_the_break_of_a_bent_way_is_between_the_right_pictures():
         assert gain > 1000.0
 
 
-def test_straight_ways_gain_nothing_by_a_break():
+def test_a_break_does_not_improve_straight_paths():
     times = np.arange(24) / 30.0
     gains = [
         best_break(
@@ -36,11 +36,11 @@ def test_straight_ways_gain_nothing_by_a_break():
     assert max(gain for _, gain in gains) < 30.0
 
 
-def test_too_few_places_have_no_break():
+def test_too_few_positions_have_no_break():
     assert best_break(np.arange(3.0), np.zeros((3, 2)), np.ones(3), 2) == (0, 0.0)
 
 
-def test_a_line_says_how_wrong_it_may_be():
+def test_a_line_has_the_stated_errors():
     times = np.arange(12) / 30.0
     lines = [
         fit_line(times, _bent_path(times, 0.0, (2e-3, 0.0), (2e-3, 0.0), seed), np.full(12, ERROR))
@@ -53,7 +53,7 @@ def test_a_line_says_how_wrong_it_may_be():
     assert np.mean([line.chi_square for line in lines]) == pytest.approx(20.0, rel=0.1)
 
 
-def test_lines_before_and_after_meet_when_the_bead_turned():
+def test_lines_before_and_after_intersect_at_the_time_of_the_jump():
     times = np.arange(20) / 30.0
     at = 10.3 / 30.0
     misses = []

@@ -37,7 +37,7 @@ def test_the_velocity_of_a_swinging_tray_is_known_within_its_error():
         assert error < 0.15 * 1e-4 * omega
 
 
-def test_a_tray_at_rest_moves_no_faster_than_the_jitter_lets_it_seem():
+def test_the_velocity_of_a_tray_at_rest_is_within_the_noise():
     speeds = [_history_of(_jitter(seed)).velocity(2.0) for seed in range(20)]
     scatter = np.std([velocity for velocity, _ in speeds])
     errors = [error for _, error in speeds]
@@ -45,13 +45,13 @@ def test_a_tray_at_rest_moves_no_faster_than_the_jitter_lets_it_seem():
     assert np.mean(errors) < 0.05 * PIXEL * RATE
 
 
-def test_a_tray_that_nobody_registered_is_at_rest():
+def test_a_tray_without_registration_is_at_rest():
     velocity, error = _history_of(np.zeros((TIMES.size, 2))).velocity(2.0)
     assert velocity == pytest.approx([0.0, 0.0])
     assert error == 0.0
 
 
-def test_a_jerk_is_followed_too():
+def test_a_jerk_is_fitted_by_a_cubic():
     jerk = np.where(TIMES > 2.0, 3e-3 * (TIMES - 2.0), 0.0)
     jerk = jerk + np.where(TIMES > 2.6, 9e-3 * (TIMES - 2.6), 0.0)
     velocity, error = _history_of(np.outer(jerk, (1.0, 0.0)) + _jitter(1)).velocity(2.3)
