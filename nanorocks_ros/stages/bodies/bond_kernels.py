@@ -24,14 +24,11 @@ _SMOOTHING_TIMES = np.array([0.1, 2.0])
 _MAX_HIDDEN_TIME = 1.5
 # A bonded pair of which one bead is hidden is kept for this time, [s].
 _MAX_HIDDEN_BOND_TIME = 60.0
-SMOOTHED, LOW, HIGH, OFFSET, TOLERANCE, SPEED, PATH, START, LAST, LAST_TOGETHER = (
-    0,
-    2,
-    4,
-    6,
-    *range(8, 14),
-)
-"""Columns of `PairTable.values`; the first four have two each."""
+SMOOTHED, LOW, HIGH, OFFSET = 0, 2, 4, 6
+"""First columns of `PairTable.values`: separations with two components each."""
+
+TOLERANCE, SPEED, PATH, START, LAST, LAST_TOGETHER = range(8, 14)
+"""Further columns of `PairTable.values`."""
 
 _COLUMNS = 14
 

@@ -266,10 +266,8 @@ def _write_jump(
     buffer.previous_starts[slot] = -1
     window_start = max(previous, start - MAX_FLIGHT_POINTS)
     first = window_start + _break_point(buffer, slot, window_start, end)[0]
-    if (
-        min(first - window_start, end - first) < MIN_FLIGHT_POINTS
-        or abs(first - start) > _MAX_SHIFT
-    ):
+    shortest = min(first - window_start, end - first)
+    if shortest < MIN_FLIGHT_POINTS or abs(first - start) > _MAX_SHIFT:
         return False
     # The error that neighbouring positions share differs between the ends of a flight.
     shared_error = (
@@ -287,11 +285,8 @@ def _write_jump(
 
 @compiled
 def _discard_oldest(buffer: TrackBuffer, slot: int) -> None:
-    start, previous, end = (
-        buffer.flight_starts[slot],
-        buffer.previous_starts[slot],
-        buffer.ends[slot],
-    )
+    start, end = buffer.flight_starts[slot], buffer.ends[slot]
+    previous = buffer.previous_starts[slot]
     first_kept = max(previous if previous >= 0 else start, start - MAX_FLIGHT_POINTS)
     kept = end - first_kept
     for k in range(kept):

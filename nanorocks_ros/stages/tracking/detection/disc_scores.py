@@ -212,11 +212,8 @@ def _find_candidates(
                     limit = below[right] - above[right] - below[left] + above[left]
                     middle_is_floor = 2 * balance[i, j] <= -step * step
                     if limit > min_score and not middle_is_floor:
-                        candidates[count, 0], candidates[count, 1], candidates[count, 2] = (
-                            size,
-                            i,
-                            j,
-                        )
+                        candidates[count, 0], candidates[count, 1] = size, i
+                        candidates[count, 2] = j
                         count += 1
     return count
 

@@ -74,11 +74,8 @@ def classify_pixels(
     # Flat arrays, unsigned indices, 16-bit integers and no branches let the compiler vectorise the
     # loop. Only the product in `scaled` needs more than 16 bits.
     pixels, empty = color.reshape(-1), background.reshape(-1)
-    darkness, hue, pixel_class = (
-        maps.darkness.reshape(-1),
-        maps.hue.reshape(-1),
-        maps.pixel_class.reshape(-1),
-    )
+    darkness, hue = maps.darkness.reshape(-1), maps.hue.reshape(-1)
+    pixel_class = maps.pixel_class.reshape(-1)
     dark_gray = np.uint8(GRAY) if has_gray else np.uint8(UNKNOWN)
     one, two, three, zero = np.uint64(1), np.uint64(2), np.uint64(3), np.int16(0)
     for pixel in range(pixel_class.size):
@@ -100,16 +97,11 @@ def classify_pixels(
             & (level < _SATURATED)
         )
         scaled = np.int32(np.float32(255 * np.int32(max(darkening, zero))) / np.float32(level))
-        small_darkness, scaled_darkness = (
-            np.uint8(max(darkening, zero)),
-            np.uint8(min(scaled, np.int32(255))),
-        )
+        small_darkness = np.uint8(max(darkening, zero))
+        scaled_darkness = np.uint8(min(scaled, np.int32(255)))
         darkness[k] = small_darkness if is_background else scaled_darkness
-        depth, light, colour = (
-            np.int16(100 * darkening),
-            np.int16(red + blue),
-            np.int16(_COLOURED * redness),
-        )
+        depth, light = np.int16(100 * darkening), np.int16(red + blue)
+        colour = np.int16(_COLOURED * redness)
         kind = dark_gray if depth > np.int16(_GRAY_DARK_PERCENT * level) else np.uint8(UNKNOWN)
         kind = np.uint8(BLUE) if np.int16(-colour) > light else kind
         kind = np.uint8(RED) if colour > light else kind

@@ -89,15 +89,15 @@ def link_detections(
     starts = np.zeros(n + 1, dtype=np.int64)
     costs = Costs(starts, np.empty(n * m, dtype=np.int64), np.empty(n * m))
     squares = np.empty(m)
-    unlinked_cost = _write_link_costs(
+    largest_cost = _write_link_costs(
         known, detected, velocity_change, max_speed, False, squares, costs
     )
     if _detect_shaking(known.elapsed, starts):
-        unlinked_cost = _write_link_costs(
+        largest_cost = _write_link_costs(
             known, detected, velocity_change, max_speed, True, squares, costs
         )
     # Any link within reach costs less than none.
-    return assign(costs, m, unlinked_cost + 1.0)
+    return assign(costs, m, largest_cost + 1.0)
 
 
 @kernel
