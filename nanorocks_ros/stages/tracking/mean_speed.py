@@ -46,7 +46,7 @@ _RELIABLE_FACTOR = 0.8
 _LOSS_BIAS = 0.4
 # Smallest number of beads of a mean.
 _MIN_BEADS = 3
-JITTER_PICTURES = 10
+NOISE_FRAMES = 10
 """Number of frames from which the noise is measured."""
 
 
@@ -108,16 +108,16 @@ def mean_speeds(
     """Mean speeds of several species of the same tracks; None stands for all beads."""
     if not tracks:
         return [None for _ in species]
-    return mean_speeds_in(
+    return mean_speeds_of_series(
         join_tracks(tracks),
-        join_tracks(tracks[-JITTER_PICTURES:]),
+        join_tracks(tracks[-NOISE_FRAMES:]),
         tracks[-1].expected,
         least_distance=least_distance,
         species=species,
     )
 
 
-def mean_speeds_in(
+def mean_speeds_of_series(
     series: TrackSeries,
     recent: TrackSeries,
     expected: NDArray[np.int32],
@@ -131,7 +131,7 @@ def mean_speeds_in(
     ----------
     series : TrackSeries
     recent : TrackSeries
-        The last `JITTER_PICTURES` of them.
+        The last `NOISE_FRAMES` of them.
     expected : ndarray of int32, (species,)
         Number of beads in the tray.
     least_distance, species

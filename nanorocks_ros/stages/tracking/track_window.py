@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _MIN_CAPACITY = 4096
 
 
-class RecentTracks:
+class TrackWindow:
     """Tracks up to the present; one frame is added at a time.
 
     Concatenating all records for every speed took a third of its time.
