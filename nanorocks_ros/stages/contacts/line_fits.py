@@ -67,10 +67,6 @@ class Line(NamedTuple):
         """Position at a time, (2,), [m]."""
         return self.position + self.velocity * (time - self.time)
 
-    def variance_at(self, time: float) -> float:
-        """Variance of a coordinate of the position at a time, [m^2]."""
-        return self.position_variance + self.velocity_variance * (time - self.time) ** 2
-
 
 @compiled
 def _chi_square(sums: NDArray[np.float64], first: int, end: int) -> float:
@@ -226,10 +222,3 @@ def intersect_lines(lines: NDArray[np.float64]) -> tuple[float, float, float]:
         time += step
         error, chi_square = 1.0 / math.sqrt(denominator), max(total - numerator * step, 0.0)
     return time, error, chi_square
-
-
-def intersection(pairs: list[tuple[Line, Line]]) -> Intersection:
-    """The time at which the lines before and after agree best on the positions of the beads."""
-    return Intersection(
-        *intersect_lines(np.array([[before.row, after.row] for before, after in pairs]))
-    )

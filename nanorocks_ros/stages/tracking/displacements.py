@@ -23,8 +23,8 @@ _MAX_ERROR_RATIO = 5.0
 _MAX_INTERVAL_DIFFERENCE = 0.2
 # Median of the square of a Gaussian variable of unit variance.
 _MEDIAN_SQUARE = 0.4549
-# Number of frames that the noise is measured from.
-_NOISE_FRAMES = 3
+# Smallest number of frames that the noise can be measured from.
+_MIN_NOISE_FRAMES = 3
 
 ALL_SPECIES = -1
 """Beads of every species."""
@@ -143,7 +143,7 @@ def position_noise(series: TrackSeries, species: int) -> float:
     the midpoint of the others has 3/2 of the variance. Errors that all frames share do not count.
     Infinite without three frames at equal intervals.
     """
-    if series.stamps.size < _NOISE_FRAMES:
+    if series.stamps.size < _MIN_NOISE_FRAMES:
         return math.inf
     squares = np.empty(2 * series.ids.size)
     rows = np.empty((3, series.ids.size), dtype=np.int64)

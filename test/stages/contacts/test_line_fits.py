@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nanorocks_ros.stages.contacts.line_fits import best_break, fit_line, intersection
+from nanorocks_ros.stages.contacts.line_fits import best_break, fit_line, intersect_lines
 
 ERROR = 4e-6
 
@@ -49,7 +49,9 @@ def test_a_line_has_the_stated_errors():
     velocities = np.array([line.velocity - (2e-3, 0.0) for line in lines])
     assert velocities.std() == pytest.approx(lines[0].velocity_variance ** 0.5, rel=0.1)
     positions = np.array([line.at(0.5) - (0.011, 0.01) for line in lines])
-    assert positions.std() == pytest.approx(lines[0].variance_at(0.5) ** 0.5, rel=0.1)
+    lever = 0.5 - lines[0].time
+    variance = lines[0].position_variance + lines[0].velocity_variance * lever**2
+    assert positions.std() == pytest.approx(variance**0.5, rel=0.1)
     assert np.mean([line.chi_square for line in lines]) == pytest.approx(20.0, rel=0.1)
 
 
@@ -60,10 +62,9 @@ def test_lines_before_and_after_intersect_at_the_time_of_the_jump():
     for seed in range(200):
         positions = _bent_path(times, at, (3e-3, 1e-3), (-2e-3, 1e-3), seed)
         errors = np.full(20, ERROR)
-        crossing = intersection([(
-            fit_line(times[:11], positions[:11], errors[:11]),
-            fit_line(times[11:], positions[11:], errors[11:]),
-        )])  # fmt: skip
-        misses.append((crossing.time - at) / crossing.error)
+        before = fit_line(times[:11], positions[:11], errors[:11])
+        after = fit_line(times[11:], positions[11:], errors[11:])
+        time, error, _ = intersect_lines(np.array([[before.row, after.row]]))
+        misses.append((time - at) / error)
     assert np.std(misses) == pytest.approx(1.0, abs=0.2)
     assert abs(np.mean(misses)) < 0.3
