@@ -24,10 +24,10 @@ def _beads(positions):
     )
 
 
-def _pushed(finder, motion, start, pictures):
+def _pushed(finder, motion, start, frames):
     """New and broken bonds of beads that are at `motion(k)` in frame k."""
     bonds, broken = [], []
-    for k in range(start, start + pictures):
+    for k in range(start, start + frames):
         bonds_now, broken_now = finder.push(k * STEP, _beads(motion(k)), 1.0)
         bonds += [bond.ids for bond in bonds_now]
         broken += broken_now

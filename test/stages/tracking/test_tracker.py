@@ -88,7 +88,7 @@ def test_errors_of_positions_and_velocities_are_not_understated(tray_3):
             velocities.append((difference / tracks.velocity_errors[rows, None])[known])
     for pulls in (np.concatenate(positions), np.concatenate(velocities)):
         assert np.median(np.abs(pulls)) / 0.6745 < 1.3
-        # Collisions between two pictures, and beads half hidden.
+        # Collisions between two frames, and beads half hidden.
         assert np.mean(np.abs(pulls) > 3.0) < 0.15
 
 

@@ -56,9 +56,9 @@ def test_an_empty_tray_has_no_detections():
 
 @pytest.mark.parametrize('level', [0, 255])
 def test_a_black_or_white_image_has_no_detections(level):
-    picture = np.full((188, 188, 3), level, dtype=np.uint8)
+    image = np.full((188, 188, 3), level, dtype=np.uint8)
     detector = BeadDetector(TrackingSettings(), load_trays()[1], SCALE)
-    assert detector.detect(picture)[0].radii.size == 0
+    assert detector.detect(image)[0].radii.size == 0
 
 
 def test_light_that_fades_by_a_third_loses_no_bead():
