@@ -21,7 +21,7 @@ from nanorocks_ros.records import (
     SpeedEstimate,
     SpeedMethod,
 )
-from nanorocks_ros.stages.contacts.cycle_contacts import ContactsOfCycle
+from nanorocks_ros.stages.contacts.cycle_contacts import CycleContacts
 from nanorocks_ros.stages.preprocess.shake_detection import NS
 from nanorocks_ros.stages.restitution.restitution_methods import (
     UNDETERMINED,
@@ -69,7 +69,7 @@ class HaffFitter:
         reading = LibraryReading if self._settings.relation == 'library' else PaperReading
         self._make_reading = partial(reading, settings, tray)
         self._grains = any(hue_of(one.material) == 0 for one in tray.species)
-        self._contacts = ContactsOfCycle(self._settings)
+        self._contacts = CycleContacts(self._settings)
         self._restart()
 
     def _restart(self) -> None:

@@ -29,11 +29,11 @@ from nanorocks_ros.stages.bodies.body_counter import BodyCounter
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
 from nanorocks_ros.stages.preprocess.shake_detection import NS, CycleFollower
 from nanorocks_ros.stages.tracking.mean_speed import (
-    JITTER_PICTURES,
+    NOISE_FRAMES,
     RELIABLE_SHARE,
-    mean_speeds_in,
+    mean_speeds_of_series,
 )
-from nanorocks_ros.stages.tracking.track_window import RecentTracks
+from nanorocks_ros.stages.tracking.track_window import TrackWindow
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class TrackSpeed:
         wanted = settings.cooling.rebounds or settings.cooling.collisions
         self._contacts = ContactFinder(tray) if wanted else None
         self._bodies = BodyCounter(settings, tray)
-        self._recent = RecentTracks()
+        self._recent = TrackWindow()
         self._shares = np.empty((_MEMORY_FRAMES, self._counts.size))
         self._judged_frames = 0
         self._followed: deque[float] = deque(maxlen=_MEMORY_SPEEDS)
@@ -161,9 +161,9 @@ class TrackSpeed:
 
     def _speeds(self, shakes: CycleFollower, expected: NDArray[np.int32]) -> list[SpeedEstimate]:
         series = self._recent.series()
-        mean, *each = mean_speeds_in(
+        mean, *each = mean_speeds_of_series(
             series,
-            self._recent.series(JITTER_PICTURES),
+            self._recent.series(NOISE_FRAMES),
             expected,
             least_distance=self._least_distance,
             species=(None, *range(self._counts.size)),
