@@ -25,9 +25,10 @@ import numpy as np
 from benchmarks.filmed_cycles import Cycle, Film, load, make
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
-from nanorocks_ros.inference.posterior import Posterior, posterior_of, tables_of
+from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.posterior import Posterior, posterior_of
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.records import CorEstimate, CorStatus, PairCollision
 from nanorocks_ros.settings import PipelineSettings, PriorSettings, with_values
@@ -152,8 +153,8 @@ def _said(tray: Tray, cycle: Cycle) -> _Said | None:
     time = np.array(
         [(estimate.stamp_ns - shake_ns) / _NS - final.cooling_start for estimate in used]
     )
-    speed = np.array([estimate.mean_projected_speed for estimate in used])
-    error = np.array([estimate.mean_projected_speed_error for estimate in used])
+    speed = np.array([estimate.mean_projected_speed.value for estimate in used])
+    error = np.array([estimate.mean_projected_speed.error for estimate in used])
     true = np.array([_truth(cycle, estimate.stamp_ns / _NS, estimate.window) for estimate in used])
     ripe = [
         contact
@@ -194,9 +195,11 @@ def _posterior(cycles: list[_Said], how: _From) -> Posterior:
     return posterior_of(
         tables,
         reduce(add, likelihoods).integrated(),
-        (walls, walls) if how.walls_known else (prior.wall_low, prior.wall_high),
-        of_beads=contacts.of_beads(prior.collision_bias),
-        of_walls=contacts.of_walls(prior.rebound_bias),
+        (walls, walls)
+        if how.walls_known
+        else (prior.min_wall_restitution, prior.max_wall_restitution),
+        bead_likelihood=contacts.bead_likelihood(prior.collision_bias),
+        wall_likelihood=contacts.wall_likelihood(prior.rebound_bias),
     )
 
 

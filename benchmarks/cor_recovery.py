@@ -23,10 +23,11 @@ from scipy import special
 from benchmarks.cor_costs import print_costs
 from benchmarks.drawn import varied
 from nanorocks_ros.experiment.trays import Tray, load_trays
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import DecayTables, decay_likelihood
+from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.decay.haff_fit import fit_haff
-from nanorocks_ros.inference.posterior import posterior_of, tables_of
+from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
 from nanorocks_ros.settings import (
@@ -61,7 +62,7 @@ _EXACT = PriorSettings(
     diameter_error=0.0,
     count_error=0.0,
     anisotropy_spread=0.0,
-    start_spread=0.0,
+    speed_distribution_spread=0.0,
     scale_error=0.0,
     speed_bias=0.0,
 )
@@ -209,12 +210,14 @@ def _drawn_from_priors(case: _Range) -> tuple[str, str]:
         drawn = _Case(
             tray=case.tray,
             restitution=random.uniform(case.low, case.high),
-            wall=random.uniform(prior.wall_low, prior.wall_high),
+            wall=random.uniform(prior.min_wall_restitution, prior.max_wall_restitution),
         )
         there, values = varied(tray, drawn.wall, prior, random)
         (speed,) = _speeds(drawn, there, values, range(number, number + 1))
         likelihood = _likelihood(tables, camera, speed)
-        posterior = posterior_of(tables, likelihood, (prior.wall_low, prior.wall_high))
+        posterior = posterior_of(
+            tables, likelihood, (prior.min_wall_restitution, prior.max_wall_restitution)
+        )
         beads.append(posterior.quantiles(_LEVELS) - drawn.restitution)
         walls.append(posterior.wall_quantiles(_LEVELS) - drawn.wall)
     head = '| tray | beads | beads: bias | sd | covered 68 % | 95 % | half of a 68 % interval '

@@ -20,6 +20,7 @@ from benchmarks.drawn import varied
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.experiment.view import View
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
+from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import (
     Frame,
@@ -163,7 +164,7 @@ def _filled(
     for number, cell in cells.items():
         random = np.random.default_rng([film.number, number])
         pairs = random.uniform(*DRAWN_PAIRS)
-        walls = random.uniform(prior.wall_low, prior.wall_high)
+        walls = random.uniform(prior.min_wall_restitution, prior.max_wall_restitution)
         there[number], values = varied(cell, walls, prior, random)
         values |= {'restitution': pairs, 'wall_restitution': walls}
         gases[number] = with_values(common, values, 'benchmark')
@@ -197,9 +198,7 @@ def _make(film: Film) -> None:
                 follow[record.tray].push(record)
     cycles = [follower.cycle(like[number], gases[number]) for number, follower in follow.items()]
     path = folder() / film.name
-    unfinished = path.with_suffix('.part')
-    unfinished.write_bytes(pickle.dumps(cycles))
-    unfinished.replace(path)
+    write_bytes(path, pickle.dumps(cycles))
 
 
 class _Follower:

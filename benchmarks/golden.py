@@ -35,14 +35,14 @@ _ANALYSE_SAMPLE = f'analyse {_SAMPLE} --json -o results'
 _SIMULATE = 'simulate --json --runs 2 --times 11 --trajectory beads.npz --events events.npz'
 _PLATE = '--trays 1 2 3 4 5 6 7 8 --preprocess-layout plate --preprocess-pixels-per-metre 12500'
 # Of each case its commands, run in a folder of its own. 10 s after the shaking event the swinging
-# plate is still faster than the default calm share allows; with 1 all trays give restitutions.
+# plate is still faster than the default ratio allows; with 1 all trays give restitutions.
 CASES = {
     'sample': (_ANALYSE_SAMPLE,),
     'sample_structure': (f'{_ANALYSE_SAMPLE} --speed-method structure_function',),
     'sample_area': (f'{_ANALYSE_SAMPLE} --speed-method binarised_area --cooling-relation paper',),
     'film': (
         'simulate --scene --seed 7 --duration 10 --effects all --bag film --json',
-        f'analyse film --json -o results {_PLATE} --cooling-calm-share 1',
+        f'analyse film --json -o results {_PLATE} --cooling-max-tray-to-bead-speed 1',
     ),
     'tray_1': (f'{_SIMULATE} --tray 1 --duration 10',),
     'tray_3': (f'{_SIMULATE} --tray 3 --duration 5 --tangential-restitution 0.4 --friction 0.3',),

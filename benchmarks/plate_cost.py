@@ -46,9 +46,9 @@ def _push(pipeline: Pipeline, clock: _Clock, frame: Frame) -> list[TrayImage]:
     images = [record for record in records if isinstance(record, TrayImage)]
     for image in images:
         tray = pipeline.trays[image.tray]
-        for speed in clock.timed('speeds', tray.speed.push, image):
+        for speed in clock.timed('speeds', tray.measurement.push, image):
             if isinstance(speed, SpeedEstimate):
-                clock.timed('fits of the decay', tray.cooling.push, speed)
+                clock.timed('fits of the decay', tray.restitution.push, speed)
         clock.timed('autocorrelations', tray.clusters.push, image)
     return images
 

@@ -18,9 +18,9 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.physics.confined_theory import confined_gas
 from nanorocks_ros.physics.rough_spheres import (
     SOLID_SPHERE,
+    rms_spin,
     rough_temperature_ratio,
     smooth_equivalent,
-    spin_of,
     temperature_ratio_course,
 )
 
@@ -204,7 +204,7 @@ def _camera():
     )  # fmt: skip
     for diameter in (0.002, 0.001):
         for speed in (0.010, 0.005, 0.001):
-            spin = spin_of(speed, diameter)
+            spin = rms_spin(speed, diameter)
             turn = math.degrees(spin) / RATE
             surface = 0.5 * spin * diameter * PIXELS / RATE
             _row(

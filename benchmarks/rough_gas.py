@@ -18,10 +18,11 @@ from benchmarks.contacts import contacts_of, true_tracks
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.contacts.contact_estimate import contact_estimate
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.decay.instantaneous_restitution import local_slopes
-from nanorocks_ros.inference.posterior import posterior_of, tables_of
+from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.physics.paper_formulas import (
     RELATIVE_TO_MEAN_SPEED,
     paper_instantaneous_restitution,
@@ -194,15 +195,18 @@ def read_cycles(number, roughness, cycles):
     tables = tables_of(library, tray, prior)
     decays = [decay_likelihood(tables, times, speed, _ERROR * speed, camera) for speed in speeds]
     contacts = [_contacts(tray, settings, run) for run in range(cycles)]
-    together, walls = reduce(add, decays).integrated(), (prior.wall_low, prior.wall_high)
+    together, walls = (
+        reduce(add, decays).integrated(),
+        (prior.min_wall_restitution, prior.max_wall_restitution),
+    )
 
     def with_contacts(decay, found):
         return posterior_of(
             tables,
             decay,
             walls,
-            of_beads=found.of_beads(prior.collision_bias),
-            of_walls=found.of_walls(prior.rebound_bias),
+            bead_likelihood=found.bead_likelihood(prior.collision_bias),
+            wall_likelihood=found.wall_likelihood(prior.rebound_bias),
         )
 
     each = [
@@ -228,7 +232,7 @@ def read_cycles(number, roughness, cycles):
 def _alone(contacts):
     """Restitutions of beads and walls by contacts alone; NaN without any."""
     found = []
-    for term in (contacts.of_beads(), contacts.of_walls()):
+    for term in (contacts.bead_likelihood(), contacts.wall_likelihood()):
         if term is None:
             found.append(math.nan)
         else:

@@ -86,9 +86,9 @@ def _ratios(seed: int, mean_speed: float, found: dict) -> None:
             inside = np.abs(time - estimate.stamp_ns / _NS) <= 0.5 * estimate.window + 1e-6
             true = value[inside].mean()
             column = int(np.digitize(true, _BINS))
-            found[name, column].append(estimate.mean_projected_speed / true)
+            found[name, column].append(estimate.mean_projected_speed.value / true)
             if name == _DEFAULT:
-                found[_OWN_ERROR, column].append(estimate.mean_projected_speed_error / true)
+                found[_OWN_ERROR, column].append(estimate.mean_projected_speed.error / true)
 
 
 def report() -> None:

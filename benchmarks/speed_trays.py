@@ -18,7 +18,7 @@ import numpy as np
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import View
-from nanorocks_ros.jobs.worker_processes import finished_in_processes
+from nanorocks_ros.jobs.worker_processes import run_in_processes
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import Frame, Quality, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.settings import (
@@ -29,6 +29,7 @@ from nanorocks_ros.settings import (
 )
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm, without_effects
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.wire.flat_records import flat_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -93,7 +94,7 @@ def report() -> None:
     # The longest first, so that no process is left with one at the end.
     longest_first = sorted(tasks, key=lambda one: -one.seconds * (1 + one.effects))
     named = {str(task): task for task in longest_first}
-    found = dict(finished_in_processes(_compared, named, _PROCESSES))
+    found = dict(run_in_processes(_compared, named, _PROCESSES))
     for effects in (False, True):
         _print(effects, [found[str(task)] for task in tasks if task.effects is effects])
 
@@ -202,11 +203,11 @@ def _ratios(found: list[SpeedEstimate], truth: np.ndarray) -> list[_Compared]:
             continue
         inside = np.abs(time - middle) <= 0.5 * estimate.window + 1e-6
         true, *species = (float(speed[inside].mean()) for speed in speeds)
-        each = (estimate.first_species_speed, estimate.second_species_speed)
+        each = tuple(flat_value(estimate, f'{name}_species_speed') for name in ('first', 'second'))
         compared.append(
             _Compared(
-                ratio=estimate.mean_projected_speed / true,
-                error=estimate.mean_projected_speed_error / true,
+                ratio=estimate.mean_projected_speed.value / true,
+                error=estimate.mean_projected_speed.error / true,
                 species=tuple(a / b for a, b in zip(each, species, strict=False)),
                 trusted=not estimate.quality,
                 quality=estimate.quality,

@@ -23,6 +23,7 @@ from nanorocks_ros.experiment.view import View
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
 from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
+from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.physics.paper_clusters import paper_onset
 from nanorocks_ros.physics.sticking_rates import slow_contacts
 from nanorocks_ros.pipeline.composition import TrayStages
@@ -218,7 +219,7 @@ def _cycle(one: Filmed, merges: Sequence[Merge], beads: int) -> StickingCycle:
         beads,
         merges,
         np.array([speed.stamp_ns for speed in speeds], dtype=np.int64),
-        np.array([speed.mean_projected_speed for speed in speeds]),
+        np.array([speed.mean_projected_speed.value for speed in speeds]),
         round(_SHAKE * _NS),
     )
 
@@ -253,9 +254,7 @@ def _make(task: tuple[int, bool]) -> None:
         for cell, values in found.items()
     ]
     path = folder() / _name(number, sticks=sticks)
-    unfinished = path.with_suffix('.part')
-    unfinished.write_bytes(pickle.dumps(kept))
-    unfinished.replace(path)
+    write_bytes(path, pickle.dumps(kept))
 
 
 def _film(cells: dict[int, Tray], gases: dict[int, SimulationSettings]) -> dict[int, dict]:
@@ -271,7 +270,7 @@ def _film(cells: dict[int, Tray], gases: dict[int, SimulationSettings]) -> dict[
     stage = Preprocessor(settings, cells, 'film', View(camera=scene.camera.geometry.camera))
     stages = {cell: TrayStages(settings, tray) for cell, tray in cells.items()}
     for each in stages.values():
-        each.speed.emit_tracks = True
+        each.measurement.emit_tracks = True
     tracks: dict[int, list[tuple[int, Tracks]]] = {cell: [] for cell in cells}
     records: dict[int, list] = {cell: [] for cell in cells}
     truth: dict[int, list[tuple[float, float, float]]] = {cell: [] for cell in cells}

@@ -180,7 +180,7 @@ def _detections(
         truth = shot.truth[number]
         own = np.flatnonzero(truth.species == index)
         rows, columns = _pairs(
-            truth.positions[own, :2], one.places / SCALE, 0.6 * float(truth.radii[own].min())
+            truth.positions[own, :2], one.positions / SCALE, 0.6 * float(truth.radii[own].min())
         )
         bead = np.full(one.radii.size, -1)
         bead[columns] = own[rows]
@@ -195,21 +195,21 @@ def _link_ours(found: list[Detections], number: int, index: int) -> list[NDArray
     linker = Linker(
         tray.species[index].count,
         size,
-        settings.fastest * SCALE,
-        settings.longest_gap,
+        settings.max_speed * SCALE,
+        settings.memory,
         settings.window,
         0.0,
     )
     first, numbers = 0, []
     for k, one in enumerate(found):
         first += linker.push(k / RATE, one, np.zeros(2), first)
-        places, _ = linker.places()
-        here = linker.last == k / RATE
+        places, _ = linker.positions()
+        here = linker.last_seen == k / RATE
         row = np.full(one.radii.size, -1)
-        apart = cdist(one.places, places[here])
+        apart = cdist(one.positions, places[here])
         nearest = apart.argmin(axis=1)
         same = apart[np.arange(apart.shape[0]), nearest] == 0.0
-        row[same] = linker.numbers[here][nearest[same]]
+        row[same] = linker.ids[here][nearest[same]]
         numbers.append(row)
     return numbers
 
@@ -224,7 +224,7 @@ def _link_trackpy(
     tray = load_trays()[number]
     reach = diameters * tray.species[index].diameter * SCALE
     frames = np.repeat(np.arange(len(found)), [one.radii.size for one in found])
-    places = np.concatenate([one.places for one in found])
+    places = np.concatenate([one.positions for one in found])
     table = pd.DataFrame({'frame': frames, 'x': places[:, 0], 'y': places[:, 1]})
     predictor = trackpy.predict.NearestVelocityPredict()
     linked = predictor.link_df(table, search_range=reach, memory=int(RATE))

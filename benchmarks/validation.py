@@ -209,7 +209,7 @@ def _silent(tray: ComparedSpeeds) -> float:
     """Share of the speeds chosen from the data that are far off, and do not say so."""
     estimates = [speed for speed in tray.speeds[AUTO] if speed.cycle == 1]
     ratios = np.array(
-        [estimate.mean_projected_speed for estimate in estimates]
+        [estimate.mean_projected_speed.value for estimate in estimates]
     ) / tray.true_speeds(estimates)
     flagged = np.array([bool(estimate.quality) for estimate in estimates])
     return float(np.mean((np.abs(ratios - 1.0) > _FAR_OFF) & ~flagged))

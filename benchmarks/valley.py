@@ -16,9 +16,10 @@ import numpy as np
 from benchmarks.contacts import contacts_of, true_tracks
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood, decay_likelihood
-from nanorocks_ros.inference.posterior import Posterior, posterior_of, tables_of
+from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.posterior import Posterior, posterior_of
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
@@ -90,9 +91,9 @@ def _posterior(tray: int, cycles: list[_Cycle], *, beads: bool, walls: bool) -> 
     return posterior_of(
         tables,
         decay.integrated(),
-        (prior.wall_low, prior.wall_high),
-        of_beads=contacts.of_beads(prior.collision_bias) if beads else None,
-        of_walls=contacts.of_walls(prior.rebound_bias) if walls else None,
+        (prior.min_wall_restitution, prior.max_wall_restitution),
+        bead_likelihood=contacts.bead_likelihood(prior.collision_bias) if beads else None,
+        wall_likelihood=contacts.wall_likelihood(prior.rebound_bias) if walls else None,
     )
 
 

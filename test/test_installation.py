@@ -47,7 +47,7 @@ def test_ros2_run_finds_the_executable(monkeypatch, name):
 
 
 def test_every_node_is_an_executable():
-    tree = ast.parse((ROOT / 'nanorocks_ros' / 'nodes' / '_run.py').read_text())
+    tree = ast.parse((ROOT / 'nanorocks_ros' / 'nodes' / 'run.py').read_text())
     (nodes,) = (
         ast.literal_eval(statement.value)
         for statement in tree.body

@@ -139,18 +139,20 @@ def _print_cycles(results: TrayResults) -> None:
         print('  no COR: no shaking event with a decay after it was found')
     for estimate in cycles:
         print(f'  cycle {estimate.cycle}: {_cor_text(estimate)}')
-        for name in ('first', 'second'):
-            speed, time = (
-                getattr(estimate, f'{name}_species_{what}')
-                for what in ('initial_speed', 'haff_time')
-            )
-            if math.isfinite(time):
-                print(f'    {name} species: v0 {speed * 1e3:.2f} mm/s, tau {time:.2f} s')
+        for name, speed, time in zip(
+            ('first', 'second'),
+            estimate.species_initial_speeds,
+            estimate.species_haff_times,
+            strict=False,
+        ):
+            if math.isfinite(time.value):
+                print(
+                    f'    {name} species: v0 {speed.value * 1e3:.2f} mm/s, tau {time.value:.2f} s'
+                )
     last = cycles[-1] if cycles else None
-    if last is not None and len(cycles) > 1 and math.isfinite(last.mean_restitution):
-        print(
-            f'  all cycles: COR {last.mean_restitution:.4f} +- {last.mean_restitution_error:.4f}'
-        )
+    if last is not None and len(cycles) > 1 and math.isfinite(last.mean_restitution.value):
+        mean = last.mean_restitution
+        print(f'  all cycles: COR {mean.value:.4f} +- {mean.error:.4f}')
     if cycles and results.truth:
         truth = results.truth[-1]
         print(f'  truth:   COR {truth.restitution:g}, walls {truth.wall_restitution:g}')
@@ -164,14 +166,15 @@ def _cor_text(cor: CorEstimate) -> str:
         if cor.quality & Quality.WRONG_SCALE:
             why = 'the trays are not where the settings say'
         return f'COR unknown ({cor.status.name.lower()}: {why})'
+    beads, wall = cor.restitution, cor.wall_restitution
     walls = (
-        f', walls {cor.wall_restitution:.3f} [{cor.wall_restitution_lower:.3f}, '
-        f'{cor.wall_restitution_upper:.3f}], paper says {cor.paper_restitution:.3f}'
+        f', walls {wall.value:.3f} [{wall.lower:.3f}, {wall.upper:.3f}], '
+        f'paper says {cor.paper_restitution:.3f}'
         if cor.relation is CorRelation.LIBRARY
         else ''
     )
     return (
-        f'COR {cor.restitution:.4f} [{cor.restitution_lower:.4f}, {cor.restitution_upper:.4f}] '
+        f'COR {beads.value:.4f} [{beads.lower:.4f}, {beads.upper:.4f}] '
         f'({cor.relation.name.lower()}, {cor.status.name.lower()}), '
-        f'v0 {cor.initial_speed * 1e3:.2f} mm/s, tau {cor.haff_time:.2f} s{walls}'
+        f'v0 {cor.initial_speed.value * 1e3:.2f} mm/s, tau {cor.haff_time.value:.2f} s{walls}'
     )

@@ -11,7 +11,7 @@ from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.outputs.safe_text import counted, shown
+from nanorocks_ros.outputs.safe_text import counted, printable
 
 if TYPE_CHECKING:
     import argparse
@@ -60,13 +60,15 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
     folder = Path(options.output)
     found = find_bags(options.bags)
     for text in found.left_out:
-        _notice(f'{shown(text)}; left out')
+        _notice(f'{printable(text)}; left out')
     for error in found.missing.values():
-        _notice(shown(str(error)))
+        _notice(printable(str(error)))
     if not found.bags:
         raise (
             ConfigurationError(
-                ', '.join(shown(bag) for bag in options.bags), 'name no recording', 'correct them'
+                ', '.join(printable(bag) for bag in options.bags),
+                'name no recording',
+                'correct them',
             )
             if not found.missing
             else next(iter(found.missing.values()))
@@ -82,7 +84,7 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
         print(json.dumps(_as_json(batch, together, folder, report), allow_nan=False))
     else:
         _print(batch, together)
-    _notice(f'results in {shown(folder)}, report in {shown(report)}')
+    _notice(f'results in {printable(folder)}, report in {printable(report)}')
     return _end(batch)
 
 
@@ -103,14 +105,18 @@ def _end(batch: Batch) -> int:
 def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> dict[str, Any]:
     from nanorocks_ros.studies.batch.campaign_means import means_as_json
 
-    shown_keys = 'state', 'frames', 'frames_lost', 'seconds', 'complete', 'notices'
     return {
         'bags': [
             {
                 'bag': result.name,
-                'results': shown(result.folder),
+                'results': printable(result.folder),
                 'same_as': result.twin or None,
-                **{key: result.summary[key] for key in shown_keys},
+                'state': result.summary['state'],
+                'frames': result.summary['frames'],
+                'frames_lost': result.summary['frames_lost'],
+                'seconds': result.summary['seconds'],
+                'complete': result.summary['complete'],
+                'notices': result.summary['notices'],
                 'trays': {
                     number: {'cycles': tray['cycles'], 'truth': tray['truth']}
                     for number, tray in result.summary['trays'].items()
@@ -123,18 +129,18 @@ def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> di
             {'bag': failure.name, 'reason': failure.reason, 'analysed': failure.analysed}
             for failure in batch.failed
         ],
-        'results': shown(folder),
-        'report': shown(report),
+        'results': printable(folder),
+        'report': printable(report),
     }
 
 
 def _print(batch: Batch, together: Combined) -> None:
-    from nanorocks_ros.studies.batch.batch_analysis import told
+    from nanorocks_ros.studies.batch.batch_analysis import merged_notes
 
     frames = sum(result.summary['frames'] for result in batch.results)
     seconds = sum(result.summary['seconds'] for result in batch.results)
     print(f'{counted(len(batch.results), "recording")}, {frames} frames, {seconds:.0f} s')
-    for text in told(batch.results):
+    for text in merged_notes(batch.results):
         print(text)
     for number, tray in sorted(together.trays.items()):
         cycles, recordings = counted(tray.cycles, 'cycle'), counted(tray.recordings, 'recording')

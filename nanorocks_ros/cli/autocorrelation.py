@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
@@ -71,10 +72,7 @@ def run(options: argparse.Namespace) -> int:
 def _print(found: BagClusters, *, as_json: bool) -> None:
     ends = {number: _end(tray) for number, tray in found.trays.items()}
     if as_json:
-        shown = {
-            str(number): {name: _known(value) for name, value in end.items()}
-            for number, end in ends.items()
-        }
+        shown = {str(number): json_values(end) for number, end in ends.items()}
         print(json.dumps({'cycle': found.cycle, 'trays': shown}, allow_nan=False))
         return
     for number, end in ends.items():
@@ -102,16 +100,12 @@ def _end(tray: CycleClusters) -> dict[str, Any]:
         'breadth': last.breadth,
         'axes_ratio': last.axes_ratio,
         'direction': last.direction,
-        'cluster_size': last.cluster_size,
-        'cluster_size_error': last.cluster_size_error,
-        'cluster_size_lower': last.cluster_size_lower,
-        'cluster_size_upper': last.cluster_size_upper,
+        'cluster_size': last.cluster_size.value,
+        'cluster_size_error': last.cluster_size.error,
+        'cluster_size_lower': last.cluster_size.lower,
+        'cluster_size_upper': last.cluster_size.upper,
         'size_status': last.size_status.name.lower(),
         'true_cluster_size': float(tray.true_sizes()[-1]),
         'paper_onset': tray.paper_onset(),
         'true_onset': tray.true_onset(),
     }
-
-
-def _known(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value

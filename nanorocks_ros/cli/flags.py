@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.settings import PipelineSettings, SettingRow, rows, with_values
+from nanorocks_ros.settings import (
+    PipelineSettings,
+    SettingRow,
+    rows,
+    with_current_names,
+    with_values,
+)
 
 SettingsType = TypeVar('SettingsType')
+_LOGGER = logging.getLogger(__name__)
 
 
 def add_flags(
@@ -23,13 +31,18 @@ def add_flags(
         if row.name in skip:
             continue
         unit = f' [{row.unit}]' if row.unit else ''
+        nargs = '*' if isinstance(row.default, tuple) else None
         group.add_argument(
             flag_of(row.name),
             dest=row.name,
             metavar='V',
-            nargs='*' if isinstance(row.default, tuple) else None,
+            nargs=nargs,
             help=f'{row.doc}{unit}; default {_shown(row)}'.replace('%', '%%'),
         )
+        if row.deprecated:
+            group.add_argument(
+                flag_of(row.deprecated), dest=row.deprecated, nargs=nargs, help=argparse.SUPPRESS
+            )
 
 
 def add_bag(
@@ -71,13 +84,21 @@ def settings_from(
         For a file that cannot be read, an unknown name, or a value that cannot be used.
     """
     if parameters:
-        settings = with_values(settings, _from_file(Path(parameters)), parameters)
+        settings = _replaced(settings, _from_file(Path(parameters)), parameters)
     given = {
-        row.name: _parsed(row, getattr(options, row.name))
+        name: _parsed(row, getattr(options, name))
         for row in rows(settings)
-        if getattr(options, row.name, None) is not None
+        for name in (row.name, row.deprecated)
+        if getattr(options, name, None) is not None
     }
-    return with_values(settings, given, 'command line')
+    return _replaced(settings, given, 'command line')
+
+
+def _replaced(settings: SettingsType, values: dict[str, Any], where: str) -> SettingsType:
+    values, messages = with_current_names(settings, values, where)
+    for message in messages:
+        _LOGGER.warning(message)
+    return with_values(settings, values, where)
 
 
 def _parsed(row: SettingRow, text: Any) -> Any:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
@@ -96,19 +97,15 @@ def _tray_as_json(steps: TraySteps) -> dict[str, Any]:
     image, tracks = steps.image, steps.tracks
     return {
         'cycle': image.cycle,
-        'displacement': [_known(one) for one in image.displacement],
-        'displacement_error': _known(image.displacement_error),
-        'noise_power': _known(image.noise_power),
-        'glare': _known(image.glare),
+        'displacement': [finite_or_none(value) for value in image.displacement],
+        'displacement_error': finite_or_none(image.displacement_error),
+        'noise_power': finite_or_none(image.noise_power),
+        'glare': finite_or_none(image.glare),
         'quality': image.quality.names(),
         'moving_area': steps.moving_area,
         'seen': None if tracks is None else int(tracks.seen.sum()),
         'expected': steps.tray.count,
     }
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _print(steps: FrameSteps) -> None:

@@ -97,9 +97,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.close()
         return 0
     except OSError as error:
-        from nanorocks_ros.outputs.safe_text import shown
+        from nanorocks_ros.outputs.safe_text import printable
 
-        where = '' if error.filename is None else f'{shown(str(error.filename))}: '
+        where = '' if error.filename is None else f'{printable(str(error.filename))}: '
         what = f'{where}{error.strerror or error}'
         print(f'nanorocks: {what}; make room, or write elsewhere', file=sys.stderr)
         return EXIT_INPUT

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Iterable
 
     from nanorocks_ros.studies.inspection.speed_comparison import BagSpeeds, ComparedSpeeds
 
@@ -109,19 +108,19 @@ def _method_as_json(found: BagSpeeds, tray: ComparedSpeeds, method: str) -> dict
     return {
         'time': [(speed.stamp_ns - found.epoch_ns) / 1e9 for speed in speeds],
         'cycle': [speed.cycle for speed in speeds],
-        'mean_projected_speed': _known(speed.mean_projected_speed for speed in speeds),
-        'mean_projected_speed_error': _known(speed.mean_projected_speed_error for speed in speeds),
+        'mean_projected_speed': json_values(
+            [speed.mean_projected_speed.value for speed in speeds]
+        ),
+        'mean_projected_speed_error': json_values(
+            [speed.mean_projected_speed.error for speed in speeds]
+        ),
         'window': [speed.window for speed in speeds],
         'method': [speed.method.name.lower() for speed in speeds],
         'quality': [speed.quality.names() for speed in speeds],
-        'true_mean_projected_speed': _known(tray.true_speeds(speeds).tolist()),
+        'true_mean_projected_speed': json_values(tray.true_speeds(speeds)),
         'ratio_to_truth': float(ratios.mean()) if ratios.size else None,
         'ratio_to_truth_scatter': float(ratios.std()) if ratios.size else None,
     }
-
-
-def _known(values: Iterable[float]) -> list[float | None]:
-    return [value if math.isfinite(value) else None for value in values]
 
 
 def _print(found: BagSpeeds, cycle: int) -> None:

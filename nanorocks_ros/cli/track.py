@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
@@ -173,10 +174,7 @@ def _comparison_as_json(found: TrackComparison | None) -> dict[str, Any] | None:
         )
     }
     values['offset'] = list(found.offset)
-    known = {
-        name: None if isinstance(value, float) and math.isnan(value) else value
-        for name, value in values.items()
-    }
+    known: dict[str, Any] = json_values(values)
     if math.isnan(found.offset[0]):
         known['offset'] = None
     return known

@@ -1,4 +1,4 @@
-"""Who may see the page: this machine alone, or whoever knows the token."""
+"""Access to the page: from this machine alone, or with a token."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 SHORTEST_TOKEN = 12
-# Wrong tokens within a minute, from everybody, before nobody is asked any more.
+# Failed attempts per minute, from all clients, after which all are refused.
 _MOST_FAILURES, _PER_S = 30, 60.0
 
 
 class Access:
-    """Decides on every request.
+    """The access rules for requests.
 
     Parameters
     ----------
@@ -54,17 +54,17 @@ class Access:
 
     @property
     def cookie(self) -> str:
-        """What a browser keeps in place of the token; outlives a restart with the same token."""
+        """Value of the cookie that stands for the token; the same after a restart."""
         return hashlib.sha256(f'nanorocks {self.token}'.encode()).hexdigest()
 
     def host_is_ours(self, host: str) -> bool:
-        """Whether a request was meant for us.
+        """Whether the Host header of a request names this server.
 
         A page elsewhere can let its own name point to a loopback address, and so read what is
         served there without a token; the name in the request gives it away.
         """
         if not self.is_local:
-            # The cookie belongs to the name it was set under, and without it nothing is served.
+            # The cookie is bound to the host name, and nothing is served without it.
             return True
         name = _hostname(f'//{host}')
         return name in ('localhost', self.host.lower()) or _is_loopback_number(name)
@@ -79,14 +79,14 @@ class Access:
             return False
 
     def is_token(self, text: str) -> bool:
-        """Whether a text is the token; one that is not counts as an attempt."""
+        """Whether a text is the token; a wrong text counts as a failed attempt."""
         right = bool(self.token) and _same(text, self.token)
         if not right:
             self._failures.append(time.monotonic())
         return right
 
     def is_known(self, headers: Mapping[str, str], cookie: str) -> bool:
-        """Whether a request brings the cookie, or the token in a header."""
+        """Whether a request has the cookie, or the token in a header."""
         if not self.token or _same(cookie, self.cookie):
             return True
         kind, _, given = headers.get('Authorization', '').partition(' ')
@@ -94,7 +94,7 @@ class Access:
 
     @property
     def is_tired(self) -> bool:
-        """Whether too many wrong tokens were given lately."""
+        """Whether the limit of failed attempts per minute is reached."""
         full = len(self._failures) == _MOST_FAILURES
         return full and time.monotonic() - self._failures[0] < _PER_S
 
@@ -108,16 +108,16 @@ def is_loopback(host: str) -> bool:
         For a name without an address.
     """
     try:
-        found = socket.getaddrinfo(host or None, 0, flags=socket.AI_PASSIVE)
+        addresses = socket.getaddrinfo(host or None, 0, flags=socket.AI_PASSIVE)
     except (OSError, UnicodeError) as error:
         raise DashboardError(
             f'host {host!r}', 'has no address here', 'name one of this machine, or 127.0.0.1'
         ) from error
-    return all(_is_loopback_number(str(address[0])) for *_, address in found)
+    return all(_is_loopback_number(str(address[0])) for *_, address in addresses)
 
 
 def _same(given: str, right: str) -> bool:
-    # In a time that does not tell how much of it is right.
+    # In constant time.
     return hmac.compare_digest(given.encode('utf-8', 'replace'), right.encode())
 
 

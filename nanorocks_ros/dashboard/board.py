@@ -1,7 +1,7 @@
-"""What the page shows: of each tray the present cycle and what was found last, and every node.
+"""The contents of the page: current cycle and latest results of each tray, and all nodes.
 
-Nothing here waits for a client. Each keeps a `Cursor` of what it was told, and `Board.news` is the
-difference to now: a slow client misses steps on the way, and a new one gets the whole cycle.
+Nothing here waits for a client. A `Cursor` per client records what was sent; `Board.news` returns
+the difference to now. A slow client misses intermediate steps, a new one gets the whole cycle.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from nanorocks_ros.dashboard.tray_board import TrayBoard
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from nanorocks_ros.dashboard.tray_board import Cursor, Shown
+    from nanorocks_ros.dashboard.tray_board import Cursor
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.records import ArrayRecord
 
-# Nodes and values of a node that are remembered: a page needs no more.
+# Limits of nodes and of values per node.
 _MOST_NODES, _MOST_VALUES = 64, 48
 _LONGEST_NAME, _LONGEST_TEXT = 80, 300
 _FORGOTTEN_S = 60.0
@@ -29,7 +30,7 @@ class Board:
     Parameters
     ----------
     trays : mapping of int to Tray
-        For what is said of them; others are shown without.
+        For their descriptions; other trays are shown without.
     """
 
     def __init__(self, trays: Mapping[int, Tray]) -> None:
@@ -38,12 +39,12 @@ class Board:
         self._nodes: dict[str, dict[str, Any]] = {}
         self._nodes_version = 0
 
-    def take(self, record: Shown, now_s: float) -> None:
+    def take(self, record: ArrayRecord, now_s: float) -> None:
         """Note a result.
 
         Parameters
         ----------
-        record : SpeedEstimate, CorEstimate, ClusterEstimate or GroundTruth
+        record : any of `wire.products.CURVES`
         now_s : float, [s]
             Of a clock that never goes back.
         """
@@ -51,7 +52,7 @@ class Board:
         self._trays[record.tray].take(record, now_s)
 
     def expect(self, number: int, now_s: float) -> None:
-        """Show a tray of which nothing is known but that somebody will tell."""
+        """Show a tray that has no results yet."""
         if number not in self._trays:
             self._trays[number] = TrayBoard(describe(self._known.get(number)), heard_s=now_s)
 
@@ -60,12 +61,12 @@ class Board:
         statuses: Iterable[tuple[str, int, str, Sequence[tuple[str, str]]]],
         now_s: float,
     ) -> None:
-        """Note what nodes say of themselves: name, level, text, and pairs of names and values."""
+        """Note the diagnostics of nodes: name, level, text, and pairs of names and values."""
         for name, level, text, values in statuses:
-            shown = clean(name, _LONGEST_NAME)
-            if shown not in self._nodes and len(self._nodes) >= _MOST_NODES:
+            node = clean(name, _LONGEST_NAME)
+            if node not in self._nodes and len(self._nodes) >= _MOST_NODES:
                 continue
-            self._nodes[shown] = {
+            self._nodes[node] = {
                 'level': _LEVELS.get(level, 'error'),
                 'text': clean(text, _LONGEST_TEXT),
                 'values': [
@@ -82,18 +83,18 @@ class Board:
         self._nodes_version += 1
 
     def news(self, cursor: Cursor, now_s: float) -> dict[str, Any]:
-        """What the cursor does not know yet, empty when there is nothing."""
-        told: dict[str, Any] = {}
+        """The changes since the cursor, empty without any; the cursor is moved to now."""
+        news: dict[str, Any] = {}
         trays = {
             str(number): tray.news(number, cursor, now_s)
             for number, tray in sorted(self._trays.items())
             if cursor.trays.get(number) != (tray.serial, tray.version)
         }
         if trays:
-            told['trays'] = trays
+            news['trays'] = trays
         if cursor.nodes != self._nodes_version:
             cursor.nodes = self._nodes_version
-            told['nodes'] = [
+            news['nodes'] = [
                 {
                     'name': name,
                     **{key: value for key, value in node.items() if key != 'heard_s'},
@@ -101,22 +102,24 @@ class Board:
                 }
                 for name, node in sorted(self._nodes.items())
             ]
-        return told
+        return news
 
 
 def describe(tray: Tray | None) -> str:
-    """What lies in a tray, in words."""
+    """The contents of a tray, in words."""
     if tray is None:
         return ''
     kinds = []
-    for one in tray.species:
-        low, high = 1e3 * one.diameter_low, 1e3 * one.diameter_high
+    for species in tray.species:
+        low, high = 1e3 * species.diameter_low, 1e3 * species.diameter_high
         size = f'{low:.3g}' if low == high else f'{low:.3g} to {high:.3g}'
-        kinds.append(f'{one.count} {one.material} {size} mm')
+        kinds.append(f'{species.count} {species.material} {size} mm')
     return clean(', '.join(kinds) + (', with chalk' if tray.chalk else ''), _LONGEST_TEXT)
 
 
 def clean(text: str, longest: int) -> str:
-    """A text from outside: cut, and without characters that turn or hide others."""
-    shown = ''.join(one if one.isprintable() else '\N{REPLACEMENT CHARACTER}' for one in text)
-    return shown if len(shown) <= longest else f'{shown[: longest - 1]}…'
+    """A text from outside: cut, unprintable characters replaced."""
+    printable = ''.join(
+        character if character.isprintable() else '\N{REPLACEMENT CHARACTER}' for character in text
+    )
+    return printable if len(printable) <= longest else f'{printable[: longest - 1]}…'

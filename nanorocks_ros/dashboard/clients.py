@@ -1,4 +1,4 @@
-"""One browser: what it looks at, and how much of what it was sent it has taken."""
+"""The connection to one browser: viewed images, and flow control by acknowledgements."""
 
 from __future__ import annotations
 
@@ -16,40 +16,40 @@ if TYPE_CHECKING:
     from nanorocks_ros.dashboard.board import Board
 
 Look = tuple[int, str]
-"""A tray, and one of `LAYERS`."""
+"""Tray number and one of `LAYERS`."""
 
-# Steps that may be on their way: with two, a far client does not wait for each by turns.
+# Unacknowledged steps: two hide the latency of a distant client.
 _AHEAD = 2
 _MOST_TRAYS = 99
 
 
 class Pictures:
-    """The last picture of each kind, which is all that anybody gets."""
+    """The latest image of each tray and layer; older images are dropped."""
 
     def __init__(self) -> None:
         self._latest: dict[Look, tuple[int, bytes]] = {}
         self._count = 0
 
     def put(self, look: Look, content: bytes) -> None:
-        """Keep a picture in place of the one before."""
+        """Replace the image of a tray and layer."""
         self._count += 1
         self._latest[look] = (self._count, content)
 
     def newer(self, look: Look, than: int) -> tuple[int, bytes] | None:
-        """The last picture with its number, if it is newer."""
-        found = self._latest.get(look)
-        return found if found is not None and found[0] > than else None
+        """The latest image with its number, or None if it is not newer."""
+        picture = self._latest.get(look)
+        return picture if picture is not None and picture[0] > than else None
 
     def keep(self, wanted: frozenset[Look]) -> None:
-        """Forget what nobody looks at: it would be shown as if it were new."""
-        self._latest = {look: one for look, one in self._latest.items() if look in wanted}
+        """Drop images that no browser views: they would be shown as new later."""
+        self._latest = {look: picture for look, picture in self._latest.items() if look in wanted}
 
 
 class Client:
-    """Sends one browser what is new, step by step, and never more than it takes.
+    """Sends the changes to one browser, no faster than it acknowledges them.
 
-    The browser acknowledges each step. What it has not taken is not sent, so that nothing piles
-    up, here or on the way: the next step has what is new then.
+    The browser acknowledges each step. With too many steps unacknowledged nothing is sent, so
+    that nothing queues up; the next step then has all changes.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Client:
         self.looks: frozenset[Look] = frozenset()
 
     async def run(self, greeting: dict[str, Any]) -> None:
-        """Send until the connection ends."""
+        """Send changes until the connection ends."""
         try:
             await self._socket.send_str(json.dumps(greeting))
             while True:
@@ -83,18 +83,18 @@ class Client:
                 if self._sent - self._seen < _AHEAD and await self._step():
                     await asyncio.sleep(self._pause_s)
         except ConnectionError:
-            # The browser went away; whoever reads from it hears of that too.
+            # The browser disconnected; the reader of the connection notices it, too.
             return
 
     async def close(self) -> None:
-        """Say goodbye."""
+        """Close the connection with code 1001."""
         await self._socket.close(code=1001, message=b'the server ends')
 
     async def _step(self) -> bool:
         pictures = [
-            (look, found)
+            (look, picture)
             for look in sorted(self.looks)
-            if (found := self._pictures.newer(look, self._shown.get(look, 0)))
+            if (picture := self._pictures.newer(look, self._shown.get(look, 0)))
         ]
         news = self._board.news(self._cursor, time.monotonic())
         if not pictures and not news:
@@ -108,28 +108,28 @@ class Client:
         return True
 
     def hear(self, text: str) -> None:
-        """Take what the browser says.
+        """Handle a message of the browser.
 
         Raises
         ------
         ValueError
-            When our page would not say that.
+            For a message that the page never sends.
         """
-        said = json.loads(text)
-        if not isinstance(said, dict):
+        message = json.loads(text)
+        if not isinstance(message, dict):
             raise ValueError('no object')
-        if type(seen := said.get('seen', 0)) is not int:
+        if type(seen := message.get('seen', 0)) is not int:
             raise ValueError('no number')
         self._seen = max(self._seen, min(seen, self._sent))
-        if 'look' in said:
-            self.looks = _looks(said['look'])
+        if 'look' in message:
+            self.looks = _looks(message['look'])
         self.changed.set()
 
 
-def _looks(said: Any) -> frozenset[Look]:
-    if said is None:
+def _looks(request: Any) -> frozenset[Look]:
+    if request is None:
         return frozenset()
-    tray, layers = said['tray'], said['layers']
+    tray, layers = request['tray'], request['layers']
     if type(tray) is not int or not 0 < tray <= _MOST_TRAYS or not isinstance(layers, list):
         raise ValueError('no tray with its layers')
     if any(layer not in LAYERS for layer in layers):

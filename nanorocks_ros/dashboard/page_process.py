@@ -1,4 +1,4 @@
-"""The process in which the page is served: the node that hears the graph."""
+"""The command and environment of the process that serves the page, the node `dashboard`."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ TOKEN_VARIABLE = 'NANOROCKS_DASHBOARD_TOKEN'
 """Environment variable that holds the token, where it is not to be seen in a command line."""
 
 
-# Twice _ is no part of a name where rcl reads one in a command line.
+# rcl refuses two underscores in a row in names on the command line.
 _NAMESPACE = re.compile(r'(?!.*__)(/[A-Za-z_][A-Za-z0-9_]*)+')
 # What ROS allows (RMW_NAMESPACE_MAX_NAME_LENGTH).
 _LONGEST_NAMESPACE = 245
 
 
 def full_namespace(text: str) -> str:
-    """A namespace as ROS has it, which begins with a slash and does not end with one.
+    """A full ROS namespace: it begins with a slash and does not end with one.
 
     Parameters
     ----------
@@ -73,5 +73,5 @@ def node_command(
 
 
 def with_token(environment: Mapping[str, str], token: str) -> dict[str, str]:
-    """The environment of that process; other users of a machine see command lines, not this."""
+    """The environment of that process, with the token: command lines are visible to all users."""
     return {**environment, TOKEN_VARIABLE: token} if token else dict(environment)

@@ -1,4 +1,4 @@
-"""Serves the page and what is new on it, from a thread of its own."""
+"""The server of the page, in a thread of its own."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
     from nanorocks_ros.dashboard.board import Board
-    from nanorocks_ros.dashboard.tray_board import Shown
+    from nanorocks_ros.records import ArrayRecord
     from nanorocks_ros.settings import DashboardSettings
 
 _MOST_CLIENTS = 64
@@ -43,7 +43,7 @@ _FAREWELL_S = 1.0
 
 
 def _is_our_fault(record: logging.LogRecord) -> bool:
-    """Whether what is logged is more than a request that is none, which has its answer, 400."""
+    """Whether a log record is about more than a malformed request, which is answered with 400."""
     error = record.exc_info[1] if record.exc_info else None
     return not isinstance(error, HttpProcessingError | web.RequestPayloadError)
 
@@ -80,17 +80,17 @@ class PageServer:
 
     @property
     def port(self) -> int:
-        """Where it is served."""
+        """Port on which the page is served."""
         return self._port
 
     @property
     def clients(self) -> int:
-        """Browsers that look."""
+        """Number of connected browsers."""
         return len(self._clients)
 
     @property
     def url(self) -> str:
-        """What to open in a browser, the token included."""
+        """Address of the page, with the token."""
         host = self._settings.host
         if host in ('0.0.0.0', '::'):
             host = socket.gethostname()
@@ -125,7 +125,7 @@ class PageServer:
             ) from error
 
     def stop(self) -> None:
-        """Tell the browsers, and end the thread."""
+        """Close all connections and end the thread."""
         if self._loop.is_closed():
             return
         farewell: Future[None] = asyncio.run_coroutine_threadsafe(self._close(), self._loop)
@@ -137,21 +137,21 @@ class PageServer:
         self._thread.join(_FAREWELL_S)
 
     def expect(self, tray: int) -> None:
-        """Show that a tray is there."""
+        """Show a tray that has no results yet."""
         self._soon(self._board.expect, tray, time.monotonic())
 
-    def take(self, record: Shown) -> None:
+    def take(self, record: ArrayRecord) -> None:
         """Show a result."""
         self._soon(self._board.take, record, time.monotonic())
 
     def diagnose(
         self, statuses: Sequence[tuple[str, int, str, Sequence[tuple[str, str]]]]
     ) -> None:
-        """Show what nodes say of themselves: name, level, text, names and values."""
+        """Show the diagnostics of nodes: name, level, text, names and values."""
         self._soon(self._board.diagnose, statuses, time.monotonic())
 
     def show(self, look: Look, content: bytes) -> None:
-        """Show a picture that somebody looks at."""
+        """Show an image that a browser views."""
         self._soon(self._pictures.put, look, content)
 
     def _soon(self, work: Callable[..., None], *arguments: Any) -> None:

@@ -1,4 +1,4 @@
-"""What there is to ask for: the page, its files, the way in, and the live connection."""
+"""The routes of the site: page, files, login, live connection."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _HEADERS = {
 }
 _MOST_POSTED_BYTES = 4096
 _YEAR_S = 365 * 86400
-# What somebody who is not let in yet may see.
+# Served without a token.
 _IN_FRONT = frozenset(('/login', '/style.css', '/icon.svg'))
 _AFTER_A_WRONG_TOKEN_S = 0.5
 
@@ -94,7 +94,7 @@ async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
 
 
 class _Entrance:
-    """Lets in who may see the page."""
+    """Checks access and serves the login form."""
 
     def __init__(self, access: Access, cookie: str) -> None:
         self._access, self._cookie = access, cookie
@@ -103,7 +103,7 @@ class _Entrance:
 
     @web.middleware
     async def check(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        """Refuse who came by another name, from another page, or without the token."""
+        """Refuse requests with a foreign host or origin, or without the token."""
         if 'Host' not in request.headers:
             # Old versions of aiohttp make one up.
             return _refused(400, 'asked for without a host')
@@ -126,13 +126,13 @@ class _Entrance:
         return await self._answer(given)
 
     async def page(self, request: web.Request) -> web.StreamResponse:
-        """The page; without the token in its address, which would be kept and passed on."""
+        """The page; a token in the address is moved to the cookie: addresses are stored."""
         if 'token' in request.query:
             return await self._first_visit(request)
         return await self._page(request)
 
     async def ask(self, request: web.Request) -> web.StreamResponse:
-        """The form that asks for the token."""
+        """The login form."""
         return await self._form(request)
 
     async def log_in(self, request: web.Request) -> web.StreamResponse:

@@ -1,55 +1,40 @@
-"""One tray on the page: the curves of the present cycle, what was found last, and past cycles.
+"""One tray on the page: curves of the current cycle, latest results, past cycles.
 
-Each client keeps a `Cursor` of what it was told.
+A `Cursor` per client records what was sent to it.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 from typing import Any
 
+from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.records import (
-    ClusterEstimate,
+    ArrayRecord,
     CorEstimate,
     CorStatus,
     GroundTruth,
     SpeedEstimate,
 )
 from nanorocks_ros.wire.array_layouts import NS
+from nanorocks_ros.wire.flat_records import flat_names, flat_value
+from nanorocks_ros.wire.products import CURVES
 
-Measured = SpeedEstimate | CorEstimate | ClusterEstimate
-Shown = Measured | GroundTruth
 Row = list[float | None]
 
 # Points of a curve; at ten a second the longest cycle of the flight has 600.
 MOST_POINTS = 4096
-# Cycles that are remembered: a page needs no more.
+# Past cycles that are kept.
 _MOST_CYCLES = 200
-# The clock of a source that starts again; windows of one kind overlap by less.
+# A step back by more is a restart of the source; windows of a method overlap by less.
 _BACK_NS = NS // 2
-_COLUMNS: dict[type, tuple[str, tuple[str, ...]]] = {
-    SpeedEstimate: ('speed', ('mean_projected_speed', 'mean_projected_speed_error')),
-    CorEstimate: (
-        'cor',
-        (
-            'restitution',
-            'restitution_lower',
-            'restitution_upper',
-            'wall_restitution',
-            'wall_restitution_lower',
-            'wall_restitution_upper',
-        ),
-    ),
-    ClusterEstimate: ('cluster', ('combined_size', 'combined_size_error')),
-    GroundTruth: ('truth', ('mean_projected_speed',)),
-}
 _NOT_SHOWN = {'stamp_ns', 'tray', 'cycle_start_ns'}
 
 
 class Series:
-    """Points of a curve in order of time, of which old ones are thinned when there are many."""
+    """Points of a curve in order of time; halved in number when there are too many."""
 
     def __init__(self) -> None:
         self.rows: list[Row] = []
@@ -63,32 +48,32 @@ class Series:
             self.generation += 1
 
     def cut(self, time: float) -> None:
-        """Take back what is later."""
+        """Remove the points later than a time, [s]."""
         kept = [row for row in self.rows if row[0] is None or row[0] <= time]
         if len(kept) < len(self.rows):
             self.rows = kept
             self.generation += 1
 
     def drop_before(self, time: float) -> None:
-        """Forget what is earlier."""
+        """Remove the points earlier than a time, [s]."""
         self.rows = [row for row in self.rows if row[0] is not None and row[0] >= time]
         self.generation += 1
 
-    def since(self, told: tuple[int, int]) -> tuple[int, list[Row]]:
-        """Where new points begin, and the points."""
-        generation, count = told
+    def since(self, end: tuple[int, int]) -> tuple[int, list[Row]]:
+        """Index of the first new point, and the new points."""
+        generation, count = end
         first = count if generation == self.generation else 0
         return first, self.rows[first:]
 
     @property
     def end(self) -> tuple[int, int]:
-        """What somebody knows who was told everything."""
+        """The position of a client that has all points."""
         return self.generation, len(self.rows)
 
 
 @dataclass
 class Cursor:
-    """What a client was told."""
+    """What was sent to a client."""
 
     trays: dict[int, tuple[int, int]] = field(default_factory=dict)
     series: dict[tuple[int, str], tuple[int, int]] = field(default_factory=dict)
@@ -111,7 +96,7 @@ class TrayBoard:
     version : int
         Rises with every record.
     heard_s : float, [s]
-        When something measured came last; the truth is none.
+        Time of the last measured record; the truth does not count.
     """
 
     description: str
@@ -129,13 +114,13 @@ class TrayBoard:
     def __post_init__(self) -> None:
         self._clear()
 
-    def take(self, record: Shown, now_s: float) -> None:
+    def take(self, record: ArrayRecord, now_s: float) -> None:
         """Note a record."""
         self.version += 1
         if isinstance(record, GroundTruth):
             self._take_truth(record)
             return
-        name, _ = _COLUMNS[type(record)]
+        name = CURVES[type(record)].name
         # A merge that became known later ends the window where beads began to stick.
         ended = (
             isinstance(record, CorEstimate)
@@ -153,29 +138,30 @@ class TrayBoard:
         if record.cycle > self.cycle:
             self._begin(record)
         if record.cycle < self.cycle:
-            # Known seconds later, of the cycle before: only the number that is final counts.
+            # A late estimate of an earlier cycle: only the final one is shown.
             return
         self._learn_start(record)
         self._note(record)
 
     def _take_truth(self, truth: GroundTruth) -> None:
-        """Put the truth beside what is measured at that time, whatever its cycle.
+        """Add the truth by time, whatever its cycle.
 
-        It counts cycles from the start of the simulator, a node that measures from when it joined.
+        The simulator counts cycles from its start, a measuring node from when it joined.
         """
         if truth.stamp_ns < self._stamps.get('truth', truth.stamp_ns) - _BACK_NS:
             self.series['truth'].cut(-math.inf)
         self._note(truth)
 
-    def _note(self, record: Shown) -> None:
-        name, columns = _COLUMNS[type(record)]
+    def _note(self, record: ArrayRecord) -> None:
+        product = CURVES[type(record)]
+        name = product.name
         self._stamps[name] = record.stamp_ns
         self.latest[name] = as_fields(record)
-        values = (_number(getattr(record, column)) for column in columns)
+        values = (_number(flat_value(record, column)) for column in product.curve)
         self.series[name].append([_number(record.stamp_ns / NS), *values])
 
-    def _start_again(self, record: Measured, last_ns: int) -> None:
-        """Forget what the source told before its clock went back from `last_ns`."""
+    def _start_again(self, record: ArrayRecord, last_ns: int) -> None:
+        """Drop the results from before the clock of the source went back from `last_ns`."""
         self.finals.clear()
         self._finals_version += 1
         # The truth may have gone back first, and then belongs to what begins here.
@@ -183,8 +169,8 @@ class TrayBoard:
             self._clear()
         self._begin(record)
 
-    def _begin(self, record: Measured) -> None:
-        """Show the cycle of a record, with the truth since it began or, not known, since then."""
+    def _begin(self, record: ArrayRecord) -> None:
+        """Show the cycle of a record, with the truth since its start, or since the record."""
         truth, latest = self.series['truth'], self.latest.get('truth')
         stamp_ns = self._stamps.get('truth')
         self._clear()
@@ -199,35 +185,35 @@ class TrayBoard:
     def _clear(self) -> None:
         self.start_ns = None
         self.serial += 1
-        self.series = {name: Series() for name, _ in _COLUMNS.values()}
+        self.series = {product.name: Series() for product in CURVES.values()}
         self.latest = {}
         self._stamps = {}
 
     def _finish(self, record: CorEstimate) -> None:
         self.finals[record.cycle] = [
             record.cycle,
-            _number(record.restitution),
-            _number(record.restitution_lower),
-            _number(record.restitution_upper),
+            _number(record.restitution.value),
+            _number(record.restitution.lower),
+            _number(record.restitution.upper),
         ]
         self._finals_version += 1
         while len(self.finals) > _MOST_CYCLES:
             del self.finals[min(self.finals)]
 
-    def _learn_start(self, record: Measured) -> None:
+    def _learn_start(self, record: ArrayRecord) -> None:
         if isinstance(record, SpeedEstimate) and record.cycle_start_ns is not None:
             self.start_ns = record.cycle_start_ns
         if self.start_ns is not None or not isinstance(record, CorEstimate):
             return
         if math.isfinite(record.window_end):
-            # Whoever comes late has the latched estimates before the first speed.
+            # A late subscriber gets the latched estimates before the first speed.
             self.start_ns = record.stamp_ns - round(record.window_end * NS)
 
     def news(self, number: int, cursor: Cursor, now_s: float) -> dict[str, Any]:
-        """What the cursor does not know yet; the cursor knows it afterwards."""
+        """The changes since the cursor; the cursor is moved to now."""
         known_serial = cursor.trays.get(number, (0, 0))[0]
         cursor.trays[number] = (self.serial, self.version)
-        told: dict[str, Any] = {
+        news: dict[str, Any] = {
             'description': self.description,
             'cycle': self.cycle,
             'serial': self.serial,
@@ -237,33 +223,33 @@ class TrayBoard:
         }
         if cursor.finals.get(number) != self._finals_version:
             cursor.finals[number] = self._finals_version
-            told['finals'] = list(self.finals.values())
+            news['finals'] = list(self.finals.values())
         for name, series in self.series.items():
             known = cursor.series.get((number, name), (0, 0))
             first, rows = series.since(known if known_serial == self.serial else (-1, 0))
             cursor.series[number, name] = series.end
             if rows or known_serial != self.serial:
-                told[name] = {'from': first, 'rows': rows}
-        return told
+                news[name] = {'from': first, 'rows': rows}
+        return news
 
 
-def as_fields(record: Shown) -> dict[str, Any]:
-    """The numbers of a record by name, None where one is not known; states as words."""
-    found: dict[str, Any] = {}
-    for one in fields(record):
-        value = getattr(record, one.name)
-        if one.name in _NOT_SHOWN:
+def as_fields(record: ArrayRecord) -> dict[str, Any]:
+    """The numbers of a record by flat name, None where one is not known; states as words."""
+    elements: dict[str, Any] = {}
+    for name in flat_names(type(record)):
+        if name in _NOT_SHOWN:
             continue
+        value = flat_value(record, name)
         if isinstance(value, IntFlag):
             value = value.names() if hasattr(value, 'names') else int(value)
         elif isinstance(value, IntEnum):
             value = value.name.lower()
         elif isinstance(value, float):
             value = _number(value)
-        found[one.name] = value
-    return found
+        elements[name] = value
+    return elements
 
 
 def _number(value: float) -> float | None:
     # Stamps in seconds need the milliseconds, up to a day.
-    return float(f'{value:.9g}') if math.isfinite(value) else None
+    return finite_or_none(float(f'{value:.9g}'))

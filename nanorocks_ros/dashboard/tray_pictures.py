@@ -1,4 +1,4 @@
-"""Pictures of trays as a browser takes them."""
+"""Images of trays, encoded for a browser."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LAYERS = ('tray', 'tracks', 'motion')
 
 _QUALITY = 80
 _LARGEST_PX = 900
-# Blue, green, red and opacity of what moves.
+# Blue, green, red and opacity of moving pixels.
 _MOVING = (60, 190, 255, 84)
 
 

@@ -1,4 +1,7 @@
-"""What finished cycles say of both restitutions, kept so that those of others can be added."""
+"""Likelihoods of both restitutions from finished cycles, which can be added and saved.
+
+Tested in test/studies/batch/test_batch_analysis.py.
+"""
 
 from __future__ import annotations
 
@@ -20,20 +23,20 @@ _NOT_THERE = 'analyse the recording again'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Evidence:
-    """Of some cycles of one tray, all of them read in the same way.
+class CycleLikelihoods:
+    """Likelihoods of some cycles of one tray, by the same relation.
 
-    What is not known of tray, camera and start is the same in all of them, so it does not
-    average out: likelihoods are added up first, and integrated over it last.
+    The nuisances of tray, camera and start are common to all cycles, so they do not average out:
+    likelihoods are added first and integrated over the nuisances last.
 
     Parameters
     ----------
     cycles : int
     decay : DecayLikelihood or None
-        By a library; None for the closed form of the paper.
+        From a library; None for the closed form of the paper.
     contacts : ContactTerms or None
     by_form : tuple of (float, float)
-        By the closed form: restitution and error of each cycle.
+        From the closed form: restitution and error of each cycle.
     """
 
     cycles: int
@@ -41,8 +44,8 @@ class Evidence:
     contacts: ContactTerms | None = None
     by_form: tuple[tuple[float, float], ...] = ()
 
-    def __add__(self, other: Evidence) -> Evidence:
-        return Evidence(
+    def __add__(self, other: CycleLikelihoods) -> CycleLikelihoods:
+        return CycleLikelihoods(
             cycles=self.cycles + other.cycles,
             decay=self.decay + other.decay if self.decay and other.decay else None,
             contacts=self.contacts + other.contacts if self.contacts and other.contacts else None,
@@ -50,38 +53,38 @@ class Evidence:
         )
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Everything as arrays, to be kept; derivatives to seven digits."""
-        found: dict[str, NDArray[Any]] = {
+        """All fields as arrays, for a file; derivatives in single precision."""
+        content: dict[str, NDArray[Any]] = {
             'cycles': np.array(self.cycles),
             'by_form': np.array(self.by_form, dtype=np.float64).reshape(-1, 2),
         }
         if self.decay is None or self.contacts is None:
-            return found
+            return content
         upper = np.triu_indices(self.decay.gradient.shape[-1])
         for prefix, part in (('decay', self.decay), ('contacts', self.contacts)):
             for field in fields(part):
-                found[f'{prefix}.{field.name}'] = np.asarray(getattr(part, field.name))
-        # The largest by far, and symmetric.
-        found['decay.information'] = self.decay.information[..., upper[0], upper[1]].astype(
+                content[f'{prefix}.{field.name}'] = np.asarray(getattr(part, field.name))
+        # By far the largest array, and symmetric: the upper half is enough.
+        content['decay.information'] = self.decay.information[..., upper[0], upper[1]].astype(
             np.float32
         )
-        found['decay.gradient'] = self.decay.gradient.astype(np.float32)
-        return found
+        content['decay.gradient'] = self.decay.gradient.astype(np.float32)
+        return content
 
     @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], where: str) -> Evidence:
-        """What `arrays` gave.
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], where: str) -> CycleLikelihoods:
+        """Likelihoods from the arrays of `arrays`.
 
         Parameters
         ----------
         arrays : mapping of str to ndarray
         where : str
-            What to name in an error.
+            Source of the arrays, for the error.
 
         Raises
         ------
         FitError
-            When something is missing, or does not fit together.
+            When an array is missing or has the wrong shape.
         """
         try:
             by_form = tuple((float(a), float(b)) for a, b in arrays['by_form'])
@@ -116,17 +119,17 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeanRestitution:
-    """What many cycles say together; NaN where nothing is known.
+    """Restitutions from many cycles together; NaN where unknown.
 
     Parameters
     ----------
     cycles : int
     restitution, restitution_error : float
-        Of two beads: mean of what is probable, and standard deviation.
+        Between beads: mean and standard deviation of the posterior.
     restitution_lower, restitution_upper : float
         Interval.
     wall_restitution, wall_restitution_error : float
-        Of beads and side walls.
+        Between beads and side walls.
     wall_restitution_lower, wall_restitution_upper : float
     tension : float
         Standard deviations by which decays, rebounds and collisions disagree.

@@ -1,4 +1,4 @@
-"""What something else than the decay says of one of the two restitutions."""
+"""Log likelihood of one restitution alone, on a grid, from rebounds or collisions."""
 
 from __future__ import annotations
 
@@ -14,22 +14,21 @@ from nanorocks_ros.numerics.splines import spline_at, spline_slopes
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Places, at least, at which a term is evaluated to be smeared.
+# Smallest number of points at which a likelihood is evaluated for a convolution.
 _SMEARED = 1000
-# Parts of a sum that are less than the largest by exp(-this) are left out: not even all of them
-# together would change the last digit.
+# Terms of a sum below exp(-this) of the largest are left out: all of them together do not change
+# the last digit.
 _LOST = 45.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SingleTerm:
-    """What something else says of one of the two restitutions, such as rebounds or collisions.
+class Likelihood1D:
+    """Log likelihood of one of the two restitutions, from rebounds or collisions.
 
     Parameters
     ----------
     restitution : ndarray (n,)
-        Rising, from end to end of what is possible, and close enough that a cubic spline tells
-        the term between them; 4 or more.
+        Rising, over the whole range, and dense enough for a cubic spline; 4 or more.
     log_likelihood : ndarray (n,)
     """
 
@@ -37,19 +36,19 @@ class SingleTerm:
     log_likelihood: NDArray[np.float64]
 
     def at(self, restitution: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The term at other restitutions, (n,), that rise."""
+        """The log likelihood at other rising restitutions, (n,)."""
         slopes = spline_slopes(self.restitution, self.log_likelihood)
         return spline_at(self.restitution, self.log_likelihood, slopes, restitution)
 
-    def off_by(self, spread: float) -> SingleTerm:
-        """The same where all of it may be off by a common amount, a Gaussian of this spread."""
+    def convolved(self, spread: float) -> Likelihood1D:
+        """Convolution with a Gaussian: the likelihood with a common systematic error."""
         if spread == 0.0:
             return self
         first, last = self.restitution[[0, -1]]
         step = min(0.25 * spread, float(last - first) / _SMEARED)
         fine = np.arange(first, last + step, step)
         smeared = _smeared(fine, self.at(fine), self.restitution, spread)
-        return SingleTerm(restitution=self.restitution, log_likelihood=smeared)
+        return Likelihood1D(restitution=self.restitution, log_likelihood=smeared)
 
 
 @compiled
@@ -59,15 +58,15 @@ def _smeared(
     nodes: NDArray[np.float64],
     spread: float,
 ) -> NDArray[np.float64]:
-    """Logarithm of the sum, over even places, of exp(logs) times a Gaussian around each node."""
-    found = np.empty(nodes.size)
+    """Logarithm of the convolution of exp(logs) on an even grid with a Gaussian, at each node."""
+    smeared = np.empty(nodes.size)
     part = np.empty(fine.size)
     most = logs.max()
     step = fine[1] - fine[0]
     for i in range(nodes.size):
         near = min(max(int((nodes[i] - fine[0]) / step + 0.5), 0), fine.size - 1)
         least = logs[near] - 0.5 * ((fine[near] - nodes[i]) / spread) ** 2
-        # Farther away the Gaussian alone makes too little of the best of all.
+        # Farther away the Gaussian makes even the maximum negligible.
         reach = int(spread * math.sqrt(2.0 * (most - least + _LOST)) / step) + 2
         start, end = max(near - reach, 0), min(near + reach + 1, fine.size)
         best = least
@@ -78,5 +77,5 @@ def _smeared(
         for k in range(start, end):
             if part[k] > best - _LOST:
                 total += math.exp(part[k] - best)
-        found[i] = best + math.log(total)
-    return found
+        smeared[i] = best + math.log(total)
+    return smeared

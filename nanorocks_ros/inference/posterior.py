@@ -1,148 +1,45 @@
-"""The restitutions of beads and walls: what is known of both together, and of each.
+"""Joint posterior of the restitutions of beads and walls.
 
-The decay of the mean speed alone tells one combination of the two: along a valley a higher
-restitution of the beads makes up for a lower one of the walls. So the result is a probability
-over both, and what is said of one of them depends on what is known of the other: the prior.
+The decay of the mean speed alone determines one combination of the two: a higher restitution of
+the beads compensates a lower one of the walls. So the result is a probability over both, and the
+estimate of one depends on the prior of the other.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
-from scipy.signal import savgol_filter
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL, NUISANCES, UNITS, count_step
-from nanorocks_ros.inference.decay.decay_likelihood import DecayTables
+from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL
+from nanorocks_ros.inference.decay.decay_tables import BEAD_POWER, WALL_POWER
 from nanorocks_ros.numerics.splines import spline_basis
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.inference.decay.decay_library import DecayLibrary
-    from nanorocks_ros.inference.likelihood_1d import SingleTerm
-    from nanorocks_ros.settings import PriorSettings
+    from nanorocks_ros.inference.decay.decay_likelihood import DecayTables
+    from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 
-# Places of the grid along each restitution, closer towards 1: evenly spaced in the powers below of
-# 1 - restitution, in which likelihoods are smooth.
-_PLACES, _WALL_PLACES = 35, 15
-_POWER, _WALL_POWER = 1.0 / 1.5, 0.5
+# Points of the fine grid along each restitution.
 _FINE, _WALL_FINE = 241, 121
-# Less likely places than exp(-this) of the best are not looked at.
+# Points with a probability below exp(-this) of the maximum are left out.
 _DEPTH = 18.0
-# Beyond about so much less, log likelihoods are compressed before they are interpolated: next to
-# steep slopes a spline would swing.
+# Log likelihoods lower than the maximum by more than about this are compressed before the
+# interpolation: a spline overshoots next to steep slopes.
 _COMPRESSION = 200.0
-# Where nothing is lost there is no decay to compare with: that corner of the grid is taken as so
-# much less likely than the likelier of its neighbours, lest a spline swing around it.
+# The elastic corner of the grid has no decay to compare with. Its log likelihood is set this much
+# below its better neighbour, so that the spline does not overshoot.
 _CORNER = 10.0
-# Cells of ln t over which curves of the library are smoothed.
-_SMOOTH_CELLS = 9
-
-
-@lru_cache(maxsize=16)
-def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> DecayTables:
-    """The library at the grid of restitutions, with the spread of what is not known exactly.
-
-    Parameters
-    ----------
-    library : DecayLibrary
-    tray : Tray
-    settings : PriorSettings
-        Its spreads.
-    """
-    restitution = 1.0 - np.linspace(1.0, 0.0, _PLACES) ** (1.0 / _POWER)
-    wall = 1.0 - (1.0 - LOWEST_WALL) * np.linspace(1.0, 0.0, _WALL_PLACES) ** (1.0 / _WALL_POWER)
-    beads, walls = (one.ravel() for one in np.meshgrid(restitution, wall, indexing='ij'))
-    mean = _smooth(library.log_speed(beads, walls))
-    slopes = [_floor_and_lid(library, beads, walls, settings.floor_lid_spread)]
-    for number, spread in enumerate(_spreads(tray, settings)):
-        change = np.zeros((beads.size, len(NUISANCES)))
-        change[:, number] = UNITS[number]
-        high = library.log_speed(beads, walls, None, change)
-        low = library.log_speed(beads, walls, None, -change)
-        slopes.append(0.5 * (high - low) * spread / UNITS[number])
-    corners, shares = _corners(library, beads, walls)
-    return DecayTables(
-        decays=library,
-        restitution=restitution,
-        wall_restitution=wall,
-        mean=mean,
-        slopes=_smooth(np.stack(slopes, axis=1)),
-        corners=corners,
-        shares=shares,
-    )
-
-
-def _smooth(curves: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Curves of the library without the noise of its runs.
-
-    Their slopes tell how far amplitude and scale make up for each other. Where the speed falls as
-    1/t they nearly do, and noise of 0.01 from cell to cell would decide.
-    """
-    return np.asarray(savgol_filter(curves, _SMOOTH_CELLS, 3, axis=-1))
-
-
-def _spreads(tray: Tray, settings: PriorSettings) -> tuple[float, ...]:
-    """One standard deviation of each of `NUISANCES`."""
-    counted = all(one.mass is None for one in tray.species)
-    count = settings.count_error / count_step(tray) if counted else 1.0
-    return (
-        settings.height_error,
-        settings.diameter_error,
-        settings.anisotropy_spread,
-        count,
-        settings.start_spread,
-    )
-
-
-def _floor_and_lid(
-    library: DecayLibrary,
-    beads: NDArray[np.float64],
-    walls: NDArray[np.float64],
-    spread: float,
-) -> NDArray[np.float64]:
-    """Change of ln f when floor and lid take more than the side walls, by exp(spread)."""
-    if spread == 0.0:
-        return np.zeros((beads.size, library.distances.size))
-    more, less = (1.0 - (1.0 - walls) * math.exp(one) for one in (spread, -spread))
-    high = library.log_speed(beads, walls, np.maximum(more, LOWEST_WALL - 0.05))
-    return np.asarray(0.5 * (high - library.log_speed(beads, walls, less)))
-
-
-def _corners(
-    library: DecayLibrary, beads: NDArray[np.float64], walls: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Where each place lies among those of the covariance."""
-    falling = -library.covariance_restitution
-    rising = library.covariance_wall
-    i, s = _cell(falling, -beads)
-    j, t = _cell(rising, walls)
-    width = rising.size
-    corners = np.stack(
-        [i * width + j, i * width + j + 1, (i + 1) * width + j, (i + 1) * width + j + 1], axis=1
-    )
-    shares = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=1)
-    return corners, shares
-
-
-def _cell(
-    axis: NDArray[np.float64], at: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    found = np.clip(np.searchsorted(axis, at, side='right') - 1, 0, axis.size - 2)
-    share = (at - axis[found]) / (axis[found + 1] - axis[found])
-    return found.astype(np.int64), np.clip(share, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Posterior:
-    """Probability of pairs of restitutions, on a grid that covers all that are likely.
+    """Probability of pairs of restitutions, on a grid that covers all likely values.
 
     Parameters
     ----------
@@ -151,8 +48,8 @@ class Posterior:
     probability : ndarray (n_c, n_w)
         Sums to 1.
     tension : float
-        Standard deviations by which what went into it disagrees: decay, rebounds and collisions;
-        0 where there was the decay alone.
+        Disagreement of decay, rebounds and collisions in standard deviations; 0 with the decay
+        alone.
     """
 
     restitution: NDArray[np.float64]
@@ -162,7 +59,7 @@ class Posterior:
 
     @property
     def mean(self) -> tuple[float, float]:
-        """Of both restitutions."""
+        """Means of both restitutions."""
         return (
             float(self.probability.sum(axis=1) @ self.restitution),
             float(self.probability.sum(axis=0) @ self.wall_restitution),
@@ -170,7 +67,7 @@ class Posterior:
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """Of both restitutions, (2, 2)."""
+        """Covariance of both restitutions, (2, 2)."""
         x = self.restitution - self.mean[0]
         y = self.wall_restitution - self.mean[1]
         p = self.probability
@@ -183,25 +80,25 @@ class Posterior:
         )
 
     def quantiles(self, probabilities: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Of the restitution of the beads, whatever the walls."""
+        """Quantiles of the bead restitution, marginalised over the walls."""
         return _quantiles(self.restitution, self.probability.sum(axis=1), probabilities)
 
     def wall_quantiles(self, probabilities: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Of the restitution of the walls, whatever the beads."""
+        """Quantiles of the wall restitution, marginalised over the beads."""
         return _quantiles(self.wall_restitution, self.probability.sum(axis=0), probabilities)
 
 
 def _quantiles(
     axis: NDArray[np.float64], weight: NDArray[np.float64], probabilities: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Each entry stands for the stretch half way to its neighbours."""
+    """Quantiles of a distribution whose entries extend half way to their neighbours."""
     edges = np.concatenate(([axis[0]], 0.5 * (axis[1:] + axis[:-1]), [axis[-1]]))
     below = np.concatenate(([0.0], np.cumsum(weight)))
     return np.asarray(np.interp(probabilities, below / below[-1], edges))
 
 
 def check_walls(walls: tuple[float, float]) -> None:
-    """Refuse a prior of the walls beyond what a library covers.
+    """Refuse a prior of the wall restitution outside the range of a library.
 
     Raises
     ------
@@ -210,7 +107,7 @@ def check_walls(walls: tuple[float, float]) -> None:
     low, high = walls
     if not LOWEST_WALL <= low <= high <= 1.0:
         raise ConfigurationError(
-            'prior.wall_low, prior.wall_high',
+            'prior.min_wall_restitution, prior.max_wall_restitution',
             f'{low:g} to {high:g}',
             f'give a range within {LOWEST_WALL:g} to 1',
         )
@@ -221,10 +118,10 @@ def posterior_of(
     log_likelihood: NDArray[np.float64],
     walls: tuple[float, float],
     *,
-    of_beads: SingleTerm | None = None,
-    of_walls: SingleTerm | None = None,
+    bead_likelihood: Likelihood1D | None = None,
+    wall_likelihood: Likelihood1D | None = None,
 ) -> Posterior:
-    """The posterior, with even priors.
+    """The posterior for flat priors.
 
     Parameters
     ----------
@@ -232,15 +129,15 @@ def posterior_of(
     log_likelihood : ndarray (n_places,)
         On the grid of the tables.
     walls : tuple of 2 floats
-        Lowest and highest restitution that the walls may have, each as likely; equal when it is
-        known. That of the beads may be anything from 0 to 1.
-    of_beads, of_walls : SingleTerm, optional
-        Further log likelihoods, of each of the two by itself.
+        Ends of the flat prior of the wall restitution; equal if it is known. The prior of the
+        bead restitution is flat from 0 to 1.
+    bead_likelihood, wall_likelihood : Likelihood1D, optional
+        Further log likelihoods of one restitution alone.
 
     Raises
     ------
     ConfigurationError
-        For walls outside what the library covers.
+        For a wall prior outside the range of the library.
     """
     check_walls(walls)
     shape = (tables.restitution.size, tables.wall_restitution.size)
@@ -249,30 +146,34 @@ def posterior_of(
     less[-1, -1] = min(less[-1, -1], min(less[-2, -1], less[-1, -2]) + _CORNER)
     values = -_COMPRESSION * np.log1p(less / _COMPRESSION)
     surface = _Surface.through(
-        _even(tables.restitution, 0.0, _POWER),
-        _even(tables.wall_restitution, LOWEST_WALL, _WALL_POWER),
+        _even(tables.restitution, 0.0, BEAD_POWER),
+        _even(tables.wall_restitution, LOWEST_WALL, WALL_POWER),
         values,
     )
     box = (0.0, 1.0, *walls)
     for _ in range(3):
         beads, wall = _axes(*box)
-        pressed = surface.at(_even(beads, 0.0, _POWER), _even(wall, LOWEST_WALL, _WALL_POWER))
+        pressed = surface.at(_even(beads, 0.0, BEAD_POWER), _even(wall, LOWEST_WALL, WALL_POWER))
         fine = -_COMPRESSION * np.expm1(-pressed / _COMPRESSION)
-        if of_beads is not None:
-            fine += of_beads.at(beads)[:, np.newaxis]
-        if of_walls is not None:
-            fine += of_walls.at(wall)
+        if bead_likelihood is not None:
+            fine += bead_likelihood.at(beads)[:, np.newaxis]
+        if wall_likelihood is not None:
+            fine += wall_likelihood.at(wall)
         best = float(fine.max())
         fine -= best
         box = _likely(fine, beads, wall)
     weight = np.exp(fine) * _halves(beads.size)[:, np.newaxis] * _halves(wall.size)
-    # By itself each of the terms could be as good as its own best.
-    apart = sum(float(term.log_likelihood.max()) for term in (of_beads, of_walls) if term)
+    # Without the decay each likelihood would reach its own maximum.
+    apart = sum(
+        float(term.log_likelihood.max()) for term in (bead_likelihood, wall_likelihood) if term
+    )
     return Posterior(
         restitution=beads,
         wall_restitution=wall,
         probability=weight / weight.sum(),
-        tension=math.sqrt(2.0 * max(apart - best, 0.0)) if of_beads or of_walls else 0.0,
+        tension=math.sqrt(2.0 * max(apart - best, 0.0))
+        if bead_likelihood or wall_likelihood
+        else 0.0,
     )
 
 
@@ -290,18 +191,18 @@ class _Surface(NamedTuple):
         return cls(spline.get_knots(), spline.get_coeffs().reshape(values.shape))
 
     def at(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """On the grid of some places within the knots, (n_x, n_y)."""
+        """Values on a grid of points within the knots, (n_x, n_y)."""
         rows, columns = (
-            spline_basis(knots, one) for knots, one in zip(self.knots, (x, y), strict=True)
+            spline_basis(knots, points) for knots, points in zip(self.knots, (x, y), strict=True)
         )
         return np.asarray(rows @ self.coefficients @ columns.T)
 
 
 def _without_pits(less: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    """How much less likely places are, where along one restitution there is one best of them.
+    """Log likelihood below the maximum, made unimodal along one axis.
 
-    Where amplitude, scale and restitution make up for each other, noise of the library leaves
-    single places without the best of it, around which a spline would swing.
+    Where amplitude, scale and restitution compensate each other, noise of the library leaves
+    isolated pits, around which a spline overshoots.
     """
     before = np.minimum.accumulate(less, axis=axis)
     behind = np.flip(np.minimum.accumulate(np.flip(less, axis=axis), axis=axis), axis=axis)
@@ -309,7 +210,7 @@ def _without_pits(less: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
 
 
 def _even(restitution: NDArray[np.float64], low: float, power: float) -> NDArray[np.float64]:
-    """Where restitutions lie, from 0 for the lowest to 1, in what the grid is even in."""
+    """Coordinate in which the grid is evenly spaced, 0 at the lowest restitution, 1 at 1."""
     return np.asarray(1.0 - ((1.0 - restitution) / (1.0 - low)) ** power)
 
 
@@ -323,19 +224,19 @@ def _axes(
 
 
 def _halves(n: int) -> NDArray[np.float64]:
-    """The first and the last entry of an axis stand for half as much."""
-    found = np.ones(n)
-    found[[0, -1]] = 0.5
-    return found
+    """Weights of the trapezoidal rule: half at the first and the last entry."""
+    weights = np.ones(n)
+    weights[[0, -1]] = 0.5
+    return weights
 
 
 def _likely(
     fine: NDArray[np.float64], beads: NDArray[np.float64], wall: NDArray[np.float64]
 ) -> tuple[float, float, float, float]:
-    """The box around all places that are not beyond hope, and one more on each side."""
-    found = []
+    """Bounding box of all likely points, with one point more on each side."""
+    box = []
     for axis, other in ((beads, 1), (wall, 0)):
-        there = np.flatnonzero(fine.max(axis=other) > -_DEPTH)
-        first, last = max(there[0] - 1, 0), min(there[-1] + 1, axis.size - 1)
-        found += [float(axis[first]), float(axis[last])]
-    return found[0], found[1], found[2], found[3]
+        likely = np.flatnonzero(fine.max(axis=other) > -_DEPTH)
+        first, last = max(likely[0] - 1, 0), min(likely[-1] + 1, axis.size - 1)
+        box += [float(axis[first]), float(axis[last])]
+    return box[0], box[1], box[2], box[3]

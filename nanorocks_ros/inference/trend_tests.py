@@ -1,4 +1,4 @@
-"""What changes over many cycles: trends, and periods in which clusters were larger than usual."""
+"""Tests for trends over many cycles, and for periods with larger clusters than usual."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Of normal values, standard deviation over median absolute deviation.
+# Ratio of standard deviation to median absolute deviation of a normal distribution.
 _MAD = 1.4826
 _ONE_SIGMA = 0.6827
-# With fewer points a slope has no error.
+# Smallest number of points for a slope.
 _FEWEST = 5
-# Mean of a period over what is usual, in standard deviations of a cycle: beside a stretch of small
-# clusters usual ones would pass for large.
+# Smallest mean excess of a period, in standard deviations of a cycle: next to a run of small
+# clusters the usual ones would count as large.
 _LEAST_EXCESS = 1.0
 
 
@@ -33,11 +33,11 @@ class Trend:
     Parameters
     ----------
     slope, slope_error : float
-        Change of the value in a cycle, and one standard error; NaN for too few values, and for
-        the error where values don't scatter. It takes cycles for independent: neighbours that
-        are alike make it too small.
+        Change of the value per cycle, and one standard error; NaN for too few values, and for
+        the error if values do not scatter. Cycles are assumed independent: with correlated
+        neighbours the error is too small.
     middle : float
-        Median of the values less that of the line through 0.
+        Intercept: median of the values minus slope times cycle.
     samples : int
     """
 
@@ -47,17 +47,17 @@ class Trend:
     samples: int
 
     def at(self, cycles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The line."""
+        """Values of the line."""
         return np.asarray(self.middle + self.slope * cycles)
 
 
 def robust_trend(cycles: NDArray[np.float64], values: NDArray[np.float64]) -> Trend:
-    """The median of the slopes between any two values, which outliers do not move.
+    """Theil-Sen line: the median of the slopes between all pairs, robust against outliers.
 
     Parameters
     ----------
     cycles, values : ndarray (n,)
-        Values may be NaN, not known.
+        NaN for an unknown value.
 
     References
     ----------
@@ -79,22 +79,22 @@ def robust_trend(cycles: NDArray[np.float64], values: NDArray[np.float64]) -> Tr
 
 
 def _least_squares_error(x: NDArray[np.float64], left: NDArray[np.float64]) -> float:
-    """Of a slope where most values are the same, such as counts, so that the median has none."""
+    """Error of a slope if most values are equal, such as counts, and the median gives 0."""
     scatter = float(np.std(left, ddof=2)) / math.sqrt(float(np.sum((x - x.mean()) ** 2)))
     return scatter or math.nan
 
 
 class QuietPeriod(NamedTuple):
-    """Cycles in a row in which clusters were larger than usual, in all trays together.
+    """Consecutive cycles with larger clusters than usual, in all trays together.
 
     Parameters
     ----------
     first, last : int
-        Places in the series, both within.
+        Indices in the series, inclusive.
     excess : float
-        Mean of the cycles in it, in standard deviations of a cycle.
+        Mean of its cycles, in standard deviations of a cycle.
     chance : float
-        Part of the series in random order that hold a period as clear as this.
+        Fraction of the series in random order with a period as significant as this.
     """
 
     first: int
@@ -110,24 +110,24 @@ def quiet_periods(
     orders: int = 999,
     seed: int = 1,
 ) -> tuple[QuietPeriod, ...]:
-    """Periods in which clusters grew larger, as the paper sees three by eye.
+    """Periods in which clusters grew larger; the paper finds three by eye.
 
-    Sizes are taken about the trend of each tray, in units of its scatter, and averaged over the
-    trays. The clearest period is the run of cycles with the largest sum over the root of their
-    number, of those that are a standard deviation above the usual on average. It counts when the
-    same cycles in random order have one as clear in no more than `false_alarms` of the draws.
-    Then the rest is searched in the same way.
+    Residuals of the sizes about the trend of each tray, in units of their scatter, are averaged
+    over the trays. The most significant period is the run of cycles with the largest sum divided
+    by the square root of their number, if its mean is one standard deviation or more. It counts
+    if the same cycles in random order have such a run in at most `false_alarms` of the draws.
+    Then the rest of the series is searched in the same way.
 
     Parameters
     ----------
     sizes : ndarray (n_trays, n_cycles)
-        NaN where not known.
+        NaN where unknown.
     false_alarms : float, (0, 0.5]
-        Part of series without any period that one is found in, cycles being independent.
+        Fraction of series without a period in which one is reported, for independent cycles.
     shortest : int, >= 1
-        Cycles of a period.
+        Smallest number of cycles of a period.
     orders : int
-        Random orders that are drawn, 1 / `false_alarms` or more.
+        Number of random orders, 1 / `false_alarms` or more.
     seed : int
 
     Returns
@@ -171,7 +171,7 @@ def quiet_periods(
 
 
 def combined_series(sizes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean over the trays of sizes about their trends, in units of its scatter, (n_cycles,)."""
+    """Scaled mean over the trays of the residuals about their trends, (n_cycles,)."""
     rows = np.atleast_2d(np.asarray(sizes, dtype=np.float64))
     cycles = np.arange(rows.shape[1], dtype=np.float64)
     scores = np.full(rows.shape, np.nan)
@@ -181,7 +181,7 @@ def combined_series(sizes: NDArray[np.float64]) -> NDArray[np.float64]:
             scores[k] = _scaled(row - trend.at(cycles))
     counts = np.isfinite(scores).sum(axis=0)
     total = np.nansum(scores, axis=0)
-    # The mean of fewer trays scatters more: all are given the same scatter.
+    # The mean of fewer trays scatters more: scaled to the same scatter.
     mean = np.where(counts > 0, total / np.sqrt(np.maximum(counts, 1)), np.nan)
     return _scaled(mean)
 
@@ -200,7 +200,7 @@ def _scaled(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def _clearest(
     values: Sequence[NDArray[np.float64]], shortest: int
 ) -> tuple[float, int, int, int] | None:
-    """How clear the clearest run is, the number of its piece, and its ends there."""
+    """Significance, piece, first and last index of the most significant run."""
     best: tuple[float, int, int, int] | None = None
     for which, value in enumerate(values):
         sums = np.concatenate(([0.0], np.cumsum(value)))
@@ -221,7 +221,7 @@ def _chance(
     shortest: int,
     draws: tuple[int, np.random.Generator],
 ) -> float:
-    """Part of random orders, this one included, that hold a run as clear."""
+    """Fraction of random orders, the actual one included, with a run as significant."""
     orders, rng = draws
     shuffled = rng.permuted(np.tile(values, (orders, 1)), axis=1)
     best = np.full(orders, -np.inf)
@@ -239,5 +239,5 @@ def _chance(
 
 
 def _longest(cycles: int) -> int:
-    """More than half of all cycles are no period: they are what is usual."""
+    """Longest period: more than half of all cycles would be the usual state."""
     return cycles // 2

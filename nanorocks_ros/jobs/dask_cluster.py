@@ -1,4 +1,7 @@
-"""Tasks on a Dask cluster that somebody else started: the scheduler hands them to its workers."""
+"""Tasks on the workers of a running Dask cluster.
+
+Tested in test_tasks.py.
+"""
 
 from __future__ import annotations
 
@@ -20,24 +23,24 @@ if TYPE_CHECKING:
 Argument = TypeVar('Argument')
 Result = TypeVar('Result')
 
-# How long a scheduler may take to answer, and a cluster to show its first worker [s].
-_PATIENCE = 10.0
-# How often we look whether there is still a worker, and how long we wait for a new one [s].
-_LOOK, _WORKERS_BACK = 30.0, 60.0
-# Dask gives a task up after four workers died over it; we hand it in so often.
-_MOST_TRIES = 5
-# On Python 3.10 the one is no kind of the other.
-_TIMED_OUT = (TimeoutError, asyncio.TimeoutError)
+# Timeout for the answer of a scheduler, and for the first worker [s].
+_CONNECT_TIMEOUT = 10.0
+# Interval of the check that there are workers, and timeout for new ones [s].
+_CHECK_INTERVAL, _NEW_WORKER_TIMEOUT = 30.0, 60.0
+# Dask abandons a task that has killed four workers; it is submitted at most this often.
+_MAX_SUBMISSIONS = 5
+# On Python 3.10 neither is a subclass of the other.
+_TIMEOUT_ERRORS = (TimeoutError, asyncio.TimeoutError)
 _LOGGERS = ('distributed', 'distributed.client')
 
 
-def finished_on_cluster(
+def run_on_cluster(
     function: Callable[[Argument], Result],
     tasks: Mapping[str, Argument],
     scheduler: str,
     lost: Callable[[str, str], Result] | None = None,
 ) -> Generator[tuple[str, Result], None, None]:
-    """Results as they come. What a lost worker had in hand goes to another.
+    """Yield results as tasks finish; another worker repeats the task of a lost one.
 
     Parameters
     ----------
@@ -46,8 +49,8 @@ def finished_on_cluster(
     scheduler : str
         Address, ``tcp://host:port``.
     lost : callable, optional
-        Makes, of a key and what happened, the result of a task over which workers died; without
-        it that ends everything.
+        Returns the result of a task that killed its workers, from its key and the reason;
+        without it, such a task ends the job.
 
     Yields
     ------
@@ -56,17 +59,17 @@ def finished_on_cluster(
     Raises
     ------
     ConfigurationError
-        When Dask is not installed, or the address is none.
+        When Dask is not installed, or the address is not one.
     NanorocksError
         When the scheduler does not answer within 10 s or is lost, when there are no workers,
         or these run another version of this package.
     """
-    with _checked(scheduler) as client:
-        yield from _gathered(client, scheduler, function, dict(tasks), lost)
+    with _checked_client(scheduler) as client:
+        yield from _run_tasks(client, scheduler, function, dict(tasks), lost)
 
 
 def check_cluster(scheduler: str) -> None:
-    """Refuse a cluster that cannot be used, before any work is done.
+    """Raise for a cluster that cannot be used, before any work is done.
 
     Parameters
     ----------
@@ -76,26 +79,26 @@ def check_cluster(scheduler: str) -> None:
     Raises
     ------
     ConfigurationError
-        When Dask is not installed, or the address is none.
+        When Dask is not installed, or the address is not one.
     NanorocksError
         When the scheduler does not answer within 10 s, when there are no workers, or these run
         another version of this package.
     """
-    with _checked(scheduler):
+    with _checked_client(scheduler):
         pass
 
 
 @contextmanager
-def _checked(scheduler: str) -> Iterator[Any]:
+def _checked_client(scheduler: str) -> Iterator[Any]:
     with _quiet_logs(), _connected(scheduler) as client:
-        _await_workers(client, scheduler, _PATIENCE)
+        _await_workers(client, scheduler, _CONNECT_TIMEOUT)
         _check_versions(client, scheduler)
         yield client
 
 
 @contextmanager
 def _quiet_logs() -> Iterator[None]:
-    """No tracebacks of Dask's own; what goes wrong is raised, as one line."""
+    """Suppress the tracebacks that Dask logs; errors are raised, as one line."""
     loggers = [logging.getLogger(name) for name in _LOGGERS]
     levels = [logger.level for logger in loggers]
     try:
@@ -119,7 +122,7 @@ def _connected(scheduler: str) -> Iterator[Any]:
             "run: pip install 'nanorocks_ros[cluster]'",
         ) from error
     try:
-        # Before the client, which takes its time to give such an address up.
+        # Checked here: the client retries a wrong address for long.
         _, port = get_address_host_port(scheduler)
         if not 0 < int(port) < 65536:
             raise ValueError(f'port {port}')
@@ -127,10 +130,10 @@ def _connected(scheduler: str) -> Iterator[Any]:
         raise ConfigurationError(
             '--scheduler', f'{scheduler!r} is no address', 'give tcp://host:port'
         ) from error
-    # In a thread, since there may be an event loop in this one, as in a notebook.
+    # In a thread, since this one may run an event loop, as in a notebook.
     with ThreadPoolExecutor(1) as thread:
         thread.submit(asyncio.run, _await_scheduler(scheduler)).result()
-    client = Client(scheduler, timeout=_PATIENCE, set_as_default=False)
+    client = Client(scheduler, timeout=_CONNECT_TIMEOUT, set_as_default=False)
     try:
         yield client
     finally:
@@ -139,16 +142,16 @@ def _connected(scheduler: str) -> Iterator[Any]:
 
 
 async def _await_scheduler(address: str) -> None:
-    """Refuse an address where nobody answers; Dask itself may wait for ever."""
+    """Raise for an address that does not answer; Dask itself may wait for ever."""
     from distributed.core import rpc
 
     try:
         async with rpc(address) as scheduler:
-            await asyncio.wait_for(scheduler.identity(), _PATIENCE)
-    except (OSError, *_TIMED_OUT) as error:
+            await asyncio.wait_for(scheduler.identity(), _CONNECT_TIMEOUT)
+    except (OSError, *_TIMEOUT_ERRORS) as error:
         raise NanorocksError(
             address,
-            f'no Dask scheduler answers within {_PATIENCE:g} s',
+            f'no Dask scheduler answers within {_CONNECT_TIMEOUT:g} s',
             'start one with: dask scheduler',
         ) from error
 
@@ -156,7 +159,7 @@ async def _await_scheduler(address: str) -> None:
 def _await_workers(client: Any, scheduler: str, seconds: float) -> None:
     try:
         client.wait_for_workers(1, timeout=seconds)
-    except _TIMED_OUT as error:
+    except _TIMEOUT_ERRORS as error:
         raise NanorocksError(
             scheduler,
             f'the scheduler has had no workers for {seconds:g} s',
@@ -165,62 +168,62 @@ def _await_workers(client: Any, scheduler: str, seconds: float) -> None:
 
 
 def _check_versions(client: Any, scheduler: str) -> None:
-    found = client.run(pkgutil.resolve_name, 'nanorocks_ros:__version__', on_error='return')
-    # A worker that went away meanwhile is no worker with another version.
-    wrong = {
+    versions = client.run(pkgutil.resolve_name, 'nanorocks_ros:__version__', on_error='return')
+    # A worker that has left meanwhile (OSError) has no other version.
+    mismatched = {
         worker: version if isinstance(version, str) else f'missing ({version})'
-        for worker, version in found.items()
+        for worker, version in versions.items()
         if version != __version__ and not isinstance(version, OSError)
     }
-    if wrong:
-        worker, version = next(iter(wrong.items()))
+    if mismatched:
+        worker, version = next(iter(mismatched.items()))
         raise NanorocksError(
             scheduler,
-            f'nanorocks_ros is {version} on {len(wrong)} of {len(found)} workers ({worker}), '
-            f'but {__version__} here',
+            f'nanorocks_ros is {version} on {len(mismatched)} of {len(versions)} workers '
+            f'({worker}), but {__version__} here',
             'install the same version everywhere',
         )
 
 
-def _gathered(
+def _run_tasks(
     client: Any,
     scheduler: str,
     function: Callable[[Argument], Result],
-    left: dict[str, Argument],
+    tasks: dict[str, Argument],
     lost: Callable[[str, str], Result] | None,
 ) -> Generator[tuple[str, Result], None, None]:
     from distributed import KilledWorker
     from distributed.comm.core import CommClosedError
 
-    # Keys of ours alone: what another client asked for is another question.
+    # Unique keys: the scheduler would share results of equal keys between clients.
     session = uuid4().hex
-    names = [f'{key}-{session}' for key in left]
-    # No reference to a future stays when it is done, so that the cluster forgets the result.
-    futures = client.map(function, list(left.values()), key=names, pure=False)
-    keys = dict(zip(futures, left, strict=True))
+    names = [f'{key}-{session}' for key in tasks]
+    # No reference to a finished future is kept, so that the cluster frees the result.
+    futures = client.map(function, list(tasks.values()), key=names, pure=False)
+    keys = dict(zip(futures, tasks, strict=True))
     del futures
-    tries: Counter[str] = Counter()
+    submissions: Counter[str] = Counter()
     try:
-        for future in _done(client, scheduler, keys):
+        for future in _completed_futures(client, scheduler, keys):
             key = keys[future]
             try:
-                result = future.result(timeout=_LOOK)
-            except _TIMED_OUT:
+                result = future.result(timeout=_CHECK_INTERVAL)
+            except _TIMEOUT_ERRORS:
                 if future.status == 'error':
                     raise
-                # The only worker that had the result is gone: it will be worked out again.
-                _await_workers(client, scheduler, _WORKERS_BACK)
+                # The only worker with the result is lost: the task is run again.
+                _await_workers(client, scheduler, _NEW_WORKER_TIMEOUT)
                 continue
             except KilledWorker as error:
                 del keys[future]
                 if lost is not None:
-                    yield key, lost(key, f'{error.allowed_failures + 1} workers died over it')
+                    yield key, lost(key, f'{error.allowed_failures + 1} workers died running it')
                     continue
-                tries[key] += 1
-                if tries[key] == _MOST_TRIES:
-                    raise _deadly(key, error) from error
-                name = f'{key}-{session}-{tries[key]}'
-                keys[client.submit(function, left[key], key=name, pure=False)] = key
+                submissions[key] += 1
+                if submissions[key] == _MAX_SUBMISSIONS:
+                    raise _task_kills_workers(key, error) from error
+                name = f'{key}-{session}-{submissions[key]}'
+                keys[client.submit(function, tasks[key], key=name, pure=False)] = key
                 continue
             except (CancelledError, CommClosedError) as error:
                 raise NanorocksError(
@@ -235,20 +238,21 @@ def _gathered(
             client.cancel(list(keys))
 
 
-def _done(client: Any, scheduler: str, futures: Mapping[Any, str]) -> Iterator[Any]:
-    """Futures as they are done, as long as there are any and workers to do them."""
+def _completed_futures(client: Any, scheduler: str, futures: Mapping[Any, str]) -> Iterator[Any]:
+    """Yield futures as they finish, while there are workers."""
     from distributed import as_completed
 
     while futures:
         try:
-            yield from as_completed(list(futures), loop=client.loop, timeout=_LOOK)
-        except _TIMED_OUT:
-            _await_workers(client, scheduler, _WORKERS_BACK)
+            yield from as_completed(list(futures), loop=client.loop, timeout=_CHECK_INTERVAL)
+        except _TIMEOUT_ERRORS:
+            _await_workers(client, scheduler, _NEW_WORKER_TIMEOUT)
 
 
-def _deadly(key: str, error: Any) -> NanorocksError:
+def _task_kills_workers(key: str, error: Any) -> NanorocksError:
+    workers = _MAX_SUBMISSIONS * (error.allowed_failures + 1)
     return NanorocksError(
         f'task {key}',
-        f'every worker that tried it died, {_MOST_TRIES * (error.allowed_failures + 1)} of them',
+        f'every worker that tried it died, {workers} of them',
         'look into the logs of the workers, for lack of memory first',
     )

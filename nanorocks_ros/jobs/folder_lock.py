@@ -1,4 +1,7 @@
-"""A folder that one process at a time works in."""
+"""A lock that lets one process at a time use a folder.
+
+Tested in test_journal.py.
+"""
 
 from __future__ import annotations
 
@@ -14,24 +17,24 @@ if TYPE_CHECKING:
 LOCK = 'lock'
 
 
-def hold_folder(folder: Path, name: str = LOCK) -> int:
-    """Make a folder and hold it until what is returned is closed, or the process ends.
+def lock_folder(folder: Path, name: str = LOCK) -> int:
+    """Make a folder and lock it.
 
     Parameters
     ----------
     folder : Path
     name : str
-        Of the file in it that is locked.
+        Name of the lock file in it.
 
     Returns
     -------
     int
-        Descriptor of that file.
+        Descriptor of the lock file; closing it, or the end of the process, unlocks the folder.
 
     Raises
     ------
     RecordingError
-        When the folder cannot be used, or is held by another process.
+        When the folder cannot be used, or is locked by another process.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""What is done of a long job, kept beside its output so that the job can go on later."""
+"""Finished parts of a long job, kept in a folder so that the job can be resumed."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.jobs.folder_lock import LOCK, hold_folder
-from nanorocks_ros.outputs.npz_archive import Arrays, read_archive, write_archive, write_whole
+from nanorocks_ros.jobs.folder_lock import LOCK, lock_folder
+from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.outputs.npz_archive import Arrays, read_archive, write_archive
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,56 +22,55 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-QUESTION, _FINGERPRINT = 'question.json', 'fingerprint'
+SPECIFICATION, _FINGERPRINT = 'question.json', 'fingerprint'
 _KEY = re.compile(r'[A-Za-z0-9][A-Za-z0-9_.-]*')
 
 
 class Journal:
     """A folder of finished parts of one job.
 
-    Every part is a file, written complete or not at all, and bears the fingerprint of the
-    question it answers. One process at a time may hold the folder.
+    Every part is a file, written complete or not at all, with a fingerprint of the job. One
+    process at a time may lock the folder.
 
     Parameters
     ----------
     folder : Path
-        Made when it is not there.
-    question : str
-        A JSON object: everything that the results depend on.
+        Made when it does not exist.
+    specification : str
+        JSON object with everything that the results depend on; it identifies the job.
 
     Raises
     ------
     RecordingError
-        When the folder cannot be used, is held by another process, or belongs to another
-        question.
+        When the folder cannot be used, is locked by another process, or belongs to another job.
     """
 
-    def __init__(self, folder: Path, question: str) -> None:
+    def __init__(self, folder: Path, specification: str) -> None:
         self.folder = folder
         self.notices: list[str] = []
-        self._fingerprint = hashlib.sha256(question.encode()).hexdigest()
-        self._lock: int | None = hold_folder(folder)
+        self._fingerprint = hashlib.sha256(specification.encode()).hexdigest()
+        self._lock: int | None = lock_folder(folder)
         try:
-            self._check_question(question)
+            self._check_specification(specification)
         except BaseException:
-            self._let_go()
+            self._unlock()
             raise
 
-    def _check_question(self, question: str) -> None:
-        path = self.folder / QUESTION
+    def _check_specification(self, specification: str) -> None:
+        path = self.folder / SPECIFICATION
         if not self.keys():
-            write_whole(path, question.encode())
+            write_bytes(path, specification.encode())
             return
         try:
-            found = path.read_text(encoding='utf-8')
+            earlier = path.read_text(encoding='utf-8')
         except (OSError, UnicodeDecodeError) as error:
             raise RecordingError(
                 str(path), 'cannot be read', 'delete the folder, or pass another --output'
             ) from error
-        if found != question:
+        if earlier != specification:
             raise RecordingError(
                 str(self.folder),
-                f'belongs to another job ({difference(found, question)})',
+                f'belongs to another job ({difference(earlier, specification)})',
                 'delete the folder, or pass another --output',
             )
 
@@ -79,16 +79,16 @@ class Journal:
         return sorted(path for path in paths if _KEY.fullmatch(path.name))
 
     def keys(self) -> list[str]:
-        """Keys of the parts there are, unread."""
+        """Keys of the parts, whether they can be read or not."""
         return [path.stem for path in self._paths()]
 
-    def good_keys(self) -> list[str]:
-        """Keys of the finished parts that can be read; damaged ones are deleted, and told.
+    def intact_keys(self) -> list[str]:
+        """Keys of the parts that can be read; deletes damaged parts and notes them in `notices`.
 
         Raises
         ------
         RecordingError
-            For a part of another question.
+            For a part of another job.
         """
         good = []
         for key in self.keys():
@@ -108,31 +108,33 @@ class Journal:
         Raises
         ------
         RecordingError
-            When the part cannot be read or belongs to another question.
+            When the part cannot be read or belongs to another job.
         """
         path = self._path(key)
         try:
             arrays = read_archive(path)
         except RecordingError as error:
             raise _DamagedError(error.where, error.what, error.do) from error
-        if str(arrays.pop(_FINGERPRINT, '')) != self._mark(key):
+        if str(arrays.pop(_FINGERPRINT, '')) != self._part_fingerprint(key):
             raise RecordingError(
                 str(path), 'is a part of another job', 'delete it, or pass another --output'
             )
         return arrays
 
     def write(self, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Keep a part.
+        """Write a part.
 
         Raises
         ------
         RecordingError
             When it cannot be written.
         """
-        write_archive(self._path(key), {**arrays, _FINGERPRINT: np.array(self._mark(key))})
+        write_archive(
+            self._path(key), {**arrays, _FINGERPRINT: np.array(self._part_fingerprint(key))}
+        )
 
-    def _mark(self, key: str) -> str:
-        # With the key: a file that was renamed is another part.
+    def _part_fingerprint(self, key: str) -> str:
+        # With the key: a renamed file does not count as another part.
         return f'{self._fingerprint} {key}'
 
     def _path(self, key: str) -> Path:
@@ -143,22 +145,22 @@ class Journal:
         return self.folder / f'{key}.npz'
 
     def delete(self) -> None:
-        """Delete the parts and let go of the folder; if it holds anything else it stays."""
+        """Delete the parts and unlock the folder; it stays if it holds anything else."""
         for path in self._paths():
             path.unlink(missing_ok=True)
-        (self.folder / QUESTION).unlink(missing_ok=True)
+        (self.folder / SPECIFICATION).unlink(missing_ok=True)
         (self.folder / LOCK).unlink(missing_ok=True)
         with suppress(OSError):
             self.folder.rmdir()
-        self._let_go()
+        self._unlock()
 
     def close(self) -> None:
-        """Let another process use the folder; without parts it is deleted."""
+        """Unlock the folder; without parts it is deleted."""
         if self._lock is not None and not self.keys():
             self.delete()
-        self._let_go()
+        self._unlock()
 
-    def _let_go(self) -> None:
+    def _unlock(self) -> None:
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
@@ -171,27 +173,27 @@ class Journal:
 
 
 class _DamagedError(RecordingError):
-    """A part whose bytes are not those that were written."""
+    """A part is damaged."""
 
 
-def difference(found: str, wanted: str) -> str:
-    """In which entries two JSON objects differ, for people.
+def difference(actual: str, wanted: str) -> str:
+    """The entries in which two JSON objects differ, as text.
 
     Parameters
     ----------
-    found, wanted : str
+    actual, wanted : str
     """
     try:
-        one, other = json.loads(found), json.loads(wanted)
+        left, right = json.loads(actual), json.loads(wanted)
     except ValueError:
-        return 'its question cannot be read'
-    if not (isinstance(one, dict) and isinstance(other, dict)):
-        return 'its question cannot be read'
-    one, other = _flat(one), _flat(other)
-    names = [name for name in {**one, **other} if one.get(name) != other.get(name)]
-    shown = [f'{name}: {_short(one.get(name))}, not {_short(other.get(name))}' for name in names]
-    more = f' and {len(shown) - 3} more' if len(shown) > 3 else ''
-    return '; '.join(shown[:3]) + more
+        return 'its specification cannot be read'
+    if not (isinstance(left, dict) and isinstance(right, dict)):
+        return 'its specification cannot be read'
+    left, right = _flat(left), _flat(right)
+    names = [name for name in {**left, **right} if left.get(name) != right.get(name)]
+    shown = [f'{name}: {_short(left.get(name))}, not {_short(right.get(name))}' for name in names]
+    remainder = f' and {len(shown) - 3} more' if len(shown) > 3 else ''
+    return '; '.join(shown[:3]) + remainder
 
 
 def _flat(tree: dict[str, Any], prefix: str = '') -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Progress of long work, as callbacks report it."""
+"""The type of callbacks that report progress; there is nothing to test."""
 
 from __future__ import annotations
 

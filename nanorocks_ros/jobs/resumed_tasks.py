@@ -1,20 +1,61 @@
-"""Tasks whose results are kept in a journal, so that an interrupted call goes on."""
+"""Tasks whose results are kept in a journal, so that an interrupted job can be resumed."""
 
 from __future__ import annotations
 
-from contextlib import closing
+from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, TypeVar
 
-from nanorocks_ros.jobs.tasks import as_finished
+from nanorocks_ros.jobs.journal import Journal
+from nanorocks_ros.jobs.tasks import as_completed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
+    from pathlib import Path
 
-    from nanorocks_ros.jobs.journal import Journal
+    from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.outputs.npz_archive import Arrays
 
 Argument = TypeVar('Argument')
+
+
+def parts_folder(output: Path) -> Path:
+    """Folder that keeps the finished parts of a job until its output is complete."""
+    return output.with_name(f'{output.name}.parts')
+
+
+@contextmanager
+def resumed_journal(
+    output: Path, specification: str, notice: Callable[[str], None] | None = None
+) -> Iterator[Journal]:
+    """Open the journal of an output; delete it when the block ends without an exception.
+
+    Parameters
+    ----------
+    output : Path
+        The journal lies in `parts_folder` of it.
+    specification : str
+        See `Journal`.
+    notice : callable, optional
+        Called with one line of text for each damaged part, which is deleted.
+
+    Yields
+    ------
+    Journal
+        Its parts can be read.
+
+    Raises
+    ------
+    RecordingError
+        When the folder cannot be used, or holds the parts of another job.
+    """
+    with Journal(parts_folder(output), specification) as journal:
+        journal.intact_keys()
+        if notice is not None:
+            for text in journal.notices:
+                notice(text)
+        yield journal
+        journal.delete()
 
 
 def fill_journal(
@@ -22,17 +63,19 @@ def fill_journal(
     function: Callable[[Argument], Arrays],
     tasks: Mapping[str, Argument],
     workers: Workers,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> None:
-    """Do the tasks whose results are not in the journal, and keep each as it comes.
+    """Run the tasks whose results are not in the journal, and write each result to it.
 
     Parameters
     ----------
     journal : Journal
+        Its parts can be read.
     function, tasks, workers
-        As for `as_finished`; keys are those of the journal.
+        As for `as_completed`; the keys are those of the journal.
     progress : callable, optional
-        Called with the tasks done and the tasks there are, those that were there among them.
+        Called with the number of finished tasks, those of earlier calls included, and the number
+        of tasks.
 
     Raises
     ------
@@ -40,14 +83,14 @@ def fill_journal(
         Ctrl-C; its text says what is kept.
     """
     report = progress or (lambda done, total: None)
-    there = set(journal.good_keys())
-    missing = {key: task for key, task in tasks.items() if key not in there}
+    finished = set(journal.keys())
+    missing = {key: task for key, task in tasks.items() if key not in finished}
     done = len(tasks) - len(missing)
     report(done, len(tasks))
     try:
-        with closing(as_finished(function, missing, workers)) as results:
-            for key, found in results:
-                journal.write(key, found)
+        with closing(as_completed(function, missing, workers)) as results:
+            for key, arrays in results:
+                journal.write(key, arrays)
                 done += 1
                 report(done, len(tasks))
     except KeyboardInterrupt:

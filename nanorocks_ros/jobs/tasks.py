@@ -1,7 +1,7 @@
-"""Many independent tasks at once: in processes of this machine, or on a Dask cluster.
+"""Independent tasks in parallel: in processes of this machine, or on a Dask cluster.
 
-The order in which tasks end depends on the machines; what they return must not. Nothing here
-adds up results: that is done by the caller, in the order of the tasks.
+Tasks finish in any order, but their results must not depend on it. The caller adds up results, in
+the order of the tasks.
 """
 
 from __future__ import annotations
@@ -17,28 +17,30 @@ from nanorocks_ros.errors import ConfigurationError
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Mapping
 
+    from nanorocks_ros.jobs.progress import Progress
+
 Argument = TypeVar('Argument')
 Result = TypeVar('Result')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Workers:
-    """Who does the work.
+    """Processes or cluster that run tasks.
 
     Parameters
     ----------
     processes : int or None, > 0
-        On this machine; None takes all cores this process may use. One means this process.
+        On this machine; None: one for each core this process may use; 1: this process itself.
     scheduler : str or None
-        Address of a Dask scheduler, ``tcp://host:port``; its workers do the work instead.
+        Address of a Dask scheduler, ``tcp://host:port``, whose workers run the tasks.
     task_seconds : float, [s], > 0
-        About how much work to put into one task where work can be divided at will: no less is
-        lost by an interruption, and each task costs some milliseconds.
+        Approximate length of a task where work can be divided freely: an interruption loses the
+        running tasks, and each task has an overhead of some milliseconds.
 
     Raises
     ------
     ConfigurationError
-        For a number of processes below 1, or both, or a time that cannot be used.
+        For fewer than 1 process, both processes and a scheduler, or a time that is not positive.
     """
 
     processes: int | None = None
@@ -52,19 +54,18 @@ class Workers:
             raise ConfigurationError(
                 '--workers', 'counts processes of this machine', 'leave it out with --scheduler'
             )
-
         if not (math.isfinite(self.task_seconds) and self.task_seconds > 0.0):
             raise ConfigurationError(
                 '--task-seconds', f'{self.task_seconds}', 'give a time above 0'
             )
 
     def check(self) -> None:
-        """Refuse a cluster that cannot be used, before any work is done.
+        """Raise for a cluster that cannot be used, before any work is done.
 
         Raises
         ------
         NanorocksError
-            See `cluster.check_cluster`.
+            See `dask_cluster.check_cluster`.
         """
         if self.scheduler is not None:
             from nanorocks_ros.jobs.dask_cluster import check_cluster
@@ -77,19 +78,19 @@ class Workers:
         return self.processes or len(os.sched_getaffinity(0))
 
 
-def as_finished(
+def as_completed(
     function: Callable[[Argument], Result], tasks: Mapping[str, Argument], workers: Workers
 ) -> Generator[tuple[str, Result], None, None]:
-    """Results as they come; close the generator to stop the work.
+    """Yield results as tasks finish; close the generator to stop the work.
 
     Parameters
     ----------
     function : callable
-        Of one argument; importable on the workers, which get its name only.
+        Takes one argument; must be importable on the workers, which receive only its name.
     tasks : mapping of str to picklable objects
         Arguments by key.
     workers : Workers
-        Processes on this machine import the main module anew: a script has to start its work
+        Processes of this machine import the main module again: a script must start its work
         under ``if __name__ == '__main__'``.
 
     Yields
@@ -99,39 +100,39 @@ def as_finished(
     Raises
     ------
     NanorocksError
-        When workers end again and again, or the cluster cannot be used.
+        When workers die repeatedly, or the cluster cannot be used.
     Exception
-        What a task raised.
+        Raised by a task.
     """
     if not tasks:
         return
     if workers.scheduler is not None:
-        from nanorocks_ros.jobs.dask_cluster import finished_on_cluster
+        from nanorocks_ros.jobs.dask_cluster import run_on_cluster
 
-        yield from finished_on_cluster(function, tasks, workers.scheduler)
+        yield from run_on_cluster(function, tasks, workers.scheduler)
     elif workers.count == 1:
         for key, argument in tasks.items():
             yield key, function(argument)
     else:
-        from nanorocks_ros.jobs.worker_processes import finished_in_processes
+        from nanorocks_ros.jobs.worker_processes import run_in_processes
 
-        yield from finished_in_processes(function, tasks, min(workers.count, len(tasks)))
+        yield from run_in_processes(function, tasks, min(workers.count, len(tasks)))
 
 
-def as_finished_apart(
+def as_completed_isolated(
     function: Callable[[Argument], Result],
     tasks: Mapping[str, Argument],
     workers: Workers,
     lost: Callable[[str, str], Result],
 ) -> Generator[tuple[str, Result], None, None]:
-    """As `as_finished`, but a task that kills its worker is that task's concern alone.
+    """As `as_completed`, but a task that kills its worker does not stop the others.
 
     Parameters
     ----------
     function, tasks, workers
-        As for `as_finished`; a single process of this machine is another one than this.
+        As for `as_completed`; one process means a worker process, not this one.
     lost : callable
-        Makes, of a key and what happened, the result of a task whose worker ended under it.
+        Returns the result of a task that killed its worker, from its key and the reason.
 
     Yields
     ------
@@ -142,46 +143,46 @@ def as_finished_apart(
     NanorocksError
         When the cluster cannot be used.
     Exception
-        What a task raised.
+        Raised by a task.
     """
     if not tasks:
         return
     if workers.scheduler is not None:
-        from nanorocks_ros.jobs.dask_cluster import finished_on_cluster
+        from nanorocks_ros.jobs.dask_cluster import run_on_cluster
 
-        yield from finished_on_cluster(function, tasks, workers.scheduler, lost)
+        yield from run_on_cluster(function, tasks, workers.scheduler, lost)
     else:
-        from nanorocks_ros.jobs.worker_processes import finished_apart
+        from nanorocks_ros.jobs.worker_processes import run_isolated
 
-        yield from finished_apart(function, tasks, workers.count, lost)
+        yield from run_isolated(function, tasks, workers.count, lost)
 
 
 def run_tasks(
     function: Callable[[Argument], Result],
     tasks: Mapping[str, Argument],
     workers: Workers,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> list[Result]:
-    """Results in the order of the tasks.
+    """Run tasks; return the results in the order of the tasks.
 
     Parameters
     ----------
     function, tasks, workers
-        As for `as_finished`.
+        As for `as_completed`.
     progress : callable, optional
-        Called with the tasks done and the tasks there are.
+        Called with the number of finished tasks and the number of tasks.
 
     Raises
     ------
     NanorocksError
-        When workers end again and again, or the cluster cannot be used.
+        When workers die repeatedly, or the cluster cannot be used.
     Exception
-        What a task raised.
+        Raised by a task.
     """
-    found: dict[str, Result] = {}
-    with closing(as_finished(function, tasks, workers)) as results:
+    results_by_key: dict[str, Result] = {}
+    with closing(as_completed(function, tasks, workers)) as results:
         for key, result in results:
-            found[key] = result
+            results_by_key[key] = result
             if progress is not None:
-                progress(len(found), len(tasks))
-    return [found[key] for key in tasks]
+                progress(len(results_by_key), len(tasks))
+    return [results_by_key[key] for key in tasks]

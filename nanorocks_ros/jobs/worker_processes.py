@@ -1,4 +1,7 @@
-"""Tasks in processes of this machine, which end with the process that started them."""
+"""Tasks in worker processes of this machine, which exit when their parent does.
+
+Tested in test_tasks.py.
+"""
 
 from __future__ import annotations
 
@@ -28,17 +31,17 @@ if TYPE_CHECKING:
 Argument = TypeVar('Argument')
 Result = TypeVar('Result')
 
-# Pools in a row that end without finishing a single task.
-_MOST_FRUITLESS = 3
-_DIED = 'the process that worked on it was killed, for lack of memory perhaps'
-# What a worker gets to hand over a result when it is told to end [s].
-_GRACE = 1.0
+# Pools in a row that may break without finishing a single task.
+_MAX_BROKEN_POOLS = 3
+_DIED = 'its worker process was killed, perhaps for lack of memory'
+# Time that an ending worker has to send its result [s].
+_GRACE_PERIOD = 1.0
 
 
-def finished_in_processes(
+def run_in_processes(
     function: Callable[[Argument], Result], tasks: Mapping[str, Argument], processes: int
 ) -> Generator[tuple[str, Result], None, None]:
-    """Results as they come. What a killed worker had in hand is done again by a new one.
+    """Yield results as tasks finish; a new worker repeats the task of a killed one.
 
     Parameters
     ----------
@@ -53,39 +56,39 @@ def finished_in_processes(
     Raises
     ------
     NanorocksError
-        When the workers of three pools in a row end before any task does.
+        When three pools in a row break before any task is finished.
     """
-    left = dict(tasks)
-    fruitless = 0
-    while left:
-        before = len(left)
+    remaining = dict(tasks)
+    broken_pools = 0
+    while remaining:
+        remaining_before = len(remaining)
         try:
-            with closing(_one_pool(function, dict(left), processes)) as results:
+            with closing(_run_in_pool(function, dict(remaining), processes)) as results:
                 for key, result in results:
-                    del left[key]
+                    del remaining[key]
                     yield key, result
         except BrokenProcessPool as error:
-            fruitless = fruitless + 1 if len(left) == before else 0
-            if fruitless == _MOST_FRUITLESS:
+            broken_pools = broken_pools + 1 if len(remaining) == remaining_before else 0
+            if broken_pools == _MAX_BROKEN_POOLS:
                 raise NanorocksError(
                     'workers',
-                    f'were killed {fruitless} times with nothing done, for lack of memory perhaps',
+                    f'were killed {broken_pools} times in a row, perhaps for lack of memory',
                     'use fewer --workers, or a smaller task',
                 ) from error
 
 
-def _one_pool(
+def _run_in_pool(
     function: Callable[[Argument], Result], tasks: Mapping[str, Argument], processes: int
 ) -> Generator[tuple[str, Result], None, None]:
     broken = None
     with _pool(processes) as pool:
-        with _born_quiet():
-            keys = {pool.submit(_work, function, task): key for key, task in tasks.items()}
+        with _worker_environment():
+            keys = {pool.submit(_run_task, function, task): key for key, task in tasks.items()}
         for future in as_completed(keys):
             try:
                 result = future.result()
             except BrokenProcessPool as error:
-                # Others may have finished before: hand these over first.
+                # Tasks that finished before the break are yielded first.
                 broken = error
             else:
                 yield keys[future], result
@@ -95,103 +98,103 @@ def _one_pool(
 
 @contextmanager
 def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
-    """Workers that end with this block; nobody waits for work that is not wanted any more."""
-    # Not forked: a fork copies the locks of threads that numba or matplotlib may have started.
+    """A pool whose workers exit with this block; tasks that have not started are cancelled."""
+    # Not fork: it copies the locks of threads that numba or matplotlib may have started.
     context = multiprocessing.get_context('spawn')
-    ending, lifeline = context.Pipe(duplex=False)
+    pipe_end, lifeline = context.Pipe(duplex=False)
     pool = ProcessPoolExecutor(
-        processes, mp_context=context, initializer=_start, initargs=(ending,)
+        processes, mp_context=context, initializer=_initialise_worker, initargs=(pipe_end,)
     )
     try:
         yield pool
     finally:
         lifeline.close()
         pool.shutdown(wait=True, cancel_futures=True)
-        ending.close()
+        pipe_end.close()
 
 
-def finished_apart(
+def run_isolated(
     function: Callable[[Argument], Result],
     tasks: Mapping[str, Argument],
     processes: int,
     lost: Callable[[str, str], Result],
 ) -> Generator[tuple[str, Result], None, None]:
-    """Results as they come; a task that kills its worker costs no other task anything.
+    """Yield results as tasks finish; a task that kills its worker does not affect the others.
 
     Parameters
     ----------
     function, tasks, processes
-        As for `finished_in_processes`.
+        As for `run_in_processes`.
     lost : callable
-        Makes, of a key and what happened, the result of a task whose worker ended under it.
+        Returns the result of a task that killed its worker, from its key and the reason.
 
     Yields
     ------
     key, result
     """
-    with ExitStack() as everything:
-        lanes = _Lanes(function, tasks, everything)
+    with ExitStack() as stack:
+        workers = _IsolatedWorkers(function, tasks, stack)
         for _ in range(min(processes, len(tasks))):
-            lanes.open()
-        while lanes.busy:
-            for future in wait(lanes.busy, return_when=FIRST_COMPLETED).done:
-                yield lanes.collect(future, lost)
+            workers.start_worker()
+        while workers.running:
+            for future in wait(workers.running, return_when=FIRST_COMPLETED).done:
+                yield workers.collect(future, lost)
 
 
-class _Lanes(Generic[Argument, Result]):
-    """Pools of one worker each: when one breaks, it is known over what."""
+class _IsolatedWorkers(Generic[Argument, Result]):
+    """Pools of one worker each: a pool that breaks identifies the task that broke it."""
 
     def __init__(
         self,
         function: Callable[[Argument], Result],
         tasks: Mapping[str, Argument],
-        everything: ExitStack,
+        stack: ExitStack,
     ) -> None:
         self._function = function
         self._waiting = deque(tasks.items())
-        self._everything = everything
-        self.busy: dict[Future[Result], tuple[str, ExitStack, ProcessPoolExecutor]] = {}
+        self._stack = stack
+        self.running: dict[Future[Result], tuple[str, ExitStack, ProcessPoolExecutor]] = {}
 
-    def open(self) -> None:
+    def start_worker(self) -> None:
         """Start a worker on the next task, if there is one."""
         if self._waiting:
-            lane = self._everything.enter_context(ExitStack())
-            self._hand_over(lane, lane.enter_context(_pool(1)))
+            pool_stack = self._stack.enter_context(ExitStack())
+            self._submit_next(pool_stack, pool_stack.enter_context(_pool(1)))
 
-    def _hand_over(self, lane: ExitStack, pool: ProcessPoolExecutor) -> None:
+    def _submit_next(self, pool_stack: ExitStack, pool: ProcessPoolExecutor) -> None:
         key, argument = self._waiting[0]
         try:
-            with _born_quiet():
-                future = pool.submit(_work, self._function, argument)
+            with _worker_environment():
+                future = pool.submit(_run_task, self._function, argument)
         except BrokenProcessPool:
-            # Killed with nothing in hand: nobody's fault.
-            lane.close()
-            self.open()
+            # The worker was killed between two tasks.
+            pool_stack.close()
+            self.start_worker()
             return
         self._waiting.popleft()
-        self.busy[future] = key, lane, pool
+        self.running[future] = key, pool_stack, pool
 
     def collect(
         self, future: Future[Result], lost: Callable[[str, str], Result]
     ) -> tuple[str, Result]:
-        """What came of a task; its worker takes the next, or another one does."""
-        key, lane, pool = self.busy.pop(future)
+        """Key and result of a finished task; its worker, or a new one, takes the next task."""
+        key, pool_stack, pool = self.running.pop(future)
         try:
             result = future.result()
         except BrokenProcessPool:
-            lane.close()
-            self.open()
+            pool_stack.close()
+            self.start_worker()
             return key, lost(key, _DIED)
         if self._waiting:
-            self._hand_over(lane, pool)
+            self._submit_next(pool_stack, pool)
         else:
-            lane.close()
+            pool_stack.close()
         return key, result
 
 
 @contextmanager
-def _born_quiet() -> Iterator[None]:
-    """Processes started here get one thread of BLAS, and no Ctrl-C while they start."""
+def _worker_environment() -> Iterator[None]:
+    """Start processes with one BLAS thread, and with Ctrl-C blocked while they start."""
     earlier = os.environ.get('OPENBLAS_NUM_THREADS')
     os.environ['OPENBLAS_NUM_THREADS'] = '1'
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -202,28 +205,28 @@ def _born_quiet() -> Iterator[None]:
             del os.environ['OPENBLAS_NUM_THREADS']
         else:
             os.environ['OPENBLAS_NUM_THREADS'] = earlier
-        # Last: a Ctrl-C that came meanwhile is raised here.
+        # Last: a Ctrl-C that was pressed meanwhile is raised here.
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
-_working = threading.Lock()
+_task_running = threading.Lock()
 
 
-def _start(ending: Connection) -> None:
-    """In the worker: Ctrl-C is for the parent, which tells us by closing the pipe, or dying."""
+def _initialise_worker(pipe_end: Connection) -> None:
+    """Initialise a worker: the parent handles Ctrl-C, and ends the worker by closing the pipe."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-    threading.Thread(target=_end_with, args=(ending,), daemon=True).start()
+    threading.Thread(target=_exit_with_parent, args=(pipe_end,), daemon=True).start()
 
 
-def _end_with(ending: Connection) -> None:
-    ending.poll(None)
-    # Cutting a result in two would leave the parent waiting for the other half.
-    if _working.acquire(blocking=False):
-        time.sleep(_GRACE)
+def _exit_with_parent(pipe_end: Connection) -> None:
+    pipe_end.poll(None)
+    # The parent would wait for ever for the rest of a result that was cut.
+    if _task_running.acquire(blocking=False):
+        time.sleep(_GRACE_PERIOD)
     os._exit(1)
 
 
-def _work(function: Callable[[Argument], Result], argument: Argument) -> Result:
-    with _working:
+def _run_task(function: Callable[[Argument], Result], argument: Argument) -> Result:
+    with _task_running:
         return function(argument)

@@ -1,10 +1,13 @@
-"""``python -m nanorocks_ros.nodes NAME``: a node without an installed executable."""
+"""``python -m nanorocks_ros.nodes NAME``: starts a node without an installed executable.
+
+Tested by test/nodes/test_graph.py.
+"""
 
 from __future__ import annotations
 
 import sys
 
-from nanorocks_ros.nodes._run import NODES, run
+from nanorocks_ros.nodes.run import NODES, run
 
 if __name__ == '__main__':
     if len(sys.argv) < 2 or sys.argv[1] not in NODES:

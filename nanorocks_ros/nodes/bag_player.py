@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.qos import QoSProfile
@@ -10,12 +11,12 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from nanorocks_ros.errors import ConfigurationError, FrameError, RecordingError
-from nanorocks_ros.nodes._node import NanorocksNode
-from nanorocks_ros.nodes._pacing import Pacer
-from nanorocks_ros.nodes._part import Part
-from nanorocks_ros.nodes._playback import Playback, stamp_in
-from nanorocks_ros.nodes._shell import compressed_message, image_message, time_message
-from nanorocks_ros.nodes._sources import path_of_bag
+from nanorocks_ros.nodes.base.node import NanorocksNode
+from nanorocks_ros.nodes.base.ros_messages import compressed_message, image_message, time_message
+from nanorocks_ros.nodes.sources.bag_publishers import BagPublishers, stamp_in
+from nanorocks_ros.nodes.sources.bag_source import path_of_bag
+from nanorocks_ros.nodes.sources.play_range import PlayRange
+from nanorocks_ros.nodes.sources.player import Player
 from nanorocks_ros.recordings.bag.played_range import latest
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.messages.image_messages import (
@@ -24,223 +25,231 @@ from nanorocks_ros.recordings.messages.image_messages import (
     jpeg_of,
 )
 from nanorocks_ros.settings import BagSettings, PacingSettings, PlayerSettings, rows
-from nanorocks_ros.settings import problem as wrong_with
+from nanorocks_ros.settings import problem as setting_problem
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 from nanorocks_ros.wire import topics
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rclpy.parameter import Parameter
+
+    from nanorocks_ros.recordings.bag.reader import BagMessage
+
 _CLOCK_S = 0.025
 _JPEG_QUALITY = 95
-_CAMERA = (topics.RAW.absolute(), topics.RAW_COMPRESSED.absolute())
+_RAW, _COMPRESSED = topics.RAW.absolute(), topics.RAW_COMPRESSED.absolute()
 _ONE_CLOCK = (
-    'end all but one, or give each a clock of its own (-r /clock:=/NAME/clock, also for the nodes '
-    'that follow it)'
+    'stop all but one, or give each a clock of its own (-r /clock:=/NAME/clock, also for the '
+    'nodes that use it)'
 )
-_WORK_IT_OUT_AGAIN = 'set results:=false for bag_player, or end the other'
+_RESULTS_TWICE = 'set results:=false for bag_player, or stop the other node'
 
 
 class BagPlayerNode(NanorocksNode):
     """Plays a bag; topics under ``/nanorocks`` move with the node's own namespace."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('bag_player')
-        settings = self.declare(BagSettings())
-        player = self.declare(PlayerSettings(), fixed=False)
-        pacing = self.declare(PacingSettings(), fixed=False)
-        self.refuse_unknown_parameters()
+        settings = self.parameters.declare(BagSettings())
+        playback = self.parameters.declare(PlayerSettings(), read_only=False)
+        pacing = self.parameters.declare(PacingSettings(), read_only=False)
+        self.parameters.refuse_unknown()
         self._reader = open_bag(path_of_bag(settings))
         self._reader.require_topic(list(self._reader.topics))
-        self._part = Part(self, self._reader, settings, pacing.duration)
-        self._last = None
-        self._clock_ns = None
-        self._clock_output = self.create_publisher(Clock, '/clock', QoSProfile(depth=10))
-        self._playback = Playback(self, self._reader, player.results)
-        self._part.require(self._playback.names, 'message')
-        self._part.tell_missing()
-        self._camera = [name for name in _CAMERA if self._has_messages(name)]
+        self._range = PlayRange(self, self._reader, settings, pacing.duration)
+        self._last_decoded: object = None
+        self._clock_ns: int | None = None
+        self._clock_publisher = self.create_publisher(Clock, '/clock', QoSProfile(depth=10))
+        self._publishers_of_bag = BagPublishers(self, self._reader, with_results=playback.results)
+        self._range.require(self._publishers_of_bag.names, 'message')
+        self._range.log_damage()
+        self._camera = [name for name in (_RAW, _COMPRESSED) if self._has_messages(name)]
         self._epoch_ns = BagFrames(self._reader.path).epoch_ns() if self._camera else None
-        self._expect_to_be_alone()
-        begin_ns = self._begin_ns(player.position)
-        self._tell_latched(begin_ns)
-        self._pacer = Pacer(
-            self,
-            self._moments(begin_ns),
-            self._emit,
-            replace(pacing, duration=0.0),
-            self.finish,
-            player.paused,
-        )
-        self.create_timer(_CLOCK_S, self._tell_time, clock=self.steady_clock)
-        self._take_orders()
+        self._require_single_publishers()
+        begin_ns = self._begin_ns(playback.position)
+        self._publish_latched(begin_ns)
+        # The range has the duration already.
+        pacing = replace(pacing, duration=0.0)
+        self._player = Player(self, self._moments(begin_ns), self._emit, pacing, self.finish)
+        if playback.paused:
+            self._player.pause()
+        self.create_timer(_CLOCK_S, self._publish_clock, clock=self.steady_clock)
+        self._offer_services()
 
-    def _begin_ns(self, position):
-        # Its default is no order: the part may begin later.
+    def _begin_ns(self, position: float) -> int:
+        # The default is 0, and the range may begin later.
         if position == 0.0:
-            return self._part.first_ns
-        if self._part.stamp_at(position) is None:
+            return self._range.first_ns
+        stamp_ns = self._range.stamp_at(position)
+        if stamp_ns is None:
             raise ConfigurationError(
-                'parameter position', self._wrong_with_position(position), 'give another'
+                'parameter position', self._outside_range(position), 'give another'
             )
-        return self._part.stamp_at(position)
+        return stamp_ns
 
-    def _has_messages(self, name):
-        return name in self._playback.names and self._reader.topics[name].count > 0
+    def _has_messages(self, name: str) -> bool:
+        return name in self._publishers_of_bag.names and self._reader.topics[name].count > 0
 
-    def _expect_to_be_alone(self):
-        self.watch.alone_on('/clock', _ONE_CLOCK)
+    def _require_single_publishers(self) -> None:
+        self.topic_monitor.require_single_publisher('/clock', _ONE_CLOCK)
         for topic in (topics.RAW, topics.RAW_COMPRESSED):
-            self.offer((topic,))
-            self.watch.alone_on(topic.name)
-        for name in self._playback.results:
-            self.watch.alone_on(name, _WORK_IT_OUT_AGAIN)
+            self.outputs.offer((topic,))
+            self.topic_monitor.require_single_publisher(topic.name)
+        for name in self._publishers_of_bag.results:
+            self.topic_monitor.require_single_publisher(name, _RESULTS_TWICE)
 
-    # What is played
+    # Playback
 
-    def _moments(self, first_ns):
-        names, last_ns = self._playback.names, self._part.last_ns
-        for turn, begin_ns in enumerate(self._part.turns(first_ns)):
-            if turn > 0:
-                # Between the last message and the first.
+    def _moments(self, first_ns: int) -> Iterator[tuple[int, BagMessage | None]]:
+        """Log time and message; between two passes of a loop the start and None."""
+        names, last_ns = self._publishers_of_bag.names, self._range.last_ns
+        for number, begin_ns in enumerate(self._range.starts(first_ns)):
+            if number > 0:
                 yield begin_ns, None
             for message in self._reader.messages(names, begin_ns, last_ns):
                 yield message.log_time_ns, message
 
-    def _emit(self, stamp_ns, message):
-        self._tell_time(stamp_ns)
+    def _emit(self, stamp_ns: int, message: BagMessage | None) -> None:
+        self._publish_clock(stamp_ns)
         if message is None:
-            self._tell_latched(stamp_ns)
+            self._publish_latched(stamp_ns)
             return
         if message.topic not in self._camera:
-            self._playback.send(message)
+            self._publishers_of_bag.send(message)
             return
         try:
             self._send_frame(message)
         except FrameError as error:
-            self.refuse(error)
+            self.diagnostics.refuse(error)
 
-    def _send_frame(self, message):
+    def _send_frame(self, message: BagMessage) -> None:
         stamp_ns = stamp_in(message)
-        self._playback.send(message)
-        self._pacer.takers.sent(stamp_ns)
-        # Who asks for the camera in the other form gets it.
-        if self._camera == [_CAMERA[1]] and self.wanted(topics.RAW):
-            self.timed(self._decoded, message)
-        if self._camera == [_CAMERA[0]] and self.wanted(topics.RAW_COMPRESSED):
-            self.timed(self._encoded, message)
+        self._publishers_of_bag.send(message)
+        self._player.flow_control.note_sent(stamp_ns)
+        # The camera is also published in the other form, if somebody subscribes to that.
+        if self._camera == [_COMPRESSED] and self.outputs.has_subscribers(topics.RAW):
+            self.diagnostics.process(self._send_decoded, message)
+        if self._camera == [_RAW] and self.outputs.has_subscribers(topics.RAW_COMPRESSED):
+            self.diagnostics.process(self._send_encoded, message)
 
-    def _content(self, message):
+    def _deserialized(self, message: BagMessage) -> Any:
         try:
             return self._reader.deserialize(message)
         except RecordingError as error:
-            # One of many: the others are played.
+            # A damaged message is refused like a frame, and the others are played.
             raise FrameError(error.where, error.what, error.do) from error
 
-    def _decoded(self, message):
-        frame = frame_from_compressed(self._content(message), message.topic)
+    def _send_decoded(self, message: BagMessage) -> None:
+        frame = frame_from_compressed(self._deserialized(message), message.topic)
         image = image_message(frame.stamp_ns, 'camera', frame.image)
-        self.send(topics.RAW, image)
-        # Let go only when there is the next one, see _camera.py.
-        self._last = frame, image
+        self.outputs.send(topics.RAW, image)
+        # Kept until the next one is there: see CameraSubscription.
+        self._last_decoded = frame, image
 
-    def _encoded(self, message):
-        frame = frame_from_image(self._content(message), message.topic)
+    def _send_encoded(self, message: BagMessage) -> None:
+        frame = frame_from_image(self._deserialized(message), message.topic)
         jpeg = jpeg_of(frame, _JPEG_QUALITY)
-        self.send(topics.RAW_COMPRESSED, compressed_message(frame.stamp_ns, 'camera', jpeg))
+        image = compressed_message(frame.stamp_ns, 'camera', jpeg)
+        self.outputs.send(topics.RAW_COMPRESSED, image)
 
-    def _tell_latched(self, stamp_ns):
-        """Publish what latched topics held at a time."""
+    def _publish_latched(self, stamp_ns: int) -> None:
+        """Publish the last messages of latched topics before a time."""
         if self._epoch_ns is not None:
-            self.send(topics.EPOCH, time_message(self._epoch_ns))
-        for message in latest(self._reader, self._playback.latched, stamp_ns):
-            self._playback.send(message)
+            self.outputs.send(topics.EPOCH, time_message(self._epoch_ns))
+        for message in latest(self._reader, self._publishers_of_bag.latched, stamp_ns):
+            self._publishers_of_bag.send(message)
 
-    def _tell_time(self, stamp_ns=None):
-        """Publish the clock: steadily, and whenever a message moves it on."""
-        now_ns = self._pacer.now_ns if stamp_ns is None else stamp_ns
+    def _publish_clock(self, stamp_ns: int | None = None) -> None:
+        """Publish the clock: by the timer, and for each message of a new time."""
+        now_ns = self._player.now_ns if stamp_ns is None else stamp_ns
         if stamp_ns is None or stamp_ns != self._clock_ns:
-            self._clock_output.publish(Clock(clock=time_message(now_ns)))
+            self._clock_publisher.publish(Clock(clock=time_message(now_ns)))
         self._clock_ns = now_ns
-        self.state['position [s]'] = f'{self._part.seconds(now_ns):.3f}'
-        self.state['paused'] = str(self._pacer.paused).lower()
+        self.diagnostics.values['position [s]'] = f'{self._range.seconds(now_ns):.3f}'
+        self.diagnostics.values['paused'] = str(self._player.paused).lower()
 
-    # What it is told to do
+    # Services and parameters
 
-    def _take_orders(self):
-        orders = {
+    def _offer_services(self) -> None:
+        services = {
             'pause': self._pause,
             'resume': self._resume,
-            'toggle_paused': self._toggle,
-            'is_paused': self._tell_paused,
+            'toggle_paused': self._toggle_paused,
+            'is_paused': self._is_paused,
             'play_next': self._play_next,
         }
-        for name, order in orders.items():
-            self.create_service(Trigger, f'~/{name}', order)
-        self.add_on_set_parameters_callback(self._check)
-        self.add_post_set_parameters_callback(self._changed)
+        for name, service in services.items():
+            self.create_service(Trigger, f'~/{name}', service)
+        self.add_on_set_parameters_callback(self._check_change)
+        self.add_post_set_parameters_callback(self._apply_change)
 
-    def _answer(self, response, success=True):
+    def _answer(self, response: Trigger.Response, *, success: bool = True) -> Trigger.Response:
         response.success = success
-        where = f'{self._part.seconds(self._pacer.now_ns):.3f} s'
-        response.message = f'{"paused" if self._pacer.paused else "playing"} at {where}'
+        position = f'{self._range.seconds(self._player.now_ns):.3f} s'
+        response.message = f'{"paused" if self._player.paused else "playing"} at {position}'
         return response
 
-    def _pause(self, _, response):
-        self._pacer.pause()
+    def _pause(self, _: object, response: Trigger.Response) -> Trigger.Response:
+        self._player.pause()
         return self._answer(response)
 
-    def _resume(self, _, response):
-        self._pacer.resume()
+    def _resume(self, _: object, response: Trigger.Response) -> Trigger.Response:
+        self._player.resume()
         return self._answer(response)
 
-    def _toggle(self, request, response):
-        turn = self._resume if self._pacer.paused else self._pause
-        return turn(request, response)
+    def _toggle_paused(self, request: object, response: Trigger.Response) -> Trigger.Response:
+        toggle = self._resume if self._player.paused else self._pause
+        return toggle(request, response)
 
-    def _tell_paused(self, _, response):
-        return self._answer(response, self._pacer.paused)
+    def _is_paused(self, _: object, response: Trigger.Response) -> Trigger.Response:
+        return self._answer(response, success=self._player.paused)
 
-    def _play_next(self, _, response):
-        """Play up to the next frame of the camera, or the next message where there is none."""
-        if not self._pacer.paused:
+    def _play_next(self, _: object, response: Trigger.Response) -> Trigger.Response:
+        """Play up to the next frame of the camera, or the next message without a camera."""
+        if not self._player.paused:
             response.message = 'playing; pause first'
             return response
-        held = self._camera
-        found = self._pacer.step(lambda m: m is not None and (not held or m.topic in held))
-        return self._answer(response, found)
 
-    def _check(self, parameters):
-        known = {row.name: row for row in (*rows(PlayerSettings()), *rows(PacingSettings()))}
+        def is_last(message: BagMessage | None) -> bool:
+            return message is not None and (not self._camera or message.topic in self._camera)
+
+        return self._answer(response, success=self._player.step(is_last))
+
+    def _check_change(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:
-            text = (
-                wrong_with(known[parameter.name], parameter.value)
-                if parameter.name in known
-                else None
-            )
-            if text is None and parameter.name == 'position':
-                text = self._wrong_with_position(parameter.value)
-            if (
-                text is None
-                and parameter.name in known
-                and parameter.name not in ('rate', 'position')
-            ):
-                text = 'takes effect at the start only'
-            if text is not None:
-                return SetParametersResult(successful=False, reason=f'{parameter.name}: {text}')
+            problem = self._problem_with(parameter.name, parameter.value)
+            if problem is not None:
+                reason = f'{parameter.name}: {problem}'
+                return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
 
-    def _wrong_with_position(self, seconds):
-        if self._part.stamp_at(seconds) is None:
-            return f'{seconds:g} s is not in the part that is played, {self._part.where}'
-        return None
+    def _problem_with(self, name: str, value: Any) -> str | None:
+        """Why a parameter cannot have a value now; None when it can, or is no setting."""
+        settings = {row.name: row for row in (*rows(PlayerSettings()), *rows(PacingSettings()))}
+        if name not in settings:
+            return None
+        problem = setting_problem(settings[name], value)
+        if problem is not None or name == 'rate':
+            return problem
+        if name != 'position':
+            return 'can only be set at the start'
+        return self._outside_range(value) if self._range.stamp_at(value) is None else None
 
-    def _changed(self, parameters):
+    def _outside_range(self, seconds: float) -> str:
+        return f'{seconds:g} s is outside the range that is played, {self._range.description}'
+
+    def _apply_change(self, parameters: list[Parameter]) -> None:
         for parameter in parameters:
             if parameter.name == 'rate':
-                self._pacer.set_rate(float(parameter.value))
+                self._player.set_rate(float(parameter.value))
             if parameter.name == 'position':
-                self._seek(self._part.stamp_at(parameter.value))
+                stamp_ns = self._range.stamp_at(parameter.value)
+                if stamp_ns is not None:
+                    self._seek(stamp_ns)
 
-    def _seek(self, stamp_ns):
-        self._pacer.restart(self._moments(stamp_ns), stamp_ns)
-        self._tell_time(stamp_ns)
-        self._tell_latched(stamp_ns)
-        self.get_logger().info(f'went to {self._part.seconds(stamp_ns):.3f} s')
+    def _seek(self, stamp_ns: int) -> None:
+        self._player.seek(self._moments(stamp_ns), stamp_ns)
+        self._publish_clock(stamp_ns)
+        self._publish_latched(stamp_ns)
+        self.get_logger().info(f'moved to {self._range.seconds(stamp_ns):.3f} s')

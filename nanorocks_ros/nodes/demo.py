@@ -1,4 +1,7 @@
-"""The demonstration: every node in a process of its own, tray 1, live COR, and a figure."""
+"""The demonstration: every node in a process of its own, tray 1, live COR, and a figure.
+
+Run by `make demo`, not by a test.
+"""
 
 from __future__ import annotations
 
@@ -8,109 +11,119 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.nodes._epoch import Epoch
-from nanorocks_ros.nodes._node import NanorocksNode
+from nanorocks_ros.nodes.base.epoch import Epoch
+from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.records import CorEstimate, CorStatus, GroundTruth, SpeedEstimate
 from nanorocks_ros.studies.figures.demo_figure import cooling_figure
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array
 
+if TYPE_CHECKING:
+    from std_msgs.msg import Float32MultiArray
+
+_Record = TypeVar('_Record', SpeedEstimate, CorEstimate, GroundTruth)
+
 _TRAY = 1
 _GRAPH = ('preprocessor', 'speed_estimator', 'cluster_autocorrelator', 'haff_fitter', 'simulator')
-# All frames, from the first: the nodes listen before the camera starts.
-_SIMULATOR = ('--ros-args', '-p', 'listeners:=3')
+# All frames from the first one on: the camera starts when three nodes listen.
+_SIMULATOR_ARGUMENTS = ('--ros-args', '-p', 'listeners:=3')
 _FIGURE = Path('nanorocks_demo.png')
 _NODE_ENDS_WITHIN_S = 10.0
-# The first time all is compiled, on a slow machine for minutes.
+# The first run compiles everything, on a slow machine for minutes.
 _DEADLINE_S = 360.0
+_CHECK_S = 0.5
+_FRAMES_PER_LINE = 15
 
 
 class DemoNode(NanorocksNode):
-    """Starts the graph, prints the COR as it converges, draws the end result."""
+    """Starts the graph, prints the COR as it converges, draws the final result."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('demo')
         self._epoch = Epoch(self, may_set=False)
-        self._records = {SpeedEstimate: [], CorEstimate: [], GroundTruth: []}
-        for topic, kind in (
-            (topics.SPEED, SpeedEstimate),
-            (topics.COR, CorEstimate),
-            (topics.TRUTH, GroundTruth),
-        ):
-            self.listen(topic, lambda m, kind=kind: self._take(kind, m), _TRAY, required=False)
+        self._speeds: list[SpeedEstimate] = []
+        self._cors: list[CorEstimate] = []
+        self._truth: list[GroundTruth] = []
+        self.listen(topics.SPEED, self._receive_speed, _TRAY, required=False)
+        self.listen(topics.COR, self._receive_cor, _TRAY, required=False)
+        self.listen(topics.TRUTH, self._receive_truth, _TRAY, required=False)
         print('starting the nodes: ' + ', '.join(_GRAPH), flush=True)
         self._deadline = time.monotonic() + _DEADLINE_S
-        self._processes = [_started(name) for name in _GRAPH]
-        self.create_timer(0.5, self._watch, clock=self.steady_clock)
+        self._processes = [_start_node(name) for name in _GRAPH]
+        self.create_timer(_CHECK_S, self._check_processes, clock=self.steady_clock)
 
-    def _take(self, kind, message):
-        if self._epoch.ns is None:
-            return
-        record = from_array(kind, message.data, tray=_TRAY, epoch_ns=self._epoch.ns, where='demo')
-        self._records[kind].append(record)
-        if kind is GroundTruth:
-            self._print_progress(record)
-        if kind is CorEstimate:
-            self._print_cor(record)
+    def _receive_speed(self, message: Float32MultiArray) -> None:
+        if self._epoch.is_known:
+            self._speeds.append(_record(SpeedEstimate, message, self._epoch.ns))
 
-    def _print_progress(self, truth):
-        if len(self._records[GroundTruth]) % 15 == 0 and sys.stdout.isatty():
-            seconds = (truth.stamp_ns - self._epoch.ns) / 1e9
-            speeds = self._records[SpeedEstimate]
-            measured = f'{speeds[-1].mean_projected_speed * 1e3:5.2f}' if speeds else '  ...'
+    def _receive_truth(self, message: Float32MultiArray) -> None:
+        if self._epoch.is_known:
+            self._truth.append(_record(GroundTruth, message, self._epoch.ns))
+            self._print_progress(self._truth[-1])
+
+    def _receive_cor(self, message: Float32MultiArray) -> None:
+        if self._epoch.is_known:
+            self._cors.append(_record(CorEstimate, message, self._epoch.ns))
+            self._print_cor(self._cors[-1])
+
+    def _seconds(self, stamp_ns: int) -> float:
+        return (stamp_ns - self._epoch.ns) / 1e9
+
+    def _print_progress(self, truth: GroundTruth) -> None:
+        if len(self._truth) % _FRAMES_PER_LINE == 0 and sys.stdout.isatty():
+            measured = '  ...'
+            if self._speeds:
+                measured = f'{self._speeds[-1].mean_projected_speed.value * 1e3:5.2f}'
+            seconds = self._seconds(truth.stamp_ns)
             print(f'\r{seconds:5.1f} s  mean speed {measured} mm/s ', end='', flush=True)
 
-    def _print_cor(self, cor):
-        truth = self._records[GroundTruth]
-        seconds = (cor.stamp_ns - self._epoch.ns) / 1e9
-        known = f'  truth {truth[-1].restitution:g}' if truth else ''
+    def _print_cor(self, cor: CorEstimate) -> None:
+        seconds = self._seconds(cor.stamp_ns)
         if cor.status in (CorStatus.NO_DECAY, CorStatus.UNDETERMINED):
-            print(f'\r{seconds:5.1f} s  the decay tells too little yet      ', flush=True)
+            print(f'\r{seconds:5.1f} s  no COR yet: too little decay         ', flush=True)
             return
+        truth = f'  truth {self._truth[-1].restitution:g}' if self._truth else ''
         print(
-            f'\r{seconds:5.1f} s  COR {cor.restitution:.4f} '
-            f'[{cor.restitution_lower:.4f}, {cor.restitution_upper:.4f}] '
-            f'{cor.status.name.lower()}{known}',
+            f'\r{seconds:5.1f} s  COR {cor.restitution.value:.4f} '
+            f'[{cor.restitution.lower:.4f}, {cor.restitution.upper:.4f}] '
+            f'{cor.status.name.lower()}{truth}',
             flush=True,
         )
         if cor.status is CorStatus.FINAL:
-            self._draw()
+            self._draw(cor)
             self.done = True
 
-    def _draw(self):
-        cycle = self._records[CorEstimate][-1].cycle
-        of_cycle = {
-            kind: [one for one in found if one.cycle == cycle]
-            for kind, found in self._records.items()
-        }
+    def _draw(self, final: CorEstimate) -> None:
+        cycle = final.cycle
         cooling_figure(
             _FIGURE,
             load_trays()[_TRAY],
-            of_cycle[SpeedEstimate],
-            of_cycle[CorEstimate],
-            of_cycle[GroundTruth],
+            [speed for speed in self._speeds if speed.cycle == cycle],
+            [cor for cor in self._cors if cor.cycle == cycle],
+            [truth for truth in self._truth if truth.cycle == cycle],
         )
-        last = self._records[CorEstimate][-1]
         print(
-            f'walls {last.wall_restitution:.3f} [{last.wall_restitution_lower:.3f}, '
-            f"{last.wall_restitution_upper:.3f}]; the paper's closed form says "
-            f'{last.paper_restitution:.3f}; see docs/method/restitution.md'
+            f'walls {final.wall_restitution.value:.3f} [{final.wall_restitution.lower:.3f}, '
+            f"{final.wall_restitution.upper:.3f}]; the paper's closed form says "
+            f'{final.paper_restitution:.3f}; see docs/method/restitution.md'
         )
         print(f'figure: {_FIGURE.resolve()}', flush=True)
 
-    def _watch(self):
+    def _check_processes(self) -> None:
         if time.monotonic() > self._deadline:
-            print('demo: no final COR in time; see what the nodes said above', file=sys.stderr)
-            self.exit_code, self.done = 1, True
+            self._fail(f'no final COR within {_DEADLINE_S:g} s; see the messages above')
         for name, process in zip(_GRAPH, self._processes, strict=True):
             if process.poll() is not None:
-                print(f'demo: node {name} ended with code {process.returncode}', file=sys.stderr)
-                self.exit_code = 1
-                self.done = True
+                self._fail(f'node {name} ended with code {process.returncode}')
 
-    def destroy_node(self):
+    def _fail(self, text: str) -> None:
+        print(f'demo: {text}', file=sys.stderr)
+        self.exit_code, self.done = 1, True
+
+    def destroy_node(self) -> None:
         """End the nodes that were started, and wait for them."""
         for process in self._processes:
             if process.poll() is None:
@@ -123,9 +136,13 @@ class DemoNode(NanorocksNode):
         super().destroy_node()
 
 
-def _started(name):
-    arguments = _SIMULATOR if name == 'simulator' else ()
-    # A session of its own, so that a Ctrl-C here reaches it once, from us.
+def _record(record_type: type[_Record], message: Float32MultiArray, epoch_ns: int) -> _Record:
+    return from_array(record_type, message.data, tray=_TRAY, epoch_ns=epoch_ns, where='demo')
+
+
+def _start_node(name: str) -> subprocess.Popen[bytes]:
+    arguments = _SIMULATOR_ARGUMENTS if name == 'simulator' else ()
+    # In a session of its own, a Ctrl-C of the terminal reaches it only through `destroy_node`.
     return subprocess.Popen(
         [sys.executable, '-m', 'nanorocks_ros.nodes', name, *arguments],
         env=dict(os.environ, ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST'),

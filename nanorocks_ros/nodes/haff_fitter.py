@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.nodes._node import NanorocksNode
+from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.pipeline.warm_up import warm_up_cooling
 from nanorocks_ros.records import Merge, PairCollision, Rebound, SpeedEstimate
@@ -13,45 +14,52 @@ from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEs
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array
 
+if TYPE_CHECKING:
+    from std_msgs.msg import Float32MultiArray
+
+    from nanorocks_ros.wire.topics import Topic
+
+_INPUTS = (
+    (topics.SPEED, SpeedEstimate),
+    (topics.REBOUND, Rebound),
+    (topics.COLLISION, PairCollision),
+    (topics.MERGE, Merge),
+)
+# Times are only compared with each other, so any epoch does.
+_EPOCH_NS = 0
+
 
 class HaffFitterNode(NanorocksNode):
-    """Reads restitutions from the speeds and contacts of each tray."""
+    """Estimates the restitution of each tray from its speeds and contacts."""
 
-    _INPUTS = (
-        (topics.SPEED, SpeedEstimate),
-        (topics.REBOUND, Rebound),
-        (topics.COLLISION, PairCollision),
-        (topics.MERGE, Merge),
-    )
-    # Times are only ever compared with one another, so any epoch does.
-    _EPOCH_NS = 0
-
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('haff_fitter')
-        self._settings = self.declare(PipelineSettings(), fixed=False)
+        self._settings = self.parameters.declare(PipelineSettings(), read_only=False)
         self._adopt(self._settings, self._build(self._settings))
-        self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
+        self.parameters.react_to_changes(PipelineSettings(), self._build, self._adopt)
         for tray in self._settings.trays:
-            self.offer((topics.COR,), tray)
-        # Others find the publishers meanwhile.
+            self.outputs.offer((topics.COR,), tray)
+        # Meanwhile others discover the publishers.
         warm_up_cooling()
         for tray in self._settings.trays:
-            for topic, record in self._INPUTS:
-                take = partial(self._take, topic, record, tray)
+            for topic, record_type in _INPUTS:
+                receive = partial(self._receive, topic, record_type, tray)
                 # Without tracks there are speeds, but no contacts.
-                self.listen(topic, take, tray, required=record is SpeedEstimate)
+                self.listen(topic, receive, tray, required=record_type is SpeedEstimate)
 
-    def _build(self, settings):
+    def _build(self, settings: PipelineSettings) -> dict[int, RestitutionEstimator]:
         return {
             number: RestitutionEstimator(settings, tray)
             for number, tray in trays_of(settings).items()
         }
 
-    def _adopt(self, settings, stages):
+    def _adopt(self, settings: PipelineSettings, stages: dict[int, RestitutionEstimator]) -> None:
         self._settings, self._stages = settings, stages
 
-    def _take(self, topic, kind, tray, message):
+    def _receive(
+        self, topic: Topic, record_type: type[Any], tray: int, message: Float32MultiArray
+    ) -> None:
         where = self.resolve_topic_name(topic.of(tray))
-        taken = from_array(kind, message.data, tray=tray, epoch_ns=self._EPOCH_NS, where=where)
-        for record in self._stages[tray].push(taken):
-            self.publish_result(record, self._EPOCH_NS)
+        record = from_array(record_type, message.data, tray=tray, epoch_ns=_EPOCH_NS, where=where)
+        for result in self._stages[tray].push(record):
+            self.outputs.publish_result(result, _EPOCH_NS)

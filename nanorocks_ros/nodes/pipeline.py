@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nanorocks_ros import settings as st
 from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.experiment.calibration_file import calibrated
-from nanorocks_ros.nodes import _sources
-from nanorocks_ros.nodes._background import Background
-from nanorocks_ros.nodes._camera import Camera
-from nanorocks_ros.nodes._epoch import Epoch
-from nanorocks_ros.nodes._live_page import LivePage
-from nanorocks_ros.nodes._node import RESULT_TOPICS, NanorocksNode
-from nanorocks_ros.nodes._pacing import Pacer
-from nanorocks_ros.nodes._part import Part
-from nanorocks_ros.nodes._recorder import GraphRecorder, provenance
-from nanorocks_ros.nodes._tracks import TracksPicture
+from nanorocks_ros.nodes.base.epoch import Epoch
+from nanorocks_ros.nodes.base.node import NanorocksNode
+from nanorocks_ros.nodes.base.result_topics import RESULT_TOPICS
+from nanorocks_ros.nodes.sources.bag_source import (
+    open_bag_frames,
+    recorded_moments,
+    refuse_unused_parameters,
+)
+from nanorocks_ros.nodes.sources.camera_subscription import CameraSubscription
+from nanorocks_ros.nodes.sources.play_range import PlayRange
+from nanorocks_ros.nodes.sources.player import Player
+from nanorocks_ros.nodes.sources.simulated_tray import SimulatedTray, publish_frame
+from nanorocks_ros.nodes.trays.track_images import TrackImages
+from nanorocks_ros.nodes.workers.background_worker import BackgroundWorker
+from nanorocks_ros.nodes.workers.graph_recorder import GraphRecorder, provenance
+from nanorocks_ros.nodes.workers.live_page_process import LivePageProcess
 from nanorocks_ros.pipeline.composition import Pipeline, Wanted
 from nanorocks_ros.pipeline.parallel_pipeline import SharedPipeline, started, worker_count
 from nanorocks_ros.pipeline.warm_up import (
@@ -28,41 +35,78 @@ from nanorocks_ros.pipeline.warm_up import (
 from nanorocks_ros.records import Tracks, TrayImage
 from nanorocks_ros.wire import topics
 
-# With more frames behind than these, pictures are published of one frame in so many.
-_BEHIND, _SHOWN_BEHIND = 3, 10
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from nanorocks_ros.experiment.view import View
+    from nanorocks_ros.nodes.sources.simulated_tray import TrayMoment
+    from nanorocks_ros.pipeline.composition import Result
+    from nanorocks_ros.recordings.bag.reader import BagMessage
+    from nanorocks_ros.records import Frame, Notice
+    from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+
+# With more frames waiting than these, images are published of one frame in ten only.
+_MAX_WAITING, _SHOWN_EVERY = 3, 10
+
+
+class _Job(NamedTuple):
+    """The tray images of a frame, and which images to make and to publish."""
+
+    records: Sequence[TrayImage | Notice]
+    wanted: Mapping[int, Wanted]
+    visible: bool
+
+
+class _Done(NamedTuple):
+    """The results of a frame, and whether its images are to be published."""
+
+    results: Sequence[Result]
+    visible: bool
 
 
 class PipelineNode(NanorocksNode):
-    """Composes the stages; records pass between them in memory.
+    """Runs all stages; records pass between them in memory.
 
-    What follows from the tray images of a frame is worked out in the background, while the next
+    What follows from the tray images of a frame is computed in the background, while the next
     frame is decoded and cut: by other processes where there are cores for them, or in a thread.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('pipeline')
-        self._settings = self.declare(st.PipelineSettings(), fixed=False)
-        self._source = self.declare(st.SourceSettings()).source
-        self._simulation = self.declare(st.SimulationSettings(), prefix='simulation.')
-        self._bag = self.declare(st.BagSettings())
-        self._pacing = self.declare(st.PacingSettings())
-        camera = self.declare(st.CameraSettings())
-        record = self.declare(st.RecordSettings())
-        page = self.declare(st.DashboardSettings(), prefix='dashboard_')
-        shown = self.declare(st.LivePageSettings()).dashboard
-        workers = self.declare(st.WorkSettings()).workers
-        self.refuse_unknown_parameters()
-        _sources.refuse_unused(self._source, self._bag, self._pacing)
-        self._page = LivePage(self, page, self._settings.trays_file) if shown else None
+        declare = self.parameters.declare
+        self._settings = declare(st.PipelineSettings(), read_only=False)
+        self._source = declare(st.SourceSettings()).source
+        self._simulation = declare(st.SimulationSettings(), prefix='simulation.')
+        self._bag_settings = declare(st.BagSettings())
+        self._pacing = declare(st.PacingSettings())
+        camera = declare(st.CameraSettings())
+        record = declare(st.RecordSettings())
+        page = declare(st.DashboardSettings(), prefix='dashboard_')
+        with_page = declare(st.LivePageSettings()).dashboard
+        workers = declare(st.WorkSettings()).workers
+        self.parameters.refuse_unknown()
+        refuse_unused_parameters(self._source, self._bag_settings, self._pacing)
+        self._as_fast_as_possible = self._source != 'topic' and self._pacing.rate == 0.0
+        self._page = LivePageProcess(self, page, self._settings.trays_file) if with_page else None
+        self._start_stages(workers)
+        self._bag: BagFrames | None = None
+        self._start_source(camera)
+        # Last, so that no bag is left behind when the rest cannot start.
+        if record.record:
+            self._start_recording(record)
+
+    def _start_stages(self, workers: int) -> None:
+        """Offer all topics, start the workers, and build the stages."""
         self._epoch = Epoch(self, may_set=True, follow=self._source == 'topic')
-        self._recorded = None
-        self._frames = 0
-        self._where = self._source
-        self._camera, self._view = None, None
+        self._recorder: GraphRecorder | None = None
+        self._frame_count = 0
+        # What to call the camera in an error.
+        self._camera_name = self._source
+        self._view: View | None = None
         self._workers = started(worker_count(workers, len(self._settings.trays)))
-        self._offer_everything()
-        self._background = Background(self, self._follow, self._publish)
-        # Others find the publishers meanwhile.
+        self._offer_topics()
+        self._background = BackgroundWorker(self, self._follow, self._publish)
+        # Meanwhile others discover the publishers.
         warm_up()
         if not self._workers:
             warm_up_speed()
@@ -71,160 +115,186 @@ class PipelineNode(NanorocksNode):
         for worker in self._workers:
             worker.ready()
         self._adopt(self._settings, self._build(self._settings))
-        self.react_to_parameters(st.PipelineSettings(), self._build, self._adopt)
+        self.parameters.react_to_changes(st.PipelineSettings(), self._build, self._adopt)
+
+    def _offer_topics(self) -> None:
+        self.outputs.offer((topics.EPOCH,))
+        # With source 'topic' another node publishes the camera.
+        if self._source != 'topic':
+            self.outputs.offer((topics.RAW,))
+            self.topic_monitor.require_single_publisher(topics.RAW.name)
+        for tray in self._settings.trays:
+            self.outputs.offer(RESULT_TOPICS, tray)
+
+    # Stages
+
+    def _build(self, settings: st.PipelineSettings) -> Pipeline:
+        if self._workers:
+            return SharedPipeline(settings, self._camera_name, self._view, self._workers)
+        return Pipeline(settings, self._camera_name, self._view)
+
+    def _adopt(self, settings: st.PipelineSettings, pipeline: Pipeline) -> None:
+        self._background.drain()
+        self._settings, self._pipeline = settings, pipeline
+        pipeline.prepare()
+        self._track_images = TrackImages(self, calibrated(settings).preprocess.pixels_per_metre)
+
+    def _rebuild(self, camera_name: str, view: View | None = None) -> None:
+        self._camera_name, self._view = camera_name, view
+        self._pipeline = self._build(self._settings)
+        self._pipeline.prepare()
+
+    # Sources
+
+    def _start_source(self, camera: st.CameraSettings) -> None:
         if self._source == 'topic':
-            look = None if self._settings.preprocess.calibration else self._straighten
-            self._camera = Camera(self, camera, self._take, look)
-            self._name_source(self._camera.topic)
+            self._subscribe(camera)
         elif self._source == 'simulator':
             self._play_simulated()
         else:
             self._play_recorded()
-        # Last, so that nothing is left behind where the rest cannot start.
-        if record.record:
-            self._start_recording(record)
 
-    def _start_recording(self, record):
-        of_source = {'simulator': (self._simulation,), 'bag': (self._bag,), 'topic': ()}
-        kept = provenance(self._source, self._settings, *of_source[self._source])
-        # Who plays as fast as it goes waits for the disk as well.
-        self.recorder = GraphRecorder(self, record, kept, self._settings.trays, self._patient)
-        lens = self._recorded.lens_message() if self._recorded is not None else None
-        if lens is not None:
-            self.recorder.lens(lens)
+    def _subscribe(self, settings: st.CameraSettings) -> None:
+        def on_frame(frame: Frame) -> None:
+            self._record(frame, camera.message)
+            self._epoch.when_known(frame.stamp_ns, self._push, frame)
 
-    @property
-    def _patient(self):
-        """Whether the frames come as fast as they are taken."""
-        return self._source != 'topic' and self._pacing.rate == 0.0
+        def on_view() -> None:
+            self._background.drain()
+            if self._recorder is not None:
+                self._recorder.record_camera_info(camera.camera_info)
+            self._rebuild(self._camera_name, camera.view)
 
-    def _offer_everything(self):
-        self.offer((topics.EPOCH,))
-        # A camera that others publish has one publisher, theirs.
-        if self._source != 'topic':
-            self.offer((topics.RAW,))
-            self.watch.alone_on(topics.RAW.name)
-        for tray in self._settings.trays:
-            self.offer(RESULT_TOPICS, tray)
+        calibrated_by_file = bool(self._settings.preprocess.calibration)
+        camera = CameraSubscription(
+            self, settings, on_frame, None if calibrated_by_file else on_view
+        )
+        self._rebuild(camera.topic)
 
-    def _build(self, settings):
-        if self._workers:
-            return SharedPipeline(settings, self._where, self._view, self._workers)
-        return Pipeline(settings, self._where, self._view)
-
-    def _adopt(self, settings, pipeline):
-        self._background.drain()
-        self._settings, self._pipeline = settings, pipeline
-        pipeline.prepare()
-        self._picture = TracksPicture(self, calibrated(settings).preprocess.pixels_per_metre)
-
-    def _straighten(self):
-        self._background.drain()
-        self._view = self._camera.view
-        if self.recorder is not None:
-            self.recorder.lens(self._camera.lens_message)
-        self._rebuild()
-
-    def _name_source(self, where, view=None):
-        self._where, self._view = where, view
-        self._rebuild()
-
-    def _rebuild(self):
-        self._pipeline = self._build(self._settings)
-        self._pipeline.prepare()
-
-    def _play_simulated(self):
+    def _play_simulated(self) -> None:
         if self._simulation.tray not in self._settings.trays:
             raise ConfigurationError(
                 'parameter simulation.tray',
                 f'{self._simulation.tray} is not among trays {self._settings.trays}',
                 'set both',
             )
-        source = _sources.Simulated(self, self._simulation, self._settings.trays_file)
-        self._play(source.moments(), source.dated)
+        source = SimulatedTray(self, self._simulation, self._settings.trays_file)
 
-    def _play_recorded(self):
-        bag = _sources.opened_bag(self._bag)
-        part = Part(self, bag.reader, self._bag, self._pacing.duration)
-        part.require([bag.topic], 'frame')
-        self._name_source(bag.where, bag.view())
-        self._recorded = bag
-        self._epoch.set(bag.epoch_ns())
-        self._pacing = replace(self._pacing, duration=0.0)
-        self._play(_sources.recorded_moments(bag, part), tuple)
+        def emit(_: int, moment: TrayMoment) -> None:
+            frame, truth = source.stamped(moment)
+            self._emit_frame(frame)
+            self.outputs.publish_result(truth, self._epoch.ns)
+            self.diagnostics.process(self._push, frame)
 
-    def _play(self, moments, dated):
-        def emit(_, moment):
-            frame, truth, *received = dated(moment)
+        self._player = Player(self, source.moments(), emit, self._pacing, self._finish)
+
+    def _play_recorded(self) -> None:
+        bag = open_bag_frames(self._bag_settings)
+        play_range = PlayRange(self, bag.reader, self._bag_settings, self._pacing.duration)
+        play_range.require([bag.topic], 'frame')
+        self._rebuild(bag.where, bag.view())
+        self._bag = bag
+        epoch_ns = bag.epoch_ns()
+        if epoch_ns is not None:
+            self._epoch.set(epoch_ns)
+
+        def emit(_: int, moment: tuple[Frame | FrameError, BagMessage]) -> None:
+            frame, message = moment
             if isinstance(frame, FrameError):
-                self.refuse(frame)
+                self.diagnostics.refuse(frame)
                 return
-            if self._epoch.ns is None:
-                self._epoch.set(frame.stamp_ns)
-            self._record(frame, *received)
-            _sources.publish_moment(self, (frame, truth), self._epoch.ns)
-            self.timed(self._push, frame)
+            self._emit_frame(frame, message)
+            self.diagnostics.process(self._push, frame)
 
-        self._pacer = Pacer(self, moments, emit, self._pacing, self._finish)
+        # The range has the duration already.
+        pacing = replace(self._pacing, duration=0.0)
+        self._player = Player(self, recorded_moments(bag, play_range), emit, pacing, self._finish)
 
-    def _record(self, frame, message=None):
-        if self.recorder is not None:
-            self.recorder.frame(frame, message)
+    def _emit_frame(self, frame: Frame, message: BagMessage | None = None) -> None:
+        """Set the epoch with the first frame; record and publish the frame."""
+        if not self._epoch.is_known:
+            self._epoch.set(frame.stamp_ns)
+        self._record(frame, message)
+        publish_frame(self, frame)
 
-    def _take(self, frame):
-        self._record(frame, self._camera.message)
-        self._epoch.when_known(frame.stamp_ns, self._push, frame)
-
-    def _push(self, frame):
-        if self.recorder is not None:
-            self.recorder.epoch(self._epoch.ns)
-        waiting = self._background.waiting
-        # Who only looks must not keep the graph from measuring.
-        self._frames += 1
-        shown = self._patient or waiting <= _BEHIND or self._frames % _SHOWN_BEHIND == 0
-        wanted = {
-            number: Wanted(
-                self.wanted(topics.MOTION, number) and shown,
-                self._picture.wanted(number),
-                self.wanted(topics.AUTOCORRELATION, number) and shown,
-            )
-            for number in self._pipeline.trays
+    def _start_recording(self, record: st.RecordSettings) -> None:
+        of_source: dict[str, tuple[Any, ...]] = {
+            'simulator': (self._simulation,),
+            'bag': (self._bag_settings,),
+            'topic': (),
         }
-        self._background.put((self._pipeline.preprocessor.push(frame), wanted, shown))
-        self.state['frames waiting for the trays'] = waiting
+        self._recorder = GraphRecorder(
+            self,
+            record,
+            provenance(self._source, self._settings, *of_source[self._source]),
+            self._settings.trays,
+            wait_for_disk=self._as_fast_as_possible,
+        )
+        self.outputs.recorder = self._recorder
+        if self._bag is not None and (camera_info := self._bag.lens_message()) is not None:
+            self._recorder.record_camera_info(camera_info)
 
-    def _follow(self, job):
-        records, wanted, shown = job
-        return self._pipeline.follow(records, wanted), shown
+    def _record(self, frame: Frame, message: object) -> None:
+        if self._recorder is not None:
+            self._recorder.record_frame(frame, message)
 
-    def _publish(self, found):
-        records, self.pictures = found
+    # Frames
+
+    def _push(self, frame: Frame) -> None:
+        if self._recorder is not None:
+            self._recorder.record_epoch(self._epoch.ns)
+        waiting = self._background.waiting
+        # Somebody who views images must not keep the graph from measuring.
+        self._frame_count += 1
+        visible = (
+            self._as_fast_as_possible
+            or waiting <= _MAX_WAITING
+            or self._frame_count % _SHOWN_EVERY == 0
+        )
+        wanted = {
+            tray: Wanted(
+                self.outputs.has_subscribers(topics.MOTION, tray) and visible,
+                self._track_images.has_subscribers(tray),
+                self.outputs.has_subscribers(topics.AUTOCORRELATION, tray) and visible,
+            )
+            for tray in self._pipeline.trays
+        }
+        self._background.put(_Job(self._pipeline.preprocessor.push(frame), wanted, visible))
+        self.diagnostics.values['frames waiting for the trays'] = waiting
+
+    def _follow(self, job: _Job) -> _Done:
+        """Compute the results of a frame, in the background."""
+        return _Done(self._pipeline.follow(job.records, job.wanted), job.visible)
+
+    def _publish(self, done: _Done) -> None:
+        self.outputs.publishes_images = done.visible
         image = None
-        for record in records:
+        for record in done.results:
             if isinstance(record, TrayImage):
                 image = record
             if isinstance(record, Tracks):
-                # What follows from an image comes right after it.
-                self._picture.send(image, record, self.pictures)
+                # The tracks come right after the image that they end in.
+                if image is not None:
+                    self._track_images.publish(image, record, visible=done.visible)
             else:
-                self.publish_result(record, self._epoch.ns)
+                self.outputs.publish_result(record, self._epoch.ns)
 
-    def _finish(self):
+    def _finish(self) -> None:
         self._background.drain()
         for record in self._pipeline.flush():
-            self.publish_result(record, self._epoch.ns)
-        if self.recorder is not None:
-            self.recorder.close()
+            self.outputs.publish_result(record, self._epoch.ns)
+        if self._recorder is not None:
+            self._recorder.close()
         self.finish()
 
-    def destroy_node(self):
-        """End the threads and processes before what they work for is gone."""
-        # First the processes: the thread need not wait for what they are doing.
+    def destroy_node(self) -> None:
+        """End processes and threads before the node that they work for."""
+        # The processes first: then the thread does not wait for what they are doing.
         for worker in self._workers:
             worker.close()
         self._background.close()
-        if self.recorder is not None:
-            self.recorder.close()
+        if self._recorder is not None:
+            self._recorder.close()
         if self._page is not None:
             self._page.close()
         super().destroy_node()

@@ -2,45 +2,51 @@
 
 from __future__ import annotations
 
-from nanorocks_ros.nodes._camera import Camera
-from nanorocks_ros.nodes._epoch import Epoch
-from nanorocks_ros.nodes._node import NanorocksNode
+from typing import TYPE_CHECKING
+
+from nanorocks_ros.nodes.base.epoch import Epoch
+from nanorocks_ros.nodes.base.node import NanorocksNode
+from nanorocks_ros.nodes.sources.camera_subscription import CameraSubscription
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.pipeline.warm_up import warm_up
 from nanorocks_ros.settings import CameraSettings, PipelineSettings
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.wire import topics
 
+if TYPE_CHECKING:
+    from nanorocks_ros.records import Frame
+
 
 class PreprocessorNode(NanorocksNode):
     """Crops each tray out of the camera's frames and publishes it."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('preprocessor')
-        self._settings = self.declare(PipelineSettings(), fixed=False)
+        self._settings = self.parameters.declare(PipelineSettings(), read_only=False)
         for tray in self._settings.trays:
-            self.offer((topics.STATE, topics.GRAY, topics.RECTIFIED), tray)
-        # Others find the publishers meanwhile, and no frame is waiting yet.
+            self.outputs.offer((topics.STATE, topics.GRAY, topics.RECTIFIED), tray)
+        # Meanwhile others discover the publishers, and no frame is waiting yet.
         warm_up()
-        look = None if self._settings.preprocess.calibration else self._straighten
-        self._camera = Camera(self, self.declare(CameraSettings()), self._take, look)
+        on_view = None if self._settings.preprocess.calibration else self._rebuild
+        camera = self.parameters.declare(CameraSettings())
+        self._camera = CameraSubscription(self, camera, self._receive, on_view)
         self._epoch = Epoch(self, may_set=True)
         self._adopt(self._settings, self._build(self._settings))
-        self.react_to_parameters(PipelineSettings(), self._build, self._adopt)
+        self.parameters.react_to_changes(PipelineSettings(), self._build, self._adopt)
 
-    def _build(self, settings):
+    def _build(self, settings: PipelineSettings) -> Preprocessor:
         camera = self._camera
         return Preprocessor(settings, trays_of(settings), camera.topic, camera.view)
 
-    def _straighten(self):
+    def _rebuild(self) -> None:
         self._stage = self._build(self._settings)
 
-    def _adopt(self, settings, stage):
+    def _adopt(self, settings: PipelineSettings, stage: Preprocessor) -> None:
         self._settings, self._stage = settings, stage
 
-    def _take(self, frame):
+    def _receive(self, frame: Frame) -> None:
         self._epoch.when_known(frame.stamp_ns, self._push, frame)
 
-    def _push(self, frame):
+    def _push(self, frame: Frame) -> None:
         for record in self._stage.push(frame):
-            self.publish_result(record, self._epoch.ns)
+            self.outputs.publish_result(record, self._epoch.ns)

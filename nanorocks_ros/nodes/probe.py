@@ -1,7 +1,7 @@
-"""What ``nanorocks doctor`` asks of ROS, in a process of its own; answers are JSON lines.
+"""Checks of ROS for ``nanorocks doctor``, in a process of its own; answers are JSON lines.
 
-``python -m nanorocks_ros.nodes.probe import`` tells what was imported, ``receive TOPIC COUNT``
-and ``send TOPIC COUNT`` count frames, ``graph SECONDS`` lists who hears whom.
+``python -m nanorocks_ros.nodes.probe import`` tells what is imported, ``receive TOPIC COUNT``
+and ``send TOPIC COUNT`` count frames, ``graph SECONDS`` lists the topics of the graph.
 """
 
 from __future__ import annotations
@@ -10,15 +10,25 @@ import json
 import os
 import sys
 import time
+from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.nodes._run import NODES, use_large_segments
+from nanorocks_ros.nodes.run import NODES, use_large_segments
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rclpy.node import Node
+    from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+Answer = dict[str, Any]
+"""What is printed as JSON."""
 
 _ROWS, _COLUMNS = 1080, 1920
 _DEADLINE_S = 15.0
 _STEP_S = 0.05
 
 
-def _imported():
+def _import_ros() -> Answer:
     import rclpy
 
     rclpy.init(args=[])
@@ -30,53 +40,54 @@ def _imported():
     rclpy.shutdown()
     return {
         'rmw': rclpy.get_rmw_implementation_identifier(),
-        'where': os.path.dirname(packages[0].__file__),
+        'where': os.path.dirname(str(packages[0].__file__)),
         'executables': NODES,
     }
 
 
-def _received(topic, count):
-    """Count the frames that come until all did, or none came for long."""
+def _receive(topic: str, count: int) -> Answer:
+    """Count frames until all have arrived, or the deadline has passed."""
     from rclpy.node import Node
 
-    from nanorocks_ros.nodes._shell import message_class, qos_of
+    from nanorocks_ros.nodes.base.ros_messages import message_class, qos_of
     from nanorocks_ros.wire import topics
 
     node = Node('doctor_receiver')
-    sizes, begun = [], []
+    sizes: list[int] = []
+    arrivals: list[float] = []
 
-    def take(message):
-        begun[:] = begun or [time.monotonic()]
+    def receive(message: Any) -> None:
+        arrivals.append(time.monotonic())
         sizes.append(len(message.data))
 
-    node.create_subscription(message_class(topics.RAW.type), topic, take, qos_of(topics.RAW))
+    node.create_subscription(message_class(topics.RAW.type), topic, receive, qos_of(topics.RAW))
     print('ready', flush=True)
-    _spin(node, lambda: len(sizes) >= count)
-    seconds = time.monotonic() - begun[0] if begun else 0.0
+    _spin_until(node, lambda: len(sizes) >= count)
+    seconds = time.monotonic() - arrivals[0] if arrivals else 0.0
     return {'received': len(sizes), 'bytes': sum(sizes), 'seconds': seconds}
 
 
-def _sent(topic, count):
-    """Send frames, once somebody listens."""
+def _send(topic: str, count: int) -> Answer:
+    """Send frames, once somebody subscribes."""
     import numpy as np
     from rclpy.duration import Duration
     from rclpy.node import Node
 
-    from nanorocks_ros.nodes._shell import image_message, message_class, qos_of
+    from nanorocks_ros.nodes.base.ros_messages import image_message, message_class, qos_of
     from nanorocks_ros.wire import topics
 
     node = Node('doctor_sender')
     publisher = node.create_publisher(message_class(topics.RAW.type), topic, qos_of(topics.RAW))
-    _spin(node, lambda: publisher.get_subscription_count() > 0)
-    listened = publisher.get_subscription_count() > 0
+    _spin_until(node, lambda: publisher.get_subscription_count() > 0)
+    sent = count if publisher.get_subscription_count() > 0 else 0
     pixels = np.zeros((_ROWS, _COLUMNS, 3), dtype=np.uint8)
-    for number in range(count if listened else 0):
+    for number in range(sent):
         publisher.publish(image_message(number, 'doctor', pixels))
     publisher.wait_for_all_acked(Duration(seconds=_DEADLINE_S))
-    return {'sent': count if listened else 0, 'frame_bytes': pixels.nbytes}
+    return {'sent': sent, 'frame_bytes': pixels.nbytes}
 
 
-def _spin(node, condition):
+def _spin_until(node: Node, condition: Callable[[], bool]) -> None:
     from rclpy.executors import SingleThreadedExecutor
 
     executor = SingleThreadedExecutor()
@@ -86,78 +97,87 @@ def _spin(node, condition):
         executor.spin_once(timeout_sec=_STEP_S)
 
 
-def _graph(seconds):
-    """Every topic with who publishes and subscribes, and the pairs that do not match."""
+def _list_topics(seconds: float) -> Answer:
+    """Every topic with its publishers and subscriptions, and the pairs that do not match."""
     from rclpy.node import Node
 
     node = Node('doctor')
-    # Names and what is offered come with a heartbeat, every 3 s.
+    # Names and endpoints are discovered with a heartbeat, every 3 s.
     end = time.monotonic() + seconds
-    _spin(node, lambda: time.monotonic() > end)
-    found = []
+    _spin_until(node, lambda: time.monotonic() > end)
+    listed = []
     for name, types in sorted(node.get_topic_names_and_types()):
-        publishers = _others(node, node.get_publishers_info_by_topic(name))
-        subscriptions = _others(node, node.get_subscriptions_info_by_topic(name))
+        publishers = _of_others(node, node.get_publishers_info_by_topic(name))
+        subscriptions = _of_others(node, node.get_subscriptions_info_by_topic(name))
         if publishers or subscriptions:
-            found.append(
+            listed.append(
                 {
                     'name': name,
                     'types': types,
-                    'publishers': [_endpoint(publisher) for publisher in publishers],
-                    'subscriptions': [_endpoint(subscription) for subscription in subscriptions],
+                    'publishers': [_describe(endpoint) for endpoint in publishers],
+                    'subscriptions': [_describe(endpoint) for endpoint in subscriptions],
                     'mismatches': _mismatches(publishers, subscriptions),
                 }
             )
-    return {'topics': found}
+    return {'topics': listed}
 
 
-def _others(node, endpoints):
+def _of_others(node: Node, endpoints: Sequence[TopicEndpointInfo]) -> list[TopicEndpointInfo]:
     return [endpoint for endpoint in endpoints if endpoint.node_name != node.get_name()]
 
 
-def _endpoint(info):
-    profile = info.qos_profile
+def _describe(endpoint: TopicEndpointInfo) -> Answer:
+    from nanorocks_ros.nodes.base.ros_messages import node_name_of
+
+    profile = endpoint.qos_profile
     return {
-        'node': _name(info),
+        'node': node_name_of(endpoint),
         'reliability': profile.reliability.name.lower(),
         'durability': profile.durability.name.lower(),
     }
 
 
-def _name(info):
-    return f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+def _mismatches(
+    publishers: Sequence[TopicEndpointInfo], subscriptions: Sequence[TopicEndpointInfo]
+) -> list[Answer]:
+    """Publisher, subscription and reason of each pair that does not match."""
+    from nanorocks_ros.nodes.base.ros_messages import node_name_of
+
+    pairs = []
+    for publisher in publishers:
+        for subscription in subscriptions:
+            reason = _mismatch(publisher, subscription)
+            if reason is not None:
+                names = (node_name_of(publisher), node_name_of(subscription))
+                pairs.append({'publisher': names[0], 'subscription': names[1], 'reason': reason})
+    return pairs
 
 
-def _mismatches(publishers, subscriptions):
+def _mismatch(publisher: TopicEndpointInfo, subscription: TopicEndpointInfo) -> str | None:
+    """Why no message gets from one to the other; None when it does."""
     from rclpy.qos import QoSCompatibility, qos_check_compatible
 
-    found = []
-    for offer in publishers:
-        for request in subscriptions:
-            if offer.topic_type != request.topic_type:
-                reason = f'the types differ: {offer.topic_type}, {request.topic_type}'
-            else:
-                compatible, reason = qos_check_compatible(offer.qos_profile, request.qos_profile)
-                # A new object every time: `is` would never hold.
-                if compatible != QoSCompatibility.ERROR:
-                    continue
-            pair = {'publisher': _name(offer), 'subscription': _name(request)}
-            found.append({**pair, 'reason': reason.strip()})
-    return found
+    if publisher.topic_type != subscription.topic_type:
+        return f'the types differ: {publisher.topic_type}, {subscription.topic_type}'
+    compatibility, reason = qos_check_compatible(publisher.qos_profile, subscription.qos_profile)
+    # A new object every time: `is` would never hold.
+    if compatibility != QoSCompatibility.ERROR:
+        return None
+    return str(reason).strip()
 
 
-_TASKS = {
-    'receive': lambda topic, count: _received(topic, int(count)),
-    'send': lambda topic, count: _sent(topic, int(count)),
-    'graph': lambda seconds: _graph(float(seconds)),
+_TASKS: dict[str, Callable[..., Answer]] = {
+    'receive': lambda topic, count: _receive(topic, int(count)),
+    'send': lambda topic, count: _send(topic, int(count)),
+    'graph': lambda seconds: _list_topics(float(seconds)),
 }
 
 
-def main(arguments):
-    """Do what was asked, and print the answer."""
+def main(arguments: Sequence[str]) -> None:
+    """Do a task, and print the answer."""
     task, *rest = arguments
     if task == 'import':
-        print(json.dumps(_imported()))
+        print(json.dumps(_import_ros()))
         return
     use_large_segments()
     import rclpy

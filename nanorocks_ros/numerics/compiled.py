@@ -1,4 +1,4 @@
-"""How every compiled function here is compiled: one place, so that results agree everywhere.
+"""Decorators for numba functions: one set of options, so that results agree everywhere.
 
 No ``fastmath``: together with the rule that compiled code uses only ``+ - * /``, square roots
 and integers, this makes states and pictures bit-identical on every machine.
@@ -22,31 +22,31 @@ if TYPE_CHECKING:
 
 LOGGER = logging.getLogger('nanorocks_ros')
 
-# The functions that take longest to compile, and what they belong to.
+# Functions that take longest to compile, and the part of the program they belong to.
 _SLOWEST = {'run_until': 'the simulation', 'cover': 'the tracking'}
 
-# At the left margin: what is imported for the type checker alone is not compiled.
+# Imports at the left margin; those for the type checker alone are indented and not compiled.
 _IMPORT = re.compile(r'^(?:from|import) ([\w.]+)', re.MULTILINE)
 
 Function = TypeVar('Function', bound='Callable[..., Any]')
 
 
 def compiled(function: Function) -> Function:
-    """Compile a function when first called, and keep the result on disk where possible."""
+    """Compile a function at its first call, and cache the result on disk if possible."""
     return _compiled(function, {})
 
 
 def kernel(function: Function) -> Function:
-    """The same for a long loop over many arrays that makes no new ones.
+    """Compile a long loop over many arrays that allocates none, as `compiled`.
 
-    Counting the references to the arrays of a tuple at each use costs more than the physics, so
-    they are not counted.
+    References to arrays are not counted: counting those of a tuple at each use would cost more
+    than the physics.
     """
     return _compiled(function, {'_nrt': False})
 
 
 class _Announcer(event.Listener):
-    """Tells the log once when what takes its time must be compiled."""
+    """Logs once that a long compilation starts."""
 
     def __init__(self) -> None:
         self._told: set[str] = set()
@@ -67,8 +67,8 @@ event.register('numba:compile', _Announcer())  # type: ignore[no-untyped-call]
 def inlined(function: Function) -> Function:
     """Compile a function into every place in a kernel that calls it.
 
-    The arrays of a tuple are handed over one by one at a call, which takes longer than most
-    of these functions.
+    A call passes the arrays of a tuple one by one, which takes longer than most of these
+    functions.
     """
     return _njit(function, {'forceinline': True, '_nrt': False})
 
@@ -77,10 +77,10 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
     try:
         dispatcher: Any = _njit(function, {**options, 'cache': True})
     except RuntimeError:
-        # numba refuses to cache where neither the package nor the home can be written.
+        # numba does not cache if neither the package nor the home is writable.
         return _njit(function, options)
-    # numba looks at the file of the function only, but what that calls, and the constants that it
-    # uses, are compiled into it: after an update there would be old code in new.
+    # numba checks the file of the function only, but called functions and constants are compiled
+    # into it: after an update the cache would mix old and new code.
     with suppress(AttributeError):
         file = dispatcher._cache._cache_file
         file._source_stamp = (file._source_stamp, _stamp(function.__module__))
@@ -89,19 +89,21 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
 
 @cache
 def _stamp(module: str) -> tuple[tuple[str, int, int], ...]:
-    """Name, time and size of a module and all of its package that it imports, also indirectly."""
+    """Name, time and size of a module and of all modules of its package that it imports."""
     package = module.partition('.')[0]
-    found: dict[str, tuple[str, int, int]] = {}
-    left = [module]
-    while left:
-        name = left.pop()
+    stamps: dict[str, tuple[str, int, int]] = {}
+    pending = [module]
+    while pending:
+        name = pending.pop()
         path = getattr(sys.modules.get(name), '__file__', None)
-        if name in found or path is None:
+        if name in stamps or path is None:
             continue
         status = Path(path).stat()
-        found[name] = name, status.st_mtime_ns, status.st_size
-        left += [one for one in _imports(path) if one.partition('.')[0] == package]
-    return tuple(found[name] for name in sorted(found))
+        stamps[name] = name, status.st_mtime_ns, status.st_size
+        pending += [
+            imported for imported in _imports(path) if imported.partition('.')[0] == package
+        ]
+    return tuple(stamps[name] for name in sorted(stamps))
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Random numbers that are a function of (key, counter): no state, any order, any machine.
+"""Counter-based random numbers: a function of (key, counter), without state.
 
 A key belongs to one purpose of one run of one root seed. The numbers under a key are the
 SplitMix64 sequence, addressed by its index.
@@ -39,7 +39,7 @@ _BYTES_DEVIATION = math.sqrt(8 * (256 * 256 - 1) / 12.0)
 
 
 class Purpose(IntEnum):
-    """What a stream of random numbers is for; numbers are never reused between releases."""
+    """Purpose of a stream of random numbers; values are never reused between releases."""
 
     DIAMETERS = 1
     POSITIONS = 2
@@ -81,7 +81,7 @@ def hashed(key: np.uint64, counter: int) -> np.uint64:
 
 @compiled
 def uniform(key: np.uint64, counter: int) -> float:
-    """Random number, even in [0, 1), with 53 random bits."""
+    """Random number, uniform in [0, 1), with 53 random bits."""
     return np.float64(hashed(key, counter) >> _UNUSED_BITS) * _TO_UNIT
 
 
@@ -99,7 +99,7 @@ def nearly_normal(key: np.uint64, counter: int) -> float:
 
 @compiled
 def direction(key: np.uint64) -> tuple[float, float, float]:
-    """Random unit vector, even over the sphere, by rejection from a square (Marsaglia 1972)."""
+    """Random unit vector, uniform over the sphere, by rejection (Marsaglia 1972)."""
     counter = 0
     while True:
         a = 2.0 * uniform(key, counter) - 1.0

@@ -1,4 +1,4 @@
-"""Logarithms of sums of what is known by its logarithm."""
+"""Logarithm of a sum of exponentials."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ def log_sum(
     ----------
     logs : ndarray (m, n)
     weights : ndarray (m,), optional
-        Positive; all 1 where not given.
+        Positive; default 1.
     """
     most = logs.max(axis=0)
-    # Where all are impossible nothing is to be taken off.
+    # All terms 0: nothing to subtract.
     most[np.isneginf(most)] = 0.0
     terms = np.exp(logs - most)
     total = terms.sum(axis=0) if weights is None else weights @ terms

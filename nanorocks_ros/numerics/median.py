@@ -1,4 +1,4 @@
-"""The median of many numbers, without the branches of a partition that nobody can foresee."""
+"""Median of many numbers by counting in buckets, without unpredictable branches."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from nanorocks_ros.numerics.compiled import compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Fewer numbers are as well partitioned.
+# Below this size a partition is as fast.
 _MANY = 100
-# Bits of a number that are not looked at to tell buckets apart: 32 are left to a factor of two.
+# Bits of a number that the bucket ignores: 32 buckets per factor of two.
 _SHIFT = 47
-# Numbers below the largest by 2^32 share the first one.
+# Numbers below the largest by 2^32 share the first bucket.
 _BUCKETS = 1024
 _INFINITE = 0x7FF << 52
 
@@ -24,7 +24,7 @@ _INFINITE = 0x7FF << 52
 def median_of(values: NDArray[np.float64]) -> float:
     """The median of numbers that are not negative, at least one, (n,), contiguous.
 
-    The same as numpy's. Of positive numbers the bits rise as they do.
+    Equal to `numpy.median`. The bits of positive numbers, as integers, have the same order.
     """
     n = values.size
     bits = values.view(np.int64)
@@ -37,7 +37,7 @@ def median_of(values: NDArray[np.float64]) -> float:
     lowest = (largest >> _SHIFT) - (_BUCKETS - 1)
     for k in range(n):
         counts[max((bits[k] >> _SHIFT) - lowest, 0)] += 1
-    # The one in the middle, or the two.
+    # Ranks of the middle number, or of the two middle ones.
     low_rank, high_rank = (n - 1) // 2, n // 2
     first, below = 0, 0
     while below + counts[first] <= low_rank:

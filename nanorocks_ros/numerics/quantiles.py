@@ -1,4 +1,4 @@
-"""Medians and quantiles of a few numbers, for which numpy takes ten times as long."""
+"""Medians and quantiles of a few numbers; numpy takes ten times as long."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 
-def middle(values: Iterable[float]) -> float:
-    """The median of some numbers, one at least."""
+def median(values: Iterable[float]) -> float:
+    """Median of one or more numbers."""
     known = sorted(values)
     half = len(known) // 2
     return float(known[half]) if len(known) % 2 else (known[half - 1] + known[half]) / 2.0
 
 
 class Quantile:
-    """Quantile of the last values, kept in order: `numpy.quantile` sorts them anew each time."""
+    """Running quantile of the last values, which are kept sorted."""
 
     def __init__(self, share: float, length: int) -> None:
         self._share = share
@@ -27,7 +27,7 @@ class Quantile:
         self._sorted: list[float] = []
 
     def push(self, value: float) -> float:
-        """Take a value; the quantile of the last ones, interpolated."""
+        """Add a value; return the interpolated quantile of the last values."""
         self._values.append(value)
         insort(self._sorted, value)
         if len(self._values) > self._length:
@@ -36,7 +36,7 @@ class Quantile:
         low = int(place)
         high = min(low + 1, len(self._sorted) - 1)
         step, rest = self._sorted[high] - self._sorted[low], place - low
-        # Rounded as numpy rounds it.
+        # Rounded as in numpy.
         if rest < 0.5:
             return self._sorted[low] + step * rest
         return self._sorted[high] - step * (1.0 - rest)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def mean_of(values: Sequence[float | None]) -> tuple[float, float, int]:
-    """Mean, its scatter (NaN of one) and number of those that are known."""
+    """Mean, standard deviation (NaN for a single value) and number of the known values."""
     known = np.array([value for value in values if value is not None and math.isfinite(value)])
     if not known.size:
         return math.nan, math.nan, 0

@@ -1,6 +1,6 @@
-"""Loops over small symmetric matrices, by their triangular factors; compiled.
+"""Cholesky factors of small symmetric matrices, compiled.
 
-For a few rows a call of LAPACK takes longer than the work.
+For a few rows the overhead of a LAPACK call exceeds the work.
 """
 
 from __future__ import annotations
@@ -15,34 +15,34 @@ from nanorocks_ros.numerics.compiled import compiled, kernel
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Beyond these a product could be too much for a double.
+# Beyond these limits a product could overflow or underflow.
 _LEAST, _MOST = 1e-150, 1e150
-# Standard deviations up to which a nuisance may be off.
+# Largest shift of a nuisance, in standard deviations.
 _FARTHEST = 4.0
 
 
 @kernel
 def factorise(matrix: NDArray[np.float64]) -> float:
-    """Cholesky factor in place, in the lower half, but 1 over its diagonal; ln of the determinant.
+    """Cholesky factor in the lower half, in place, with inverse diagonal; ln of the determinant.
 
-    Two of a row are worked out side by side: one alone would wait for itself at each term.
+    Two elements of a row are computed at a time: the sum of one alone would wait for each term.
     """
     log_determinant, product = 0.0, 1.0
     for i in range(matrix.shape[0]):
         row = matrix[i]
         for j in range(0, i - 1, 2):
-            one, two = matrix[j], matrix[j + 1]
+            upper, lower = matrix[j], matrix[j + 1]
             a, b = row[j], row[j + 1]
             for k in range(j):
-                a -= row[k] * one[k]
-                b -= row[k] * two[k]
-            a *= one[j]
-            row[j], row[j + 1] = a, (b - a * two[j]) * two[j + 1]
+                a -= row[k] * upper[k]
+                b -= row[k] * lower[k]
+            a *= upper[j]
+            row[j], row[j + 1] = a, (b - a * lower[j]) * lower[j + 1]
         if i % 2 == 1:
-            one, a = matrix[i - 1], row[i - 1]
+            upper, a = matrix[i - 1], row[i - 1]
             for k in range(i - 1):
-                a -= row[k] * one[k]
-            row[i - 1] = a * one[i - 1]
+                a -= row[k] * upper[k]
+            row[i - 1] = a * upper[i - 1]
         rest = row[i]
         for k in range(i):
             rest -= row[k] * row[k]
@@ -55,31 +55,31 @@ def factorise(matrix: NDArray[np.float64]) -> float:
 
 @kernel
 def whiten(factor: NDArray[np.float64], columns: NDArray[np.float64], count: int) -> None:
-    """The first columns divided by a factor of `factorise`, in place; two side by side."""
+    """Solve with a factor of `factorise` for the first columns, in place; two at a time."""
     for first in range(0, count, 2):
-        # An odd one at the end goes with itself.
-        one, two = columns[first], columns[min(first + 1, count - 1)]
+        # An odd last column is paired with itself.
+        column, next_column = columns[first], columns[min(first + 1, count - 1)]
         for i in range(factor.shape[0]):
             row = factor[i]
-            a, b = one[i], two[i]
+            a, b = column[i], next_column[i]
             for k in range(i):
-                a -= row[k] * one[k]
-                b -= row[k] * two[k]
-            one[i], two[i] = a * row[i], b * row[i]
+                a -= row[k] * column[k]
+                b -= row[k] * next_column[k]
+            column[i], next_column[i] = a * row[i], b * row[i]
 
 
 @compiled
 def integrate(
     gradients: NDArray[np.float64],
     informations: NDArray[np.float64],
-    found: NDArray[np.float64],
+    gains: NDArray[np.float64],
 ) -> None:
-    """What the log likelihood gains by nuisances that may be off by one of their deviations each.
+    """Gain of the log likelihood by the integration over nuisances with unit Gaussian priors.
 
     Parameters
     ----------
     gradients, informations : ndarray (n_places, n_z), (n_places, n_z, n_z)
-    found : ndarray (n_places,)
+    gains : ndarray (n_places,)
         Filled in.
     """
     n = gradients.shape[1]
@@ -107,6 +107,6 @@ def integrate(
                 shift[i] -= lower[k, i] * shift[k]
             farthest = max(farthest, abs(shift[i]))
             product += gradients[place, i] * shift[i]
-        # Far out the dependence is not linear, and could explain anything.
+        # Beyond that the dependence is not linear: the shift is limited.
         share = min(1.0, _FARTHEST / max(farthest, _FARTHEST))
-        found[place] = (share - 0.5 * share**2) * product - 0.5 * log_determinant
+        gains[place] = (share - 0.5 * share**2) * product - 0.5 * log_determinant

@@ -1,4 +1,4 @@
-"""Cubic splines that are needed for a few points at once, and soon others: compiled."""
+"""Cubic splines evaluated at a few points, compiled."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ORDER = 4
 
 @compiled
 def spline_slopes(nodes: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Derivatives at the nodes of the cubic spline without a knot at the last but one node.
+    """Derivatives at the nodes of the cubic spline with not-a-knot ends.
 
     Parameters
     ----------
@@ -28,28 +28,30 @@ def spline_slopes(nodes: NDArray[np.float64], values: NDArray[np.float64]) -> ND
     width = np.diff(nodes)
     slope = np.diff(values) / width
     # Tridiagonal equations, solved from the first row down and up again.
-    diagonal, above, found = np.empty(n), np.empty(n), np.empty(n)
-    both = width[0] + width[1]
-    diagonal[0], above[0] = width[1], both
-    found[0] = ((width[0] + 2.0 * both) * width[1] * slope[0] + width[0] ** 2 * slope[1]) / both
+    diagonal, above, derivatives = np.empty(n), np.empty(n), np.empty(n)
+    span = width[0] + width[1]
+    diagonal[0], above[0] = width[1], span
+    derivatives[0] = (
+        (width[0] + 2.0 * span) * width[1] * slope[0] + width[0] ** 2 * slope[1]
+    ) / span
     for i in range(1, n):
         if i < n - 1:
             below, own, above[i] = width[i], 2.0 * (width[i - 1] + width[i]), width[i - 1]
-            found[i] = 3.0 * (width[i] * slope[i - 1] + width[i - 1] * slope[i])
+            derivatives[i] = 3.0 * (width[i] * slope[i - 1] + width[i - 1] * slope[i])
         else:
-            both = width[n - 2] + width[n - 3]
-            below, own = both, width[n - 3]
-            found[i] = (
+            span = width[n - 2] + width[n - 3]
+            below, own = span, width[n - 3]
+            derivatives[i] = (
                 width[n - 2] ** 2 * slope[n - 3]
-                + (2.0 * both + width[n - 2]) * width[n - 3] * slope[n - 2]
-            ) / both
+                + (2.0 * span + width[n - 2]) * width[n - 3] * slope[n - 2]
+            ) / span
         share = below / diagonal[i - 1]
         diagonal[i] = own - share * above[i - 1]
-        found[i] -= share * found[i - 1]
-    found[n - 1] /= diagonal[n - 1]
+        derivatives[i] -= share * derivatives[i - 1]
+    derivatives[n - 1] /= diagonal[n - 1]
     for i in range(n - 2, -1, -1):
-        found[i] = (found[i] - above[i] * found[i + 1]) / diagonal[i]
-    return found
+        derivatives[i] = (derivatives[i] - above[i] * derivatives[i + 1]) / diagonal[i]
+    return derivatives
 
 
 @compiled
@@ -59,8 +61,8 @@ def spline_at(
     slopes: NDArray[np.float64],
     at: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The spline at some rising places, (m,); beyond the ends as next to them."""
-    found = np.empty(at.size)
+    """The spline at rising points, (m,), extrapolated beyond the ends."""
+    interpolated = np.empty(at.size)
     cell = 0
     for k in range(at.size):
         while cell < nodes.size - 2 and at[k] >= nodes[cell + 1]:
@@ -68,17 +70,19 @@ def spline_at(
         width = nodes[cell + 1] - nodes[cell]
         slope = (values[cell + 1] - values[cell]) / width
         bend = (slopes[cell] + slopes[cell + 1] - 2.0 * slope) / width
-        way = at[k] - nodes[cell]
+        offset = at[k] - nodes[cell]
         second = (slope - slopes[cell]) / width - bend
-        found[k] = values[cell] + way * (slopes[cell] + way * (second + way * bend / width))
-    return found
+        interpolated[k] = values[cell] + offset * (
+            slopes[cell] + offset * (second + offset * bend / width)
+        )
+    return interpolated
 
 
 @compiled
 def spline_basis(knots: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The cubic B-splines of some knots at some places within them, (m, n_knots - 4)."""
+    """Cubic B-splines of some knots at points within them, (m, n_knots - 4)."""
     n = knots.size - _ORDER
-    found = np.zeros((at.size, n))
+    basis = np.zeros((at.size, n))
     part = np.empty(_ORDER)
     for k in range(at.size):
         cell = min(max(np.searchsorted(knots, at[k], side='right') - 1, _ORDER - 1), n - 1)
@@ -93,5 +97,5 @@ def spline_basis(knots: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray
                 saved = (at[k] - left) * term
             part[degree] = saved
         for r in range(_ORDER):
-            found[k, cell - _ORDER + 1 + r] = part[r]
-    return found
+            basis[k, cell - _ORDER + 1 + r] = part[r]
+    return basis

@@ -1,4 +1,4 @@
-"""Stable sorting for compiled code: the same order with every version of every library."""
+"""Stable sort for compiled code, independent of the versions of libraries."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 @compiled
-def rising(values: NDArray[np.float64]) -> NDArray[np.int64]:
+def stable_argsort(values: NDArray[np.float64]) -> NDArray[np.int64]:
     """Indices of the values from the smallest to the largest; equals keep their order.
 
     Runs of 1, 2, 4, ... values are merged two by two.

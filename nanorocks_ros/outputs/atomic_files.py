@@ -1,4 +1,4 @@
-"""Files a command is asked to write: looked at before the work, complete or absent after it."""
+"""Output files: checked before the work, written complete or not at all."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.errors import ConfigurationError, NanorocksError, RecordingError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -16,41 +16,41 @@ if TYPE_CHECKING:
 def check_outputs(
     files: Mapping[str, Path], kinds: Mapping[str, tuple[str, ...]], *, force: bool = False
 ) -> None:
-    """Refuse files that could not be written in the end, before hours of work.
+    """Raise for files that could not be written, before hours of work.
 
     Parameters
     ----------
     files : mapping of str to Path
-        By the flag that asked for them.
+        Files by the flag that names them.
     kinds : mapping of str to tuple of str
-        Endings that a flag accepts; a flag that is not listed names a new folder.
+        Suffixes that a flag accepts; a flag that is not listed names a new folder.
     force : bool
-        Whether files (not folders) that exist may be replaced.
+        Whether existing files (not folders) may be replaced.
 
     Raises
     ------
     ConfigurationError
-        For an ending that is not known, or two flags with the same file.
+        For an unknown suffix, or two flags with the same file.
     RecordingError
-        For a file that exists, or cannot be made where it should.
+        For a file that exists, or cannot be created.
     """
-    seen: dict[Path, str] = {}
+    flags: dict[Path, str] = {}
     for flag, path in files.items():
         if flag in kinds and path.suffix not in kinds[flag]:
             raise ConfigurationError(
                 flag, f'{path} ends in none of {", ".join(kinds[flag])}', 'name such a file'
             )
-        place = path.resolve()
-        if place in seen:
+        target = path.resolve()
+        if target in flags:
             raise ConfigurationError(
-                flag, f'names the file of {seen[place]}, {path}', 'name another'
+                flag, f'names the file of {flags[target]}, {path}', 'name another'
             )
-        seen[place] = flag
+        flags[target] = flag
     for flag, path in files.items():
-        _check_place(path, folder=flag not in kinds, force=force)
+        _check_target(path, folder=flag not in kinds, force=force)
 
 
-def _check_place(path: Path, *, folder: bool, force: bool) -> None:
+def _check_target(path: Path, *, folder: bool, force: bool) -> None:
     if os.path.lexists(path) and (folder or path.is_dir()):
         raise RecordingError(str(path), 'exists already and is not overwritten', 'name another')
     if os.path.lexists(path) and not force:
@@ -70,23 +70,26 @@ def _check_place(path: Path, *, folder: bool, force: bool) -> None:
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """Give a place to write a file, which gets its name when all of it is there.
+def atomic_file(path: Path, error_type: type[NanorocksError] = RecordingError) -> Iterator[Path]:
+    """Write a file under a temporary name and rename it once it is complete.
 
     Parameters
     ----------
     path : Path
-        A file there is replaced.
+        An existing file is replaced.
+    error_type : type of NanorocksError
+        Raised when the file cannot be written.
 
     Yields
     ------
     Path
-        Where to write; with the same ending. Gone afterwards, whatever happens.
+        Temporary file to write, in the same folder and with the same suffix. It is deleted when
+        the block raises.
 
     Raises
     ------
-    RecordingError
-        When the file cannot be written.
+    NanorocksError
+        Of `error_type`, when the file cannot be written.
     """
     part = path.with_name(f'.{path.stem}.part{path.suffix}')
     try:
@@ -99,8 +102,20 @@ def whole_file(path: Path) -> Iterator[Path]:
             with suppress(OSError):
                 part.unlink(missing_ok=True)
     except OSError as error:
-        raise RecordingError(
+        raise error_type(
             str(path),
             f'cannot be written ({error.strerror or error})',
             'make room, or write elsewhere',
         ) from error
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write bytes to a file, complete or not at all.
+
+    Raises
+    ------
+    RecordingError
+        When the file cannot be written.
+    """
+    with atomic_file(path) as part:
+        part.write_bytes(content)

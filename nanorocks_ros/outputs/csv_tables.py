@@ -1,14 +1,13 @@
-"""Tables of results as CSV files."""
+"""Tables as CSV files: names with units in the header, then numbers."""
 
 from __future__ import annotations
 
 import csv
-import os
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.outputs.atomic_files import atomic_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -38,22 +37,37 @@ def write_csv(
         When the file cannot be written, or a row has another length.
     """
     path = Path(path)
-    part = path.with_name(f'.{path.name}.part')
     header = [f'{field} [{unit}]' for field, unit in zip(fields, units, strict=True)]
-    try:
-        try:
-            with part.open('w', encoding='utf-8', newline='') as stream:
-                table = csv.writer(stream, lineterminator='\n')
-                table.writerow(header)
-                table.writerows(_checked(path, rows, len(fields)))
-            os.replace(part, path)
-        finally:
-            with suppress(OSError):
-                part.unlink(missing_ok=True)
-    except OSError as error:
-        raise RecordingError(
-            str(path), f'cannot be written ({error.strerror})', 'pass a writable folder'
-        ) from error
+    with atomic_file(path) as part, part.open('w', encoding='utf-8', newline='') as stream:
+        table = csv.writer(stream, lineterminator='\n')
+        table.writerow(header)
+        table.writerows(_checked(path, rows, len(fields)))
+
+
+def read_csv(path: Path) -> tuple[list[str], list[list[str]]]:
+    """Read a table that `write_csv` wrote, or one like it.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    names : list of str, (n_fields,)
+        Without units.
+    rows : list of list of str
+        Blank lines are left out.
+
+    Raises
+    ------
+    OSError
+        When the file cannot be read.
+    ValueError, csv.Error
+        When it is empty, or is not text in UTF-8 separated by commas.
+    """
+    with path.open(encoding='utf-8', newline='') as stream:
+        header, *rows = [row for row in csv.reader(stream) if row]
+    return [name.split('[')[0].strip() for name in header], rows
 
 
 def _checked(

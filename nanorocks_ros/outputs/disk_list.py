@@ -1,4 +1,4 @@
-"""Lists that lie on the disk but for their ends, so that memory does not grow with a recording."""
+"""Lists on disk, so that memory does not grow with the length of a recording."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ if TYPE_CHECKING:
 
 Item = TypeVar('Item')
 
-# Items that are written together.
+# Items written together; fewer are kept in memory.
 _BLOCK = 256
 
 
 class SpoolError(UnwritableError):
-    """There is no room for what was measured."""
+    """The temporary file cannot be written."""
 
 
 class SpoolFile:
-    """A file without a name, which goes with the process, that several spools share.
+    """An unnamed temporary file that several spools share.
 
     Parameters
     ----------
     folder : Path
-        On a disk with room.
+        On a disk with enough space.
 
     Raises
     ------
     SpoolError
-        When nothing can be written there.
+        When the folder cannot be written to.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -47,32 +47,32 @@ class SpoolFile:
             ) from error
 
     def add(self, content: bytes) -> tuple[int, int]:
-        """Keep some bytes; where they are.
+        """Write bytes; return their offset and length.
 
         Raises
         ------
         SpoolError
-            When there is no room for them.
+            When the disk is full.
         """
         try:
-            place = self._file.seek(0, 2)
+            start = self._file.seek(0, 2)
             self._file.write(content)
-            # Here, not when they are read back.
+            # Now, so that a full disk is noticed here and not when reading.
             self._file.flush()
         except OSError as error:
             raise SpoolError(
                 str(self._folder), f'cannot be written ({error.strerror})', 'make room'
             ) from error
-        return place, len(content)
+        return start, len(content)
 
-    def get(self, place: tuple[int, int]) -> bytes:
-        """Bytes that were kept."""
-        self._file.seek(place[0])
-        return self._file.read(place[1])
+    def get(self, extent: tuple[int, int]) -> bytes:
+        """Read the bytes at an offset and of a length, as `add` returned them."""
+        self._file.seek(extent[0])
+        return self._file.read(extent[1])
 
 
 class Spool(Sequence[Item]):
-    """A list to append to and to read.
+    """A list on disk that can be appended to and read.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Spool(Sequence[Item]):
         self._length = 0
 
     def append(self, item: Item) -> None:
-        """Add one at the end."""
+        """Add an item at the end."""
         self._tail.append(item)
         self._length += 1
         if len(self._tail) == _BLOCK:
@@ -104,8 +104,8 @@ class Spool(Sequence[Item]):
         yield from self._tail
 
     def _block(self, number: int) -> list[Item]:
-        found: list[Item] = pickle.loads(self._file.get(self._places[number]))
-        return found
+        items: list[Item] = pickle.loads(self._file.get(self._places[number]))
+        return items
 
     @overload
     def __getitem__(self, index: int) -> Item: ...

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -119,7 +119,7 @@ def write_report(path: Path, title: str, summary: str, sections: Sequence[Sectio
         f'<h1>{html.escape(title)}</h1><p>{html.escape(summary)}</p>'
         f'<nav><ol>{contents}</ol></nav>\n{body}</body></html>\n'
     )
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_text(page, 'utf-8')
 
 

@@ -1,18 +1,17 @@
-"""Arrays in a file: complete or not at all, and refused when damaged."""
+"""Arrays in ``.npz`` files: written complete or not at all, refused when damaged."""
 
 from __future__ import annotations
 
 import io
-import os
 import struct
 import zipfile
 import zlib
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.errors import NanorocksError, RecordingError
+from nanorocks_ros.outputs.atomic_files import atomic_file
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 
 Arrays = dict[str, 'NDArray[Any]']
 
-# What zipfile and numpy raise for bytes that are not theirs.
+# What zipfile and numpy raise for damaged files and files of other formats.
 _DAMAGE = (
     zipfile.BadZipFile,
     zlib.error,
@@ -35,52 +34,33 @@ _DAMAGE = (
 )
 
 
-def write_archive(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write arrays as an ``.npz`` file that ``numpy.load`` reads.
+def write_archive(
+    path: Path,
+    arrays: Mapping[str, NDArray[Any]],
+    error_type: type[NanorocksError] = RecordingError,
+) -> None:
+    """Write arrays as an ``.npz`` file that ``numpy.load`` reads, complete or not at all.
 
     Parameters
     ----------
     path : Path
-        An earlier file there is replaced, once the new one is complete.
+        An existing file is replaced.
     arrays : mapping of str to ndarray
+    error_type : type of NanorocksError
+        Raised when the file cannot be written.
 
     Raises
     ------
-    RecordingError
-        When the file cannot be written.
+    NanorocksError
+        Of `error_type`, when the file cannot be written.
     """
-    buffer = io.BytesIO()
-    np.savez(buffer, **dict(arrays))  # type: ignore[arg-type]  # a name is never allow_pickle
-    write_whole(path, buffer.getvalue())
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it is there complete or, whatever happens, not at all.
-
-    Raises
-    ------
-    RecordingError
-        When the file cannot be written.
-    """
-    part = path.with_name(f'.{path.name}.part')
-    try:
-        try:
-            with part.open('wb') as stream:
-                stream.write(content)
-                stream.flush()
-                os.fsync(stream.fileno())
-            os.replace(part, path)
-        finally:
-            with suppress(OSError):
-                part.unlink(missing_ok=True)
-    except OSError as error:
-        raise RecordingError(
-            str(path), f'cannot be written ({error.strerror})', 'make room, or write elsewhere'
-        ) from error
+    # A stream, since numpy appends .npz to names that end otherwise.
+    with atomic_file(path, error_type) as part, part.open('wb') as stream:
+        np.savez(stream, **dict(arrays))  # type: ignore[arg-type]  # a name is never allow_pickle
 
 
 def read_archive(path: Path) -> Arrays:
-    """Arrays of an ``.npz`` file; every byte of them, though not of their names, is checked.
+    """Read an ``.npz`` file; checksums cover the arrays, but not their names.
 
     Parameters
     ----------
@@ -106,8 +86,8 @@ def read_archive(path: Path) -> Arrays:
         with zipfile.ZipFile(io.BytesIO(content)) as members:
             if members.testzip() is not None:
                 raise zipfile.BadZipFile
-        with np.load(io.BytesIO(content), allow_pickle=False) as found:
-            return {name: found[name] for name in found.files}
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
     except _DAMAGE as error:
         raise RecordingError(
             str(path), 'is damaged, or no .npz file of arrays', 'make it again'

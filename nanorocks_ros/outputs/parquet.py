@@ -1,4 +1,7 @@
-"""Tables as Parquet files, where pyarrow is installed."""
+"""Tables as Parquet files, where pyarrow is installed.
+
+Tested in test_trajectory.py.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -86,7 +89,7 @@ def write_parquet(
         ],
         metadata={'provenance': provenance},
     )
-    with whole_file(path) as part, writer_of(part, schema, compression='zstd') as writer:
+    with atomic_file(path) as part, writer_of(part, schema, compression='zstd') as writer:
         for piece in _groups(columns, pieces):
             arrays = [_array(arrow, piece[column.name], kinds[column.kind]) for column in columns]
             writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))

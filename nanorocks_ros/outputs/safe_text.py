@@ -1,4 +1,4 @@
-"""Names that somebody else gave, and numbers of things, as they can be shown."""
+"""Text for terminals and pages: names of unknown origin, counted nouns."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def shown(text: str | Path) -> str:
-    """In one line, and without what a terminal, a page or a file of text would choke on.
+def printable(text: str | Path) -> str:
+    """Escape control characters, so that the text fits on one line of a terminal or page.
 
     Parameters
     ----------
     text : str or Path
-        Names of files may hold any bytes, line ends and escapes of terminals among them.
+        File names may hold line ends and escape sequences of terminals.
     """
     return ''.join(
-        one if one.isprintable() else one.encode('unicode_escape').decode('ascii')
-        for one in str(text)
+        character
+        if character.isprintable()
+        else character.encode('unicode_escape').decode('ascii')
+        for character in str(text)
     )
 
 
-def counted(count: int, what: str) -> str:
-    """So many of something that has a plural in s."""
-    return f'{count} {what}{"" if count == 1 else "s"}'
+def counted(count: int, noun: str) -> str:
+    """A number with its noun, such as ``3 frames``; the plural is formed with s."""
+    return f'{count} {noun}{"" if count == 1 else "s"}'

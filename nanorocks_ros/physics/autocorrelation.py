@@ -1,4 +1,4 @@
-"""The autocorrelation of an image about its mean, and the region in which it exceeds a level."""
+"""Autocorrelation of an image about its mean, and the region above a level."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nanorocks_ros.numerics.compiled import compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Sums over a region: its area, its second moments about zero lag, nodes of it on the border.
+# Sums over a region: area, second moments about zero lag, number of nodes on the border.
 _AREA, _XX, _XY, _YY, _BORDER = range(5)
 # Corners of a cell of the grid, in order around it.
 _CORNERS = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
@@ -27,13 +27,13 @@ class LevelRegion:
     Parameters
     ----------
     area : float, [px^2]
-        0 where nothing exceeds the level, as in a uniform image.
+        0 if no value exceeds the level, as in a uniform image.
     axes_ratio : float, >= 1
-        Longer over shorter axis of the ellipse of the same second moments; NaN without area.
+        Axis ratio of the ellipse with the same second moments; NaN without area.
     direction : float, [rad], -pi/2 to pi/2
         From the columns to the longer axis, positive towards the rows (down); NaN without area.
     whole : bool
-        Whether it ends inside the lags that are known; where it does not, all of it is larger.
+        Whether it does not touch the border; if it does, its true area is larger.
     """
 
     area: float
@@ -57,8 +57,8 @@ def autocorrelation(image: NDArray[np.uint8] | NDArray[np.float32]) -> NDArray[n
     rows, columns = image.shape
     deviation = image.astype(np.float32)
     deviation -= np.float32(deviation.mean(dtype=np.float64))
-    # Padded, so that at the lags that are wanted, up to half of the size, the image is not
-    # compared with its own repetition. Rows that are all zero, or not wanted, are not transformed.
+    # Padded, so that up to lags of half the size the image does not overlap its periodic copy.
+    # Rows of zeros and rows that are not needed are not transformed.
     down, right = (fft.next_fast_len(size + size // 2 + 1, real=True) for size in (rows, columns))
     spectrum = fft.fft(fft.rfft(deviation, n=right, axis=1), n=down, axis=0)
     power = spectrum.real**2 + spectrum.imag**2
@@ -70,18 +70,18 @@ def autocorrelation(image: NDArray[np.uint8] | NDArray[np.float32]) -> NDArray[n
     if variance <= 0.0:
         return np.zeros((rows, columns), dtype=np.float32)
     lags = np.arange(columns) - columns // 2
-    found = np.empty((rows, columns), dtype=np.float32)
-    found[rows // 2 :] = covariance[: rows - rows // 2, lags]
-    found[: rows // 2] = covariance[rows // 2 : 0 : -1, -lags]
-    found /= variance
-    return found
+    values = np.empty((rows, columns), dtype=np.float32)
+    values[rows // 2 :] = covariance[: rows - rows // 2, lags]
+    values[: rows // 2] = covariance[rows // 2 : 0 : -1, -lags]
+    values /= variance
+    return values
 
 
 def level_region(values: NDArray[np.float32], level: float) -> LevelRegion:
     """The region around zero lag in which an autocorrelation exceeds a level.
 
-    Its outline lies where straight lines between neighbouring values cross the level, so that
-    the area has no steps of a pixel. Other regions above the level do not count.
+    Its outline is interpolated linearly between neighbouring values, so that the area is not
+    quantised in pixels. Other regions above the level do not count.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def _outline(
     xs: NDArray[np.float64],
     ys: NDArray[np.float64],
 ) -> int:
-    """Corners of the part of one cell that belongs to the region, from zero lag; how many."""
+    """Corners of the part of a cell inside the region, relative to zero lag; their number."""
     rows, columns = inside.shape
     n = 0
     for k in range(4):

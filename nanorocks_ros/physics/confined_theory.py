@@ -1,15 +1,16 @@
 """Kinetic theory of a cooling gas of beads between close walls; derived in docs/method/theory.md.
 
-Each class of beads has a temperature of its own along x, y and z: in a flat tray walls take most
-from the motion along z, and beads, which meet almost side by side, give little back. Velocities
-are taken for Gaussian and beads for unrelated before they meet; contacts are those of `contacts`.
-Nothing is fitted. In the steady state all temperatures fall alike, as Haff's law says.
+Each class of beads has its own temperatures along x, y and z: in a flat tray the walls cool the
+motion along z most, and beads, which collide almost side by side, return little energy to it.
+Velocities are Gaussian and uncorrelated before a collision; contact rates are from
+`contact_rates`. Nothing is fitted. In the steady state all temperatures fall at the same rate,
+by Haff's law.
 
 Against simulation (`python -m benchmarks closed_forms`) the restitution of the beads of trays 1, 3
 and 5 comes out within 0.01 from 0.9 up, 0.03 at 0.8 and, with walls from 0.9 to 0.99, 0.04 at 0.7.
-Lower ones fail where walls are nearly elastic: the steady state, with 3 to 6 times more energy
-along z, is reached too late; `confined_decay` follows the gas to it. Among the grains of trays 6
-to 8 it reads 0.02 too much at 0.9 (tray 7: at 0.8), and 0.1 at 0.8, where they form clusters.
+Lower ones fail with nearly elastic walls: the steady state, with 3 to 6 times more energy along z,
+is reached too late; `confined_decay` integrates up to it. For the grains of trays 6 to 8 it is
+0.02 too high at 0.9 (tray 7: at 0.8), and 0.1 at 0.8, where they form clusters.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ class Cooling:
     decay_rate : float, [1/m]
         1 / (v0 tau), v0 being the mean projected speed of all beads.
     granular_temperature : ndarray (n, 3), [m^2/s^2]
-        Of each class of beads along x, y and z, where the mean projected speed is 1 m/s.
+        Of each class of beads along x, y and z, at a mean projected speed of 1 m/s.
     """
 
     decay_rate: float
@@ -72,13 +73,13 @@ class ConfinedGas:
         ----------
         restitution, wall_restitution : float, [0, 1]
         width : float, [0, 1]
-            Full width of the even distribution about `restitution` that each collision of two
-            beads draws from.
+            Full width of the uniform distribution of the restitution of single collisions,
+            about `restitution`.
 
         Raises
         ------
         ConfigurationError
-            When a restitution is none.
+            For a restitution outside [0, 1].
         FitError
             When no steady state is found.
         """
@@ -86,16 +87,16 @@ class ConfinedGas:
         masses = self.beads.masses
         start = np.repeat(np.log(masses.mean() / masses), 3)
 
-        def unequal(logs: NDArray[np.float64]) -> NDArray[np.float64]:
+        def imbalance(logs: NDArray[np.float64]) -> NDArray[np.float64]:
             temperature = np.exp(logs).reshape(-1, 3)
             rates = self._log_rates(temperature, restitution, wall_restitution, width).ravel()
-            found: NDArray[np.float64] = rates - rates.mean()
+            differences: NDArray[np.float64] = rates - rates.mean()
             # One of these differences follows from the others; the scale is free.
-            found[0] = self.mean_projected_speed(temperature) - 1.0
-            return found
+            differences[0] = self.mean_projected_speed(temperature) - 1.0
+            return differences
 
         scale = self.mean_projected_speed(np.exp(start).reshape(-1, 3))
-        solution = optimize.root(unequal, start - 2.0 * math.log(scale), tol=1e-10)
+        solution = optimize.root(imbalance, start - 2.0 * math.log(scale), tol=1e-10)
         if not solution.success:
             raise FitError(
                 'confined theory',
@@ -117,7 +118,7 @@ class ConfinedGas:
         return self.cooling(restitution, wall_restitution, width).decay_rate
 
     def restitution(self, decay_rate: float, wall_restitution: float, width: float = 0.0) -> float:
-        """Restitution between beads that goes with a decay rate; its range is not checked.
+        """Restitution between beads for a decay rate; the range of the theory is not checked.
 
         Parameters
         ----------
@@ -131,7 +132,7 @@ class ConfinedGas:
         ConfigurationError
             When a value cannot be used.
         FitError
-            When beads of no restitution would make this decay.
+            When no restitution gives this decay.
         """
         check_positive(decay_rate=decay_rate)
 
@@ -160,7 +161,7 @@ class ConfinedGas:
         wall_restitution: float,
         granular_temperature: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Mean projected speed of a gas that starts otherwise than in the steady state.
+        """Mean projected speed of a gas that does not start in the steady state.
 
         Parameters
         ----------
@@ -203,7 +204,7 @@ class ConfinedGas:
             atol=1e-8,
         )
         return np.array(
-            [self.mean_projected_speed(np.exp(one.reshape(-1, 3))) for one in course.y.T]
+            [self.mean_projected_speed(np.exp(logs.reshape(-1, 3))) for logs in course.y.T]
         )
 
     def mean_projected_speed(self, granular_temperature: NDArray[np.float64]) -> float:
@@ -217,7 +218,7 @@ class ConfinedGas:
         return float(self.beads.counts @ means / self.beads.counts.sum())
 
     def species_speeds(self, granular_temperature: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The same for each species of the tray, (n_species,), [m/s]."""
+        """Mean projected speed of each species of the tray, (n_species,), [m/s]."""
         beads = self.beads
         weights = beads.counts * _projected(granular_temperature)
         sums = np.bincount(beads.species, weights)
@@ -239,8 +240,8 @@ class ConfinedGas:
 
     def _approach(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
         """Standard deviation of the relative velocity along each direction, (n, n, ...)."""
-        both = temperature[:, np.newaxis] + temperature
-        squares = np.einsum('abqi,abi->abq', self.contacts.squares, both)
+        sums = temperature[:, np.newaxis] + temperature
+        squares = np.einsum('abqi,abi->abq', self.contacts.squares, sums)
         spread: NDArray[np.float64] = np.sqrt(squares)
         return spread
 
@@ -267,18 +268,18 @@ class ConfinedGas:
 def _projected(temperature: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean of sqrt(vx^2 + vy^2) for each class; velocities normal, with two variances."""
     along, across = temperature[:, 0], temperature[:, 1]
-    found: NDArray[np.float64] = _MEAN * np.sqrt(along) * special.ellipe(1.0 - across / along)
-    return found
+    projected: NDArray[np.float64] = _MEAN * np.sqrt(along) * special.ellipe(1.0 - across / along)
+    return projected
 
 
 def confined_gas(tray: Tray, sizes: int = 3) -> ConfinedGas:
-    """The beads of a tray.
+    """Confined gas of the beads of a tray.
 
     Parameters
     ----------
     tray : Tray
     sizes : int, > 0
-        A species with a range of diameters is represented by so many.
+        Number of diameters that represent a species with a range.
 
     Raises
     ------

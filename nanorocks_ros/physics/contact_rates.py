@@ -1,4 +1,4 @@
-"""How often beads in a narrow box touch one another and the walls: geometry, and nothing else.
+"""Contact rates of beads in a narrow box, with each other and with the walls, by geometry.
 
 Beads of a gas without losses are spread evenly over all arrangements in which none overlap. Two
 beads thrown into the box at random touch along a direction k with the density
@@ -6,13 +6,15 @@ beads thrown into the box at random touch along a direction k with the density
     p_ab(k) = product over x, y, z of l_i(d_ab k_i) / (H_ai H_bi),
     l_i(r) = min(H_ai, H_bi, (H_ai + H_bi)/2 - |r|) or 0,      H_ai = L_i - d_a,
 
-exactly. The other beads make contacts more frequent, because beads that touch leave more room to
-the rest: to first order in the density by 1 + x_ab, x_ab being the volume from which the pair
-keeps others, less when touching than when apart, averaged over the box. Both are worked out
-numerically, with the walls. Higher orders are those of Carnahan and Starling's spheres at the
-density at which these have the same first order. A wall is met more often because beads next to it
-are pushed there by those they touch: by 1 + the first order times the contact value, as the
-pressure of a fluid is. Where the box is wide all of this is Enskog's theory.
+exactly. The other beads increase the rate, because beads that touch leave more room to the rest:
+to first order in the density by 1 + x_ab, where x_ab is the decrease of the volume excluded to the
+others when the pair touches, averaged over the box. Both are computed numerically, with the walls.
+Higher orders are those of Carnahan and Starling's spheres at the density with the same first
+order. Contacts with a wall increase because neighbours push beads against it: by 1 + the first
+order times the contact value, like the pressure of a fluid. In a wide box this is Enskog's
+theory.
+
+Tested in test/physics/test_confined_theory.py.
 """
 
 from __future__ import annotations
@@ -31,28 +33,28 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
 
-# Points of the integrals over the box: rates of collision are good to 0.5 %.
+# Number of points of the integrals over the box: collision rates are accurate to 0.5 %.
 _POINTS = 4096
-# Directions in an octant, along z and around it.
+# Number of directions in an octant, along z and around it.
 _NODES = 12
 # First order of the contact value of spheres in the filling factor.
 _SPHERES = 2.5
-# Beyond, the first order says too little.
+# Above these values the first order is not accurate.
 _MOST_FILLING = 0.4
 _MOST_AT_WALLS = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeadClasses:
-    """Beads of a tray by size: all of one class are alike.
+    """Beads of a tray by size; those of a class are equal.
 
     Parameters
     ----------
     counts : ndarray (n,)
-        Need not be whole: a range of diameters is represented by a few.
+        Not whole numbers if a range of diameters is represented by a few.
     diameters, masses : ndarray (n,), [m], [kg]
     species : ndarray of int, (n,)
-        Place in the tray's list.
+        Index in `Tray.species`.
     """
 
     counts: NDArray[np.float64]
@@ -62,7 +64,7 @@ class BeadClasses:
 
 
 def bead_classes(tray: Tray, sizes: int = 3) -> BeadClasses:
-    """The beads of a tray; a range of diameters as so many of them, with Gaussian weights.
+    """Classes of the beads of a tray; a range of diameters by Gauss-Legendre nodes.
 
     Parameters
     ----------
@@ -71,22 +73,22 @@ def bead_classes(tray: Tray, sizes: int = 3) -> BeadClasses:
     """
     nodes, weights = np.polynomial.legendre.leggauss(sizes)
     rows = []
-    for place, one in enumerate(tray.species):
-        half = 0.5 * (one.diameter_high - one.diameter_low)
-        wanted = zip(nodes, 0.5 * weights, strict=True) if half > 0.0 else ((0.0, 1.0),)
-        for node, weight in wanted:
-            diameter = one.diameter + half * node
-            mass = one.density * math.pi / 6.0 * diameter**3
-            rows.append((one.count * weight, diameter, mass, place))
-    counts, diameters, masses, species = np.array(rows).T
+    for place, species in enumerate(tray.species):
+        half = 0.5 * (species.diameter_high - species.diameter_low)
+        quadrature = zip(nodes, 0.5 * weights, strict=True) if half > 0.0 else ((0.0, 1.0),)
+        for node, weight in quadrature:
+            diameter = species.diameter + half * node
+            mass = species.density * math.pi / 6.0 * diameter**3
+            rows.append((species.count * weight, diameter, mass, place))
+    counts, diameters, masses, species_index = np.array(rows).T
     return BeadClasses(
-        counts=counts, diameters=diameters, masses=masses, species=species.astype(np.int64)
+        counts=counts, diameters=diameters, masses=masses, species=species_index.astype(np.int64)
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contacts:
-    """Where beads of some classes touch in a box.
+    """Contact rates of bead classes in a box.
 
     Parameters
     ----------
@@ -106,7 +108,7 @@ class Contacts:
 
 
 def contacts(beads: BeadClasses, dimensions: tuple[float, float, float]) -> Contacts:
-    """Contacts in a box.
+    """Contact rates in a box.
 
     Parameters
     ----------
@@ -144,11 +146,11 @@ def contacts(beads: BeadClasses, dimensions: tuple[float, float, float]) -> Cont
 
 
 def _shared(
-    one: NDArray[np.float64], other: NDArray[np.float64], apart: NDArray[np.float64]
+    first: NDArray[np.float64], second: NDArray[np.float64], apart: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Length over which one centre can be, with the other so far apart from it."""
-    least = np.minimum(one, other)
-    return np.clip(np.minimum(least, 0.5 * (one + other) - np.abs(apart)), 0.0, None)
+    """Length available to the first centre, with the second at a distance `apart`."""
+    least = np.minimum(first, second)
+    return np.clip(np.minimum(least, 0.5 * (first + second) - np.abs(apart)), 0.0, None)
 
 
 def _spread(dimensions: int) -> NDArray[np.float64]:
@@ -188,15 +190,15 @@ def _volume(radius: float) -> float:
 
 
 def _overlaps(room: NDArray[np.float64], touch: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Probability that two beads thrown into the box overlap, (n, n)."""
+    """Probability that two beads at random positions in the box overlap, (n, n)."""
     places = _ball(_spread(3))
-    found = np.empty_like(touch)
+    probability = np.empty_like(touch)
     for a, b in np.ndindex(touch.shape):
         shared = _shared(room[a], room[b], touch[a, b] * places).prod(axis=1)
-        found[a, b] = (
+        probability[a, b] = (
             _volume(float(touch[a, b])) * shared.mean() / (room[a].prod() * room[b].prod())
         )
-    return found
+    return probability
 
 
 def _wall_crowding(
@@ -205,12 +207,12 @@ def _wall_crowding(
     touch: NDArray[np.float64],
     overlaps: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """How much more probable contacts with walls are, to first order in the density.
+    """Relative increase of wall contacts to first order in the density, (n, n, 3).
 
-    (n, n, 3): of each class, what each class adds, across each axis.
+    For each class, the part of each other class, at the walls across each axis.
     """
     places = _ball(_spread(3))
-    found = np.zeros((*touch.shape, 3))
+    crowding = np.zeros((*touch.shape, 3))
     for a, c in np.ndindex(touch.shape):
         apart = touch[a, c] * places
         shared = _shared(room[a], room[c], apart)
@@ -221,8 +223,8 @@ def _wall_crowding(
             at_wall = (
                 _volume(float(touch[a, c])) * (inside * rest).mean() / (room[c].prod() * area)
             )
-            found[a, c, axis] = (beads.counts[c] - (a == c)) * (overlaps[a, c] - at_wall)
-    return found
+            crowding[a, c, axis] = (beads.counts[c] - (a == c)) * (overlaps[a, c] - at_wall)
+    return crowding
 
 
 def _pair_crowding(
@@ -231,10 +233,10 @@ def _pair_crowding(
     touch: NDArray[np.float64],
     overlaps: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The same for contacts of two beads, (n, n)."""
+    """Relative increase of contacts of two beads to first order in the density, (n, n)."""
     points = _spread(5)
     directions, third = _sphere(points), _ball(points[:, [3, 4, 2]])
-    found = np.array(overlaps)
+    crowding = np.array(overlaps)
     for a, b in np.ndindex(touch.shape):
         apart = touch[a, b] * directions
         weight = _shared(room[a], room[b], apart).prod(axis=1).mean()
@@ -242,11 +244,11 @@ def _pair_crowding(
             others = beads.counts[c] - (a == c) - (b == c)
             if others <= 0.0:
                 continue
-            both = _kept_off(room[[a, b, c]], apart, third, (touch[a, c], touch[b, c]))
-            both += _kept_off(room[[b, a, c]], -apart, third, (touch[b, c], touch[a, c]))
-            kept = both / (weight * room[c].prod())
-            found[a, b] += others * (overlaps[a, c] + overlaps[b, c] - kept)
-    return found
+            volume = _kept_off(room[[a, b, c]], apart, third, (touch[a, c], touch[b, c]))
+            volume += _kept_off(room[[b, a, c]], -apart, third, (touch[b, c], touch[a, c]))
+            kept = volume / (weight * room[c].prod())
+            crowding[a, b] += others * (overlaps[a, c] + overlaps[b, c] - kept)
+    return crowding
 
 
 def _kept_off(
@@ -255,24 +257,25 @@ def _kept_off(
     third: NDArray[np.float64],
     reach: tuple[float, float],
 ) -> float:
-    """Volume that a bead keeps a third from, over all its places; it shares it with its partner.
+    """Mean volume excluded to a third bead by one of a pair; overlap is shared with the partner.
 
     Parameters
     ----------
     rooms : ndarray (3, 3), [m]
         Of the bead, its partner and the third.
     apart, third : ndarray (n, 3), [m], [1]
-        Where the partner is from the bead, and the third in units of the distance at contact.
+        Position of the partner relative to the bead, and of the third in units of the contact
+        distance.
     reach : tuple of 2 floats, [m]
-        Distances at contact of the third with the bead and with its partner.
+        Contact distances of the third with the bead and with its partner.
     """
     offset = reach[0] * third
     half = 0.5 * rooms
     low = np.maximum(np.maximum(-half[0], -half[1] - apart), -half[2] - offset)
     high = np.minimum(np.minimum(half[0], half[1] - apart), half[2] - offset)
     places = np.clip(high - low, 0.0, None).prod(axis=1)
-    both = ((offset - apart) ** 2).sum(axis=1) < reach[1] ** 2
-    return _volume(reach[0]) * float((places * (1.0 - 0.5 * both)).mean())
+    shared = ((offset - apart) ** 2).sum(axis=1) < reach[1] ** 2
+    return _volume(reach[0]) * float((places * (1.0 - 0.5 * shared)).mean())
 
 
 def _directions(

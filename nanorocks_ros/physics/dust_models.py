@@ -1,7 +1,7 @@
-"""Speeds below which colliding dust and beads stick, against mass, as others have published them.
+"""Published sticking thresholds of dust and beads against mass.
 
-A published curve is here with its source. Where the constants were not found in any text at hand
-they are marked unverified: whoever prints or draws such a curve must say so (`label`).
+Each curve has its source. Constants that were not checked against the published text are marked
+unverified, and so is the curve in tables and figures (`label`).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 UNVERIFIED = 'unverified'
 _GRAM, _CENTIMETRE = 1e-3, 1e-2
 
-# Relative speed at the onset of clustering by tray, twice the mean speed of the beads, [m/s];
-# the paper takes it for the sticking threshold. [B19] section 3.2.3.
+# Relative speed at the onset of clustering by tray, twice the mean speed of the beads, [m/s], the
+# sticking threshold of the paper. [B19] section 3.2.3.
 PAPER_STICKING_SPEEDS = {1: 0.0104, 3: 0.0109, 5: 0.0128}
 
 
@@ -33,15 +33,15 @@ class ThresholdCurve:
     Parameters
     ----------
     name : str
-        What the curve says, as a legend has it.
+        Meaning of the curve, for a legend.
     mass : float, [kg]
         The mass m1 at which the threshold is `speed`.
     speed : float, [m/s]
     exponent : float
     source : str
-        Where it was published.
+        Publication.
     verified : bool
-        Whether the constants were compared with that text.
+        Whether the constants were checked against the publication.
     """
 
     name: str
@@ -53,7 +53,7 @@ class ThresholdCurve:
 
     @property
     def label(self) -> str:
-        """Name and source, and that it is unverified where it is."""
+        """Name and source, with a mark if unverified."""
         mark = '' if self.verified else f' ({UNVERIFIED})'
         return f'{self.name}: {self.source}{mark}'
 
@@ -73,7 +73,7 @@ class ThresholdCurve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PublishedSpeeds:
-    """Speeds at which collisions led to sticking, with no mass that the source at hand gives.
+    """Speeds at which collisions led to sticking; the source gives no mass.
 
     Parameters
     ----------
@@ -88,8 +88,8 @@ class PublishedSpeeds:
     source: str
 
 
-# The two limits of Windmark et al., after Weidling et al.: below the one all collisions stick,
-# above the other all bounce; (m / m1)^(-5/18) cm/s. From memory: no text with them was at hand.
+# The two limits of Windmark et al., after Weidling et al.: below the first all collisions stick,
+# above the second all bounce; (m / m1)^(-5/18) cm/s. Not checked against the text.
 ALWAYS_STICKING = ThresholdCurve(
     name='all stick below',
     mass=3.0e-12 * _GRAM,
@@ -127,22 +127,22 @@ MILLIMETRE_STICKS_BELOW = 8e-5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredThreshold:
-    """A sticking threshold that was measured in one tray.
+    """A sticking threshold measured in one tray.
 
     Parameters
     ----------
     tray : int
     mass, lightest, heaviest : float, [kg]
-        Mean mass of a bead, and the range of all of them.
+        Mean mass of a bead, and range of the masses.
     speed : float, [m/s]
     lower, upper : float, [m/s]
-        Ends of its interval; the speed itself where it is not known.
+        Ends of its interval; equal to the speed if unknown.
     source : str
 
     Raises
     ------
     ConfigurationError
-        For numbers that are not positive, or an interval that does not hold the speed.
+        For numbers that are not positive, or an interval without the speed.
     """
 
     tray: int
@@ -171,10 +171,10 @@ class MeasuredThreshold:
 
 
 def collapse_time_factor(restitution: float) -> float:
-    """By how much longer a cloud of bouncing particles takes to collapse, 1 / (1 - e^2).
+    """Factor on the collapse time of a cloud of bouncing particles, 1 / (1 - e^2).
 
-    Against perfectly inelastic collisions, in clouds so light that collisions neither fragment
-    particles nor are outrun by the fall.
+    Relative to perfectly inelastic collisions, for clouds of low mass, in which collisions do not
+    fragment particles and are faster than the free fall.
 
     Parameters
     ----------

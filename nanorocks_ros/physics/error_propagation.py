@@ -1,4 +1,4 @@
-"""A number with its error, and how the errors of inputs pass through a relation."""
+"""A number with its standard error, and propagation of errors to first order."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from nanorocks_ros.errors import ConfigurationError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-# Of an error: so small that only the slope counts, so large that rounding does not.
+# Step of the central differences, as a fraction of the error.
 _STEP = 0.05
 
 
@@ -44,7 +44,7 @@ class Estimate:
 def propagated(relation: Callable[..., float], **inputs: Estimate | float) -> Estimate:
     """The value of a relation at some inputs, with their errors to first order.
 
-    Slopes are central differences over a twentieth of each error; the inputs are taken for
+    Derivatives are central differences over a twentieth of each error; the inputs are
     independent.
 
     Parameters
@@ -59,13 +59,13 @@ def propagated(relation: Callable[..., float], **inputs: Estimate | float) -> Es
     NanorocksError
         Whatever the relation raises, at the inputs or next to them.
     """
-    values = {k: one.value if isinstance(one, Estimate) else one for k, one in inputs.items()}
+    values = {k: item.value if isinstance(item, Estimate) else item for k, item in inputs.items()}
     variance = 0.0
-    for name, one in inputs.items():
-        if not isinstance(one, Estimate) or one.error == 0.0:
+    for name, item in inputs.items():
+        if not isinstance(item, Estimate) or item.error == 0.0:
             continue
-        step = _STEP * one.error
-        up = relation(**{**values, name: one.value + step})
-        down = relation(**{**values, name: one.value - step})
+        step = _STEP * item.error
+        up = relation(**{**values, name: item.value + step})
+        down = relation(**{**values, name: item.value - step})
         variance += ((up - down) / (2.0 * _STEP)) ** 2
     return Estimate(value=relation(**values), error=math.sqrt(variance))

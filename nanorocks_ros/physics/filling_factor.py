@@ -1,10 +1,9 @@
-"""How densely clusters are packed: the paper's filling factor, and that of a layer of beads.
+"""Filling factors of clusters: that of the paper, and that of a layer of beads.
 
-The camera sees an area A; a volume needs a height. The paper takes one radius, A r, where a layer
-of beads is one diameter high, A 2r: its filling factors are twice those of the layer. And a layer
-of equal beads, however close, fills at most pi / (3 sqrt 3) = 0.605 of its volume (hexagonal
-order): that is near to the 0.64 of random close packing in three dimensions, and has nothing to
-do with it.
+The camera sees an area A; a volume needs a height. The paper uses one radius, A r, but a layer of
+beads is one diameter high, A 2r: its filling factors are twice those of the layer. A layer of
+equal beads fills at most pi / (3 sqrt 3) = 0.605 of its volume (hexagonal order). That is close
+to the 0.64 of random close packing in three dimensions, but unrelated.
 """
 
 from __future__ import annotations
@@ -20,33 +19,32 @@ from nanorocks_ros.physics.kinetic_theory import check_positive
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Of the area in the picture, by discs that touch six others; Thue 1892.
+# Largest covered fraction of an area by equal discs, in hexagonal order; Thue 1892.
 HEXAGONAL_AREA = math.pi / math.sqrt(12.0)
-# A sphere fills 2/3 of the cylinder around it.
+# Volume ratio of a sphere to the cylinder around it.
 SPHERE_IN_CYLINDER = 2.0 / 3.0
-# Of the volume of a flat layer of equal beads: in hexagonal and in square order.
+# Filling factor of a flat layer of equal beads in hexagonal order.
 HEXAGONAL_LAYER = SPHERE_IN_CYLINDER * HEXAGONAL_AREA
-SQUARE_LAYER = math.pi / 6.0
-# Of equal beads in three dimensions, what the paper compares with ([B19] section 3.2.3).
+# Filling factor of equal beads in three dimensions, for comparison in [B19] section 3.2.3.
 RANDOM_CLOSE_PACKING = 0.64
 # (ff_end - ff_onset) / ff_onset by tray, [B19] section 3.2.3 and fig. 10; the filling factors
 # themselves are in its figure alone.
 PAPER_COMPACTION = {1: 0.066, 3: 0.029, 5: 0.027}
 # Particles per cluster by tray, counted by hand at the end of 18 cycles: [B19] table 3.
 PAPER_CLUSTER_SIZES = {1: 2.85, 3: 5.52, 5: 6.55}
-# Directions in which a hull is touched: of the area of a disc, 1e-5 is missing.
+# Number of directions of the tangents of a hull; the area of a disc is too small by 1e-5.
 _DIRECTIONS = 720
 
 
 def paper_cluster_filling(
     beads: float, bead_volume: float, area: float, bead_radius: float
 ) -> float:
-    """Filling factor of a cluster as the paper has it, with a cluster volume of A r.
+    """Filling factor of a cluster in the paper, with a cluster volume of A r.
 
     Parameters
     ----------
     beads : float
-        Number in the cluster, the mean over clusters if that is what the area is.
+        Number in the cluster; the mean over clusters for a mean area.
     bead_volume : float, [m^3]
     area : float, [m^2]
         Of the cluster in the picture.
@@ -55,7 +53,7 @@ def paper_cluster_filling(
     Returns
     -------
     float
-        Twice what a layer of that area fills: up to 1.21 for equal beads in hexagonal order.
+        Twice the filling factor of a layer: up to 1.21 for equal beads in hexagonal order.
 
     Raises
     ------
@@ -72,10 +70,10 @@ def paper_cluster_filling(
 
 
 def layer_filling(radii: NDArray[np.float64], area: float) -> float:
-    """Filling factor of a cluster of beads that lie in one layer, with a cluster volume of A d.
+    """Filling factor of a cluster of beads in one layer, with a cluster volume of A d.
 
-    For beads of several sizes d is sum(d^3) / sum(d^2), the height over which a layer in which
-    the beads cover the part c of the area fills 2/3 c of the volume, as for equal beads.
+    For beads of several sizes d is sum(d^3) / sum(d^2): then a layer whose beads cover the
+    fraction c of the area fills 2/3 c of the volume, as for equal beads.
 
     Parameters
     ----------
@@ -87,7 +85,7 @@ def layer_filling(radii: NDArray[np.float64], area: float) -> float:
     Returns
     -------
     float
-        Above 2/3 only where beads lie over each other, so that there is no single layer.
+        Above 2/3 only if beads lie over each other, not in a single layer.
 
     Raises
     ------
@@ -99,9 +97,9 @@ def layer_filling(radii: NDArray[np.float64], area: float) -> float:
 
 
 def filling_of_height(radii: NDArray[np.float64], area: float, height: float) -> float:
-    """Filling factor of a cluster whose height is known, V / (A h).
+    """Filling factor of a cluster of known height, V / (A h).
 
-    With the height of the tray it is the least that a picture allows.
+    With the height of the tray it is a lower bound.
 
     Parameters
     ----------
@@ -119,11 +117,11 @@ def filling_of_height(radii: NDArray[np.float64], area: float, height: float) ->
 
 
 def hull_area(places: NDArray[np.float64], radii: NDArray[np.float64]) -> float:
-    """Area of the convex hull of discs: of a cluster in the picture, gaps between arms included.
+    """Area of the convex hull of discs, gaps between arms of a cluster included.
 
-    Of all outlines this one has no free parameter, is defined for any cluster, and shrinks when
-    arms fold. An outline that follows the beads more closely does not: with gaps filled that no
-    bead fits into, a straight chain covers as much of its area, 0.907, as hexagonal order.
+    This outline has no free parameter, is defined for any cluster, and shrinks when arms fold. A
+    tighter outline does not: if gaps too small for a bead are filled, a straight chain covers as
+    much of its area, 0.907, as hexagonal order.
 
     Parameters
     ----------
@@ -133,7 +131,7 @@ def hull_area(places: NDArray[np.float64], radii: NDArray[np.float64]) -> float:
     Returns
     -------
     float, [m^2]
-        Good to 1e-5.
+        Relative error 1e-5.
 
     Raises
     ------
@@ -148,59 +146,16 @@ def hull_area(places: NDArray[np.float64], radii: NDArray[np.float64]) -> float:
         )
     angles = np.linspace(0.0, 2.0 * math.pi, _DIRECTIONS, endpoint=False)
     directions = np.column_stack((np.cos(angles), np.sin(angles)))
-    # In each direction the disc that reaches furthest touches the hull.
+    # In each direction the outermost disc touches the hull.
     furthest = np.argmax(directions @ centres.T + discs, axis=1)
     x, y = (centres[furthest] + discs[furthest, np.newaxis] * directions).T
     return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
 
 
-def least_hull_area(beads: int, radius: float, perimeter: float) -> float:
-    """The least area of the convex hull of equal discs that don't overlap, [m^2].
-
-    It follows that two and more beads in a flat layer never fill as much as `HEXAGONAL_LAYER`
-    of the hull, whatever their order.
-
-    Parameters
-    ----------
-    beads : int, >= 1
-    radius : float, [m]
-    perimeter : float, [m]
-        Of the hull.
-
-    References
-    ----------
-    Groemer 1960, Math. Z. 73, 285: 2 sqrt(3) (n - 1) + p (1 - sqrt(3)/2) + pi (sqrt(3) - 1) for
-    discs of radius 1.
-    """
-    check_positive(beads=beads, radius=radius, perimeter=perimeter)
-    root = math.sqrt(3.0)
-    area = (
-        2.0 * root * (beads - 1) + (1.0 - 0.5 * root) * perimeter / radius + math.pi * (root - 1.0)
-    )
-    return area * radius**2
-
-
-def hexagonal_patch(beads: int, radius: float) -> NDArray[np.float64]:
-    """Places of equal discs in hexagonal order, those nearest to the centre of one, (n, 2), [m].
-
-    Raises
-    ------
-    ConfigurationError
-        For no disc, or a radius that is not positive and finite.
-    """
-    check_positive(beads=beads, radius=radius)
-    rings = math.ceil(math.sqrt(beads)) + 1
-    i, j = (one.ravel() for one in np.mgrid[-rings : rings + 1, -rings : rings + 1])
-    x, y = 2.0 * radius * (i + 0.5 * j), math.sqrt(3.0) * radius * j
-    # Rounded, so that those equally near are taken in order round the centre.
-    nearest = np.lexsort((np.arctan2(y, x), np.round((x**2 + y**2) / radius**2)))
-    return np.column_stack((x, y))[nearest[:beads]]
-
-
 def _radii(radii: NDArray[np.float64]) -> NDArray[np.float64]:
-    found = np.atleast_1d(np.asarray(radii, dtype=np.float64))
-    if found.ndim != 1 or found.size == 0:
-        raise ConfigurationError('radii', f'shape {found.shape}', 'give one for each bead')
-    if not (np.isfinite(found).all() and (found > 0.0).all()):
-        raise ConfigurationError('radii', f'{found.min()!r} is one', 'give positive numbers')
-    return found
+    values = np.atleast_1d(np.asarray(radii, dtype=np.float64))
+    if values.ndim != 1 or values.size == 0:
+        raise ConfigurationError('radii', f'shape {values.shape}', 'give one for each bead')
+    if not (np.isfinite(values).all() and (values > 0.0).all()):
+        raise ConfigurationError('radii', f'{values.min()!r}', 'give positive numbers')
+    return values

@@ -1,4 +1,7 @@
-"""Haff's law: how the mean speed of a freely cooling granular gas falls."""
+"""Haff's law: decay of the mean speed of a freely cooling granular gas.
+
+Tested in test/physics/test_paper_formulas.py.
+"""
 
 from __future__ import annotations
 
@@ -30,5 +33,5 @@ def haff_speed(
 
 
 def granular_energy(speed: float, mass: float) -> float:
-    """Kinetic energy per particle as the paper writes it, T = m v^2 / 2 [J] ([B19] eq. 4)."""
+    """Kinetic energy per particle in the paper, T = m v^2 / 2 [J] ([B19] eq. 4)."""
     return 0.5 * mass * speed * speed

@@ -1,10 +1,10 @@
 """Kinetic theory of a gas of equal, smooth, inelastic spheres without walls.
 
 Valid for a homogeneous gas far from any wall: filling factors up to 0.3 (the contact value is
-good to 0.3 % there) and restitutions from 0.8 up, where the rate of cooling is good to 1 %; below,
-the correlations of beads about to meet slow it down by some per cent. Through the walls of the
-trays that were flown goes about half of the energy, so that what `kinetic_restitution` reads from
-their decays is far too low: use `confined` there.
+good to 0.3 % there) and restitutions from 0.8 up, where the cooling rate is good to 1 %; below,
+velocity correlations of colliding beads reduce it by some per cent. The walls of the trays of the
+flight take about half of the energy, so that `kinetic_restitution` is far too low for their
+decays: use `confined_theory` there.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ import math
 from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.physics.error_propagation import Estimate, propagated
 
-# Of the decay rate of the mean speed in space: sqrt(2)/6, from the integrals over Maxwell's
-# speeds.
+# Coefficient of the decay rate of the mean 3-D speed: sqrt(2)/6, from integrals over the Maxwell
+# distribution.
 HAFF_COEFFICIENT = math.sqrt(2.0) / 6.0
-# Mean projected speed over mean speed, directions even.
+# Ratio of mean projected to mean 3-D speed of an isotropic gas.
 PROJECTION = math.pi / 4.0
-# Above it the fluid freezes, and the equation of state ends.
+# Filling factor at which the fluid freezes, and the equation of state ends.
 FREEZING = 0.494
 
 
 def filling_factor(diameter: float, number_density: float) -> float:
-    """Part of the volume that beads fill: diameter [m], number density [1/m^3].
+    """Volume fraction of the beads: diameter [m], number density [1/m^3].
 
     Raises
     ------
@@ -32,18 +32,18 @@ def filling_factor(diameter: float, number_density: float) -> float:
         When a value is not positive and finite, or the gas would be denser than a fluid can be.
     """
     check_positive(diameter=diameter, number_density=number_density)
-    found = math.pi / 6.0 * number_density * diameter**3
-    if found >= FREEZING:
+    filling = math.pi / 6.0 * number_density * diameter**3
+    if filling >= FREEZING:
         raise ConfigurationError(
             'number_density',
-            f'fills {found:.3g} of the volume',
+            f'fills {filling:.3g} of the volume',
             f'give less than {FREEZING}, where hard spheres freeze',
         )
-    return found
+    return filling
 
 
 def check_positive(**values: float) -> None:
-    """Refuse what is not positive and finite, by its name.
+    """Refuse values that are not positive and finite, by their names.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def check_positive(**values: float) -> None:
 
 
 def check_restitution(**values: float) -> None:
-    """Refuse what is no restitution, by its name.
+    """Refuse restitutions outside [0, 1], by their names.
 
     Raises
     ------
@@ -78,31 +78,6 @@ def contact_value(filling: float) -> float:
     Carnahan, Starling 1969, J. Chem. Phys. 51, 635, doi:10.1063/1.1672048.
     """
     return (1.0 - 0.5 * filling) / (1.0 - filling) ** 3
-
-
-def kinetic_collision_rate(mean_speed: float, diameter: float, number_density: float) -> float:
-    """Collisions of one bead per second, sqrt(2) pi d^2 n g <v>.
-
-    Parameters
-    ----------
-    mean_speed : float, [m/s], > 0
-        In space.
-    diameter : float, [m], > 0
-    number_density : float, [1/m^3], > 0
-
-    Raises
-    ------
-    ConfigurationError
-        When a value is not positive and finite, or the gas too dense.
-
-    References
-    ----------
-    Enskog; Chapman, Cowling 1970, chapter 16.
-    """
-    check_positive(mean_speed=mean_speed)
-    crowding = contact_value(filling_factor(diameter, number_density))
-    cross_section = math.pi * diameter**2
-    return math.sqrt(2.0) * cross_section * number_density * crowding * mean_speed
 
 
 def kinetic_decay_rate(restitution: float, diameter: float, number_density: float) -> float:
@@ -167,7 +142,7 @@ def kinetic_restitution(
     ConfigurationError
         When a value cannot be used.
     FitError
-        When the decay is faster than that of beads with a restitution of zero.
+        When the decay is faster than at a restitution of zero.
     """
     return propagated(
         _restitution, decay_rate=decay_rate, diameter=diameter, number_density=number_density
@@ -181,7 +156,7 @@ def _restitution(decay_rate: float, diameter: float, number_density: float) -> f
         raise FitError(
             'kinetic_restitution',
             f'1 - restitution^2 would be {loss:.3g}',
-            'this decay is faster than beads alone can make it; walls take part: use the '
+            'this decay is faster than collisions of beads allow; walls take part: use the '
             'confined theory',
         )
     return math.sqrt(1.0 - loss)

@@ -1,4 +1,7 @@
-"""Area that a moving disc uncovers and covers: the geometry behind the statistical speed."""
+"""Area that a moving disc uncovers and covers, for the speed from binarised images.
+
+Tested in test/physics/test_paper_formulas.py.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-# Quadrature of the Rayleigh distribution: quantiles at the middle of equal probabilities.
+# Quadrature of the Rayleigh distribution: quantiles at the centres of equal probabilities.
 _PROBABILITIES = (np.arange(256) + 0.5) / 256
 _RAYLEIGH_NODES = np.sqrt(-4.0 / np.pi * np.log1p(-_PROBABILITIES))
 RAYLEIGH_NODES = _RAYLEIGH_NODES / _RAYLEIGH_NODES.mean()
@@ -35,15 +38,8 @@ def moving_area(displacement: NDArray[np.float64] | float, radius: float) -> NDA
     [B19] eq. 1, with 1 - h/R = dx / 2R.
     """
     u = np.clip(np.abs(np.asarray(displacement, dtype=np.float64)) / (2.0 * radius), 0.0, 1.0)
-    # The printed form cancels to noise at small u; this is the same area without that.
+    # The printed form loses precision at small u; this form is equivalent.
     return np.asarray(4.0 * radius**2 * (np.arcsin(u) + u * np.sqrt(1.0 - u * u)))
-
-
-def taylor_moving_area(
-    displacement: NDArray[np.float64] | float, radius: float
-) -> NDArray[np.float64]:
-    """The same area for displacements well below the radius, 4 R dx ([B19] eq. 2)."""
-    return 4.0 * radius * np.asarray(displacement, dtype=np.float64)
 
 
 def mean_moving_area(
@@ -73,7 +69,7 @@ def mean_displacement(area: float, radius: float, geometry: str) -> float:
     Returns
     -------
     float, [m]
-        NaN when the exact area is so near its limit 2 pi R^2 that it says nothing.
+        NaN when the exact area is at its limit 2 pi R^2.
     """
     if geometry == 'taylor':
         return area / (4.0 * radius)

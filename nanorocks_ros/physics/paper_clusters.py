@@ -1,7 +1,7 @@
-"""Clusters as [B19] counts them, sizes them and dates them, kept under its own names.
+"""Cluster counts, sizes and onsets by the methods of [B19], for comparison.
 
-Its calibration is a straight line through the origin, though the area of the autocorrelation
-saturates while clusters grow; its rule for the onset of sticking fires in gases that do not stick
+Its calibration is a straight line through the origin, but the area of the autocorrelation
+saturates while clusters grow; its rule for the onset of sticking triggers without sticking
 (``docs/method/autocorrelation.md``).
 """
 
@@ -25,13 +25,13 @@ class ManualClusters:
     Parameters
     ----------
     clusters : float
-        Per tray; any two or more beads that stick are one.
+        Per tray; two or more beads that stick are a cluster.
     beads_per_cluster : float
-        Number-averaged, single beads left out.
+        Number average without single beads.
     deviation : float
         Mean absolute deviation of `beads_per_cluster`.
     share : float, 0 to 1
-        Of the beads that are in clusters; in tray 4 of those not hidden by glare.
+        Fraction of the beads in clusters; in tray 4 of the beads not hidden by glare.
     """
 
     clusters: float
@@ -61,20 +61,20 @@ PAPER_TABLE_3 = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperCalibration:
-    """The paper's size of a cluster, in proportion to the level area.
+    """The paper's cluster size, proportional to the level area.
 
     Parameters
     ----------
     beads_per_area : float, [1/m^2]
     beads_per_area_error : float, [1/m^2]
-        One standard error of the mean over the cycles; NaN for a single one.
+        One standard error of the mean over the cycles; NaN for a single cycle.
     """
 
     beads_per_area: float
     beads_per_area_error: float
 
     def size(self, level_area: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Number of beads per cluster that goes with level areas, [m^2].
+        """Number of beads per cluster at level areas, [m^2].
 
         At every area: the paper states no range.
         """
@@ -87,14 +87,14 @@ def paper_calibration(final_areas: NDArray[np.float64], manual_size: float) -> P
     Parameters
     ----------
     final_areas : ndarray (n_cycles,), [m^2]
-        Level area at the end of each of the cycles that were counted.
+        Level area at the end of each counted cycle.
     manual_size : float, [beads]
         Mean number of beads per cluster counted in those cycles, as in `PAPER_TABLE_3`.
 
     Raises
     ------
     ConfigurationError
-        When no area is known, or the size cannot be one.
+        When no area is known, or the size is not positive.
 
     References
     ----------
@@ -107,7 +107,7 @@ def paper_calibration(final_areas: NDArray[np.float64], manual_size: float) -> P
         raise ConfigurationError(
             'paper_calibration',
             f'{known.size} areas and {manual_size:g} beads per cluster',
-            'give the level areas at the end of cycles, and what was counted in them',
+            'give the level areas at the end of cycles and the counted size',
         )
     factor = manual_size / float(known.mean())
     spread = float(known.std(ddof=1)) if known.size > 1 else np.nan
@@ -120,8 +120,8 @@ def paper_onset(
 ) -> float:
     """Onset of clustering by the paper: when the derivative of the cluster size becomes positive.
 
-    The derivative of anything that fluctuates becomes positive soon: on gases that do not stick
-    at all this rule fires every time.
+    The derivative of a fluctuating quantity soon becomes positive: in gases without sticking this
+    rule triggers every time.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""The closed forms of [B19], kept under their own names because people compare with them.
+"""Closed forms of the restitution in [B19], for comparison.
 
-They are precise and wrong: on simulated gases that for the decay returns 0.94 to 0.99 whatever the
-truth between 0.6 and 0.95 (``docs/method/theory.md``). Errors therefore cover statistics only.
+They are precise and wrong: for simulated gases with restitutions from 0.6 to 0.95 the form for the
+decay gives 0.94 to 0.99 (``docs/method/theory.md``). Errors cover statistics only.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def paper_restitution(
 
 
 def paper_restitution_of_decay(decay_rate: float, diameter: float, number_density: float) -> float:
-    """The same closed form for the decay rate of the mean speed itself.
+    """`paper_restitution` for the decay rate of the mean speed.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def paper_restitution_of_decay(decay_rate: float, diameter: float, number_densit
 def _loss(
     initial_energy: float, haff_time: float, mass: float, diameter: float, number_density: float
 ) -> float:
-    """What the paper takes for 1 - restitution^2 when walls are elastic."""
+    """The paper's 1 - restitution^2 for elastic walls."""
     check_positive(
         initial_energy=initial_energy,
         haff_time=haff_time,
@@ -118,7 +118,7 @@ def paper_restitution_estimate(
 ) -> Estimate:
     """`paper_restitution` with the errors of its inputs, to first order.
 
-    Says how well the decay is known, not how near the truth is.
+    The error of the formula itself is not included.
 
     Raises
     ------
@@ -137,7 +137,7 @@ def paper_restitution_estimate(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperEllipse:
-    """Restitutions of beads and walls that explain a decay alike, (ew/a)^2 + (ep/b)^2 = 1.
+    """Pairs of restitutions with the same decay in the paper, (ew/a)^2 + (ep/b)^2 = 1.
 
     Parameters
     ----------
@@ -153,8 +153,8 @@ class PaperEllipse:
     def restitution(self, wall_restitution: float) -> float:
         """Restitution between beads on the ellipse; NaN where it has none in [0, 1]."""
         square = 1.0 - (wall_restitution / self.wall_axis) ** 2
-        found = self.bead_axis * math.sqrt(square) if square >= 0.0 else math.nan
-        return found if found <= 1.0 else math.nan
+        restitution = self.bead_axis * math.sqrt(square) if square >= 0.0 else math.nan
+        return restitution if restitution <= 1.0 else math.nan
 
 
 def paper_wall_ellipse(
@@ -167,9 +167,9 @@ def paper_wall_ellipse(
 ) -> PaperEllipse:
     """The paper's ellipse for a decay, with the axes that its formula gives.
 
-    Valid as the paper's convention only. It takes the side of the cell, 15 mm, for the distance
-    between walls, where the centres of beads have 1 mm between floor and lid, so that its walls
-    take some 15 times too little.
+    Valid as the paper's convention only. It uses the side of the cell, 15 mm, as the distance
+    between walls, while the centres of beads have 1 mm between floor and lid, so that its wall
+    losses are about 15 times too small.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def paper_wall_ellipse_as_printed(
     number_density: float,
     side: float,
 ) -> PaperEllipse:
-    """The same with a and b exchanged, as the paper prints their values (0.95 and 2.8)."""
+    """The ellipse with a and b exchanged, as the paper prints their values (0.95 and 2.8)."""
     ellipse = paper_wall_ellipse(initial_energy, haff_time, mass, diameter, number_density, side)
     return PaperEllipse(wall_axis=ellipse.bead_axis, bead_axis=ellipse.wall_axis)
 
@@ -249,10 +249,9 @@ def paper_instantaneous_restitution(
 ) -> NDArray[np.float64]:
     """The paper's restitution between two measurements of the mean speed.
 
-    exp(ln(v'/v) / (n sigma v dt)): every collision is taken to leave the part e of a bead's
-    speed. That is not the loss in Haff's law, -ln e standing where 1 - e^2 does, so the value
-    differs from `paper_restitution` of the same decay; and the logarithm of noisy speeds spreads
-    without bound as they become slow.
+    exp(ln(v'/v) / (n sigma v dt)): every collision is assumed to multiply the speed of a bead by
+    e. Haff's law has 1 - e^2 instead of -ln e, so the value differs from `paper_restitution` of
+    the same decay; and the noise of the logarithm grows without bound for slow beads.
 
     Parameters
     ----------
@@ -281,6 +280,8 @@ def paper_instantaneous_restitution(
     known = (before > 0.0) & (after > 0.0)
     before, after = np.where(known, before, np.nan), np.where(known, after, np.nan)
     collisions = number_density * math.pi * diameter**2 * before * interval
-    # At most what a float can hold: noise at rest has no bound.
-    found: NDArray[np.float64] = np.exp(np.minimum(np.log(after / before) / collisions, 700.0))
-    return found
+    # Limited to the range of a float: noise at rest has no bound.
+    restitution: NDArray[np.float64] = np.exp(
+        np.minimum(np.log(after / before) / collisions, 700.0)
+    )
+    return restitution

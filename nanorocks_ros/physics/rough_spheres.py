@@ -1,11 +1,11 @@
-"""Rough spheres: how translation and rotation share the energy of a cooling gas.
+"""Kinetic theory of rough spheres: partition of energy between translation and rotation.
 
 Mean-field theory of a homogeneous gas of equal, solid, inelastic, rough spheres without walls:
 velocities and spins Gaussian and independent, both restitutions constant. A temperature is the
 mean energy of one degree of freedom, T = m <v^2> / 3 and R T = I <w^2> / 3, both with three of
-them, so that R = 1 is equipartition. What a bead spins about and where it flies are correlated in
-truth (Brilliantov and others 2007), and walls of a tray take translation and rotation unevenly:
-``docs/method/rotation.md`` has both against simulation.
+them, so that R = 1 is equipartition. In a real gas spin axis and velocity are correlated
+(Brilliantov and others 2007), and the walls of a tray cool translation and rotation at different
+rates: ``docs/method/rotation.md`` compares both with simulation.
 
 References
 ----------
@@ -29,16 +29,16 @@ if TYPE_CHECKING:
 
 # I / (m r^2) of a solid sphere.
 SOLID_SPHERE = 0.4
-# Loss of temperature at a collision of each of two beads: 4 of `RoughRates` in each pair, of
-# which a bead has half, over 3/2 for each temperature.
+# Loss of temperature of a bead per collision: 4 times the `RoughRates` of the pair, half of it for
+# each bead, divided by 3/2.
 _PER_COLLISION = 4.0 / 3.0
-# Mean speed over the root mean square of Maxwell's speeds.
+# Ratio of mean to root mean square speed of the Maxwell distribution.
 _MEAN_OF_RMS = math.sqrt(8.0 / (3.0 * math.pi))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoughRates:
-    """What a collision does to the temperatures on average, s counting those of each bead.
+    """Mean change of the temperatures per collision; s is the number of collisions of a bead.
 
     dT/ds = -(4/3) (loss - exchange R) T for the translation, and
     d(RT)/ds = (4/3) (exchange - drain R) T for the rotation.
@@ -62,7 +62,7 @@ def rough_rates(restitution: float, tangential_restitution: float) -> RoughRates
     ----------
     restitution : float, [0, 1]
     tangential_restitution : float, [-1, 1]
-        -1: smooth; 1: the velocity of the surfaces turns round.
+        -1: smooth; 1: the tangential velocity of the surfaces is reversed.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def rough_rates(restitution: float, tangential_restitution: float) -> RoughRates
 
 
 def rough_temperature_ratio(restitution: float, tangential_restitution: float) -> float:
-    """Temperature of the rotation over that of the translation that a cooling gas comes to.
+    """Asymptotic ratio of rotational to translational temperature of a cooling gas.
 
     Parameters
     ----------
@@ -98,12 +98,12 @@ def rough_temperature_ratio(restitution: float, tangential_restitution: float) -
     Raises
     ------
     ConfigurationError
-        When a value is outside its range: smooth beads keep the spin that they have.
+        When a value is outside its range: smooth beads keep their spin.
 
     References
     ----------
-    [HZ]: K + sqrt(K^2 + 1) with K = (A - C) / (2 B); found good against a theory without the
-    Gaussian by [SKS].
+    [HZ]: K + sqrt(K^2 + 1) with K = (A - C) / (2 B); confirmed by [SKS] without the Gaussian
+    assumption.
     """
     return _ends(_rough(restitution, tangential_restitution))[0]
 
@@ -114,7 +114,7 @@ def temperature_ratio_course(
     tangential_restitution: float,
     start: float = 0.0,
 ) -> NDArray[np.float64]:
-    """The same ratio on the way, after so many collisions of each bead.
+    """Ratio of rotational to translational temperature after some collisions of each bead.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def temperature_ratio_course(
     restitution : float, [0, 1]
     tangential_restitution : float, (-1, 1]
     start : float, >= 0
-        Ratio at 0; 0: no rotation.
+        Initial ratio; 0: no rotation.
 
     Raises
     ------
@@ -135,15 +135,15 @@ def temperature_ratio_course(
     high, low = _ends(rates)
     gone = np.exp(-_PER_COLLISION * rates.exchange * (high - low) * np.asarray(collisions))
     gone *= (start - high) / (start - low)
-    found: NDArray[np.float64] = (high - low * gone) / (1.0 - gone)
-    return found
+    temperature_ratio: NDArray[np.float64] = (high - low * gone) / (1.0 - gone)
+    return temperature_ratio
 
 
 def smooth_equivalent(restitution: float, tangential_restitution: float) -> float:
-    """Restitution of smooth beads whose translation cools as fast as that of rough ones does.
+    """Restitution of smooth beads whose translation cools as fast as that of rough beads.
 
-    In the state that a homogeneous gas comes to. This is what a decay says of rough beads to
-    somebody who takes them for smooth.
+    For the asymptotic state of a homogeneous gas: the restitution that a fit for smooth beads
+    gives for rough ones.
 
     Parameters
     ----------
@@ -160,16 +160,16 @@ def smooth_equivalent(restitution: float, tangential_restitution: float) -> floa
     return math.sqrt(1.0 - 4.0 * (rates.loss - back))
 
 
-def spin_of(mean_projected_speed: float, diameter: float, ratio: float = 1.0) -> float:
-    """Root mean square spin of beads that fly so fast, [rad/s].
+def rms_spin(mean_projected_speed: float, diameter: float, ratio: float = 1.0) -> float:
+    """Root mean square spin of beads with a mean projected speed, [rad/s].
 
     Parameters
     ----------
     mean_projected_speed : float, [m/s], > 0
-        Of Maxwell's speeds, even in all directions.
+        Of an isotropic Maxwell distribution.
     diameter : float, [m], > 0
     ratio : float, >= 0
-        Temperature of the rotation over that of the translation; 1: equipartition.
+        Ratio of rotational to translational temperature; 1: equipartition.
 
     Raises
     ------
@@ -193,7 +193,7 @@ def _rough(restitution: float, tangential_restitution: float) -> RoughRates:
 
 
 def _ends(rates: RoughRates) -> tuple[float, float]:
-    """The ratio that attracts, and the negative one that repels."""
+    """Stable and unstable fixed point of the temperature ratio; the second is negative."""
     k = 0.5 * (rates.loss - rates.drain) / rates.exchange
     root = math.hypot(k, 1.0)
     # The product of both is -1: no difference of large numbers.

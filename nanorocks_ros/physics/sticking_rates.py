@@ -1,4 +1,4 @@
-"""How often beads of a gas meet slowly enough to stick, by the kinetic theory of `confined`.
+"""Rates of collisions below a speed, by the kinetic theory of `confined_theory`.
 
 Derived in docs/method/clusters.md.
 """
@@ -33,14 +33,14 @@ _LOG_SPEEDS = np.linspace(math.log(1e-6), math.log(1e4), 800)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlowContacts:
-    """Contacts of two beads, by how fast these meet, where the mean projected speed is 1 m/s.
+    """Contacts of two beads by relative speed, at a mean projected speed of 1 m/s.
 
     Make one with `slow_contacts`.
 
     Parameters
     ----------
     rates : ndarray (n,), [1/m]
-        Contacts of a bead per way that a bead goes in the picture, of each kind.
+        Contacts of a bead per projected path length, of each kind.
     normal, tangential : ndarray (n,), [m^2/s^2]
         Variance of a component of the relative velocity of the beads of that kind: along the
         line of centres, and across it.
@@ -55,11 +55,13 @@ class SlowContacts:
 
     @property
     def rate(self) -> float:
-        """All contacts of a bead per way in the picture, kappa, [1/m]."""
+        """All contacts of a bead per projected path length, kappa, [1/m]."""
         return float(self.rates.sum())
 
-    def slower_between(self, speed: ArrayLike, measure: str = 'normal') -> NDArray[np.float64]:
-        """The same as `slower`, between nodes that are worked out once: for many speeds.
+    def interpolated_rate_below(
+        self, speed: ArrayLike, measure: str = 'normal'
+    ) -> NDArray[np.float64]:
+        """`rate_below`, interpolated between nodes that are computed once.
 
         Raises
         ------
@@ -68,14 +70,14 @@ class SlowContacts:
         """
         return np.asarray(np.exp(np.interp(np.log(speed), _LOG_SPEEDS, self._log_curve(measure))))
 
-    def slower_sum(
+    def summed_rate_below(
         self,
         speed: NDArray[np.float64],
         mean: NDArray[np.float64],
         weights: NDArray[np.float64],
         measure: str = 'normal',
     ) -> NDArray[np.float64]:
-        """`slower_between` at some speeds, (n,), summed with weights over some mean ones.
+        """`interpolated_rate_below` at some speeds, (n,), summed with weights over mean speeds.
 
         Parameters
         ----------
@@ -89,31 +91,31 @@ class SlowContacts:
         ConfigurationError
             For another measure.
         """
-        found = np.empty(speed.size)
+        sums = np.empty(speed.size)
         curve = self._log_curve(measure)
-        _sum_slower(np.log(speed), np.log(mean), weights, _LOG_SPEEDS, curve, found)
-        return found
+        _sum_slower(np.log(speed), np.log(mean), weights, _LOG_SPEEDS, curve, sums)
+        return sums
 
-    def log_slower_sum(
+    def summed_log_rate_below(
         self, speed: NDArray[np.float64], mean: NDArray[np.float64], measure: str = 'normal'
     ) -> NDArray[np.float64]:
-        """The logarithm of `slower_between`, summed over some mean speeds; as `slower_sum`."""
+        """Logarithm of `interpolated_rate_below`, summed over mean speeds."""
         ratio = np.log(speed)[:, np.newaxis] - np.log(mean)
         return np.asarray(np.interp(ratio, _LOG_SPEEDS, self._log_curve(measure)).sum(axis=1))
 
     def _log_curve(self, measure: str) -> NDArray[np.float64]:
         if measure not in self._curves:
-            self._curves[measure] = np.log(self.slower(np.exp(_LOG_SPEEDS), measure))
+            self._curves[measure] = np.log(self.rate_below(np.exp(_LOG_SPEEDS), measure))
         return self._curves[measure]
 
-    def slower(self, speed: ArrayLike, measure: str = 'normal') -> NDArray[np.float64]:
-        """Contacts of a bead per way, [1/m], at less than a speed, over the mean projected one.
+    def rate_below(self, speed: ArrayLike, measure: str = 'normal') -> NDArray[np.float64]:
+        """Contacts per projected path length, [1/m], below a relative speed.
 
         Parameters
         ----------
         speed : array_like
         measure : 'normal' or 'total'
-            Along the line of centres, or all of the relative velocity.
+            Component of the relative velocity along the line of centres, or its modulus.
 
         Raises
         ------
@@ -143,41 +145,45 @@ def slow_contacts(
     ----------
     tray : Tray
     restitution, wall_restitution : float, [0, 1]
-        They shift energy between the directions of space; contacts depend little on them.
+        They determine the ratio of vertical to horizontal energy; contacts depend little on it.
 
     Raises
     ------
     ConfigurationError
-        When a restitution is none, or the tray too crowded for the theory.
+        For a restitution outside [0, 1], or a tray too crowded for the theory.
     FitError
         When there is no such steady state.
     """
     gas = confined_gas(tray)
     temperature = gas.cooling(restitution, wall_restitution).granular_temperature
-    both = temperature[:, np.newaxis] + temperature
+    sums = temperature[:, np.newaxis] + temperature
     squares = gas.contacts.squares
-    normal = np.einsum('abqi,abi->abq', squares, both)
-    tangential = 0.5 * (both.sum(axis=-1)[..., np.newaxis] - normal)
+    normal = np.einsum('abqi,abi->abq', squares, sums)
+    tangential = 0.5 * (sums.sum(axis=-1)[..., np.newaxis] - normal)
     counts = gas.beads.counts / gas.beads.counts.sum()
-    # The mean approach speed counts those that come nearer: half of the mean modulus.
+    # Only approaching beads count: half of the mean modulus.
     rates = counts[:, np.newaxis, np.newaxis] * gas.contacts.pairs * np.sqrt(normal) * 0.5 * _MEAN
-    some = rates > 0.0
-    return SlowContacts(rates=rates[some], normal=normal[some], tangential=tangential[some])
+    approaching = rates > 0.0
+    return SlowContacts(
+        rates=rates[approaching], normal=normal[approaching], tangential=tangential[approaching]
+    )
 
 
 def _sum_of_exponentials(
-    value: NDArray[np.float64], one: NDArray[np.float64], other: NDArray[np.float64]
+    value: NDArray[np.float64], first: NDArray[np.float64], second: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Probability that the sum of two exponential numbers of these means is below a value.
+    """Probability that the sum of two exponential variates of given means is below a value.
 
-    The square of a relative velocity is such a sum: along the line of centres, since fast beads
-    meet more often, and across it, where there are two components.
+    The square of a relative velocity is such a sum: along the line of centres, since the collision
+    rate is proportional to the speed, and across it, with two components.
     """
-    other = np.where(np.abs(other / one - 1.0) < _ALIKE, one * (1.0 + _ALIKE), other)
-    exact = (other * np.expm1(-value / other) - one * np.expm1(-value / one)) / (one - other)
-    # Where the difference would cancel.
-    small = 0.5 * value**2 / (one * other) * (1.0 - value * (1.0 / one + 1.0 / other) / 3.0)
-    return np.asarray(np.where(value < _SMALL * np.minimum(one, other), small, exact))
+    second = np.where(np.abs(second / first - 1.0) < _ALIKE, first * (1.0 + _ALIKE), second)
+    exact = (second * np.expm1(-value / second) - first * np.expm1(-value / first)) / (
+        first - second
+    )
+    # The series, where the difference would cancel.
+    small = 0.5 * value**2 / (first * second) * (1.0 - value * (1.0 / first + 1.0 / second) / 3.0)
+    return np.asarray(np.where(value < _SMALL * np.minimum(first, second), small, exact))
 
 
 @compiled
@@ -187,7 +193,7 @@ def _sum_slower(
     weights: NDArray[np.float64],
     nodes: NDArray[np.float64],
     curve: NDArray[np.float64],
-    found: NDArray[np.float64],
+    sums: NDArray[np.float64],
 ) -> None:
     """Sum over mean speeds at each speed; all as logarithms, with a curve at even nodes."""
     step = (nodes[-1] - nodes[0]) / (nodes.size - 1)
@@ -195,9 +201,9 @@ def _sum_slower(
     for i in range(speeds.size):
         total = 0.0
         for k in range(means.size):
-            # Beyond its ends the curve stays as it is there.
+            # The curve is constant beyond its ends.
             at = min(max((speeds[i] - means[k] - nodes[0]) / step, 0.0), last)
             cell = min(int(at), nodes.size - 2)
             value = curve[cell] + (at - cell) * (curve[cell + 1] - curve[cell])
             total += weights[k] * math.exp(value)
-        found[i] = total
+        sums[i] = total

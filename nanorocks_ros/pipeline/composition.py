@@ -8,9 +8,9 @@ from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement, TrayRecord
 from nanorocks_ros.records import (
+    ArrayRecord,
     Autocorrelation,
     BodyEstimate,
-    ClusterEstimate,
     CorEstimate,
     Frame,
     Merge,
@@ -33,20 +33,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.view import View
     from nanorocks_ros.settings import PipelineSettings
 
-Result = (
-    TrayImage
-    | MotionMask
-    | SpeedEstimate
-    | Tracks
-    | Rebound
-    | PairCollision
-    | BodyEstimate
-    | Merge
-    | ClusterEstimate
-    | Autocorrelation
-    | CorEstimate
-    | Notice
-)
+Result = TrayImage | MotionMask | Tracks | Autocorrelation | ArrayRecord | Notice
 
 
 class Wanted(NamedTuple):

@@ -69,7 +69,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
     def _restart(self, stamp_ns: int | None = None) -> None:
         del stamp_ns
         settings, tray = self._settings, self._tray
-        self._cycles = CycleFollower(settings.speed.shake_ratio, settings.speed.shortest_cycle)
+        self._cycles = CycleFollower(settings.speed.shake_ratio, settings.speed.min_cycle_duration)
         self._oscillation = TrayOscillation()
         self._tracker = Tracker(settings, tray)
         self._contacts = ContactFinder(tray)

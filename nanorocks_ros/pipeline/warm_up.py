@@ -11,7 +11,15 @@ from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
 from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
 from nanorocks_ros.physics.sticking_rates import slow_contacts
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
-from nanorocks_ros.records import Frame, Rebound, SpeedEstimate, SpeedMethod, Tracks, TrayImage
+from nanorocks_ros.records import (
+    Frame,
+    Measured,
+    Rebound,
+    SpeedEstimate,
+    SpeedMethod,
+    Tracks,
+    TrayImage,
+)
 from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.stages.bodies.body_counter import BodyCounter
 from nanorocks_ros.stages.clusters.correlation_width import ClusterAutocorrelator
@@ -101,8 +109,7 @@ def warm_up_cooling() -> None:
                 tray=1,
                 cycle=1,
                 cycle_start_ns=0,
-                mean_projected_speed=speed,
-                mean_projected_speed_error=0.02 * speed,
+                mean_projected_speed=Measured(speed, 0.02 * speed),
                 window=0.1,
                 method=SpeedMethod.TRACKING,
             )

@@ -1,58 +1,39 @@
-"""What passes between the stages: frozen values, SI units, one integer time stamp each.
+"""The records that pass between stages: frozen, SI units, one integer time stamp each.
 
-Estimates carry ``_error``, one standard error. NaN means "not known yet", never 0.
+Errors are one standard error. NaN means "not known yet", never 0.
 """
 
-from nanorocks_ros.records.bead_tracks import Tracks
-from nanorocks_ros.records.cluster_estimates import (
-    Autocorrelation,
-    BodyEstimate,
-    ClusterEstimate,
-    Merge,
-)
-from nanorocks_ros.records.contact_records import PairCollision, Rebound
-from nanorocks_ros.records.frames import Frame, MotionMask, Notice, TrayImage, TrayState
-from nanorocks_ros.records.quality_flags import (
-    NOTHING_WRONG,
-    UNKNOWN,
-    CorRelation,
-    CorStatus,
-    Quality,
-    SizeStatus,
-    SpeedMethod,
-    StickingStatus,
-    field_names,
-    freeze_arrays,
-)
-from nanorocks_ros.records.restitution_estimates import CorEstimate
-from nanorocks_ros.records.simulation_truth import BeadsTruth, GroundTruth
-from nanorocks_ros.records.speed_estimates import SpeedEstimate
-
-__all__ = [
-    'NOTHING_WRONG',
-    'UNKNOWN',
-    'Autocorrelation',
-    'BeadsTruth',
-    'BodyEstimate',
-    'ClusterEstimate',
-    'CorEstimate',
-    'CorRelation',
-    'CorStatus',
-    'Frame',
-    'GroundTruth',
-    'Merge',
-    'MotionMask',
-    'Notice',
-    'PairCollision',
-    'Quality',
-    'Rebound',
-    'SizeStatus',
-    'SpeedEstimate',
-    'SpeedMethod',
-    'StickingStatus',
-    'Tracks',
-    'TrayImage',
-    'TrayState',
-    'field_names',
-    'freeze_arrays',
-]
+from nanorocks_ros.records.array_record import ArrayRecord as ArrayRecord
+from nanorocks_ros.records.array_record import RecordType as RecordType
+from nanorocks_ros.records.bead_tracks import Tracks as Tracks
+from nanorocks_ros.records.cluster_estimates import Autocorrelation as Autocorrelation
+from nanorocks_ros.records.cluster_estimates import BodyEstimate as BodyEstimate
+from nanorocks_ros.records.cluster_estimates import ClusterEstimate as ClusterEstimate
+from nanorocks_ros.records.cluster_estimates import Merge as Merge
+from nanorocks_ros.records.contact_records import PairCollision as PairCollision
+from nanorocks_ros.records.contact_records import Rebound as Rebound
+from nanorocks_ros.records.frames import Frame as Frame
+from nanorocks_ros.records.frames import MotionMask as MotionMask
+from nanorocks_ros.records.frames import Notice as Notice
+from nanorocks_ros.records.frames import TrayImage as TrayImage
+from nanorocks_ros.records.frames import TrayState as TrayState
+from nanorocks_ros.records.quality_flags import NOTHING_WRONG as NOTHING_WRONG
+from nanorocks_ros.records.quality_flags import UNKNOWN as UNKNOWN
+from nanorocks_ros.records.quality_flags import CorRelation as CorRelation
+from nanorocks_ros.records.quality_flags import CorStatus as CorStatus
+from nanorocks_ros.records.quality_flags import Quality as Quality
+from nanorocks_ros.records.quality_flags import SizeStatus as SizeStatus
+from nanorocks_ros.records.quality_flags import SpeedMethod as SpeedMethod
+from nanorocks_ros.records.quality_flags import StickingStatus as StickingStatus
+from nanorocks_ros.records.quality_flags import field_names as field_names
+from nanorocks_ros.records.quality_flags import freeze_arrays as freeze_arrays
+from nanorocks_ros.records.restitution_estimates import CorEstimate as CorEstimate
+from nanorocks_ros.records.simulation_truth import BeadsTruth as BeadsTruth
+from nanorocks_ros.records.simulation_truth import GroundTruth as GroundTruth
+from nanorocks_ros.records.speed_estimates import SpeedEstimate as SpeedEstimate
+from nanorocks_ros.records.values import UNKNOWN_INTERVAL as UNKNOWN_INTERVAL
+from nanorocks_ros.records.values import UNKNOWN_MEASURED as UNKNOWN_MEASURED
+from nanorocks_ros.records.values import UNKNOWN_MEASURED_INTERVAL as UNKNOWN_MEASURED_INTERVAL
+from nanorocks_ros.records.values import Interval as Interval
+from nanorocks_ros.records.values import Measured as Measured
+from nanorocks_ros.records.values import MeasuredInterval as MeasuredInterval

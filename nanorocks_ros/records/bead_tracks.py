@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tracks:
-    """The beads of one tray in one picture, each with a number that it keeps.
+    """The beads of one tray in one image; each keeps its number.
 
     Parameters
     ----------

@@ -8,6 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.records.quality_flags import UNKNOWN, SizeStatus, StickingStatus, freeze_arrays
+from nanorocks_ros.records.values import (
+    UNKNOWN_INTERVAL,
+    UNKNOWN_MEASURED,
+    UNKNOWN_MEASURED_INTERVAL,
+    Interval,
+    Measured,
+    MeasuredInterval,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,26 +40,27 @@ class ClusterEstimate:
         From the columns to its longer axis, positive towards the rows (down in the picture).
     breadth : float, >= 1
         `level_area` over the area at 0.7; less dependent on the camera than either.
-    cluster_size, cluster_size_error : float, [beads]
+    cluster_size : MeasuredInterval, [beads]
         Number of beads per body, averaged over the beads (weight-averaged): 1 when all are single.
-    cluster_size_lower, cluster_size_upper : float, [beads]
-        Sizes between which the width is one standard deviation off or less; of a size that is
-        beyond the calibration, too.
+        Between the limits the width is one standard deviation off or less; a size beyond the
+        calibration has limits, too.
     size_status : SizeStatus
-    bodies, bodies_error : float
+    bodies : Measured
         Free bodies by tracks: single beads and clusters; unknown where beads are not tracked.
-    mean_size, weighted_size, weighted_size_error : float, [beads]
-        By tracks: beads of a body, mean over the bodies and over the beads.
+    mean_size : float, [beads]
+        By tracks: beads of a body, mean over the bodies.
+    weighted_size : Measured, [beads]
+        The same, mean over the beads.
     clustered_share : float, 0 to 1
         Of the beads, in bodies of two and more, by tracks.
-    combined_size, combined_size_error : float, [beads]
+    combined_size : Measured, [beads]
         Weight-averaged size by the autocorrelation and by tracks together.
     onset : float, [s]
         First merge of the cycle, since the shaking event; unknown before.
     sticking_status : StickingStatus
-    sticking_speed, sticking_speed_lower, sticking_speed_upper : float, [m/s]
+    sticking_speed : Interval, [m/s]
         Beads that meet more slowly stick: by the merges of this cycle so far, with an interval.
-    mean_sticking_speed, mean_sticking_speed_lower, mean_sticking_speed_upper : float, [m/s]
+    mean_sticking_speed : Interval, [m/s]
         By all cycles before this one.
     """
 
@@ -63,27 +72,17 @@ class ClusterEstimate:
     axes_ratio: float = UNKNOWN
     direction: float = UNKNOWN
     breadth: float = UNKNOWN
-    cluster_size: float = UNKNOWN
-    cluster_size_error: float = UNKNOWN
-    cluster_size_lower: float = UNKNOWN
-    cluster_size_upper: float = UNKNOWN
+    cluster_size: MeasuredInterval = UNKNOWN_MEASURED_INTERVAL
     size_status: SizeStatus = SizeStatus.UNCALIBRATED
-    bodies: float = UNKNOWN
-    bodies_error: float = UNKNOWN
+    bodies: Measured = UNKNOWN_MEASURED
     mean_size: float = UNKNOWN
-    weighted_size: float = UNKNOWN
-    weighted_size_error: float = UNKNOWN
+    weighted_size: Measured = UNKNOWN_MEASURED
     clustered_share: float = UNKNOWN
-    combined_size: float = UNKNOWN
-    combined_size_error: float = UNKNOWN
+    combined_size: Measured = UNKNOWN_MEASURED
     onset: float = UNKNOWN
     sticking_status: StickingStatus = StickingStatus.UNKNOWN
-    sticking_speed: float = UNKNOWN
-    sticking_speed_lower: float = UNKNOWN
-    sticking_speed_upper: float = UNKNOWN
-    mean_sticking_speed: float = UNKNOWN
-    mean_sticking_speed_lower: float = UNKNOWN
-    mean_sticking_speed_upper: float = UNKNOWN
+    sticking_speed: Interval = UNKNOWN_INTERVAL
+    mean_sticking_speed: Interval = UNKNOWN_INTERVAL
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +105,7 @@ class Autocorrelation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Merge:
-    """Two beads that stick to each other from some instant on.
+    """Two beads that stick to each other from an instant on.
 
     Parameters
     ----------
@@ -117,8 +116,8 @@ class Merge:
     tray, cycle : int
     tracks : ndarray of int32, (2,)
     joins : bool
-        Whether bodies became fewer by it; False for two beads of one body, or of one that only
-        seemed to be two.
+        Whether the merge made bodies fewer; False for two beads of the same body, or of a body
+        that only appeared as two.
     """
 
     stamp_ns: int

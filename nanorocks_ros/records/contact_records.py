@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rebound:
-    """A bead that came back from a side wall, as its track shows it.
+    """A rebound of a bead from a side wall, measured on its track.
 
     Speeds are past the wall, which may swing; each has the error of its own straight line.
 
@@ -60,7 +60,7 @@ class Rebound:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairCollision:
-    """Two beads that hit each other, as their tracks show it.
+    """A collision of two beads, measured on their tracks.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """One picture of the whole scene, as the camera gave it.
+    """One image of the whole scene, as the camera gave it.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class TrayImage:
         freeze_arrays(self)
 
     def state(self) -> TrayState:
-        """What is known of the image besides its pixels."""
+        """The image without its pixels."""
         return TrayState(
             stamp_ns=self.stamp_ns,
             tray=self.tray,
@@ -108,7 +108,7 @@ class TrayImage:
         gray: NDArray[np.uint8],
         color: NDArray[np.uint8] | None,
     ) -> TrayImage:
-        """The image again, from its state and its pixels; the stamp is that of the pixels."""
+        """The image from its state and its pixels; the stamp is that of the pixels."""
         return cls(
             stamp_ns=stamp_ns,
             tray=state.tray,
@@ -128,7 +128,7 @@ class TrayImage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrayState:
-    """What is known of a tray image besides its pixels; see :class:`TrayImage`.
+    """A tray image without its pixels; see :class:`TrayImage`.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ class MotionMask:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Notice:
-    """Something the user should hear about, which is not an error."""
+    """A message for the user that is not an error."""
 
     stamp_ns: int
     text: str

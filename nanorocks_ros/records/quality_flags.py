@@ -1,4 +1,4 @@
-"""Words that records use for methods, states and doubts; what all records share."""
+"""Enumerations of methods, states and quality flags, and helpers for all records."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class SpeedMethod(IntEnum):
 
 
 class CorStatus(IntEnum):
-    """Where the fit of a cycle stands (the constants of ``CorEstimate.msg``)."""
+    """State of the fit of a cycle (the constants of ``CorEstimate.msg``)."""
 
     COOLING = 1
     FINAL = 2
@@ -30,14 +30,14 @@ class CorStatus(IntEnum):
 
 
 class CorRelation(IntEnum):
-    """Which relation turned a decay into a restitution (constants of ``CorEstimate.msg``)."""
+    """Relation by which a decay gave a restitution (constants of ``CorEstimate.msg``)."""
 
     PAPER = 1
     LIBRARY = 2
 
 
 class SizeStatus(IntEnum):
-    """What an autocorrelation says of the cluster size (constants of ``ClusterEstimate.msg``)."""
+    """State of a cluster size from an autocorrelation (constants of ``ClusterEstimate.msg``)."""
 
     MEASURED = 1
     BEYOND = 2
@@ -47,7 +47,7 @@ class SizeStatus(IntEnum):
 
 
 class StickingStatus(IntEnum):
-    """What is known of a sticking speed (constants of ``ClusterEstimate.msg``).
+    """State of a sticking speed (constants of ``ClusterEstimate.msg``).
 
     The message gives each its name with ``STICKING_`` before it.
     """
@@ -60,7 +60,7 @@ class StickingStatus(IntEnum):
 
 
 class Quality(IntFlag):
-    """What is wrong with the picture of a tray since the last one, or with a speed from it.
+    """Defects of the tray images since the last estimate, or of a speed from them.
 
     0 when nothing is; docs/method/speed.md says what each flag means.
     """
@@ -79,7 +79,7 @@ class Quality(IntFlag):
     INCONSISTENT = 2048
 
     def names(self) -> list[str]:
-        """The flags that are set, in small letters."""
+        """Names of the flags that are set, in lower case."""
         return [flag.name.lower() for flag in type(self) if flag in self and flag.name]
 
 

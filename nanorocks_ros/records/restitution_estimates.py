@@ -11,6 +11,12 @@ from nanorocks_ros.records.quality_flags import (
     CorStatus,
     Quality,
 )
+from nanorocks_ros.records.values import (
+    UNKNOWN_INTERVAL,
+    UNKNOWN_MEASURED,
+    Interval,
+    Measured,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,20 +31,20 @@ class CorEstimate:
     status : CorStatus
     relation : CorRelation
         What turned the decay into a restitution.
-    restitution, restitution_lower, restitution_upper : float, 0 to 1
+    restitution : Interval, 0 to 1
         Of two beads: median of what is probable, and interval; statistical only for
         ``CorRelation.PAPER``.
-    initial_speed, initial_speed_error : float, [m/s]
+    initial_speed : Measured, [m/s]
         Mean projected speed at `cooling_start`, from the fit.
-    haff_time, haff_time_error : float, [s]
+    haff_time : Measured, [s]
     reduced_chi_square : float
         Of the fit. For ``CorRelation.LIBRARY`` with the fluctuations of the gas and the errors of
         the speeds, near 1; for ``PAPER`` with the errors of the speeds alone.
     samples : int
         Speeds in the cooling window.
-    mean_restitution, mean_restitution_error : float
+    mean_restitution : Measured
         Of all cycles finished so far, and its standard error.
-    wall_restitution, wall_restitution_lower, wall_restitution_upper : float, 0 to 1
+    wall_restitution : Interval, 0 to 1
         Of beads and side walls, as `restitution`.
     correlation : float, -1 to 1
         Of what is known of the two restitutions: near -1 in the valley in which a higher one of
@@ -56,14 +62,13 @@ class CorEstimate:
         Single contacts used besides the decay.
     tension : float
         Standard deviations by which decay, rebounds and collisions disagree.
-    mean_wall_restitution, mean_wall_restitution_error : float
+    mean_wall_restitution : Measured
         As `mean_restitution`.
-    first_species_initial_speed, first_species_initial_speed_error : float, [m/s]
-        As `initial_speed`, of the first of `Tray.species` by itself; of a mixture whose species
-        were told apart, once the cycle is over.
-    first_species_haff_time, first_species_haff_time_error : float, [s]
-    second_species_initial_speed, second_species_initial_speed_error : float, [m/s]
-    second_species_haff_time, second_species_haff_time_error : float, [s]
+    species_initial_speeds : tuple of Measured, at most 2, [m/s]
+        As `initial_speed`, of each of the first two of `Tray.species` by itself; of a mixture
+        whose species were told apart, once the cycle is over.
+    species_haff_times : tuple of Measured, at most 2, [s]
+        As `haff_time`, of each species.
     """
 
     stamp_ns: int
@@ -71,20 +76,13 @@ class CorEstimate:
     cycle: int
     status: CorStatus
     relation: CorRelation
-    restitution: float = UNKNOWN
-    restitution_lower: float = UNKNOWN
-    restitution_upper: float = UNKNOWN
-    initial_speed: float = UNKNOWN
-    initial_speed_error: float = UNKNOWN
-    haff_time: float = UNKNOWN
-    haff_time_error: float = UNKNOWN
+    restitution: Interval = UNKNOWN_INTERVAL
+    initial_speed: Measured = UNKNOWN_MEASURED
+    haff_time: Measured = UNKNOWN_MEASURED
     reduced_chi_square: float = UNKNOWN
     samples: int = 0
-    mean_restitution: float = UNKNOWN
-    mean_restitution_error: float = UNKNOWN
-    wall_restitution: float = UNKNOWN
-    wall_restitution_lower: float = UNKNOWN
-    wall_restitution_upper: float = UNKNOWN
+    mean_restitution: Measured = UNKNOWN_MEASURED
+    wall_restitution: Interval = UNKNOWN_INTERVAL
     correlation: float = UNKNOWN
     paper_restitution: float = UNKNOWN
     quality: Quality = NOTHING_WRONG
@@ -94,13 +92,6 @@ class CorEstimate:
     rebounds: int = 0
     collisions: int = 0
     tension: float = UNKNOWN
-    mean_wall_restitution: float = UNKNOWN
-    mean_wall_restitution_error: float = UNKNOWN
-    first_species_initial_speed: float = UNKNOWN
-    first_species_initial_speed_error: float = UNKNOWN
-    first_species_haff_time: float = UNKNOWN
-    first_species_haff_time_error: float = UNKNOWN
-    second_species_initial_speed: float = UNKNOWN
-    second_species_initial_speed_error: float = UNKNOWN
-    second_species_haff_time: float = UNKNOWN
-    second_species_haff_time_error: float = UNKNOWN
+    mean_wall_restitution: Measured = UNKNOWN_MEASURED
+    species_initial_speeds: tuple[Measured, ...] = ()
+    species_haff_times: tuple[Measured, ...] = ()

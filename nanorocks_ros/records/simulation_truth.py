@@ -1,4 +1,4 @@
-"""Truth that a simulation knows about its frames."""
+"""True values of simulated frames."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GroundTruth:
-    """What the simulator knows of the frame it drew.
+    """True values of a simulated frame.
 
     Parameters
     ----------
@@ -42,10 +42,10 @@ class GroundTruth:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeadsTruth:
-    """What the simulator knows of every bead of a tray in the frame it drew.
+    """True values of every bead of a tray in a simulated frame.
 
-    Relative to the floor of the tray, as somebody who registers the tray in every picture
-    finds them; the tray itself swings, while free beads fly straight past it.
+    Relative to the floor of the tray, as after registration of the tray in every image. The
+    tray oscillates; free beads fly straight past the camera.
 
     Parameters
     ----------

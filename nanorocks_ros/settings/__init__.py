@@ -1,7 +1,7 @@
-"""Every number a user may change: one frozen dataclass per stage, one field per number.
+"""Settings: every number a user may change, one frozen dataclass per stage, one field per number.
 
-A field yields the ROS parameter with its range, the command-line flag and the row in the
-documentation. Nothing else holds a default.
+Each field defines the ROS parameter with its range, the command-line flag and the row in the
+documentation. Defaults are written nowhere else.
 """
 
 from nanorocks_ros.settings.graph_settings import (
@@ -19,13 +19,15 @@ from nanorocks_ros.settings.graph_settings import (
 from nanorocks_ros.settings.pipeline_settings import (
     BodySettings,
     ClusterSettings,
-    CoolingSettings,
     PipelineSettings,
     PreprocessSettings,
-    PriorSettings,
     SpeedSettings,
-    StickingSettings,
     TrackingSettings,
+)
+from nanorocks_ros.settings.restitution_settings import (
+    CoolingSettings,
+    PriorSettings,
+    StickingSettings,
 )
 from nanorocks_ros.settings.setting_fields import (
     Bounds,
@@ -36,6 +38,7 @@ from nanorocks_ros.settings.setting_fields import (
     problem,
     rows,
     setting,
+    with_current_names,
     with_values,
 )
 from nanorocks_ros.settings.simulation_settings import (
@@ -79,5 +82,6 @@ __all__ = [
     'problem',
     'rows',
     'setting',
+    'with_current_names',
     'with_values',
 ]

@@ -1,4 +1,7 @@
-"""Settings of the node graph: sources, playback, recording, live page."""
+"""Settings of the node graph: sources, playback, recording, live page.
+
+Tested in test/settings/test_setting_fields.py.
+"""
 
 from __future__ import annotations
 
@@ -20,21 +23,21 @@ class CameraSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PacingSettings:
-    """How fast and how long frames are given out."""
+    """Rate and duration of the playback."""
 
     rate: float = setting(
         1.0,
-        'seconds of recording per second; 0: as fast as the nodes of the graph keep up',
+        'playback rate, in seconds of recording per second; 0: as fast as the nodes keep up',
         low=0.0,
         high=1000.0,
     )
     duration: float = setting(
-        0.0, 'give out so much of the recording; 0: all that there is', 's', low=0.0, high=1e6
+        0.0, 'length of the part of the recording to play; 0: all of it', 's', low=0.0, high=1e6
     )
     listeners: int = setting(
         0,
-        'nodes that take the camera, or the tray images made of it, to wait for before the first '
-        'frame',
+        'number of nodes that must receive the camera or its tray images before the first frame '
+        'is sent',
         low=0,
         high=100,
     )
@@ -42,27 +45,27 @@ class PacingSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BagSettings:
-    """Which bag is played, and which part of it."""
+    """The bag to play, and the part of it."""
 
     bag: str = setting('', 'path of the bag to play')
     start: float = setting(
-        0.0, 'begin so long after the first message of the bag', 's', low=0.0, high=1e7
+        0.0, 'start of the playback, from the first message of the bag', 's', low=0.0, high=1e7
     )
-    loop: bool = setting(False, 'start again at the end of the part that is played')
+    loop: bool = setting(False, 'start again at the end of the played part')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlayerSettings:
-    """What is played of a bag, and where in it the player is."""
+    """Content and position of the playback."""
 
     results: bool = setting(
         True,
-        'play what an earlier analysis found, too; false where a graph works it out again',
+        'also play the results of an earlier analysis; false if the graph computes them again',
     )
-    paused: bool = setting(False, 'wait at the start until told to go on')
+    paused: bool = setting(False, 'pause at the start')
     position: float = setting(
         0.0,
-        'begin, or when set later jump to, so long after the first message',
+        'start of the playback, from the first message; set later: jump to it',
         's',
         low=0.0,
         high=1e7,
@@ -71,23 +74,23 @@ class PlayerSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceSettings:
-    """Where the frames of the composed pipeline come from."""
+    """Source of the frames of the composed pipeline."""
 
     source: str = setting(
         'simulator',
-        'where the frames come from',
+        'source of the frames',
         choices=('simulator', 'bag', 'topic'),
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkSettings:
-    """How the work of the composed pipeline is shared out."""
+    """Processes of the composed pipeline."""
 
     workers: int = setting(
         -1,
-        'processes that follow the trays; 0: none, a thread does; -1: for several trays as many '
-        'as there are cores besides one, up to four',
+        'number of processes for the trays; 0: a thread instead; -1: for several trays the number '
+        'of cores less one, at most four',
         low=-1,
         high=64,
     )
@@ -95,44 +98,44 @@ class WorkSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordSettings:
-    """What the composed pipeline records while it works."""
+    """Recording by the composed pipeline."""
 
     record: str = setting(
         '', 'path of a new bag for the camera and all results; empty: nothing is recorded'
     )
     record_quality: int = setting(
-        95, 'JPEG quality of frames that do not come compressed', low=1, high=100
+        95, 'JPEG quality of frames that arrive uncompressed', low=1, high=100
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DashboardSettings:
-    """Where and how the live page is served."""
+    """Address and access of the live page."""
 
     host: str = setting(
         '127.0.0.1',
-        'address to listen on; one that other machines can reach is served with a token only',
+        'address to listen on; an address that other machines can reach requires a token',
     )
-    port: int = setting(8321, 'port to listen on; 0: any that is free', low=0, high=65535)
+    port: int = setting(8321, 'port to listen on; 0: any free port', low=0, high=65535)
     token: str = setting(
         '',
-        'what a browser must know, 12 characters or more; empty: that of the environment variable '
-        'NANOROCKS_DASHBOARD_TOKEN, else none on a loopback address, and elsewhere one that is '
-        'made up and printed',
+        'access token for browsers, 12 characters or more; empty: the environment variable '
+        'NANOROCKS_DASHBOARD_TOKEN; without it, none on a loopback address, and a random printed '
+        'token on others',
     )
     picture_rate: float = setting(
-        8.0, 'pictures of a tray a browser gets at most', '1/s', low=0.1, high=30.0
+        8.0, 'largest rate of images of a tray per browser', '1/s', low=0.1, high=30.0
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DashboardGraphSettings:
-    """What the live page has to know of the graph that it shows."""
+    """Properties of the graph on the live page."""
 
-    trays_file: str = setting('', 'YAML file of trays; empty: the trays that were flown')
+    trays_file: str = setting('', 'YAML file of trays; empty: the trays of the flight')
     parent: int = setting(
         0,
-        'number of the process that started it, and that it ends with; 0: none',
+        'process ID of the process that started the page and whose end stops it; 0: none',
         low=0,
         high=2**31 - 1,
     )
@@ -142,4 +145,4 @@ class DashboardGraphSettings:
 class LivePageSettings:
     """Whether the pipeline serves the live page."""
 
-    dashboard: bool = setting(False, 'serve the live page, from a process of its own')
+    dashboard: bool = setting(False, 'serve the live page, in a separate process')

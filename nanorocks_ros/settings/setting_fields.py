@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -18,11 +19,12 @@ Value = Scalar | tuple[int, ...] | tuple[float, ...]
 
 
 SettingsType = TypeVar('SettingsType')
+ValueType = TypeVar('ValueType')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """What a setting may be: a closed range, or a list of names."""
+    """Allowed values of a setting: a closed range of numbers, or a list of names."""
 
     low: float = -math.inf
     high: float = math.inf
@@ -30,20 +32,40 @@ class Bounds:
     whole: bool = False
 
 
-def setting(default: Value, doc: str, unit: str = '', **bounds: Any) -> Any:
-    """A field of a settings class: default, documentation, unit and bounds."""
-    return field(default=default, metadata={'doc': doc, 'unit': unit, 'bounds': Bounds(**bounds)})
+def setting(default: Value, doc: str, unit: str = '', deprecated: str = '', **bounds: Any) -> Any:
+    """A field of a settings class.
+
+    Parameters
+    ----------
+    default : bool, int, float, str or tuple
+    doc : str
+        One sentence for the documentation, the ROS parameter and the flag.
+    unit : str
+        Empty for a number without unit.
+    deprecated : str
+        Name of this setting in the previous release, without its group. It is accepted for one
+        release, with a warning.
+    **bounds
+        Fields of `Bounds`.
+    """
+    metadata = {'doc': doc, 'unit': unit, 'deprecated': deprecated, 'bounds': Bounds(**bounds)}
+    return field(default=default, metadata=metadata)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SettingRow:
-    """One setting, as the documentation, the ROS parameter and the flag need it."""
+    """One setting, as the documentation, the ROS parameter and the flag need it.
+
+    `name` and `deprecated`, the name in the previous release, include the group:
+    ``tracking.max_speed``. `deprecated` is empty for a setting that was not renamed.
+    """
 
     name: str
     default: Value
     doc: str
     unit: str
     bounds: Bounds
+    deprecated: str = ''
 
 
 def rows(settings: Any, prefix: str = '') -> Iterator[SettingRow]:
@@ -53,12 +75,14 @@ def rows(settings: Any, prefix: str = '') -> Iterator[SettingRow]:
         if is_dataclass(value):
             yield from rows(value, f'{prefix}{item.name}.')
         else:
+            deprecated = item.metadata['deprecated']
             yield SettingRow(
                 name=prefix + item.name,
                 default=value,
                 doc=item.metadata['doc'],
                 unit=item.metadata['unit'],
                 bounds=item.metadata['bounds'],
+                deprecated=prefix + deprecated if deprecated else '',
             )
 
 
@@ -88,23 +112,69 @@ def problem(row: SettingRow, value: Any) -> str | None:
     if isinstance(row.default, tuple):
         if isinstance(value, str):
             return f'{value!r} is not a list of numbers'
-        found = (_number_problem(item, row.bounds) for item in _listed(value))
-        return next((text for text in found if text), None)
+        problems = (_number_problem(item, row.bounds) for item in _as_list(value))
+        return next((text for text in problems if text), None)
     if isinstance(row.default, int) and isinstance(value, float) and not value.is_integer():
         return f'{value!r} is not a whole number'
     return _number_problem(value, row.bounds)
 
 
-def _listed(value: Any) -> list[Any]:
-    """A list as it is; a single number does for a list of one."""
+def _as_list(value: Any) -> list[Any]:
+    """A list of the values; a single number becomes a list of one."""
     return list(value) if hasattr(value, '__iter__') else [value]
 
 
 def _coerced(row: SettingRow, value: Any) -> Value:
     if isinstance(row.default, tuple):
-        return tuple(int(item) if row.bounds.whole else float(item) for item in _listed(value))
+        return tuple(int(item) if row.bounds.whole else float(item) for item in _as_list(value))
     kind = type(row.default)
     return kind(value)
+
+
+def with_current_names(
+    settings: Any, values: Mapping[str, ValueType], where: str, prefix: str = ''
+) -> tuple[dict[str, ValueType], tuple[str, ...]]:
+    """Values under the current names of their settings, and a warning for each deprecated name.
+
+    Parameters
+    ----------
+    settings : dataclass of settings
+    values : mapping
+        Setting name, current or deprecated, to value. Other names are passed on.
+    where : str
+        Source of the values, for the messages: a file, a node, the command line.
+    prefix : str
+        Text before each name in `values`.
+
+    Returns
+    -------
+    values : dict
+        Current setting name to value, in the order given.
+    messages : tuple of str
+        One sentence for each deprecated name.
+
+    Raises
+    ------
+    ConfigurationError
+        When a setting is given under its current and its deprecated name.
+    """
+    renamed = {
+        prefix + row.deprecated: prefix + row.name for row in rows(settings) if row.deprecated
+    }
+    deprecated = [name for name in values if name in renamed]
+    for name in deprecated:
+        if renamed[name] in values:
+            raise ConfigurationError(
+                where,
+                f'{name!r} and {renamed[name]!r} are the same setting',
+                f'give {renamed[name]!r} alone',
+            )
+    messages = tuple(
+        f'{where}: {name!r} is now called {renamed[name]!r}; the old name will be removed in the '
+        'next release'
+        for name in deprecated
+    )
+    return {renamed.get(name, name): value for name, value in values.items()}, messages
 
 
 def with_values(settings: SettingsType, values: Mapping[str, Any], where: str) -> SettingsType:
@@ -114,15 +184,20 @@ def with_values(settings: SettingsType, values: Mapping[str, Any], where: str) -
     ----------
     settings : dataclass of settings
     values : mapping
-        Dotted setting name to new value.
+        Setting name with its group, ``tracking.max_speed``, to new value. A deprecated name is
+        accepted with a FutureWarning.
     where : str
-        What to name in the error: a file, a node, the command line.
+        Source of the values, for the messages: a file, a node, the command line.
 
     Raises
     ------
     ConfigurationError
-        For an unknown name or a value outside its range; every problem is listed.
+        For an unknown name or a value outside its range; every problem is listed. Also for a
+        setting given under its current and its deprecated name.
     """
+    values, messages = with_current_names(settings, values, where)
+    for message in messages:
+        warnings.warn(message, FutureWarning, stacklevel=2)
     known = {row.name: row for row in rows(settings)}
     problems = [f'no setting {name!r}' for name in values if name not in known]
     for name, value in values.items():

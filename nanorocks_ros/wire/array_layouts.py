@@ -1,4 +1,4 @@
-"""Records to arrays and back. The layouts are read from ``msg_defs``, nowhere written twice."""
+"""Conversion of records to arrays and back, by the layouts in ``msg_defs``."""
 
 from __future__ import annotations
 
@@ -7,58 +7,30 @@ import math
 import re
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.records import (
-    BodyEstimate,
-    ClusterEstimate,
-    CorEstimate,
     CorRelation,
     CorStatus,
-    GroundTruth,
-    Merge,
-    PairCollision,
     Quality,
-    Rebound,
+    RecordType,
     SizeStatus,
-    SpeedEstimate,
     SpeedMethod,
     StickingStatus,
-    TrayState,
 )
+from nanorocks_ros.wire.flat_records import flat_value, nested_fields
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
+    from nanorocks_ros.records import ArrayRecord
+
 NS = 1_000_000_000
-ArrayRecord = (
-    SpeedEstimate
-    | ClusterEstimate
-    | CorEstimate
-    | GroundTruth
-    | TrayState
-    | Rebound
-    | PairCollision
-    | BodyEstimate
-    | Merge
-)
-RecordType = TypeVar(
-    'RecordType',
-    SpeedEstimate,
-    ClusterEstimate,
-    CorEstimate,
-    GroundTruth,
-    TrayState,
-    Rebound,
-    PairCollision,
-    BodyEstimate,
-    Merge,
-)
 
 _ENUMERATIONS = {
     'method': SpeedMethod,
@@ -70,42 +42,6 @@ _ENUMERATIONS = {
 }
 # By the type that a record declares.
 _WHOLE = {'int': int, 'bool': bool}
-_SIZES = ('1', '2', '3', '4_to_6', '7_or_more')
-# Of two beads, or of two directions: the array in the record, and the place in it.
-_AXES = {'x': 0, 'y': 1}
-_OF_BEADS = {
-    'track': 'tracks',
-    'species': 'species',
-    'radius': 'radii',
-    'mass': 'masses',
-    'temperature': 'temperatures',
-}
-_PARTS: dict[str, tuple[str, tuple[int, ...]]] = {
-    **{f'{name}_{k + 1}': (many, (k,)) for name, many in _OF_BEADS.items() for k in (0, 1)},
-    **{
-        f'{name}_{k + 1}_error': (many, (k,))
-        for name, many in (
-            ('radius', 'radius_errors'),
-            ('before', 'before_errors'),
-            ('after', 'after_errors'),
-        )
-        for k in (0, 1)
-    },
-    **{
-        f'{name}_{k + 1}_{letter}': (name, (k, axis))
-        for name in ('before', 'after')
-        for k in (0, 1)
-        for letter, axis in _AXES.items()
-    },
-    **{f'bodies_of_{size}': ('sizes', (k,)) for k, size in enumerate(_SIZES)},
-    **{
-        f'{name}_{letter}': (name, (axis,))
-        for name in ('separation', 'place')
-        for letter, axis in _AXES.items()
-    },
-}
-_INTEGERS = frozenset(('tracks', 'species'))
-_LENGTHS = {'sizes': len(_SIZES)}
 # Fields of the array that a record keeps as an integer stamp.
 _STAMPS = {
     'time': 'stamp_ns',
@@ -127,7 +63,7 @@ class LayoutField(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
-    """What the elements of one kind of array are.
+    """The elements of one kind of array.
 
     Parameters
     ----------
@@ -188,10 +124,7 @@ def to_array(record: ArrayRecord, epoch_ns: int) -> NDArray[np.float32]:
 
 
 def _element(record: ArrayRecord, name: str, epoch_ns: int) -> float:
-    if name in _PARTS:
-        whole, place = _PARTS[name]
-        return float(getattr(record, whole)[place])
-    value = getattr(record, _STAMPS.get(name, name))
+    value = flat_value(record, _STAMPS.get(name, name))
     if value is None:
         return math.nan
     return (value - epoch_ns) / NS if name in _STAMPS else float(value)
@@ -205,7 +138,7 @@ def from_array(
     epoch_ns: int,
     where: str,
 ) -> RecordType:
-    """The record behind an array.
+    """The record of an array.
 
     Parameters
     ----------
@@ -232,39 +165,22 @@ def from_array(
     if not math.isfinite(values[0]):
         raise FrameError(where, f'time is {values[0]}', 'publish the time in element 0')
     kinds = {field.name: field.type for field in dataclasses.fields(record_type)}
-    items: dict[str, Any] = {'tray': tray, **_wholes(fields, values)}
-    for field, value in zip(fields, values, strict=True):
-        if field.name in _PARTS:
+    numbers = {field.name: float(value) for field, value in zip(fields, values, strict=True)}
+    items: dict[str, Any] = {'tray': tray, **nested_fields(record_type, numbers)}
+    for name, number in numbers.items():
+        in_record = _STAMPS.get(name, name)
+        if in_record in items or in_record not in kinds:
             continue
-        name = _STAMPS.get(field.name, field.name)
         try:
-            items[name] = _value(field.name, kinds[name], float(value), epoch_ns)
+            items[in_record] = _value(name, kinds[in_record], number, epoch_ns)
         except (ValueError, OverflowError) as error:
             raise FrameError(
                 where,
-                f'{field.name} is {value}',
+                f'{name} is {number}',
                 'use the same release of nanorocks_ros on both sides',
             ) from error
-    return record_type(**items)
-
-
-def _wholes(
-    fields: Sequence[LayoutField], values: Sequence[float] | NDArray[np.float32]
-) -> dict[str, NDArray[Any]]:
-    """The arrays of a record, from their parts."""
-    known = {
-        _PARTS[field.name]: float(value)
-        for field, value in zip(fields, values, strict=True)
-        if field.name in _PARTS
-    }
-    found: dict[str, NDArray[Any]] = {}
-    for (whole, place), value in known.items():
-        shape = (_LENGTHS.get(whole, 2),) * len(place)
-        found.setdefault(whole, np.full(shape, np.nan))[place] = value
-    return {
-        whole: values.astype(np.int32) if whole in _INTEGERS else values
-        for whole, values in found.items()
-    }
+    make_record: Callable[..., RecordType] = record_type
+    return make_record(**items)
 
 
 def _value(name: str, kind: object, value: float, epoch_ns: int) -> object:

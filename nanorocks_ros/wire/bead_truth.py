@@ -1,4 +1,4 @@
-"""The truth about every bead, to an array and back; the layout is read from ``msg_defs``."""
+"""Conversion of the truth of all beads to an array and back, by the layout in ``msg_defs``."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _FIELD = re.compile(r'^float32(\[\])?\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
 
 
 class BeadsLayout(NamedTuple):
-    """What the elements of an array of beads are.
+    """The elements of an array of beads.
 
     Parameters
     ----------
@@ -56,11 +56,11 @@ def beads_layout() -> BeadsLayout:
     """The layout of `BeadsTruth`, from its message definition."""
     text = resources.files(__package__).joinpath('msg', 'BeadsTruth.msg').read_text('utf-8')
     lines = [line.strip() for line in text.splitlines()]
-    found = [match.groups() for line in lines if (match := _FIELD.match(line))]
+    fields = [match.groups() for line in lines if (match := _FIELD.match(line))]
     return BeadsLayout(
         lines[0].removeprefix('# '),
-        tuple(LayoutField(*field[1:]) for field in found if not field[0]),
-        tuple(LayoutField(*field[1:]) for field in found if field[0]),
+        tuple(LayoutField(*field[1:]) for field in fields if not field[0]),
+        tuple(LayoutField(*field[1:]) for field in fields if field[0]),
     )
 
 
@@ -91,7 +91,7 @@ def beads_to_array(truth: BeadsTruth, epoch_ns: int) -> NDArray[np.float32]:
 def beads_from_array(
     values: Sequence[float] | NDArray[np.float32], *, tray: int, epoch_ns: int, where: str
 ) -> BeadsTruth:
-    """The truth behind an array.
+    """The truth in an array.
 
     Parameters
     ----------

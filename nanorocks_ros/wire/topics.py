@@ -70,6 +70,13 @@ MOTION = Topic(
     name='tray_{tray}/motion', type=IMAGE, depth=10, doc='motion mask, mono8: 255 where it moves'
 )
 SPEED = Topic(name='tray_{tray}/speed', type=ARRAY, depth=1000, doc='SpeedEstimate')
+TRACKS = Topic(
+    name='tray_{tray}/tracks',
+    type=IMAGE,
+    depth=10,
+    doc='the tray with its beads and the ways they came, bgr8, ten a second; hidden beads are '
+    'magenta',
+)
 REBOUND = Topic(
     name='tray_{tray}/rebound', type=ARRAY, depth=1000, doc='Rebound: of a bead from a side wall'
 )
@@ -84,13 +91,6 @@ BODIES = Topic(
 )
 MERGE = Topic(
     name='tray_{tray}/merge', type=ARRAY, depth=1000, doc='Merge: of two beads that stick'
-)
-TRACKS = Topic(
-    name='tray_{tray}/tracks',
-    type=IMAGE,
-    depth=10,
-    doc='the tray with its beads and the ways they came, bgr8, ten a second; hidden beads are '
-    'magenta',
 )
 CLUSTER = Topic(name='tray_{tray}/cluster', type=ARRAY, depth=1000, doc='ClusterEstimate')
 AUTOCORRELATION = Topic(
@@ -121,28 +121,8 @@ TAKEN = Topic(
 )
 EPOCH = Topic(name='epoch', type=TIME, depth=1, latched=True, doc='what `time` counts from')
 
-TOPICS = (
-    RAW,
-    RAW_COMPRESSED,
-    RECTIFIED,
-    GRAY,
-    STATE,
-    MOTION,
-    SPEED,
-    TRACKS,
-    REBOUND,
-    COLLISION,
-    BODIES,
-    MERGE,
-    CLUSTER,
-    AUTOCORRELATION,
-    COR,
-    TRUTH,
-    BEADS,
-    CAMERA_INFO,
-    TAKEN,
-    EPOCH,
-)
+TOPICS = tuple(value for value in globals().values() if isinstance(value, Topic))
+"""Every topic declared above, in this order."""
 
 
 def tray_of(topic_name: str) -> int | None:

@@ -16,6 +16,8 @@ from nanorocks_ros.records import (
     CorRelation,
     CorStatus,
     GroundTruth,
+    Interval,
+    Measured,
     Quality,
     SpeedEstimate,
     SpeedMethod,
@@ -30,8 +32,7 @@ def speed(seconds, cycle=1, value=0.005, start=1.0):
         tray=1,
         cycle=cycle,
         cycle_start_ns=round(start * NS),
-        mean_projected_speed=value,
-        mean_projected_speed_error=0.1 * value,
+        mean_projected_speed=Measured(value, 0.1 * value),
         window=0.1,
         method=SpeedMethod.TRACKING,
         quality=Quality.GLARE,
@@ -45,9 +46,7 @@ def cor(seconds, cycle=1, status=CorStatus.COOLING, value=0.9):
         cycle=cycle,
         status=status,
         relation=CorRelation.LIBRARY,
-        restitution=value,
-        restitution_lower=value - 0.02,
-        restitution_upper=value + 0.02,
+        restitution=Interval(value, value - 0.02, value + 0.02),
         window_end=seconds - 1.0,
     )
 
@@ -241,7 +240,7 @@ def test_whoever_hears_estimates_before_speeds_knows_when_the_tray_was_shaken(bo
 
 def test_what_is_not_known_is_null_and_states_are_words(board):
     board.take(speed(2.0), 0.0)
-    board.take(replace(cor(2.0), haff_time=float('inf')), 0.0)
+    board.take(replace(cor(2.0), haff_time=Measured(float('inf'))), 0.0)
     told = json.loads(json.dumps(board.news(Cursor(), 0.0), allow_nan=False))['trays']['1']
     assert told['latest']['cor']['haff_time'] is None
     assert told['latest']['cor']['wall_restitution'] is None

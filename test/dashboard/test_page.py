@@ -9,7 +9,7 @@ import pytest
 
 from nanorocks_ros.dashboard.tray_pictures import encoded
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.records import CorStatus, Quality
+from nanorocks_ros.records import CorStatus, Interval, Quality
 
 WIDE = {'width': 1440, 'height': 900}
 PHONE = {'width': 390, 'height': 844}
@@ -64,9 +64,9 @@ def text_is(page, selector, text):
 def shown(cor):
     """The estimate as the page writes it."""
     return (
-        f'{cor.restitution:.3f} [{cor.restitution_lower:.3f}, {cor.restitution_upper:.3f}]',
-        f'{cor.wall_restitution:.3f}',
-        f'[{cor.wall_restitution_lower:.3f}, {cor.wall_restitution_upper:.3f}]',
+        f'{cor.restitution.value:.3f} [{cor.restitution.lower:.3f}, {cor.restitution.upper:.3f}]',
+        f'{cor.wall_restitution.value:.3f}',
+        f'[{cor.wall_restitution.lower:.3f}, {cor.wall_restitution.upper:.3f}]',
     )
 
 
@@ -88,17 +88,18 @@ def test_numbers_are_those_of_the_estimate_with_units(look, full, results):
     text_is(page, '#cor', value)
     text_is(page, '#walls', wall)
     text_is(page, '#walls', wall_interval)
-    text_is(page, '#speed', f'{1e3 * speed.mean_projected_speed:.2f} mm/s')
-    text_is(page, '#haff', f'{cor.haff_time:.2f} s')
-    text_is(page, '#cluster', f'{cluster.combined_size:.2f}')
-    text_is(page, '#cluster', f'±\u00a0{cluster.combined_size_error:.2f}')
+    text_is(page, '#speed', f'{1e3 * speed.mean_projected_speed.value:.2f} mm/s')
+    text_is(page, '#haff', f'{cor.haff_time.value:.2f} s')
+    text_is(page, '#cluster', f'{cluster.combined_size.value:.2f}')
+    text_is(page, '#cluster', f'±\u00a0{cluster.combined_size.error:.2f}')
     text_is(page, '#about', '15 acrylic 2 mm')
     text_is(page, '#health', '1 node, well')
     for chart in ('speed', 'cor', 'cluster'):
         assert page.locator(f'#{chart}-chart canvas').count() == 1
     label = page.locator('#speed-chart .plot').get_attribute('aria-label')
-    assert f'{1e3 * speed.mean_projected_speed:.2f} mm/s now' in label
-    assert f'{cor.restitution:.3f}' in page.locator('#cor-chart .plot').get_attribute('aria-label')
+    assert f'{1e3 * speed.mean_projected_speed.value:.2f} mm/s now' in label
+    label = page.locator('#cor-chart .plot').get_attribute('aria-label')
+    assert f'{cor.restitution.value:.3f}' in label
 
 
 def test_the_estimate_tightens_while_one_looks(look, serve, results):
@@ -207,7 +208,7 @@ def test_changes_are_said_to_those_who_listen(look, full, results):
     text_is(page, '#cor', 'final')
     said = page.locator('#said')
     assert said.get_attribute('aria-live') == 'polite'
-    assert f'restitution {results.cors[-1].restitution:.3f}' in said.text_content()
+    assert f'restitution {results.cors[-1].restitution.value:.3f}' in said.text_content()
     assert page.locator('#link').get_attribute('role') == 'status'
 
 
@@ -297,7 +298,7 @@ def test_a_lost_connection_is_said_and_found_again(look, full, serve, results):
     text_is(page, '#link', 'connection lost, trying again')
     assert shown(results.cors[-1])[0] in page.locator('#cor').inner_text()
     again = serve(port=port)
-    changed = replace(results.cors[-1], restitution=0.777)
+    changed = replace(results.cors[-1], restitution=Interval(0.777, 0.7, 0.8))
     for record in (*results.speeds, changed):
         again.take(record)
     text_is(page, '#link', 'live')

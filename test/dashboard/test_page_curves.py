@@ -25,7 +25,7 @@ def test_what_is_measured_from_the_middle_of_a_run_is_shown_beside_its_truth(loo
         server.take(truth_at(speed.stamp_ns))
         server.take(speed)
     text_is(page, '#state', 'no shaking event yet')
-    text_is(page, '#speed', f'{1e3 * joined[-1].mean_projected_speed:.2f} mm/s')
+    text_is(page, '#speed', f'{1e3 * joined[-1].mean_projected_speed.value:.2f} mm/s')
     page.wait_for_selector('#speed-chart canvas')
     assert page.locator('#speed-chart .only-truth').is_visible()
 

@@ -13,6 +13,7 @@ import aiohttp
 import pytest
 
 from nanorocks_ros.errors import DashboardError
+from nanorocks_ros.records import Measured
 
 TOKEN = 'correct-horse-battery'
 _PATIENCE_S = 10.0
@@ -193,7 +194,7 @@ def test_whoever_comes_late_gets_the_whole_cycle_at_once(serve, results):
             of_cycle = [speed for speed in results.speeds if speed.cycle == tray['cycle']]
             assert len(tray['speed']['rows']) == len(of_cycle)
             assert tray['latest']['cor']['restitution'] == pytest.approx(
-                results.cors[-1].restitution
+                results.cors[-1].restitution.value
             )
 
     asyncio.run(check())
@@ -286,7 +287,7 @@ def test_a_client_that_does_not_read_holds_up_nobody_and_piles_up_nothing(serve,
             await seen(quick, server, (1, 'tray'))
             for k in range(rounds):
                 server.show((1, 'tray'), picture)
-                server.take(replace(results.speeds[-1], mean_projected_speed=0.001 * k))
+                server.take(replace(results.speeds[-1], mean_projected_speed=Measured(0.001 * k)))
                 if claims:
                     slow.sendall(_text_frame({'seen': k}))
                 said, pictures = await step(quick)

@@ -1,4 +1,4 @@
-"""Posterior of the restitutions: near the truth, as wide as it says, and wide where it must be."""
+"""Posterior of the restitutions: bias, coverage and width."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
-from nanorocks_ros.inference.likelihood_1d import SingleTerm
-from nanorocks_ros.inference.posterior import posterior_of, tables_of
+from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.likelihood_1d import Likelihood1D
+from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
 
@@ -23,7 +24,7 @@ NOTHING_ELSE = PriorSettings(
     diameter_error=0.0,
     count_error=0.0,
     anisotropy_spread=0.0,
-    start_spread=0.0,
+    speed_distribution_spread=0.0,
 )
 TIMES = np.arange(1.75, 20.0, 0.25)
 NOISE = 0.02
@@ -51,30 +52,28 @@ def likelihoods(tables, speeds, camera=(0.0, 0.0)):
 
 
 @pytest.mark.parametrize(('restitution', 'wall'), [(0.7, 0.95), (0.89, 0.99), (0.95, 0.9)])
-def test_intervals_cover_the_truth_as_often_as_they_say_when_the_walls_are_known(
-    exact, restitution, wall
-):
-    found = np.array(
+def test_intervals_have_the_stated_coverage_for_known_walls(exact, restitution, wall):
+    quantiles = np.array(
         [
             posterior_of(exact, likelihood.integrated(), (wall, wall)).quantiles(LEVELS)
             for likelihood in likelihoods(exact, decays(restitution, wall, 240))
         ]
     )
     covered = [
-        np.mean((found[:, low] < restitution) & (restitution < found[:, high]))
+        np.mean((quantiles[:, low] < restitution) & (restitution < quantiles[:, high]))
         for low, high in ((1, 3), (0, 4))
     ]
     # Of 240 runs, two standard errors are 0.06 and 0.03.
     assert covered[0] == pytest.approx(0.68, abs=0.1)
     assert covered[1] >= 0.89
-    assert abs(np.median(found[:, 2]) - restitution) < 0.4 * found[:, 2].std()
+    assert abs(np.median(quantiles[:, 2]) - restitution) < 0.4 * quantiles[:, 2].std()
 
 
 def test_cycles_add_up(exact):
     many = likelihoods(exact, decays(0.89, 0.97, 36))
     total = many[0]
-    for one in many[1:]:
-        total = total + one
+    for likelihood in many[1:]:
+        total = total + likelihood
     alone = posterior_of(exact, many[0].integrated(), (0.97, 0.97))
     together = posterior_of(exact, total.integrated(), (0.97, 0.97))
     assert together.covariance[0, 0] ** 0.5 < 0.25 * alone.covariance[0, 0] ** 0.5
@@ -82,48 +81,60 @@ def test_cycles_add_up(exact):
 
 
 def test_the_two_restitutions_lie_in_a_valley(exact):
-    (one,) = likelihoods(exact, decays(0.89, 0.95, 1))
-    posterior = posterior_of(exact, one.integrated(), (0.8, 1.0))
+    (likelihood,) = likelihoods(exact, decays(0.89, 0.95, 1))
+    posterior = posterior_of(exact, likelihood.integrated(), (0.8, 1.0))
     spread = posterior.covariance
     assert spread[0, 1] / np.sqrt(spread[0, 0] * spread[1, 1]) < -0.7
-    known = posterior_of(exact, one.integrated(), (0.95, 0.95))
+    known = posterior_of(exact, likelihood.integrated(), (0.95, 0.95))
     assert spread[0, 0] > 4.0 * known.covariance[0, 0]
 
 
-def test_what_else_is_known_of_one_restitution_tells_of_the_other(exact):
-    (one,) = likelihoods(exact, decays(0.89, 0.95, 1))
+def test_a_likelihood_of_one_restitution_narrows_the_other(exact):
+    (likelihood,) = likelihoods(exact, decays(0.89, 0.95, 1))
     grid = np.linspace(0.0, 1.0, 2001)
-    of_walls = SingleTerm(restitution=grid, log_likelihood=-0.5 * ((grid - 0.95) / 0.002) ** 2)
-    free = posterior_of(exact, one.integrated(), (0.8, 1.0))
-    told = posterior_of(exact, one.integrated(), (0.8, 1.0), of_walls=of_walls)
-    known = posterior_of(exact, one.integrated(), (0.95, 0.95))
-    assert told.covariance[1, 1] ** 0.5 == pytest.approx(0.002, rel=0.1)
-    assert told.covariance[0, 0] < 0.25 * free.covariance[0, 0]
-    assert told.mean[0] == pytest.approx(known.mean[0], abs=0.005)
-    of_beads = SingleTerm(restitution=grid, log_likelihood=-0.5 * ((grid - 0.89) / 0.01) ** 2)
-    both = posterior_of(exact, one.integrated(), (0.8, 1.0), of_beads=of_beads, of_walls=of_walls)
-    assert both.covariance[0, 0] ** 0.5 < 0.01
+    wall_likelihood = Likelihood1D(
+        restitution=grid, log_likelihood=-0.5 * ((grid - 0.95) / 0.002) ** 2
+    )
+    free = posterior_of(exact, likelihood.integrated(), (0.8, 1.0))
+    constrained = posterior_of(
+        exact, likelihood.integrated(), (0.8, 1.0), wall_likelihood=wall_likelihood
+    )
+    known = posterior_of(exact, likelihood.integrated(), (0.95, 0.95))
+    assert constrained.covariance[1, 1] ** 0.5 == pytest.approx(0.002, rel=0.1)
+    assert constrained.covariance[0, 0] < 0.25 * free.covariance[0, 0]
+    assert constrained.mean[0] == pytest.approx(known.mean[0], abs=0.005)
+    bead_likelihood = Likelihood1D(
+        restitution=grid, log_likelihood=-0.5 * ((grid - 0.89) / 0.01) ** 2
+    )
+    combined = posterior_of(
+        exact,
+        likelihood.integrated(),
+        (0.8, 1.0),
+        bead_likelihood=bead_likelihood,
+        wall_likelihood=wall_likelihood,
+    )
+    assert combined.covariance[0, 0] ** 0.5 < 0.01
 
 
-def test_what_is_not_known_of_the_tray_does_not_average_out(exact, uncertain):
+def test_nuisances_of_the_tray_do_not_average_out(exact, uncertain):
     speeds = decays(0.89, 0.97, 36)
     widths = {}
     for name, tables in (('exact', exact), ('uncertain', uncertain)):
         for runs in (1, 36):
             many = likelihoods(tables, speeds[:runs], (0.01, 0.01))
             total = many[0]
-            for one in many[1:]:
-                total = total + one
+            for likelihood in many[1:]:
+                total = total + likelihood
             posterior = posterior_of(tables, total.integrated(), (0.97, 0.97))
             widths[name, runs] = float(posterior.covariance[0, 0]) ** 0.5
     assert widths['uncertain', 36] > 1.5 * widths['exact', 36]
     assert widths['uncertain', 36] < widths['uncertain', 1]
 
 
-def test_a_few_speeds_say_next_to_nothing(uncertain):
+def test_a_few_speeds_give_a_wide_posterior(uncertain):
     speed = decays(0.89, 0.97, 1)[0, :8]
-    one = decay_likelihood(uncertain, TIMES[:8], speed, 0.3 * speed, (0.01, 0.01))
-    posterior = posterior_of(uncertain, one.integrated(), (0.8, 1.0))
+    likelihood = decay_likelihood(uncertain, TIMES[:8], speed, 0.3 * speed, (0.01, 0.01))
+    posterior = posterior_of(uncertain, likelihood.integrated(), (0.8, 1.0))
     assert posterior.covariance[0, 0] ** 0.5 > 0.15
 
 
@@ -135,8 +146,8 @@ def test_a_factor_on_all_speeds_and_times_changes_nothing(exact):
 
 
 def test_the_posterior_is_a_probability_within_the_prior(uncertain):
-    (one,) = likelihoods(uncertain, decays(0.7, 0.9, 1))
-    posterior = posterior_of(uncertain, one.integrated(), (0.85, 0.95))
+    (likelihood,) = likelihoods(uncertain, decays(0.7, 0.9, 1))
+    posterior = posterior_of(uncertain, likelihood.integrated(), (0.85, 0.95))
     assert posterior.probability.sum() == pytest.approx(1.0)
     assert (posterior.probability >= 0.0).all()
     assert posterior.wall_restitution[0] >= 0.85
@@ -145,13 +156,13 @@ def test_the_posterior_is_a_probability_within_the_prior(uncertain):
 
 
 def test_walls_beyond_the_library_are_refused(uncertain):
-    (one,) = likelihoods(uncertain, decays(0.7, 0.9, 1))
+    (likelihood,) = likelihoods(uncertain, decays(0.7, 0.9, 1))
     with pytest.raises(ConfigurationError, match=r'0.5 to 0.9; give a range within 0.78 to 1'):
-        posterior_of(uncertain, one.integrated(), (0.5, 0.9))
+        posterior_of(uncertain, likelihood.integrated(), (0.5, 0.9))
 
 
 @pytest.mark.parametrize('number', [6, 7, 8])
-def test_a_gas_that_is_seen_late_is_not_read_wrong_with_confidence(number):
+def test_a_gas_first_seen_late_has_an_interval_with_the_truth(number):
     tray = load_trays()[number]
     tables = tables_of(library_of(tray), tray, PriorSettings())
     place = int(np.argmin(abs(tables.restitution - 0.89))) * tables.wall_restitution.size + int(

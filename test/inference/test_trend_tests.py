@@ -33,7 +33,7 @@ def test_the_error_of_a_slope_is_what_slopes_scatter_by():
     assert np.mean(np.abs(slopes) < errors) == pytest.approx(0.68, abs=0.09)
 
 
-def test_values_that_are_not_known_are_left_out():
+def test_unknown_values_are_left_out():
     values = 1.0 + 0.5 * CYCLES
     values[10:20] = math.nan
     trend = robust_trend(CYCLES, values)
@@ -69,7 +69,7 @@ def test_periods_are_of_large_clusters_only():
     assert not quiet_periods(sizes)
 
 
-def test_independent_cycles_hold_periods_as_often_as_is_allowed():
+def test_independent_cycles_have_periods_at_the_false_alarm_rate():
     alarms = [bool(quiet_periods(noise(k), 0.05, orders=99, seed=k)) for k in range(200)]
     # 10 are expected; 21 or more in one of a thousand such tests.
     assert 1 <= sum(alarms) <= 20
@@ -86,9 +86,9 @@ def test_trays_of_any_size_count_alike_and_may_have_gaps():
     sizes[0] *= 100.0
     sizes[1, ::3] = math.nan
     sizes[2, 45:47] = math.nan
-    (found,) = quiet_periods(sizes)
-    assert abs(found.first - 40) <= 1
-    assert abs(found.last - 51) <= 1
+    (period,) = quiet_periods(sizes)
+    assert abs(period.first - 40) <= 1
+    assert abs(period.last - 51) <= 1
 
 
 @pytest.mark.parametrize('sizes', [np.empty((0, 0)), np.ones((2, 40)), np.full((2, 9), math.nan)])

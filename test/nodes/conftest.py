@@ -21,20 +21,21 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.pipeline.warm_up import warm_up, warm_up_counting, warm_up_speed
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.tray_camera.tray_film import film
 
 _PATIENCE_S = 40.0
-# With more, ports are those that the system gives to anybody.
+# Higher domains use ports that the system gives to other programs.
 _LAST_DOMAIN = 101
 
 
 def _domains():
-    """Domains of this process; two runs of the tests at once take theirs in another order."""
+    """Domains of this process, in an order that differs between two runs at the same time."""
     workers = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
     own = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
-    numbers = [one for one in range(1, _LAST_DOMAIN + 1) if one % workers == own]
+    numbers = [domain for domain in range(1, _LAST_DOMAIN + 1) if domain % workers == own]
     random.Random(os.getpid()).shuffle(numbers)
     return itertools.cycle(numbers)
 
@@ -44,7 +45,7 @@ _DOMAINS = _domains()
 
 @pytest.fixture
 def domain():
-    """A ROS domain on which nobody else is."""
+    """A ROS domain that no other test uses."""
     return next(_DOMAINS)
 
 
@@ -98,7 +99,7 @@ class Graph:
 
     def output(self, process):
         """What a node has printed so far."""
-        path = next(path for one, path in self._running if one is process)
+        path = next(path for running, path in self._running if running is process)
         with open(path, encoding='utf-8') as log:
             return log.read()
 
@@ -119,7 +120,7 @@ class Graph:
         while not condition():
             if time.monotonic() > end:
                 logs = '\n'.join(self.output(process) for process, _ in self._running)
-                pytest.fail(f'never came true; the nodes said:\n{logs}')
+                pytest.fail(f'the condition never came true; output of the nodes:\n{logs}')
             self.executor.spin_once(timeout_sec=0.05)
 
     def end(self):
@@ -143,9 +144,51 @@ def graph(tmp_path, monkeypatch, domain):
     node = Node('listener', context=context, namespace='nanorocks')
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
-    one = Graph(domain=domain, node=node, executor=executor, folder=str(tmp_path))
-    yield one
-    one.end()
+    running = Graph(domain=domain, node=node, executor=executor, folder=str(tmp_path))
+    yield running
+    running.end()
     executor.shutdown()
     node.destroy_node()
     rclpy.try_shutdown(context=context)
+
+
+@pytest.fixture
+def spun():
+    """A node in this process, and a function that spins it until a condition holds."""
+    context = Context()
+    rclpy.init(context=context)
+    node = Node('spun', context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+
+    def spin_until(condition):
+        end = time.monotonic() + 20.0
+        while not condition() and time.monotonic() < end:
+            executor.spin_once(timeout_sec=0.1)
+        assert condition()
+
+    yield node, spin_until
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+@pytest.fixture
+def own_node(domain, monkeypatch):
+    """A NanorocksNode in this process, and a function that spins it until a condition holds."""
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    rclpy.init(args=[], domain_id=domain)
+    node = NanorocksNode('own')
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+
+    def spin_until(condition):
+        end = time.monotonic() + _PATIENCE_S
+        while not condition() and time.monotonic() < end:
+            executor.spin_once(timeout_sec=0.1)
+        assert condition()
+
+    yield node, spin_until
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.try_shutdown()

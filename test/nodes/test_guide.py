@@ -1,4 +1,4 @@
-"""The commands of the guide are run as they stand there, in a folder of their own, in order."""
+"""The commands of the guide work, in order, in a folder of their own."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ MARK = re.compile(r'^<!-- (not run: .+|goes on|Ctrl-C) -->$')
 
 def commands(text):
     """Marks and indented blocks of a page, in order: (mark or '', block or '')."""
-    mark, block, found = '', [], []
+    mark, block, marked = '', [], []
     for line in [*text.splitlines(), 'end']:
         if line.startswith('    ') or (block and not line):
             block.append(line[4:])
             continue
         if block:
-            found.append((mark, '\n'.join(block).rstrip() + '\n'))
+            marked.append((mark, '\n'.join(block).rstrip() + '\n'))
             mark, block = '', []
         if MARK.match(line):
             mark = MARK.match(line).group(1)
         if mark == 'Ctrl-C':
-            found.append((mark, ''))
+            marked.append((mark, ''))
             mark = ''
-    return found
+    return marked
 
 
 def make_film(path, bag, frames):
@@ -120,7 +120,7 @@ def test_the_guide_does_what_it_says(root, tmp_path, domain):
     for name in ('run 1.avi', 'läuft.avi'):
         make_film(tmp_path / 'videos' / name, root / 'bags/tray_1_sample', FEW_FRAMES)
     shell = Shell(tmp_path, domain)
-    said = {}
+    outputs = {}
     try:
         for mark, block in commands((root / 'docs/start/guide.md').read_text(encoding='utf-8')):
             if mark == 'Ctrl-C':
@@ -128,12 +128,12 @@ def test_the_guide_does_what_it_says(root, tmp_path, domain):
             elif mark == 'goes on':
                 shell.go_on(block)
             elif not mark:
-                said[block.splitlines()[-1]] = shell.run(block)
+                outputs[block.splitlines()[-1]] = shell.run(block)
     finally:
         shell.end()
-    assert re.search(r'cycle 1: COR 0\.\d+', said['nanorocks analyse my_film'])
-    assert '/nanorocks/tray_1/cor' in said['nanorocks info rehearsal']
-    assert '/nanorocks/pipeline' in said['nanorocks doctor --graph']
+    assert re.search(r'cycle 1: COR 0\.\d+', outputs['nanorocks analyse my_film'])
+    assert '/nanorocks/tray_1/cor' in outputs['nanorocks info rehearsal']
+    assert '/nanorocks/pipeline' in outputs['nanorocks doctor --graph']
     for made in ('steps.png', 'decay.png', 'mine.png', 'my_film_results/tray_1_cor.csv'):
         assert (tmp_path / made).stat().st_size > 0
     report = (tmp_path / 'results/report.html').read_text(encoding='utf-8')

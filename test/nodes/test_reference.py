@@ -1,4 +1,4 @@
-"""The reference of the nodes is what the nodes say."""
+"""The generated page of the nodes is up to date and complete."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from nanorocks_ros.nodes._run import NODES
 from nanorocks_ros.nodes.reference import PAGE
+from nanorocks_ros.nodes.run import NODES
 
 
 def test_the_reference_is_not_stale(root, tmp_path):
-    (tmp_path / 'bags').mkdir()
+    for name in ('bags', 'docs'):
+        (tmp_path / name).mkdir()
     (tmp_path / 'bags/tray_1_sample').symlink_to(root / 'bags/tray_1_sample')
     command = [sys.executable, '-m', 'nanorocks_ros.nodes.reference', str(tmp_path)]
     finished = subprocess.run(

@@ -1,4 +1,4 @@
-"""Compiled code that is kept is not used after something it is made of has changed."""
+"""The cache of compiled code is not used after a change of a function or constant in it."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def changed(path, text):
         path.write_text(text)
 
 
-def test_what_a_kept_function_calls_and_the_constants_in_it_are_those_of_now(tmp_path):
+def test_a_cached_function_follows_changes_of_the_functions_and_constants_it_uses(tmp_path):
     package = tmp_path / 'tried'
     package.mkdir()
     (package / '__init__.py').touch()

@@ -1,4 +1,4 @@
-"""The random numbers are known ones, even, and independent of the order they are asked in."""
+"""Random numbers: known values, uniform, and independent of the order of the calls."""
 
 from __future__ import annotations
 

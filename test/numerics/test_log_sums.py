@@ -1,4 +1,4 @@
-"""Sums of what is known by its logarithm."""
+"""Logarithms of sums of exponentials against scipy."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.special import logsumexp
 from nanorocks_ros.numerics.log_sums import log_sum
 
 
-def test_sums_of_what_no_double_holds_are_those_of_scipy():
+def test_sums_beyond_the_range_of_doubles_are_those_of_scipy():
     rng = np.random.default_rng(1)
     logs = rng.normal(-2000.0, 300.0, (7, 50))
     weights = rng.uniform(0.1, 2.0, 7)
@@ -17,6 +17,6 @@ def test_sums_of_what_no_double_holds_are_those_of_scipy():
     np.testing.assert_allclose(log_sum(logs, weights), expected, rtol=1e-14)
 
 
-def test_what_is_impossible_stays_so():
+def test_the_sum_of_impossible_terms_is_impossible():
     logs = np.array([[-np.inf, -np.inf, 1.0], [-np.inf, 3.0, 1.0]])
     np.testing.assert_allclose(log_sum(logs), [-np.inf, 3.0, 1.0 + np.log(2.0)])

@@ -9,7 +9,7 @@ from nanorocks_ros.numerics.median import median_of
 
 
 @pytest.mark.parametrize('n', [1, 2, 7, 99, 100, 101, 200, 4321])
-def test_it_is_that_of_numpy_to_the_last_bit(n):
+def test_the_median_equals_that_of_numpy_bit_by_bit(n):
     rng = np.random.default_rng(n)
     for values in (
         rng.random(n),
@@ -23,7 +23,7 @@ def test_it_is_that_of_numpy_to_the_last_bit(n):
         assert median_of(values) == np.median(values)
 
 
-def test_numbers_that_are_not_finite_or_negative_are_no_trouble():
+def test_infinite_and_negative_numbers_are_handled():
     values = np.random.default_rng(1).normal(0.0, 1.0, 500)
     assert median_of(values) == np.median(values)
     values = np.append(np.abs(values), [np.inf, np.inf])

@@ -11,7 +11,7 @@ from nanorocks_ros.numerics.small_cholesky import factorise, whiten
 
 @pytest.mark.parametrize('size', [1, 2, 3, 24, 25])
 @pytest.mark.parametrize('scale', [1.0, 1e-12, 1e12])
-def test_columns_are_divided_by_the_factor_of_cholesky(size, scale):
+def test_columns_are_whitened_by_the_cholesky_factor(size, scale):
     rng = np.random.default_rng(size)
     half = rng.normal(size=(size, 2 * size))
     matrix = scale * (half @ half.T)
@@ -22,8 +22,8 @@ def test_columns_are_divided_by_the_factor_of_cholesky(size, scale):
     np.testing.assert_allclose(np.tril(factor, -1), np.tril(expected, -1), rtol=1e-9)
     np.testing.assert_allclose(1.0 / np.diag(factor), np.diag(expected), rtol=1e-11)
     for count in (1, 2, 3):
-        found = columns.copy()
-        whiten(factor, found, count)
+        whitened = columns.copy()
+        whiten(factor, whitened, count)
         solved = solve_triangular(expected, columns[:count].T, lower=True).T
-        np.testing.assert_allclose(found[:count], solved, rtol=1e-8)
-        np.testing.assert_array_equal(found[count:], columns[count:])
+        np.testing.assert_allclose(whitened[:count], solved, rtol=1e-8)
+        np.testing.assert_array_equal(whitened[count:], columns[count:])

@@ -15,15 +15,17 @@ def test_a_spline_through_uneven_nodes_is_that_of_scipy_beyond_its_ends_too(coun
     nodes = np.cumsum(rng.uniform(0.1, 1.0, count))
     values = rng.normal(size=count)
     at = np.linspace(nodes[0] - 0.1, nodes[-1] + 0.1, 333)
-    found = spline_at(nodes, values, spline_slopes(nodes, values), at)
-    np.testing.assert_allclose(found, CubicSpline(nodes, values)(at), rtol=1e-10, atol=1e-11)
+    interpolated = spline_at(nodes, values, spline_slopes(nodes, values), at)
+    np.testing.assert_allclose(
+        interpolated, CubicSpline(nodes, values)(at), rtol=1e-10, atol=1e-11
+    )
 
 
 def test_b_splines_are_those_of_scipy_and_sum_to_one():
     inner = np.sort(np.random.default_rng(1).uniform(0.0, 1.0, 7))
     knots = np.concatenate([np.zeros(4), inner, np.ones(4)])
     at = np.concatenate([np.linspace(0.0, 1.0, 101), inner])
-    found = spline_basis(knots, at)
+    basis = spline_basis(knots, at)
     expected = BSpline.design_matrix(at, knots, 3).toarray()
-    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14)
-    np.testing.assert_allclose(found.sum(axis=1), 1.0, rtol=1e-13)
+    np.testing.assert_allclose(basis, expected, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(basis.sum(axis=1), 1.0, rtol=1e-13)

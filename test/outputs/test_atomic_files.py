@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
-from nanorocks_ros.outputs.atomic_files import check_outputs, whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file, check_outputs
 
 KINDS = {'--table': ('.npz', '.parquet'), '--other': ('.npz',)}
 
@@ -46,7 +46,7 @@ def test_a_folder_that_is_missing_is_said_before_the_work(tmp_path):
 
 
 def write(path, content, end=None):
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_bytes(content)
         if end is not None:
             raise end
@@ -54,7 +54,7 @@ def write(path, content, end=None):
 
 def test_a_file_appears_when_it_is_whole(tmp_path):
     path = tmp_path / 'a.npz'
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_bytes(b'new')
         assert not path.exists()
     assert path.read_bytes() == b'new'
@@ -67,7 +67,7 @@ def test_half_a_file_never_takes_its_place(tmp_path, end):
     with pytest.raises(end):
         write(path, b'half', end)
     assert path.read_bytes() == b'old'
-    assert [one.name for one in tmp_path.iterdir()] == ['a.npz']
+    assert [file.name for file in tmp_path.iterdir()] == ['a.npz']
 
 
 def test_the_system_says_why_it_cannot_be_written(tmp_path):

@@ -55,7 +55,9 @@ def test_a_row_of_another_length_is_refused(tmp_path):
 
 def test_a_folder_that_cannot_be_written_is_said(tmp_path):
     (tmp_path / 'file').touch()
-    with pytest.raises(RecordingError, match=r'cannot be written \(.*\); pass a writable folder$'):
+    with pytest.raises(
+        RecordingError, match=r'cannot be written \(.*\); make room, or write elsewhere$'
+    ):
         write_csv(tmp_path / 'file' / 'speed.csv', FIELDS, UNITS, [])
     with pytest.raises(RecordingError, match=r'cannot be written \(No such file'):
         write_csv(tmp_path / 'nowhere' / 'speed.csv', FIELDS, UNITS, [])

@@ -20,13 +20,13 @@ def merge(number):
 
 def test_two_spools_of_a_file_keep_their_records_apart(tmp_path):
     file = SpoolFile(tmp_path)
-    one, other = Spool(file), Spool(file)
+    first, second = Spool(file), Spool(file)
     for number in range(600):
-        one.append(merge(number))
-        other.append(-number)
-    assert [record.stamp_ns for record in one] == list(range(600))
-    assert one[299].tracks.tolist() == [299, 300]
-    assert list(other) == [-number for number in range(600)]
+        first.append(merge(number))
+        second.append(-number)
+    assert [record.stamp_ns for record in first] == list(range(600))
+    assert first[299].tracks.tolist() == [299, 300]
+    assert list(second) == [-number for number in range(600)]
     # Nothing is left behind.
     assert not list(tmp_path.iterdir())
 

@@ -66,8 +66,8 @@ def test_whatever_texts_hold_is_text(tmp_path):
 
 def test_the_contents_lead_to_every_section(tmp_path):
     page = page_of(tmp_path, [Section(title=name) for name in ('one', 'two', 'three')])
-    links = [one['href'].removeprefix('#') for name, one in page.tags if name == 'a']
-    ids = [one['id'] for name, one in page.tags if name == 'section']
+    links = [attributes['href'].removeprefix('#') for name, attributes in page.tags if name == 'a']
+    ids = [attributes['id'] for name, attributes in page.tags if name == 'section']
     assert links == ids
     assert len(ids) == 3
 

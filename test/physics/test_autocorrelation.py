@@ -18,23 +18,23 @@ Y, X = np.mgrid[:SIDE, :SIDE] - (SIDE - 1) / 2.0
 def naive_autocorrelation(image):
     rows, columns = image.shape
     deviation = image.astype(float) - image.mean()
-    found = np.zeros((rows, columns))
+    covariance = np.zeros((rows, columns))
     for i in range(rows):
         for j in range(columns):
             dy, dx = i - rows // 2, j - columns // 2
             a = deviation[max(0, dy) : rows + min(0, dy), max(0, dx) : columns + min(0, dx)]
             b = deviation[max(0, -dy) : rows + min(0, -dy), max(0, -dx) : columns + min(0, -dx)]
-            found[i, j] = (a * b).sum()
-    return found / (deviation**2).sum()
+            covariance[i, j] = (a * b).sum()
+    return covariance / (deviation**2).sum()
 
 
 @pytest.mark.parametrize('shape', [(16, 16), (17, 12), (9, 21), (2, 2), (1, 7), (8, 1)])
-def test_the_fast_autocorrelation_is_the_one_by_definition(shape):
+def test_the_fast_autocorrelation_equals_its_definition(shape):
     image = np.random.default_rng(2).integers(0, 256, shape, dtype=np.uint8)
     assert autocorrelation(image) == pytest.approx(naive_autocorrelation(image), abs=1e-5)
 
 
-def test_it_is_the_convolution_of_scipy_with_the_image_turned_round():
+def test_it_is_the_convolution_of_scipy_with_the_reversed_image():
     image = np.random.default_rng(3).integers(0, 256, (94, 200), dtype=np.uint8)
     deviation = image - image.mean()
     whole = fftconvolve(deviation, deviation[::-1, ::-1])
@@ -125,8 +125,8 @@ def test_other_peaks_above_the_level_do_not_count():
     # At the distance of the two the correlation is a half: above the level of 0.4.
     values = autocorrelation(pair)
     assert values[SIDE // 2, SIDE // 2 + 100] > 0.45
-    one = level_region(autocorrelation(single), 0.4)
-    assert level_region(values, 0.4).area == pytest.approx(one.area, rel=0.03)
+    region = level_region(autocorrelation(single), 0.4)
+    assert level_region(values, 0.4).area == pytest.approx(region.area, rel=0.03)
 
 
 def test_a_region_that_reaches_the_last_lag_is_not_whole():

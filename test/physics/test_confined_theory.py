@@ -38,9 +38,9 @@ def simulated_rate(number, restitution, walls, runs):
     settings = SimulationSettings(
         tray=number, restitution=restitution, wall_restitution=walls, speeds='maxwellian'
     )
-    found = cooling_runs(settings, TRAYS[number], TIMES, range(runs)).mean_projected_speed
-    error = found.std(axis=0) / math.sqrt(runs)
-    return fit_haff(TIMES, found.mean(axis=0), error, TRAYS[number].count * runs).decay_rate
+    result = cooling_runs(settings, TRAYS[number], TIMES, range(runs)).mean_projected_speed
+    error = result.std(axis=0) / math.sqrt(runs)
+    return fit_haff(TIMES, result.mean(axis=0), error, TRAYS[number].count * runs).decay_rate
 
 
 def wide_tray(side, count=200):
@@ -51,9 +51,9 @@ def wide_tray(side, count=200):
 
 def test_in_a_wide_box_with_elastic_walls_it_is_dilute_kinetic_theory():
     tray = wide_tray(0.4, count=3000)
-    found = confined_gas(tray).decay_rate(0.9, 1.0)
+    result = confined_gas(tray).decay_rate(0.9, 1.0)
     dilute = kinetic_decay_rate(0.9, tray.diameter, tray.number_density)
-    assert found == pytest.approx(dilute, rel=0.02)
+    assert result == pytest.approx(dilute, rel=0.02)
 
 
 def test_pairs_crowd_as_carnahan_and_starling_say_in_a_wide_box():
@@ -70,15 +70,15 @@ def test_walls_of_a_wide_box_take_the_pressure_of_carnahan_and_starling():
     tray = wide_tray(0.2, count=200_000)
     filling = tray.count * math.pi / 6.0 * tray.diameter**3 / tray.volume
     room = tray.dimensions[0] - tray.diameter
-    found = contacts(bead_classes(tray), tray.dimensions).walls[0] * room
-    assert found == pytest.approx(1.0 + 4.0 * filling * contact_value(filling), rel=0.03)
+    result = contacts(bead_classes(tray), tray.dimensions).walls[0] * room
+    assert result == pytest.approx(1.0 + 4.0 * filling * contact_value(filling), rel=0.03)
 
 
 def test_a_bead_alone_meets_walls_once_in_each_crossing_of_its_room():
     tray = replace(TRAYS[1], species=(replace(TRAYS[1].species[0], count=1),))
-    found = confined_gas(tray).contacts.walls[0]
+    result = confined_gas(tray).contacts.walls[0]
     rooms = np.array(tray.dimensions) - tray.diameter
-    assert found == pytest.approx(1.0 / rooms, rel=1e-12)
+    assert result == pytest.approx(1.0 / rooms, rel=1e-12)
 
 
 def test_an_elastic_gas_between_elastic_walls_does_not_cool():
@@ -92,18 +92,18 @@ def test_the_restitution_undoes_the_decay_rate(number):
 
 
 def test_a_lower_restitution_always_cools_faster():
-    rates = [gas(1).decay_rate(one, 0.97) for one in np.linspace(0.6, 1.0, 21)]
+    rates = [gas(1).decay_rate(restitution, 0.97) for restitution in np.linspace(0.6, 1.0, 21)]
     assert (np.diff(rates) < 0.0).all()
-    rates = [gas(1).decay_rate(0.9, one) for one in np.linspace(0.85, 1.0, 16)]
+    rates = [gas(1).decay_rate(0.9, restitution) for restitution in np.linspace(0.85, 1.0, 16)]
     assert (np.diff(rates) < 0.0).all()
 
 
 def test_a_gas_in_the_steady_state_cools_by_haffs_law():
     steady = gas(3).cooling(0.85, 0.97)
     start = 0.006
-    found = gas(3).speeds(TIMES, 0.85, 0.97, steady.granular_temperature * start**2)
+    result = gas(3).speeds(TIMES, 0.85, 0.97, steady.granular_temperature * start**2)
     law = haff_speed(TIMES, start, 1.0 / (start * steady.decay_rate))
-    assert found == pytest.approx(law, rel=1e-4)
+    assert result == pytest.approx(law, rel=1e-4)
 
 
 def test_from_any_start_it_comes_to_the_steady_decay():
@@ -131,8 +131,8 @@ def test_elastic_beads_meet_one_another_and_the_walls_as_often_as_simulated(numb
         temperature += 2.0 * energy / (3.0 * beads.masses.size) / 6.0
     theory = gas(number)
     squares = np.repeat(temperature / theory.beads.masses, 3).reshape(-1, 3)
-    each, at_walls = theory.collision_rates(squares)
-    assert theory.beads.counts @ each.sum(axis=1) / 2.0 == pytest.approx(pairs, rel=0.03)
+    rates, at_walls = theory.collision_rates(squares)
+    assert theory.beads.counts @ rates.sum(axis=1) / 2.0 == pytest.approx(pairs, rel=0.03)
     assert theory.beads.counts @ at_walls.sum(axis=1) == pytest.approx(walls, rel=0.035)
 
 
@@ -145,8 +145,8 @@ def test_the_motion_along_the_height_is_cooled_as_much_as_simulated():
         rules = rules_of(settings, TRAYS[1], run)
         beads = after_shaking(settings, rules, resting_beads(settings, TRAYS[1], run), run, 0)
         course = HardSphereGas(beads, rules).follow(12.0, (), np.linspace(4.0, 12.0, 33))
-        found = course.observations.granular_temperature[:, 0]
-        squares += (found / found.sum(axis=1, keepdims=True)).mean(axis=0)
+        result = course.observations.granular_temperature[:, 0]
+        squares += (result / result.sum(axis=1, keepdims=True)).mean(axis=0)
     simulated = 2.0 * squares[2] / (squares[0] + squares[1])
     theory = gas(1).cooling(0.9, 0.9).granular_temperature[0]
     assert simulated == pytest.approx(theory[2] / theory[0], rel=0.1)
@@ -173,7 +173,7 @@ def test_light_and_heavy_beads_have_the_energies_that_are_simulated():
 
 def test_the_mean_of_the_species_is_that_of_all_beads():
     temperature = gas(5).cooling(0.85, 0.95).granular_temperature
-    counts = [one.count for one in TRAYS[5].species]
+    counts = [species.count for species in TRAYS[5].species]
     mean = np.average(gas(5).species_speeds(temperature), weights=counts)
     assert mean == pytest.approx(gas(5).mean_projected_speed(temperature))
 
@@ -241,12 +241,12 @@ def test_outside_its_range_it_gives_no_number():
 
 
 @pytest.mark.parametrize('bad', [-0.1, 1.1, math.nan])
-def test_a_restitution_that_is_none_is_named(bad):
+def test_a_restitution_outside_0_to_1_is_named(bad):
     with pytest.raises(ConfigurationError, match='wall_restitution'):
         gas(1).decay_rate(0.9, bad)
 
 
-def test_a_tray_too_crowded_is_refused_with_the_remedy():
+def test_a_crowded_tray_is_refused_with_the_remedy():
     with pytest.raises(ConfigurationError, match='use the decay library'):
         confined_gas(wide_tray(0.02, count=900))
 

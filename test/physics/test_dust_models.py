@@ -32,7 +32,7 @@ def test_the_papers_thresholds_are_those_printed():
     assert {str(k): pytest.approx(1e3 * v) for k, v in PAPER_STICKING_SPEEDS.items()} == printed
 
 
-def test_curves_of_which_no_source_was_at_hand_say_so_wherever_they_are_named():
+def test_unverified_curves_are_marked_in_their_labels():
     for curve in CURVES:
         assert not curve.verified
         assert 'unverified' in curve.label
@@ -48,8 +48,8 @@ def test_a_curve_that_was_checked_carries_no_mark():
 
 def test_thresholds_at_masses_of_the_trays_are_as_computed_by_hand():
     # (4.94e-3 g / 3.3e-3 g)^(-5/18) cm/s, and for a bead of glass of 1.47 mg.
-    found = ALWAYS_BOUNCING.threshold(np.array([4.942772e-3, 1.466e-3]) * GRAM) / CENTIMETRE
-    assert found == pytest.approx([0.89385, 1.2527], rel=1e-3)
+    speeds = ALWAYS_BOUNCING.threshold(np.array([4.942772e-3, 1.466e-3]) * GRAM) / CENTIMETRE
+    assert speeds == pytest.approx([0.89385, 1.2527], rel=1e-3)
 
 
 @given(some.floats(1e-12, 1e-2), some.floats(1.1, 1e3))
@@ -61,12 +61,12 @@ def test_heavier_particles_stick_only_when_slower_by_the_power(mass, heavier):
 
 
 @pytest.mark.parametrize('mass', [0.0, -1.0, math.nan, math.inf])
-def test_a_mass_that_is_none_is_refused(mass):
+def test_a_mass_that_is_not_positive_is_refused(mass):
     with pytest.raises(ConfigurationError, match='mass'):
         ALWAYS_BOUNCING.threshold(mass)
 
 
-def test_the_speeds_that_stuck_hold_the_papers_thresholds():
+def test_the_published_range_of_sticking_speeds_contains_the_papers_thresholds():
     for speed in PAPER_STICKING_SPEEDS.values():
         assert STICKING_SEEN.lower < speed < STICKING_SEEN.upper
 
@@ -83,7 +83,7 @@ def test_a_collapse_is_no_slower_without_bouncing_and_never_ends_without_loss():
 
 
 @pytest.mark.parametrize('restitution', [-0.1, 1.1, math.nan])
-def test_a_restitution_that_is_none_is_refused(restitution):
+def test_a_restitution_outside_0_to_1_is_refused(restitution):
     with pytest.raises(ConfigurationError, match='from 0 to 1'):
         collapse_time_factor(restitution)
 

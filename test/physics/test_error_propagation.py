@@ -30,6 +30,6 @@ def test_the_error_of_a_curved_relation_is_that_of_many_draws():
 
 
 @pytest.mark.parametrize(('value', 'error'), [(math.nan, 0.0), (1.0, -0.1), (1.0, math.inf)])
-def test_an_estimate_that_is_no_number_is_refused(value, error):
+def test_an_estimate_that_is_not_finite_is_refused(value, error):
     with pytest.raises(ConfigurationError, match='finite'):
         Estimate(value=value, error=error)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hexagonal_discs import hexagonal_patch
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from scipy.spatial import ConvexHull, QhullError
@@ -19,12 +20,9 @@ from nanorocks_ros.physics.filling_factor import (
     PAPER_CLUSTER_SIZES,
     PAPER_COMPACTION,
     RANDOM_CLOSE_PACKING,
-    SQUARE_LAYER,
     filling_of_height,
-    hexagonal_patch,
     hull_area,
     layer_filling,
-    least_hull_area,
     paper_cluster_filling,
 )
 
@@ -42,6 +40,16 @@ def perimeter(places):
     return hull + 2.0 * math.pi * R
 
 
+def least_hull_area(beads, perimeter):
+    """Lower bound of the hull area of discs of radius R that do not overlap, [m^2].
+
+    Groemer 1960, Math. Z. 73, 285.
+    """
+    root = math.sqrt(3.0)
+    area = 2.0 * root * (beads - 1) + (1.0 - 0.5 * root) * perimeter / R + math.pi * (root - 1.0)
+    return area * R**2
+
+
 def test_the_numbers_of_the_paper_are_those_printed():
     assert PAPER['filling_factor']['rcp'] == RANDOM_CLOSE_PACKING
     printed = PAPER['filling_factor']['relative_compaction_percent']
@@ -50,10 +58,9 @@ def test_the_numbers_of_the_paper_are_those_printed():
         assert PAPER['table3_clusters']['rows'][str(tray)][1] == size
 
 
-def test_a_hexagonal_layer_fills_0_605_and_a_square_one_0_524():
-    # One bead in its cell: a hexagon of inner radius R, a square of side 2R, both 2R high.
+def test_a_hexagonal_layer_fills_0_605():
+    # One bead in its cell: a hexagon of inner radius R, 2R high.
     assert pytest.approx(VOLUME / (2 * math.sqrt(3) * R**2 * 2 * R)) == HEXAGONAL_LAYER
-    assert pytest.approx(VOLUME / (2 * R) ** 3) == SQUARE_LAYER
     assert pytest.approx(0.6046, abs=5e-5) == HEXAGONAL_LAYER
 
 
@@ -81,8 +88,8 @@ def test_a_close_packed_layer_is_more_than_full_by_the_papers_formula():
     ],
 )
 def test_the_hull_of_discs_has_the_area_of_the_hull_of_centres_a_rim_and_a_disc(places, area):
-    found = hull_area(R * np.array(places, dtype=float), np.full(len(places), R))
-    assert found == pytest.approx(area * R**2, rel=3e-5)
+    area_of_hull = hull_area(R * np.array(places, dtype=float), np.full(len(places), R))
+    assert area_of_hull == pytest.approx(area * R**2, rel=3e-5)
 
 
 def test_a_disc_inside_another_adds_nothing_to_the_hull():
@@ -97,8 +104,8 @@ def test_the_hull_of_two_discs_of_different_size_is_a_belt_around_two_wheels():
     belt = (
         (math.pi / 2 + lean) * big**2 + (math.pi / 2 - lean) * small**2 + straight * (big + small)
     )
-    found = hull_area(np.array([[0.0, 0.0], [apart, 0.0]]), np.array([big, small]))
-    assert found == pytest.approx(belt, rel=3e-5)
+    area_of_hull = hull_area(np.array([[0.0, 0.0], [apart, 0.0]]), np.array([big, small]))
+    assert area_of_hull == pytest.approx(belt, rel=3e-5)
 
 
 @pytest.mark.parametrize('rings', [1, 2, 3])
@@ -111,7 +118,7 @@ def test_a_hexagon_of_touching_discs_has_its_exact_filling(rings):
         2 / 3 * n * math.pi * R**2 / hull, rel=3e-5
     )
     # Of all orders of so many discs with this perimeter, none has a smaller hull.
-    assert hull == pytest.approx(least_hull_area(n, R, 6 * side + 2 * math.pi * R))
+    assert hull == pytest.approx(least_hull_area(n, 6 * side + 2 * math.pi * R))
 
 
 def test_discs_of_a_patch_touch_and_do_not_overlap():
@@ -137,7 +144,7 @@ def test_no_flat_cluster_fills_more_than_hexagonal_order_or_has_less_than_groeme
     places = np.array(places)
     area = hull_area(places, np.full(n, R))
     assert layer_filling(np.full(n, R), area) < HEXAGONAL_LAYER
-    assert area > least_hull_area(n, R, perimeter(places)) * (1 - 3e-5)
+    assert area > least_hull_area(n, perimeter(places)) * (1 - 3e-5)
 
 
 def test_folding_a_chain_into_a_patch_raises_its_filling():
@@ -146,8 +153,8 @@ def test_folding_a_chain_into_a_patch_raises_its_filling():
     bent = chain.copy()
     bent[4:] = chain[3] + 2 * R * np.column_stack((np.zeros(3), np.arange(1, 4)))
     fillings = [
-        layer_filling(np.full(n, R), hull_area(one, np.full(n, R)))
-        for one in (bent, chain, hexagonal_patch(n, R))
+        layer_filling(np.full(n, R), hull_area(places, np.full(n, R)))
+        for places in (bent, chain, hexagonal_patch(n, R))
     ]
     assert fillings == sorted(fillings)
     assert fillings[2] / fillings[0] > 1.5
@@ -188,11 +195,10 @@ def test_turning_moving_and_scaling_a_cluster_changes_nothing():
         lambda: paper_cluster_filling(3, VOLUME, math.nan, R),
         lambda: hull_area(np.zeros((2, 3)), np.full(2, R)),
         lambda: hull_area(np.array([[math.inf, 0.0]]), np.array([R])),
-        lambda: hexagonal_patch(0, R),
         lambda: filling_of_height(np.array([R]), 1e-6, -1.0),
     ],
 )
-def test_what_is_no_cluster_is_refused_in_one_line(call):
+def test_wrong_clusters_are_refused_in_one_line(call):
     with pytest.raises(ConfigurationError) as caught:
         call()
     assert '\n' not in str(caught.value)

@@ -13,7 +13,6 @@ from nanorocks_ros.physics.error_propagation import Estimate
 from nanorocks_ros.physics.kinetic_theory import (
     contact_value,
     filling_factor,
-    kinetic_collision_rate,
     kinetic_decay_rate,
     kinetic_haff_time,
     kinetic_restitution,
@@ -31,11 +30,17 @@ def test_the_contact_value_is_that_of_carnahan_and_starling(filling, published):
     assert contact_value(filling) == pytest.approx(published, abs=1e-6)
 
 
+def collision_rate(mean_speed, diameter, number_density):
+    """Collisions of one bead per second by Enskog, [1/s]; Chapman, Cowling 1970, chapter 16."""
+    crowding = contact_value(filling_factor(diameter, number_density))
+    return math.sqrt(2.0) * math.pi * diameter**2 * number_density * crowding * mean_speed
+
+
 def test_the_mean_free_time_is_the_published_one():
     # 0.13031 in units of d sqrt(m/kT) at n d^3 = 0.5, molecular dynamics: Lue 2005,
     # doi:10.1063/1.1834498; 0.3 % is what the contact value lacks there.
     thermal = 0.01
-    rate = kinetic_collision_rate(math.sqrt(8.0 / math.pi) * thermal, DIAMETER, 0.5 / DIAMETER**3)
+    rate = collision_rate(math.sqrt(8.0 / math.pi) * thermal, DIAMETER, 0.5 / DIAMETER**3)
     assert 1.0 / rate * thermal / DIAMETER == pytest.approx(0.13031, rel=0.004)
 
 
@@ -51,15 +56,15 @@ def test_beads_lose_a_sixth_of_their_loss_in_each_collision():
     # 1/tau = omega (1 - e^2) / 6, whatever the density.
     speed = 0.005
     time = kinetic_haff_time(speed, 0.8, DIAMETER, DENSITY)
-    rate = kinetic_collision_rate(speed * 4.0 / math.pi, DIAMETER, DENSITY)
+    rate = collision_rate(speed * 4.0 / math.pi, DIAMETER, DENSITY)
     assert 1.0 / time == pytest.approx(rate * (1.0 - 0.64) / 6.0)
 
 
 @given(some.floats(0.0, 0.999))
 def test_the_restitution_undoes_the_decay(restitution):
     rate = kinetic_decay_rate(restitution, DIAMETER, DENSITY)
-    found = kinetic_restitution(rate, DIAMETER, DENSITY).value
-    assert found == pytest.approx(restitution, abs=1e-7)
+    undone = kinetic_restitution(rate, DIAMETER, DENSITY).value
+    assert undone == pytest.approx(restitution, abs=1e-7)
 
 
 def test_errors_are_those_of_the_formula():
@@ -79,7 +84,7 @@ def test_a_decay_faster_than_beads_can_make_is_an_error():
 
 
 @pytest.mark.parametrize('bad', [-0.1, 1.1, math.nan])
-def test_a_restitution_that_is_none_is_refused(bad):
+def test_a_restitution_outside_0_to_1_is_refused(bad):
     with pytest.raises(ConfigurationError, match='from 0 to 1'):
         kinetic_decay_rate(bad, DIAMETER, DENSITY)
 

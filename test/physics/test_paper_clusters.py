@@ -18,9 +18,9 @@ VALUES = json.loads((Path(__file__).parents[1] / 'paper_values.json').read_text(
 
 def test_table_3_is_the_papers():
     for tray, row in VALUES['table3_clusters']['rows'].items():
-        found = PAPER_TABLE_3[int(tray)]
-        assert [found.clusters, found.beads_per_cluster, found.deviation] == row[:3]
-        assert 100.0 * found.share == pytest.approx(row[3])
+        manual = PAPER_TABLE_3[int(tray)]
+        assert [manual.clusters, manual.beads_per_cluster, manual.deviation] == row[:3]
+        assert 100.0 * manual.share == pytest.approx(row[3])
 
 
 @pytest.mark.parametrize('tray', [1, 2, 3, 5])
@@ -54,7 +54,7 @@ def test_the_onset_is_the_first_growth_after_the_shake():
     assert math.isnan(paper_onset(times, -times))
 
 
-def test_the_rule_fires_on_noise():
+def test_the_rule_triggers_on_noise():
     generator = np.random.default_rng(4)
     times = np.arange(0.0, 20.0, 0.2)
     fired = [paper_onset(times, 1.0 + 0.03 * generator.normal(size=100)) for _ in range(20)]

@@ -19,7 +19,6 @@ from nanorocks_ros.physics.moving_area import (
     mean_displacement,
     mean_moving_area,
     moving_area,
-    taylor_moving_area,
 )
 from nanorocks_ros.physics.paper_formulas import (
     paper_instantaneous_restitution,
@@ -46,15 +45,15 @@ SIDE = 0.015
 
 
 def test_the_worked_example_gives_the_printed_restitution():
-    found = paper_restitution(
+    restitution = paper_restitution(
         EXAMPLE['T0_J'],
         EXAMPLE['tau0_s'],
         1e-6 * EXAMPLE['m_mg'],
         TRAY.diameter,
         TRAY.number_density,
     )
-    assert round(found, 2) == EXAMPLE['eps']
-    assert found == pytest.approx(EXAMPLE['recomputed']['eps_exact_inputs'], abs=1e-12)
+    assert round(restitution, 2) == EXAMPLE['eps']
+    assert restitution == pytest.approx(EXAMPLE['recomputed']['eps_exact_inputs'], abs=1e-12)
 
 
 def test_the_form_for_speeds_is_the_form_for_energies():
@@ -62,8 +61,8 @@ def test_the_form_for_speeds_is_the_form_for_energies():
     mass = 1e-6 * EXAMPLE['m_mg']
     assert granular_energy(v_relative, mass) == pytest.approx(EXAMPLE['T0_J'])
     rate = 1.0 / (0.5 * v_relative * EXAMPLE['tau0_s'])
-    found = paper_restitution_of_decay(rate, TRAY.diameter, TRAY.number_density)
-    assert found == pytest.approx(EXAMPLE['recomputed']['eps_exact_inputs'], abs=1e-12)
+    restitution = paper_restitution_of_decay(rate, TRAY.diameter, TRAY.number_density)
+    assert restitution == pytest.approx(EXAMPLE['recomputed']['eps_exact_inputs'], abs=1e-12)
 
 
 def test_a_faster_decay_than_the_form_allows_is_a_bound_or_an_error():
@@ -83,7 +82,13 @@ def test_values_that_are_not_positive_and_finite_are_named(bad):
 )
 def test_the_moving_area_is_equation_1(row):
     assert moving_area(row['dx'], 1.0) == pytest.approx(row['A'], abs=1e-12)
-    assert taylor_moving_area(row['dx'], 1.0) == pytest.approx(row['4Rdx'])
+
+
+@pytest.mark.parametrize(
+    'row', PAPER['eq1_geometry']['checks']['rows'], ids=lambda r: str(r['dx'])
+)
+def test_the_taylor_form_is_equation_2(row):
+    assert mean_displacement(row['4Rdx'], 1.0, 'taylor') == pytest.approx(row['dx'])
 
 
 def test_the_moving_area_saturates_at_two_discs():
@@ -102,7 +107,7 @@ def test_the_mean_area_is_the_average_over_rayleigh_displacements():
     assert mean_moving_area(0.7, 1.0) == pytest.approx(moving_area(drawn, 1.0).mean(), rel=2e-3)
 
 
-def test_a_saturated_area_says_nothing():
+def test_a_saturated_area_gives_no_displacement():
     assert math.isnan(mean_displacement(2 * math.pi * 1e-6, 1e-3, 'exact'))
 
 
@@ -161,28 +166,32 @@ def test_the_instantaneous_restitution_is_the_printed_formula():
     # F = n sigma v: 1.9547... collisions per second at 7 mm/s.
     rate = PAPER['instantaneous_cor']['collision_rate_check_tray1']['F_at_7mm_s']
     speed, ratio = 0.007, 0.995
-    found = paper_instantaneous_restitution(
+    restitution = paper_instantaneous_restitution(
         speed, ratio * speed, 1.0 / 30.0, TRAY.diameter, TRAY.number_density
     )
-    assert found == pytest.approx(ratio ** (30.0 / rate), rel=1e-12)
+    assert restitution == pytest.approx(ratio ** (30.0 / rate), rel=1e-12)
 
 
-def test_the_instantaneous_restitution_of_haffs_decay_is_another_one_than_haffs():
+def test_the_instantaneous_restitution_differs_from_that_of_haffs_law():
     # -ln e stands where 1 - e^2 does: 0.89 becomes exp(-(1 - 0.89^2)) = 0.812.
     n_sigma = TRAY.number_density * math.pi * TRAY.diameter**2
     speed, step = 0.01, 1e-4
     rate = n_sigma * (1.0 - 0.89**2)
     later = speed / (1.0 + rate * speed * step)
-    found = paper_instantaneous_restitution(speed, later, step, TRAY.diameter, TRAY.number_density)
-    assert found == pytest.approx(math.exp(-(1.0 - 0.89**2)), rel=1e-4)
+    restitution = paper_instantaneous_restitution(
+        speed, later, step, TRAY.diameter, TRAY.number_density
+    )
+    assert restitution == pytest.approx(math.exp(-(1.0 - 0.89**2)), rel=1e-4)
 
 
 def test_speeds_that_rise_give_more_than_one_and_never_overflow():
-    found = paper_instantaneous_restitution(1e-9, 1e-3, 1 / 30, TRAY.diameter, 1e6)
-    assert 1.0 < found < math.inf
+    restitution = paper_instantaneous_restitution(1e-9, 1e-3, 1 / 30, TRAY.diameter, 1e6)
+    assert 1.0 < restitution < math.inf
 
 
 def test_speeds_that_are_not_positive_have_no_instantaneous_restitution():
     before, after = np.array([1e-3, 0.0, -1e-3, np.nan]), np.array([-1e-3, 1e-3, 1e-3, 1e-3])
-    found = paper_instantaneous_restitution(before, after, 1.0, TRAY.diameter, TRAY.number_density)
-    assert np.isnan(found).all()
+    restitution = paper_instantaneous_restitution(
+        before, after, 1.0, TRAY.diameter, TRAY.number_density
+    )
+    assert np.isnan(restitution).all()

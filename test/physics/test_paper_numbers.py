@@ -100,7 +100,7 @@ def leaves(value, path):
     """Paths and values of all numbers below."""
     if isinstance(value, dict | list):
         items = value.items() if isinstance(value, dict) else enumerate(value)
-        return {k: v for name, one in items for k, v in leaves(one, f'{path}.{name}').items()}
+        return {k: v for name, item in items for k, v in leaves(item, f'{path}.{name}').items()}
     return {path: value} if isinstance(value, int | float) else {}
 
 
@@ -111,8 +111,8 @@ NUMBERS = {
 
 @pytest.mark.parametrize('name', WORKED_OUT)
 def test_the_number_of_the_paper_follows_from_its_own_forms(name):
-    found, tolerance = WORKED_OUT[name]
-    assert found == pytest.approx(NUMBERS[name], rel=max(tolerance, 1e-15))
+    value, tolerance = WORKED_OUT[name]
+    assert value == pytest.approx(NUMBERS[name], rel=max(tolerance, 1e-15))
 
 
 def test_no_number_that_concerns_the_restitution_is_left_out():

@@ -10,10 +10,10 @@ import pytest
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.physics.rough_spheres import (
     SOLID_SPHERE,
+    rms_spin,
     rough_rates,
     rough_temperature_ratio,
     smooth_equivalent,
-    spin_of,
     temperature_ratio_course,
 )
 from nanorocks_ros.simulation.engine.collision_rules import CollisionRules
@@ -22,13 +22,13 @@ from nanorocks_ros.simulation.engine.gas import Beads, HardSphereGas
 ROUGH = [(0.89, -0.5), (0.89, 0.0), (0.7, 0.3), (0.5, 1.0), (1.0, 0.5)]
 
 
-def test_smooth_beads_lose_as_smooth_beads_do_and_turn_nothing():
+def test_smooth_beads_have_the_smooth_loss_and_no_rotation():
     rates = rough_rates(0.8, -1.0)
     assert (rates.loss, rates.exchange, rates.drain) == pytest.approx((0.09, 0.0, 0.0))
     assert smooth_equivalent(0.8, -1.0) == pytest.approx(0.8)
 
 
-def test_perfectly_rough_elastic_beads_share_evenly_and_lose_nothing():
+def test_perfectly_rough_elastic_beads_reach_equipartition_without_loss():
     rates = rough_rates(1.0, 1.0)
     assert rates.loss == pytest.approx(rates.exchange)
     assert rates.drain == pytest.approx(rates.exchange)
@@ -74,7 +74,7 @@ def test_the_course_follows_the_rates_and_ends_at_the_ratio(restitution, tangent
     assert end == pytest.approx(rough_temperature_ratio(restitution, tangential))
 
 
-def test_a_simulated_gas_comes_to_share_as_the_theory_says():
+def test_a_simulated_gas_reaches_the_temperature_ratio_of_the_theory():
     """864 beads, from no rotation; correlations that the theory leaves out cost some per cent."""
     side, cells = 1.0, 6
     corner = np.array([[0, 0, 0], [1, 1, 0], [1, 0, 1], [0, 1, 1]]) * 0.5
@@ -117,9 +117,9 @@ def test_a_bead_in_equipartition_turns_some_ninety_degrees_a_second_at_a_millime
     """Of a bead of 2 mm that flies at 1 mm/s in space: sqrt(5/2) rad/s."""
     rms = math.sqrt(3.0 * math.pi / 8.0)
     projected = 1e-3 * math.pi / 4.0 / rms
-    assert spin_of(projected, 0.002) == pytest.approx(math.sqrt(2.5))
-    assert math.degrees(spin_of(projected, 0.002)) == pytest.approx(90.6, abs=0.1)
-    assert spin_of(projected, 0.002, 0.25) == pytest.approx(0.5 * math.sqrt(2.5))
+    assert rms_spin(projected, 0.002) == pytest.approx(math.sqrt(2.5))
+    assert math.degrees(rms_spin(projected, 0.002)) == pytest.approx(90.6, abs=0.1)
+    assert rms_spin(projected, 0.002, 0.25) == pytest.approx(0.5 * math.sqrt(2.5))
 
 
 @pytest.mark.parametrize(
@@ -130,10 +130,10 @@ def test_a_bead_in_equipartition_turns_some_ninety_degrees_a_second_at_a_millime
         (lambda: rough_rates(0.9, math.nan), 'tangential_restitution: nan'),
         (lambda: rough_temperature_ratio(0.9, -1.0), 'smooth beads keep their spin'),
         (lambda: temperature_ratio_course(np.zeros(1), 0.9, 0.0, -1.0), 'start: -1.0'),
-        (lambda: spin_of(0.0, 0.002), 'mean_projected_speed: 0.0'),
-        (lambda: spin_of(0.001, 0.002, math.inf), 'ratio: inf'),
+        (lambda: rms_spin(0.0, 0.002), 'mean_projected_speed: 0.0'),
+        (lambda: rms_spin(0.001, 0.002, math.inf), 'ratio: inf'),
     ],
 )
-def test_what_cannot_be_is_refused(call, message):
+def test_values_outside_their_ranges_are_refused(call, message):
     with pytest.raises(ConfigurationError, match=message):
         call()

@@ -15,7 +15,7 @@ from nanorocks_ros.simulation.ensemble import cooling_runs
 CONTACTS = slow_contacts(load_trays()[1])
 
 
-def test_beads_meet_as_often_per_way_as_in_the_simulated_tray():
+def test_the_contact_rate_per_path_length_is_that_of_the_simulated_tray():
     settings = SimulationSettings(restitution=0.89, wall_restitution=0.97, mean_speed=0.01)
     times = np.linspace(0.0, 20.0, 401)
     runs = cooling_runs(settings, load_trays()[1], times, range(20))
@@ -23,14 +23,14 @@ def test_beads_meet_as_often_per_way_as_in_the_simulated_tray():
     assert CONTACTS.rate == pytest.approx(2.0 * runs.pair_collisions.sum() / (15 * way), rel=0.1)
 
 
-def test_all_contacts_are_slower_than_anything():
+def test_the_rate_below_an_infinite_speed_is_that_of_all_contacts():
     for measure in ('normal', 'total'):
-        assert CONTACTS.slower(100.0, measure) == pytest.approx(CONTACTS.rate)
+        assert CONTACTS.rate_below(100.0, measure) == pytest.approx(CONTACTS.rate)
 
 
-def test_few_contacts_are_slow_and_fewer_by_their_whole_speed():
+def test_fewer_contacts_are_below_a_total_speed_than_below_a_normal_speed():
     speeds = np.geomspace(1e-5, 3.0, 60)
-    normal, total = (CONTACTS.slower(speeds, one) for one in ('normal', 'total'))
+    normal, total = (CONTACTS.rate_below(speeds, measure) for measure in ('normal', 'total'))
     assert (np.diff(normal) > 0.0).all()
     assert (np.diff(total) > 0.0).all()
     assert (total < normal).all()
@@ -40,33 +40,35 @@ def test_few_contacts_are_slow_and_fewer_by_their_whole_speed():
 
 def test_contacts_of_an_isotropic_gas_are_those_of_the_closed_form():
     variance = np.full(1, 0.4)
-    one = replace(CONTACTS, rates=np.ones(1), normal=variance, tangential=variance)
+    single = replace(CONTACTS, rates=np.ones(1), normal=variance, tangential=variance)
     speed = 0.7
     x = speed**2 / (2.0 * 0.4)
-    assert one.slower(speed) == pytest.approx(1.0 - np.exp(-x))
-    assert one.slower(speed, 'total') == pytest.approx(1.0 - (1.0 + x) * np.exp(-x), rel=2e-3)
+    assert single.rate_below(speed) == pytest.approx(1.0 - np.exp(-x))
+    assert single.rate_below(speed, 'total') == pytest.approx(
+        1.0 - (1.0 + x) * np.exp(-x), rel=2e-3
+    )
 
 
 def test_another_measure_is_refused():
     with pytest.raises(ConfigurationError, match='tangential'):
-        CONTACTS.slower(1.0, 'tangential')
+        CONTACTS.rate_below(1.0, 'tangential')
 
 
 @pytest.mark.parametrize('measure', ['normal', 'total'])
-def test_between_nodes_contacts_are_as_many_as_worked_out_for_that_speed(measure):
+def test_the_interpolated_rate_equals_the_exact_rate(measure):
     contacts = slow_contacts(load_trays()[3])
     speeds = np.geomspace(1e-3, 30.0, 97)
     for _ in range(2):
-        found = contacts.slower_between(speeds, measure)
-        np.testing.assert_allclose(found, contacts.slower(speeds, measure), rtol=1e-3)
+        interpolated = contacts.interpolated_rate_below(speeds, measure)
+        np.testing.assert_allclose(interpolated, contacts.rate_below(speeds, measure), rtol=1e-3)
 
 
 @pytest.mark.parametrize('measure', ['normal', 'total'])
-def test_sums_over_mean_speeds_are_those_of_the_single_ones(measure):
+def test_sums_over_mean_speeds_equal_sums_of_single_rates(measure):
     speeds, means = np.geomspace(1e-9, 10.0, 40), np.geomspace(1e-4, 1e-2, 7)
     weights = np.linspace(0.5, 2.0, 7)
-    each = CONTACTS.slower_between(speeds[:, np.newaxis] / means, measure)
-    found = CONTACTS.slower_sum(speeds, means, weights, measure)
-    np.testing.assert_allclose(found, each @ weights, rtol=1e-11)
-    logs = CONTACTS.log_slower_sum(speeds, means, measure)
-    np.testing.assert_allclose(logs, np.log(each).sum(axis=1), rtol=1e-11)
+    slower = CONTACTS.interpolated_rate_below(speeds[:, np.newaxis] / means, measure)
+    sums = CONTACTS.summed_rate_below(speeds, means, weights, measure)
+    np.testing.assert_allclose(sums, slower @ weights, rtol=1e-11)
+    logs = CONTACTS.summed_log_rate_below(speeds, means, measure)
+    np.testing.assert_allclose(logs, np.log(slower).sum(axis=1), rtol=1e-11)

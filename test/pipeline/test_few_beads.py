@@ -48,10 +48,10 @@ def test_of_one_or_two_beads_there_is_a_speed_and_nothing_confident_else(beads):
     assert any(isinstance(record, SpeedEstimate) for record in records)
     assert not any(isinstance(record, Merge) for record in records)
     for item in records:
-        if isinstance(item, CorEstimate) and not math.isnan(item.restitution):
-            assert item.restitution_lower <= item.restitution <= item.restitution_upper
+        if isinstance(item, CorEstimate) and not math.isnan(item.restitution.value):
+            assert item.restitution.lower <= item.restitution.value <= item.restitution.upper
         if isinstance(item, ClusterEstimate):
-            assert not item.bodies > beads
+            assert not item.bodies.value > beads
             assert item.sticking_status in (StickingStatus.UNKNOWN, StickingStatus.NO_MERGE)
 
 
@@ -78,10 +78,12 @@ def test_of_an_empty_tray_nothing_is_said():
     assert clusters
     for cluster in clusters:
         assert cluster.size_status is SizeStatus.NOTHING
-        assert math.isnan(cluster.combined_size)
-        assert math.isnan(cluster.bodies)
+        assert math.isnan(cluster.combined_size.value)
+        assert math.isnan(cluster.bodies.value)
         assert cluster.sticking_status is StickingStatus.UNKNOWN
     assert not any(isinstance(record, Merge) for record in records)
     assert all(
-        math.isnan(record.restitution) for record in records if isinstance(record, CorEstimate)
+        math.isnan(record.restitution.value)
+        for record in records
+        if isinstance(record, CorEstimate)
     )

@@ -67,6 +67,6 @@ def test_the_estimates_of_a_first_cycle_compile_nothing_more():
         if isinstance(record, SpeedEstimate):
             results += fitter.push(record)
     assert results[-1].rebounds == 3
-    assert results[-1].restitution == pytest.approx(0.9, abs=0.2)
+    assert results[-1].restitution.value == pytest.approx(0.9, abs=0.2)
     assert meter.of_cycle(1, 20 * NS) is not None
     assert compiled_for() == before

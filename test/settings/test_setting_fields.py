@@ -19,15 +19,15 @@ ALL = (
 )
 
 
-@pytest.mark.parametrize('settings', ALL, ids=lambda one: type(one).__name__)
+@pytest.mark.parametrize('settings', ALL, ids=lambda settings: type(settings).__name__)
 def test_every_default_lies_in_its_own_range_and_is_documented(settings):
     for row in st.rows(settings):
         assert st.problem(row, row.default) is None
         assert row.doc
 
 
-@pytest.mark.parametrize('settings', ALL, ids=lambda one: type(one).__name__)
-def test_nan_and_negative_numbers_are_refused_wherever_a_number_is_wanted(settings):
+@pytest.mark.parametrize('settings', ALL, ids=lambda settings: type(settings).__name__)
+def test_nan_and_negative_numbers_are_refused_for_every_number(settings):
     numbers = [
         row
         for row in st.rows(settings)
@@ -48,7 +48,7 @@ def test_a_nested_value_is_replaced_and_nothing_else():
     assert changed.cooling == st.CoolingSettings()
 
 
-def test_a_whole_number_does_for_a_real_one_and_a_list_for_a_tuple():
+def test_a_whole_number_is_accepted_for_a_real_one_and_a_list_for_a_tuple():
     values = {'preprocess.pixels_per_metre': 13500, 'trays': [1.0, 3.0]}
     changed = st.with_values(st.PipelineSettings(), values, 'test')
     assert isinstance(changed.preprocess.pixels_per_metre, float)
@@ -74,7 +74,7 @@ def test_every_problem_is_listed_at_once():
         ('trays', [0]),
         ('trays', [math.nan]),
         ('trays_file', 3),
-        ('speed.longest_lag_frames', 2.5),
+        ('speed.max_lag_frames', 2.5),
         ('speed.interval', True),
         ('speed.interval', 'fast'),
     ],
@@ -88,3 +88,46 @@ def test_a_flag_is_true_or_false():
     assert st.with_values(st.BagSettings(), {'loop': True}, 'test').loop
     with pytest.raises(ConfigurationError, match='neither true nor false'):
         st.with_values(st.BagSettings(), {'loop': 1}, 'test')
+
+
+def deprecated_rows():
+    return [row for row in st.rows(st.PipelineSettings()) if row.deprecated]
+
+
+@pytest.mark.parametrize('row', deprecated_rows(), ids=lambda row: row.deprecated)
+def test_the_old_name_of_a_setting_sets_it_with_a_warning_that_names_the_new_one(row):
+    value = False if isinstance(row.default, bool) else type(row.default)(row.bounds.high)
+    with pytest.warns(FutureWarning, match=f"'{row.deprecated}' is now called '{row.name}'"):
+        changed = st.with_values(st.PipelineSettings(), {row.deprecated: value}, 'mine.yaml')
+    assert changed == st.with_values(st.PipelineSettings(), {row.name: value}, 'mine.yaml')
+
+
+def test_no_old_name_is_the_name_of_another_setting():
+    names = [row.name for row in st.rows(st.PipelineSettings())]
+    names += [row.deprecated for row in deprecated_rows()]
+    assert len(names) == len(set(names))
+
+
+def test_a_setting_under_its_old_and_its_new_name_is_refused():
+    values = {'tracking.fastest': 0.1, 'tracking.max_speed': 0.2}
+    with pytest.raises(ConfigurationError) as caught:
+        st.with_values(st.PipelineSettings(), values, 'mine.yaml')
+    assert str(caught.value) == (
+        "mine.yaml: 'tracking.fastest' and 'tracking.max_speed' are the same setting; "
+        "give 'tracking.max_speed' alone"
+    )
+
+
+def test_a_wrong_value_under_an_old_name_is_refused_under_the_new_one():
+    with (
+        pytest.warns(FutureWarning),
+        pytest.raises(ConfigurationError, match=r'tracking.max_speed: -1.0 is outside'),
+    ):
+        st.with_values(st.PipelineSettings(), {'tracking.fastest': -1.0}, 'test')
+
+
+def test_names_with_a_prefix_are_renamed_with_it():
+    values = {'stages.tracking.fastest': 0.1, 'tracking.fastest': 0.2}
+    renamed, messages = st.with_current_names(st.PipelineSettings(), values, 'node', 'stages.')
+    assert renamed == {'stages.tracking.max_speed': 0.1, 'tracking.fastest': 0.2}
+    assert len(messages) == 1

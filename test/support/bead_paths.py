@@ -1,4 +1,4 @@
-"""Tracks of beads whose ways are known: of a gas followed event by event, or made up."""
+"""Tracks of beads with known trajectories."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ PIXEL = 1.0 / 12500.0
 
 
 def tracks_of(positions, *, velocities=None, displacements=None, jitter=0.0, seed=1, tray=1):
-    """A record for each picture of beads of 2 mm.
+    """One record of beads of 2 mm for each frame.
 
-    Positions (frames, n, 2) are past the camera, jitter in metres; what is stated as error is
-    a twentieth of a pixel at least.
+    `positions` (frames, n, 2) are in the camera frame; `jitter` is the noise in metres. The stated
+    error is at least a twentieth of a pixel.
     """
     positions = np.asarray(positions, dtype=float)
     frames, n = positions.shape[:2]
@@ -39,14 +39,15 @@ def tracks_of(positions, *, velocities=None, displacements=None, jitter=0.0, see
 
 
 def bounced(time, speed, restitution, *, at=0.4, along=0.0, wall=lambda t: 0.0, change=0.0):
-    """Place of a bead of 2 mm that comes back from the low wall, (frames, 1, 2).
+    """Positions of a bead of 2 mm that rebounds from wall 0 at time `at`, (frames, 1, 2).
 
-    It flies along the columns at a speed, and along the rows; `wall` is where the wall is.
+    Its speed is `speed` towards the wall and `along` parallel to it; `change` is added to the
+    second at the rebound. `wall` gives the position of the wall at a time.
     """
     step = 1e-5
-    push = (wall(at + step) - wall(at - step)) / (2.0 * step)
+    wall_velocity = (wall(at + step) - wall(at - step)) / (2.0 * step)
     contact = 1e-3 + wall(at)
-    back = push + restitution * (speed + push)
-    x = np.where(time < at, contact - speed * (time - at), contact + back * (time - at))
+    outgoing = wall_velocity + restitution * (speed + wall_velocity)
+    x = np.where(time < at, contact - speed * (time - at), contact + outgoing * (time - at))
     y = 7e-3 + along * (time - at) + np.where(time > at, change * (time - at), 0.0)
     return np.stack([x, y], axis=1)[:, None]

@@ -1,4 +1,4 @@
-"""Contacts that are drawn as the likelihoods say they come about."""
+"""Contacts drawn from the likelihoods."""
 
 from __future__ import annotations
 

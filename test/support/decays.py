@@ -33,9 +33,9 @@ def simulated_table(path, cycles, error=1e-4, restitution=0.89, speed=0.007, see
     speeds = cooling_runs(settings, load_trays()[1], TIMES, range(cycles)).mean_projected_speed
     noisy = speeds + error * np.random.default_rng(seed).normal(size=speeds.shape)
     rows = [
-        (k * PERIOD + age, k + 1, k * PERIOD, one, error, 0.3)
+        (k * PERIOD + age, k + 1, k * PERIOD, speed_now, error, 0.3)
         for k in range(cycles)
-        for age, one in zip(TIMES.tolist(), noisy[k].tolist(), strict=True)
+        for age, speed_now in zip(TIMES.tolist(), noisy[k].tolist(), strict=True)
     ]
     return write_rows(path, rows)
 
@@ -52,16 +52,18 @@ def simulated_mixture(path, number, cycles, error=1e-4, restitution=0.89, speed=
         frame_rate=5.0,
         seed=seed,
     )
-    species = np.repeat(np.arange(2), [one.count for one in tray.species])
+    species = np.repeat(np.arange(2), [beads.count for beads in tray.species])
     rng = np.random.default_rng(seed)
     rows = []
     for run in range(cycles):
         for k, moment in enumerate(ShakenTray(settings, tray, run).moments(111)):
-            each = np.hypot(*moment.velocities[:, :2].T)
-            own = [each[species == one].mean() + error * rng.normal() for one in (0, 1)]
+            bead_speeds = np.hypot(*moment.velocities[:, :2].T)
+            species_speeds = [
+                bead_speeds[species == index].mean() + error * rng.normal() for index in (0, 1)
+            ]
             start = run * PERIOD
-            mean = np.average(own, weights=[one.count for one in tray.species])
-            values = (mean, error, own[0], error, own[1], error)
+            mean = np.average(species_speeds, weights=[beads.count for beads in tray.species])
+            values = (mean, error, species_speeds[0], error, species_speeds[1], error)
             if k:
                 rows.append((start + 0.2 * k, run + 1, start, *values, 0.3))
     names = ['mean_projected_speed', 'first_species_speed', 'second_species_speed']

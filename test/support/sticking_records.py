@@ -1,4 +1,4 @@
-"""Speeds, counts of bodies and merges of a cycle, as kinetic theory has them."""
+"""Speeds, body counts and merges of a cycle, simulated from kinetic theory."""
 
 from __future__ import annotations
 
@@ -7,7 +7,13 @@ import numpy as np
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.physics.haff_law import haff_speed
 from nanorocks_ros.physics.sticking_rates import slow_contacts
-from nanorocks_ros.records import BodyEstimate, Merge, SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import (
+    BodyEstimate,
+    Measured,
+    Merge,
+    SpeedEstimate,
+    SpeedMethod,
+)
 
 NS = 1_000_000_000
 TRAY = load_trays()[1]
@@ -24,8 +30,7 @@ def speed(time, value, cycle, start):
         tray=1,
         cycle=cycle,
         cycle_start_ns=round(start * NS),
-        mean_projected_speed=value,
-        mean_projected_speed_error=0.02 * value,
+        mean_projected_speed=Measured(value, 0.02 * value),
         window=0.1,
         method=SpeedMethod.TRACKING,
     )
@@ -53,18 +58,18 @@ def count(time, bodies, cycle):
 
 
 def cooling(cycle=1, start=0.0, seed=0, sticking=STICKING, until=40.0):
-    """Records of a cycle in which bodies merge as often as kinetic theory says."""
+    """Records of a cycle in which bodies merge at the rate of kinetic theory."""
     rng = np.random.default_rng([seed, cycle])
     contacts = slow_contacts(TRAY)
-    bodies, found, step = float(TRAY.count), [], 0.1
+    bodies, records, step = float(TRAY.count), [], 0.1
     for time in np.arange(step, until, step):
         value = float(haff_speed(time, 8e-3, 4.0))
-        rate = 0.5 * bodies**2 / TRAY.count * value * float(contacts.slower(sticking / value))
+        rate = 0.5 * bodies**2 / TRAY.count * value * float(contacts.rate_below(sticking / value))
         if bodies > 1.0 and rng.uniform() < rate * step:
             bodies -= 1.0
-            found.append(merge(start + time, cycle))
-        found += [speed(start + time, value, cycle, start), count(start + time, bodies, cycle)]
-    return found
+            records.append(merge(start + time, cycle))
+        records += [speed(start + time, value, cycle, start), count(start + time, bodies, cycle)]
+    return records
 
 
 def merge(time, cycle, known=0.6):

@@ -1,4 +1,4 @@
-"""Trays filmed without a lens, and the truth about every bead."""
+"""Simulated films of trays without lens effects, with the true position of every bead."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ RATE = 30.0
 
 @dataclass(frozen=True)
 class Truth:
-    """What was drawn: places [m], velocities [m/s]."""
+    """True positions [m] and velocities [m/s] of the beads in an image."""
 
     positions: np.ndarray
     velocities: np.ndarray
@@ -37,7 +37,7 @@ def pipeline_settings(number, **values):
 
 
 def tray_film(number, frames, speed=0.007, **values):
-    """Images of a tray that is shaken after six pictures, with the truth of each."""
+    """Images of a tray that is shaken after six frames, with the truth of each."""
     tray = load_trays()[number]
     width, height = (round(side * SCALE) for side in tray.dimensions[:2])
     settings = SimulationSettings(
@@ -63,12 +63,12 @@ def tray_film(number, frames, speed=0.007, **values):
         yield image, Truth(moment.positions, moment.velocities, shaken.radii, species)
 
 
-def paired(truth, places, reach):
-    """Which of the true places each of those found is of; asserts nothing."""
+def match_positions(true_positions, positions, reach):
+    """Rows of true and of detected positions that match within `reach`."""
     from scipy.optimize import linear_sum_assignment
     from scipy.spatial.distance import cdist
 
-    apart = cdist(truth, places)
-    rows, columns = linear_sum_assignment(np.minimum(apart, reach))
-    near = apart[rows, columns] < reach
-    return rows[near], columns[near]
+    distances = cdist(true_positions, positions)
+    rows, columns = linear_sum_assignment(np.minimum(distances, reach))
+    is_near = distances[rows, columns] < reach
+    return rows[is_near], columns[is_near]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from enum import Enum
 from pathlib import Path
 
@@ -13,12 +14,16 @@ from rosbags.typesys import get_types_from_msg
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.records import (
+    UNKNOWN_MEASURED,
     BodyEstimate,
     ClusterEstimate,
     CorEstimate,
     CorRelation,
     CorStatus,
     GroundTruth,
+    Interval,
+    Measured,
+    MeasuredInterval,
     Merge,
     PairCollision,
     Quality,
@@ -30,6 +35,7 @@ from nanorocks_ros.records import (
     TrayState,
 )
 from nanorocks_ros.wire.array_layouts import from_array, layout, to_array
+from nanorocks_ros.wire.products import PRODUCTS
 
 DEFINITIONS = Path(__file__).parents[2] / 'msg_defs' / 'nanorocks_msgs' / 'msg'
 EPOCH = 1_700_000_000_000_000_000
@@ -47,18 +53,32 @@ WHOLE = {
     **{f'bodies_of_{size}': 'sizes' for size in ('1', '2', '3', '4_to_6', '7_or_more')},
 }
 
+
+def part_of(element, fields):
+    """The field that an element is a part of: of an array, a value, or a tuple of species."""
+    base = re.sub('_(error|lower|upper)$', '', element)
+    if element in WHOLE or base in fields:
+        return WHOLE.get(element, base)
+    return re.sub('^(first|second)_species_(.*)', r'species_\2s', base)
+
+
+def numbers(value):
+    """The numbers of a value, or of those in a tuple."""
+    values = value if isinstance(value, tuple) else (value,)
+    return [dataclasses.astuple(measured) for measured in values]
+
+
 RECORDS = (
     SpeedEstimate(
         stamp_ns=EPOCH + 2_500_000_000,
         tray=3,
         cycle=2,
         cycle_start_ns=EPOCH + 1_000_000_000,
-        mean_projected_speed=4.5e-3,
-        mean_projected_speed_error=1e-4,
+        mean_projected_speed=Measured(4.5e-3, 1e-4),
         window=0.2,
         method=SpeedMethod.BINARISED_AREA,
         quality=Quality.GLARE | Quality.FEW_BEADS,
-        first_species_speed=4e-3,
+        species_speeds=(Measured(4e-3),),
     ),
     TrayState(
         stamp_ns=EPOCH + 10**9,
@@ -150,10 +170,7 @@ RECORDS = (
         axes_ratio=1.25,
         direction=-0.5,
         breadth=2.75,
-        cluster_size=3.5,
-        cluster_size_error=0.75,
-        cluster_size_lower=2.5,
-        cluster_size_upper=4.5,
+        cluster_size=MeasuredInterval(3.5, 0.75, 2.5, 4.5),
         size_status=SizeStatus.MEASURED,
     ),
     CorEstimate(
@@ -162,7 +179,8 @@ RECORDS = (
         cycle=1,
         status=CorStatus.FINAL,
         relation=CorRelation.PAPER,
-        restitution=0.9,
+        restitution=Interval(0.9, 0.85, 0.95),
+        species_haff_times=(UNKNOWN_MEASURED, Measured(2.5, 0.25)),
         samples=120,
     ),
     GroundTruth(
@@ -178,8 +196,20 @@ RECORDS = (
     ),
 )
 
+# And one of every kind in the register.
+RECORDS += tuple(
+    from_array(
+        product.record,
+        np.ones(len(layout(product.record).fields)),
+        tray=1,
+        epoch_ns=EPOCH,
+        where='test',
+    )
+    for product in PRODUCTS
+)
 
-@pytest.mark.parametrize('record', RECORDS, ids=lambda one: type(one).__name__)
+
+@pytest.mark.parametrize('record', RECORDS, ids=lambda record: type(record).__name__)
 def test_a_record_comes_back_from_its_array_to_float32_rounding(record):
     values = to_array(record, EPOCH)
     assert values.dtype == np.float32
@@ -187,7 +217,9 @@ def test_a_record_comes_back_from_its_array_to_float32_rounding(record):
     for field in dataclasses.fields(record):
         before, after = getattr(record, field.name), getattr(back, field.name)
         assert type(after) is type(before)
-        if isinstance(before, np.ndarray):
+        if isinstance(before, Interval | Measured | MeasuredInterval | tuple):
+            np.testing.assert_allclose(numbers(after), numbers(before), rtol=2**-23)
+        elif isinstance(before, np.ndarray):
             assert after.dtype == before.dtype
             np.testing.assert_allclose(after, before, rtol=2**-23)
         elif isinstance(before, float):
@@ -198,7 +230,7 @@ def test_a_record_comes_back_from_its_array_to_float32_rounding(record):
             assert after == pytest.approx(before, abs=200)
 
 
-@pytest.mark.parametrize('record', RECORDS, ids=lambda one: type(one).__name__)
+@pytest.mark.parametrize('record', RECORDS, ids=lambda record: type(record).__name__)
 def test_the_layout_is_the_message_definition_as_an_independent_parser_reads_it(record):
     name = type(record).__name__
     text = (DEFINITIONS / f'{name}.msg').read_text()
@@ -211,7 +243,7 @@ def test_the_layout_is_the_message_definition_as_an_independent_parser_reads_it(
     assert all(field.unit and field.doc for field in one.fields)
 
 
-@pytest.mark.parametrize('record', RECORDS, ids=lambda one: type(one).__name__)
+@pytest.mark.parametrize('record', RECORDS, ids=lambda record: type(record).__name__)
 def test_every_array_starts_with_time_and_cycle_and_holds_the_whole_record(record):
     names = [field.name for field in layout(type(record)).fields]
     assert names[:2] == ['time', 'cycle']
@@ -223,7 +255,8 @@ def test_every_array_starts_with_time_and_cycle_and_holds_the_whole_record(recor
         'first_merge_ns': 'first_merge',
     }
     parts = [
-        name if name in expected or name in renamed.values() else WHOLE[name] for name in names
+        name if name in expected or name in renamed.values() else part_of(name, expected)
+        for name in names
     ]
     assert set(parts) == {renamed.get(name, name) for name in expected}
     shapes = {

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.outputs.json_values import finite_or_none
 
 if TYPE_CHECKING:
     import argparse
@@ -48,8 +49,8 @@ def run(options: argparse.Namespace) -> int:
     from nanorocks_ros.studies.analysis.bag_frames import BagFrames
     from nanorocks_ros.studies.calibration.camera_calibration import (
         calibrate,
-        shown,
-        still_picture,
+        draw_calibration,
+        median_image,
         write_picture,
     )
 
@@ -60,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     fit = None
     if options.show:
         calibration = load_calibration(options.show)
-        picture = still_picture(BagFrames(options.recording, options.image_topic))
+        picture = median_image(BagFrames(options.recording, options.image_topic))
         _check_size(options.show, calibration, picture.shape)
     else:
         for tray in trays:
@@ -76,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
         remark = f'nanorocks calibrate, from {Path(options.recording).name}'
         write_calibration(calibration, Path(options.output), remark)
     if options.picture:
-        write_picture(Path(options.picture), shown(picture, calibration, trays))
+        write_picture(Path(options.picture), draw_calibration(picture, calibration))
     if options.json:
         print(json.dumps(as_json(calibration, fit), allow_nan=False))
     else:
@@ -104,7 +105,7 @@ def _check_size(path: str, calibration: Calibration, shape: tuple[int, ...]) -> 
 
 def as_json(calibration: Calibration, fit: PlateFit | None) -> dict[str, Any]:
     """The calibration as plain values; null where unknown."""
-    from nanorocks_ros.studies.calibration.camera_calibration import largest_bend
+    from nanorocks_ros.studies.calibration.camera_calibration import max_distortion_px
 
     residual = calibration.residual_px
     info = calibration.info
@@ -117,8 +118,8 @@ def as_json(calibration: Calibration, fit: PlateFit | None) -> dict[str, Any]:
         'r': list(info.r),
         'p': list(info.p),
         'pixels_per_metre': calibration.pixels_per_metre,
-        'residual_px': None if math.isnan(residual) else residual,
-        'largest_bend_px': largest_bend(calibration),
+        'residual_px': finite_or_none(residual),
+        'largest_bend_px': max_distortion_px(calibration),
         'trays': {str(number): list(region) for number, region in calibration.regions.items()},
     }
     if fit is not None:
@@ -128,13 +129,15 @@ def as_json(calibration: Calibration, fit: PlateFit | None) -> dict[str, Any]:
 
 
 def _print(calibration: Calibration, fit: PlateFit | None, options: argparse.Namespace) -> None:
-    from nanorocks_ros.studies.calibration.camera_calibration import largest_bend
+    from nanorocks_ros.studies.calibration.camera_calibration import max_distortion_px
 
     info = calibration.info
     print(f'{info.width}x{info.height} px, {info.distortion_model}')
     print(f'focal length {info.k[0]:.1f} px, axis at {info.k[2]:.1f}, {info.k[5]:.1f} px')
     print(f'distortion {", ".join(f"{one:.4f}" for one in info.d)}')
-    print(f'the lens moves the corners of the trays by up to {largest_bend(calibration):.1f} px')
+    print(
+        f'the lens moves the corners of the trays by up to {max_distortion_px(calibration):.1f} px'
+    )
     print(f'scale {calibration.pixels_per_metre:.0f} px/m in the rectified picture')
     if not math.isnan(calibration.residual_px):
         edges = '' if fit is None else f' ({len(fit.residuals)} places on edges)'

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
@@ -127,7 +128,7 @@ def _fit_as_json(fit: AreaFit) -> dict[str, Any]:
         'area_factor': fit.factor,
         'area_factor_error': fit.factor_error,
         'area_offset': fit.offset,
-        'area_offset_error': fit.offset_error if math.isfinite(fit.offset_error) else None,
+        'area_offset_error': finite_or_none(fit.offset_error),
         'windows': fit.windows,
         'slowest': fit.slowest,
         'fastest': fit.fastest,

@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.outputs.json_values import finite_or_none
+
 if TYPE_CHECKING:
     import argparse
 
@@ -90,7 +92,9 @@ def run(options: argparse.Namespace) -> int:
     found = {number: curves[curve_key(cells[number])] for number in numbers}
     if options.json:
         shown = {str(number): _values(curve) for number, curve in found.items()}
-        print(json.dumps({'output': str(output), 'trays': shown, **json.loads(plan.question())}))
+        print(
+            json.dumps({'output': str(output), 'trays': shown, **json.loads(plan.specification())})
+        )
         return 0
     for number, curve in found.items():
         print(f'tray {number}: {_sentence(curve)}')
@@ -99,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _values(curve: ClusterCurve) -> dict[str, Any]:
     return {
-        'largest': None if math.isnan(curve.largest) else curve.largest,
+        'largest': finite_or_none(curve.largest),
         'sizes': [math.exp(one) for one in curve.log_size],
         'readings': curve.reading.tolist(),
         'weight': curve.weight,

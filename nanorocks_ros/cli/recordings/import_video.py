@@ -131,18 +131,18 @@ def _run_each(
 
 
 def _tell(imported: Imported) -> None:
-    from nanorocks_ros.outputs.safe_text import shown
+    from nanorocks_ros.outputs.safe_text import printable
 
     for notice in imported.notices:
-        print(f'nanorocks: {shown(notice)}', file=sys.stderr)
+        print(f'nanorocks: {printable(notice)}', file=sys.stderr)
 
 
 def _tell_left_out(files: list[Path]) -> None:
     if not files:
         return
-    from nanorocks_ros.outputs.safe_text import shown
+    from nanorocks_ros.outputs.safe_text import printable
 
-    named = [*(shown(file.name) for file in files[:_NAMED]), *['...'] * (len(files) > _NAMED)]
+    named = [*(printable(file.name) for file in files[:_NAMED]), *['...'] * (len(files) > _NAMED)]
     names = ', '.join(named)
     print(
         f'nanorocks: left out {len(files)} files that may be films or pictures of one, but not by '
@@ -154,10 +154,10 @@ def _tell_left_out(files: list[Path]) -> None:
 def _tell_failures(found: ImportedEach) -> int:
     if not found.failed:
         return 0
-    from nanorocks_ros.outputs.safe_text import shown
+    from nanorocks_ros.outputs.safe_text import printable
 
     for error in found.failed.values():
-        print(f'nanorocks: {shown(str(error))}', file=sys.stderr)
+        print(f'nanorocks: {printable(str(error))}', file=sys.stderr)
     total = len(found.failed) + len(found.imported) + len(found.skipped)
     print(
         f'nanorocks: {len(found.failed)} of {total} videos could not be imported, listed above; '
@@ -168,11 +168,11 @@ def _tell_failures(found: ImportedEach) -> int:
 
 
 def _text(imported: Imported) -> str:
-    from nanorocks_ros.outputs.safe_text import shown
+    from nanorocks_ros.outputs.safe_text import printable
 
     dropped = imported.duplicates_dropped
     return (
-        f'{shown(imported.bag)}: {imported.frames} frames, {imported.duration:.3f} s'
+        f'{printable(imported.bag)}: {imported.frames} frames, {imported.duration:.3f} s'
         f'{f", {dropped} duplicates dropped" if dropped else ""}, '
         f'{imported.provenance["pictures"]}'
     )

@@ -23,13 +23,13 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Salvage, print; the exit code."""
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.outputs.safe_text import shown
+    from nanorocks_ros.outputs.safe_text import printable
     from nanorocks_ros.recordings.bag.salvage import salvage
 
     with Progress('salvaging') as progress:
         found = salvage(Path(options.bag), Path(options.output), progress.count)
     for notice in found.notices:
-        print(f'nanorocks: {shown(notice)}', file=sys.stderr)
+        print(f'nanorocks: {printable(notice)}', file=sys.stderr)
     if options.json:
         values = {
             'messages_recovered': found.recovered,
@@ -40,5 +40,5 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(values))
     else:
         lost = f'{found.lost} known to be lost'
-        print(f'{shown(found.bag)}: {found.recovered} messages recovered, {lost}')
+        print(f'{printable(found.bag)}: {found.recovered} messages recovered, {lost}')
     return 0

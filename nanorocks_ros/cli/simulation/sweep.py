@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.settings import SimulationSettings, rows
 
 if TYPE_CHECKING:
     import argparse
-
-    import numpy as np
-    from numpy.typing import NDArray
 
     from nanorocks_ros.settings import Scalar, SettingRow
     from nanorocks_ros.studies.decays.decay_curve import SpeedCurve
@@ -229,23 +227,14 @@ def _as_json(found: Sweep) -> dict[str, Any]:
     from nanorocks_ros.studies.sweeps.sweep_parts import COUNTS
     from nanorocks_ros.studies.sweeps.sweep_result import CURVES
 
-    asked = json.loads(found.question)
+    specification = json.loads(found.specification)
     curves = {name: getattr(found, name) for name in CURVES}
     return {
         'axes': {axis.name: list(axis.values) for axis in found.axes},
         'runs': found.runs,
-        'seed': asked['settings']['seed'],
-        'version': asked['version'],
+        'seed': specification['settings']['seed'],
+        'version': specification['version'],
         'time': found.times.tolist(),
-        **{name: _known(curve) for name, curve in curves.items()},
+        **{name: json_values(curve) for name, curve in curves.items()},
         **{name: getattr(found, name).tolist() for name in COUNTS},
     }
-
-
-def _known(values: NDArray[np.float64]) -> list[Any]:
-    """Numbers as JSON has them: null for NaN."""
-    import numpy as np
-
-    plain = values.astype(object)
-    plain[~np.isfinite(values)] = None
-    return list(plain.tolist())

@@ -1,22 +1,21 @@
-"""Curves of cluster sizes: which tray they are for, and the files that hold them."""
+"""Files of cluster curves: the relation of cluster size to level area, for each tray."""
 
 from __future__ import annotations
 
 import json
 import math
-import zipfile
 from functools import lru_cache
-from importlib import resources
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.inference.calibration_archives import load_archive
 from nanorocks_ros.inference.cluster_size.curve_fit import fit_curve
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -28,28 +27,28 @@ PACKAGED = 'cluster_curves.npz'
 
 
 def curve_key(tray: Tray) -> str:
-    """What decides how the pictures of a tray look, as a JSON object."""
+    """Properties that determine the images of a tray, as a JSON object."""
     species = [
-        {'material': one.material, 'low': one.diameter_low, 'high': one.diameter_high}
-        | {'count': one.count}
-        for one in tray.species
+        {'material': kind.material, 'low': kind.diameter_low, 'high': kind.diameter_high}
+        | {'count': kind.count}
+        for kind in tray.species
     ]
     return json.dumps({'dimensions': tray.dimensions, 'species': species, 'chalk': tray.chalk})
 
 
 def build_command(tray: Tray) -> str:
-    """What to type to get the curve of a tray."""
+    """Command that makes the curve of a tray."""
     return f'nanorocks cluster-curve --tray {tray.number} -o curve.npz'
 
 
 def curve_of(tray: Tray, path: str | Path = '') -> ClusterCurve:
-    """The curve of a tray: from a file, or the one that comes with the package.
+    """The curve of a tray, from a file or from the package.
 
     Parameters
     ----------
     tray : Tray
     path : str or Path
-        Empty: of the package.
+        Empty: the file in the package.
 
     Raises
     ------
@@ -71,12 +70,12 @@ def curve_of(tray: Tray, path: str | Path = '') -> ClusterCurve:
 
 @lru_cache(maxsize=16)
 def load_curves(name: str, *, packaged: bool) -> Mapping[str, ClusterCurve]:
-    """The curves of a file, by what is seen of their trays (`curve_key`).
+    """The curves of a file, by the `curve_key` of their trays.
 
     Parameters
     ----------
     name : str
-        Path, or name in the package.
+        Path, or name of a file in the package.
     packaged : bool
 
     Raises
@@ -84,24 +83,16 @@ def load_curves(name: str, *, packaged: bool) -> Mapping[str, ClusterCurve]:
     ConfigurationError
         When it cannot be read.
     """
-    remedy = 'make it again with `nanorocks cluster-curve`'
-    source: Any = resources.files(__package__).joinpath(name) if packaged else Path(name)
-    try:
-        with source.open('rb') as stream, np.load(stream, allow_pickle=False) as arrays:
-            return _curves(arrays)
-    except FileNotFoundError as error:
-        raise ConfigurationError(
-            name, 'there is no such calibration of cluster sizes', remedy
-        ) from error
-    except OSError as error:
-        raise ConfigurationError(name, f'cannot be read ({error.strerror})', remedy) from error
-    except (ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
-        raise ConfigurationError(
-            name, 'is damaged, or no calibration of cluster sizes', remedy
-        ) from error
+    return load_archive(
+        name,
+        __package__ if packaged else None,
+        _curves_from_arrays,
+        kind='calibration of cluster sizes',
+        command='nanorocks cluster-curve',
+    )
 
 
-def _curves(arrays: Mapping[str, NDArray[Any]]) -> dict[str, ClusterCurve]:
+def _curves_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, ClusterCurve]:
     if int(arrays['format']) != _FORMAT:
         raise ValueError('of another release')
     samples, level = arrays['samples'], float(arrays['level'])
@@ -115,11 +106,11 @@ def _curves(arrays: Mapping[str, NDArray[Any]]) -> dict[str, ClusterCurve]:
 
 
 def _discs(key: str) -> float:
-    """Area of the discs of all beads over that of the floor, from a `curve_key`."""
+    """Ratio of the disc area of all beads to the area of the floor, from a `curve_key`."""
     tray = json.loads(key)
     discs = sum(
-        one['count'] * 0.25 * math.pi * (0.5 * (one['low'] + one['high'])) ** 2
-        for one in tray['species']
+        kind['count'] * 0.25 * math.pi * (0.5 * (kind['low'] + kind['high'])) ** 2
+        for kind in tray['species']
     )
     return float(discs / (tray['dimensions'][0] * tray['dimensions'][1]))
 
@@ -127,7 +118,7 @@ def _discs(key: str) -> float:
 def as_arrays(
     trays: Mapping[int, Tray], level: float, samples: NDArray[np.float32], made_by: str
 ) -> dict[str, NDArray[Any]]:
-    """What a file of curves holds.
+    """Arrays of a file of curves.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""The curve from widths to cluster sizes, through simulated pictures."""
+"""Fit of the cluster curve, from autocorrelation width to cluster size, to simulated images.
+
+Tested in test/inference/cluster_size/test_cluster_curve.py.
+"""
 
 from __future__ import annotations
 
@@ -12,18 +15,18 @@ from nanorocks_ros.inference.cluster_size.size_from_width import ClusterCurve, W
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Of what single beads were simulated to show: the least level area and contrast that are beads.
+# Smallest level area and contrast of beads, as fractions of those of simulated single beads.
 _SMALL, _FAINT = 0.6, 0.4
-# By which ln(breadth) may be outside those simulated.
+# Margin of ln(breadth) beyond the simulated range.
 _OUTSIDE = 0.1
-# Of ln(size): a factor of three.
+# Largest error of ln(size): a factor of three.
 _WORST = math.log(3.0)
-# Sizes above that part of the largest all look alike: the weight is chosen without them.
+# Sizes above this fraction of the largest look alike: the weight is fitted without them.
 _GROWING = 0.7
-# Of the bins of ln(size), and pictures that a bin needs.
+# Width of the bins of ln(size), and smallest number of images in a bin.
 _BIN = 0.3
 _FEWEST = 8
-# Sizes below this are single beads, with a pair here and there.
+# Mean sizes below this are single beads with a few pairs.
 _SINGLE = 1.05
 
 
@@ -34,7 +37,7 @@ def fit_curve(
     made_by: str = '{}',
     discs: float = 0.0,
 ) -> ClusterCurve:
-    """The curve through simulated pictures.
+    """Fit the curve to simulated images.
 
     Parameters
     ----------
@@ -53,20 +56,20 @@ def fit_curve(
     log_breadth = np.log(seen[:, 3] / seen[:, 4])
     above = np.floor((log_size - math.log(_SINGLE)) / _BIN)
     bins = np.where(seen[:, 2] < _SINGLE, -1, above)
-    found = [bins == k for k in np.unique(bins) if (bins == k).sum() >= _FEWEST]
+    groups = [bins == k for k in np.unique(bins) if (bins == k).sum() >= _FEWEST]
     nodes, means, spreads = np.empty((3, 0))
     end, weight, least, breadths = 0, 0.0, Width(0.0, 0.0, 0.0), (0.0, math.inf)
-    # Without pictures of single beads there is nothing to start from.
-    if found and bins[found[0]][0] < 0:
+    # Without images of single beads the curve has no start.
+    if groups and bins[groups[0]][0] < 0:
         weight = _weight(log_size, log_area, log_breadth)
         reading = log_breadth + weight * log_area
         nodes, means = _rising(
-            np.array([log_size[one].mean() for one in found]),
-            np.array([reading[one].mean() for one in found]),
-            np.array([one.sum() for one in found], dtype=np.float64),
+            np.array([log_size[group].mean() for group in groups]),
+            np.array([reading[group].mean() for group in groups]),
+            np.array([group.sum() for group in groups], dtype=np.float64),
         )
         nodes[0] = 0.0
-        single = seen[found[0]].min(axis=0)
+        single = seen[groups[0]].min(axis=0)
         least = Width(_SMALL * float(single[3]), 0.0, _FAINT * float(single[5]))
         breadths = (
             math.exp(log_breadth.min() - _OUTSIDE),
@@ -74,7 +77,7 @@ def fit_curve(
         )
         spreads = _scatter(log_size, reading, nodes, means)
         end = _useful(nodes, means, spreads)
-        # Flat from the last point to the largest there was.
+        # Flat from the last node to the largest simulated size.
         nodes = np.append(nodes, log_size.max())
         means, spreads = np.append(means, means[-1]), np.append(spreads, spreads[-1])
     return ClusterCurve(
@@ -98,7 +101,7 @@ def _weight(
     log_area: NDArray[np.float64],
     log_breadth: NDArray[np.float64],
 ) -> float:
-    """Of ln(area) beside ln(breadth): Fisher's linear discriminant, none of them negative."""
+    """Weight of ln(area) beside ln(breadth), by Fisher's linear discriminant; not negative."""
     growing = log_size <= log_size.max() + math.log(_GROWING)
     terms = np.polynomial.polynomial.polyvander(log_size[growing], 3)
     seen = np.column_stack((log_area, log_breadth))[growing]
@@ -113,10 +116,10 @@ def _weight(
 def _rising(
     places: NDArray[np.float64], values: NDArray[np.float64], weights: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Places and values that rise strictly: neighbours that do not are taken together."""
+    """Isotonic regression: neighbours whose values do not rise are pooled."""
     blocks: list[NDArray[np.float64]] = []
-    for one in np.column_stack((weights * places, weights * values, weights)):
-        blocks.append(one)
+    for block in np.column_stack((weights * places, weights * values, weights)):
+        blocks.append(block)
         while len(blocks) > 1 and blocks[-2][1] / blocks[-2][2] >= blocks[-1][1] / blocks[-1][2]:
             last = blocks.pop()
             blocks[-1] = blocks[-1] + last
@@ -130,10 +133,10 @@ def _scatter(
     nodes: NDArray[np.float64],
     means: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Standard deviation about the curve of the pictures nearest to each node."""
+    """Standard deviation about the curve of the images nearest to each node."""
     squares = (reading - np.interp(log_size, nodes, means)) ** 2
     nearest = np.abs(log_size[:, None] - nodes).argmin(axis=1)
-    # A node of very few pictures between others may have none that is nearest.
+    # A node with few images may not be the nearest of any.
     return np.array(
         [
             math.sqrt(squares[nearest == k].mean() if (nearest == k).any() else squares.mean())
@@ -145,11 +148,11 @@ def _scatter(
 def _useful(
     nodes: NDArray[np.float64], means: NDArray[np.float64], spreads: NDArray[np.float64]
 ) -> int:
-    """How many nodes there are up to the last whose size is known to a factor of three.
+    """Number of nodes up to the last whose size is known to a factor of three.
 
-    None when that is below three beads: then hardly more is known than that there are beads.
+    0 if that size is below three beads: then the width hardly depends on the size.
     """
-    # Downwards, where there is a curve for sure; no size is below 1.
+    # The lower error: the curve exists there, and no size is below 1.
     errors = nodes - np.interp(means - spreads, means, nodes)
     good = np.flatnonzero((errors <= _WORST) & (means - means[0] > spreads))
     end = int(good[-1]) + 1 if good.size else 0

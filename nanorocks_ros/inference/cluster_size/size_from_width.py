@@ -1,16 +1,18 @@
-"""From the width of an autocorrelation to the size of the clusters, by simulated ones.
+"""Cluster size from the width of an autocorrelation, by a curve from simulated images.
 
 The area in which the autocorrelation exceeds a level depends on the camera as much as on the
-clusters: shadows and blur alone make it up to half as large again. They widen the peak at every
-level alike, though, so that the *breadth*, the area over the one at a higher level, hardly depends
-on them. What is *read* from a picture is ln(breadth) + weight ln(area), with the weight that tells
-sizes best where nothing is known of the camera.
+clusters: shadows and blur alone enlarge it by up to half. They widen the peak at every level by
+the same factor, so that the *breadth*, the ratio of the area to that at a higher level, hardly
+depends on them. The *reading* of an image is ln(breadth) + weight ln(area), with the weight that
+separates sizes best for an unknown camera.
 
-Where two beads touch or lie over each other in the picture they are one object to the
-autocorrelation, whether they stick or not, and where all beads hang together its width is that of
-the tray. So the reading rises slowly with ln(size), its mean over many simulated pictures is held
-as a rising curve, and what single pictures scatter about it is the error of a size. A curve ends
-where that error grows beyond a factor of three: there the width says nothing more.
+Two beads that touch or overlap in the image are one object to the autocorrelation, whether they
+stick or not, and if all beads are connected its width is that of the tray. So the reading rises
+slowly with ln(size). Its mean over many simulated images is a rising curve, and the scatter of
+single images about it is the error of a size. The curve ends where that error exceeds a factor
+of three.
+
+Tested in test/inference/cluster_size/test_cluster_curve.py.
 """
 
 from __future__ import annotations
@@ -26,23 +28,23 @@ from nanorocks_ros.records import UNKNOWN, SizeStatus
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Part of the contrast of the darkest pixel from which on a pixel counts as covered.
+# A pixel darker than this fraction of the darkest pixel counts as covered.
 DARKER = 0.15
 # Level of the area that the level area is divided by.
 INNER_LEVEL = 0.7
-# Beads and what is left of their shadows cover 0.71 to 1.4 times the area of their discs; with
-# less to see than this, beads are missing, and those left would seem to be large clusters.
+# Beads and the rest of their shadows cover 0.71 to 1.4 times the area of their discs. Below this
+# ratio beads are missing, and the others would look like large clusters.
 _COVER = 0.68
-# Sizes that are tried for an interval.
+# Number of sizes on the grid for an interval.
 _GRID = 400
 
 
 class Width(NamedTuple):
-    """How wide the autocorrelation of a picture is, and the contrast of the picture.
+    """Width of the autocorrelation of an image, and contrast of the image.
 
-    `level_area` and `inner_area`: where it exceeds the level and `INNER_LEVEL`, [m^2]; `contrast`:
-    standard deviation of the picture, [gray levels]; `cover`: share of it that is darker than
-    `DARKER` of its darkest pixel, NaN when it is not known.
+    `level_area` and `inner_area`: areas above the level and above `INNER_LEVEL`, [m^2];
+    `contrast`: standard deviation of the image, [gray levels]; `cover`: fraction of pixels darker
+    than `DARKER` times the darkest pixel, NaN if unknown.
     """
 
     level_area: float
@@ -52,9 +54,9 @@ class Width(NamedTuple):
 
 
 class SizeEstimate(NamedTuple):
-    """A weight-averaged cluster size, [beads]; NaN where it is not known.
+    """A weight-averaged cluster size, [beads]; NaN where unknown.
 
-    `lower` and `upper`: sizes between which the width is one standard deviation off or less.
+    `lower` and `upper`: sizes whose mean reading is within one standard deviation.
     """
 
     size: float
@@ -71,7 +73,7 @@ class ClusterCurve:
     Parameters
     ----------
     tray : str
-        What is seen of a tray, see `curve_key`.
+        Its `curve_key`.
     made_by : str
         JSON: version, seed, runs, level.
     level : float
@@ -81,18 +83,19 @@ class ClusterCurve:
     reading : ndarray (n,)
         ln(breadth) + weight ln(level area / m^2), rising.
     scatter : ndarray (n,)
-        Standard deviation of the reading of one picture, whatever the camera does.
+        Standard deviation of the reading of one image, over all cameras.
     end : int
-        Points up to the last whose size can be told; 0 where the width says nothing of the size.
+        Number of nodes up to the last with a known size; 0 if the width does not depend on the
+        size.
     weight : float, >= 0
     least : Width
-        Less is not of beads, of level area or of contrast.
+        Smallest level area and contrast of beads.
     breadths : tuple of 2 floats
-        Less or more is not of beads.
+        Smallest and largest breadth of beads.
     discs : float
-        Area of the discs of all beads, over that of the floor.
+        Ratio of the disc area of all beads to the area of the floor.
     samples : ndarray of float32, (n_samples, 6)
-        What it was made from: run, time since the shaking event [s], size, level area and inner
+        Simulated images: run, time since the shaking event [s], size, level area and inner
         area [m^2], contrast.
     """
 
@@ -111,11 +114,11 @@ class ClusterCurve:
 
     @property
     def largest(self) -> float:
-        """Weight-averaged size at which the curve ends, [beads]; NaN when there is none."""
+        """Weight-averaged size at the end of the curve, [beads]; NaN without a curve."""
         return math.exp(self.log_size[self.end - 1]) if self.end else UNKNOWN
 
     def size_of(self, width: Width) -> SizeEstimate:
-        """The size that goes with a width, never beyond the curve.
+        """Size at a width, never beyond the curve.
 
         Parameters
         ----------
@@ -142,10 +145,10 @@ class ClusterCurve:
         return SizeEstimate(size, 0.5 * (upper - lower), lower, upper, SizeStatus.MEASURED)
 
     def _interval(self, read: float) -> tuple[float, float]:
-        """Least and largest size of which a reading is one standard deviation off or less.
+        """Smallest and largest size whose mean reading is within one standard deviation.
 
-        All sizes that were simulated count, those beyond the end too: where the curve is flat,
-        what reads like ten beads may be all there are.
+        All simulated sizes count, also those beyond the end: where the curve is flat, an image
+        with the reading of ten beads may show a cluster of all beads.
         """
         near = min(max(read, self.reading[0]), self.reading[-1])
         log_size = np.linspace(0.0, self.log_size[-1], _GRID)
@@ -155,7 +158,7 @@ class ClusterCurve:
         return math.exp(inside[0]), math.exp(inside[-1])
 
     def _inverse(self, read: float) -> float:
-        """Size at a reading: 1, the smallest there is, below the curve; NaN beyond its end."""
+        """Size at a reading: 1, the smallest size, below the curve; NaN beyond its end."""
         if read > self.reading[self.end - 1]:
             return UNKNOWN
         return math.exp(float(np.interp(read, self.reading, self.log_size)))

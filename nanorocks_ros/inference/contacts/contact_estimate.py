@@ -1,4 +1,7 @@
-"""A restitution with its error, for people, from a log likelihood on a grid."""
+"""Restitution with its error from a log likelihood on a grid, for reports.
+
+Tested in test/inference/contacts/test_contact_likelihood.py.
+"""
 
 from __future__ import annotations
 
@@ -15,14 +18,14 @@ if TYPE_CHECKING:
 
 
 class ContactEstimate(NamedTuple):
-    """A restitution for people, from a log likelihood alone.
+    """A restitution from a log likelihood alone, for reports.
 
     Parameters
     ----------
     restitution, restitution_error : float
-        Most likely value of the grid, between its nodes; standard deviation.
+        Maximum of the interpolated likelihood; standard deviation.
     lower, upper : float
-        Ends of the central interval that holds 68 %.
+        Ends of the central 68 % interval.
     """
 
     restitution: float
@@ -32,22 +35,23 @@ class ContactEstimate(NamedTuple):
 
 
 def contact_estimate(restitution: ArrayLike, log_likelihood: ArrayLike) -> ContactEstimate:
-    """The restitution that a log likelihood on an even grid prefers; every value alike before.
+    """Restitution from a log likelihood on an even grid, with a flat prior.
 
     Raises
     ------
     FitError
-        When the log likelihood prefers nothing, or is not finite.
+        When the log likelihood is constant or not finite.
     """
     grid = checked_grid('restitution', restitution)
     values = np.asarray(log_likelihood, dtype=np.float64)
     if values.shape != grid.shape or not np.isfinite(values).all() or np.ptp(values) == 0.0:
         raise FitError(
             'contact_estimate',
-            f'a log likelihood of shape {values.shape} that prefers no value of {grid.size}',
+            f'a constant or infinite log likelihood of shape {values.shape} for {grid.size} '
+            'values',
             'give that of at least one contact, on the same grid',
         )
-    # On a fine grid: a peak may be narrower than the distance of nodes.
+    # A fine grid: a peak may be narrower than the distance of nodes.
     fine = np.linspace(grid[0], grid[-1], 20 * grid.size)
     logs = np.interp(fine, grid, values) if grid.size < 4 else _spline(grid, values, fine)
     weights = np.exp(logs - logs.max())
@@ -75,7 +79,7 @@ def checked_grid(name: str, values: ArrayLike) -> NDArray[np.float64]:
     Raises
     ------
     FitError
-        When it holds none, or one outside [0, 1].
+        When it is empty, or holds a value outside [0, 1].
     """
     grid = np.atleast_1d(np.asarray(values, dtype=np.float64))
     if grid.ndim != 1 or not grid.size or not ((grid >= 0.0) & (grid <= 1.0)).all():

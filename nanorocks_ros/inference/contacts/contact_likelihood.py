@@ -1,6 +1,6 @@
-"""What single contacts say of the restitution: rebounds of the walls, collisions of the beads.
+"""Likelihoods of the wall restitution from rebounds, and of the bead restitution from collisions.
 
-Both are functions of one restitution alone, on a grid of its values, to be added to the log
+Both are functions of one restitution alone, on a grid of its values, and are added to the log
 likelihood of the decay. Constants that do not depend on the restitution are left out.
 """
 
@@ -15,8 +15,8 @@ from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.contacts.contact_estimate import checked_grid
 from nanorocks_ros.inference.contacts.projected_collisions import (
     RANGE,
-    SeenCollisions,
-    pairs_given,
+    ProjectedCollisions,
+    projected_log_likelihood,
 )
 from nanorocks_ros.numerics.log_sums import log_sum
 
@@ -28,31 +28,31 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import PairCollision, Rebound
 
 OUTLIERS = 0.05
-"""Share of contacts that were something else: a wrong link, a third bead that nobody saw."""
+"""Fraction of outliers among contacts: a wrong link, an undetected third bead."""
 
 VERTICAL_RATIOS = (0.25, 0.4, 0.6, 0.9, 1.3)
-"""Mean square of the vertical over that of a horizontal velocity component; all alike likely."""
+"""Ratios of the mean squares of vertical and horizontal velocities; equally likely."""
 
 RADIUS_ERRORS = (-0.02, 0.0, 0.02, 0.04, 0.06)
 """Glass beads of 12 px came out 4 % too large in films with all effects."""
 
-# What errors of rebounds may be over what was stated. Not less: many slow rebounds, whose errors
-# are stated too large, would then lend too much weight to the few fast ones.
+# Factors by which the true errors of rebounds may exceed the stated ones. Not below 1: many slow
+# rebounds, whose stated errors are too large, would then give the few fast ones too much weight.
 _ERROR_SCALES = (1.0, 1.4, 2.0, 2.8)
-# The same of collisions, which tell errors from vertical speeds too badly to have it free:
-# simulated cycles scatter so much more.
+# The same factor for collisions, from the scatter of simulated cycles. It is fixed, since
+# collisions cannot separate errors from vertical speeds.
 _PAIR_ERRORS = 1.25
 _AT_ONCE = 128
 _SQRT_2_PI = math.sqrt(2.0 * math.pi)
 
 
 def marginal(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Log likelihood, (n,), whichever row of a table is true; each as likely.
+    """Log likelihood, (n,), marginalised over the equally likely rows of a table.
 
     Parameters
     ----------
     table : ndarray (m, n)
-        One of those below, or a sum of some: what is not known is then the same in all of them.
+        From `rebound_table` or `pair_table`, or a sum of such: the row is then common to all.
     """
     return np.asarray(log_sum(table) - math.log(len(table)))
 
@@ -60,7 +60,7 @@ def marginal(table: NDArray[np.float64]) -> NDArray[np.float64]:
 def rebound_log_likelihood(
     rebounds: Sequence[Rebound], wall_restitution: ArrayLike, *, outliers: float = OUTLIERS
 ) -> NDArray[np.float64]:
-    """How likely some rebounds are for each of some restitutions of the side walls.
+    """Log likelihood of rebounds for each restitution of the side walls.
 
     See `rebound_table`.
     """
@@ -70,23 +70,22 @@ def rebound_log_likelihood(
 def rebound_table(
     rebounds: Sequence[Rebound], wall_restitution: ArrayLike, *, outliers: float = OUTLIERS
 ) -> NDArray[np.float64]:
-    """How likely rebounds are for each restitution of the side walls and each scale of errors.
+    """Log likelihood of rebounds for each restitution of the side walls and each scale of errors.
 
-    The speed before is as uncertain as that after, and any speed is as likely; given the speed
-    before, that a rebound was found says nothing of the speed after.
+    The speeds before and after have errors of the same size, and the prior of the speed before is
+    flat. The detection of a rebound does not depend on the speed after it.
 
     Parameters
     ----------
     rebounds : sequence of Rebound
     wall_restitution : array_like (n,), 0 to 1
     outliers : float, 0 to 1
-        Share of rebounds that were something else.
+        Fraction of outliers.
 
     Returns
     -------
     ndarray (m, n)
-        Log likelihood but for a constant; 0 without rebounds. Those of more rebounds are to be
-        added.
+        Log likelihood up to a constant; 0 without rebounds. Tables of more rebounds add up.
     """
     grid = checked_grid('wall_restitution', wall_restitution)
     _check_share(outliers)
@@ -100,14 +99,14 @@ def rebound_table(
         ]
     )  # fmt: skip
     incoming, outgoing, before, after, wall = columns.T[:, :, None]
-    # The speed of the wall is in both speeds, with opposite signs.
+    # The speed of the wall enters both speeds, with opposite signs.
     variance = (grid * before) ** 2 + after**2 + ((1.0 + grid) * wall) ** 2
     square = (outgoing - grid * incoming) ** 2 / variance
-    other = outliers / (RANGE * incoming)
+    outlier_density = outliers / (RANGE * incoming)
     by_scale = []
     for scale in _ERROR_SCALES:
         density = np.exp(-0.5 * square / scale**2) / (_SQRT_2_PI * scale * np.sqrt(variance))
-        by_scale.append(np.log((1.0 - outliers) * density + other).sum(axis=0))
+        by_scale.append(np.log((1.0 - outliers) * density + outlier_density).sum(axis=0))
     return np.array(by_scale)
 
 
@@ -120,7 +119,7 @@ def pair_log_likelihood(
     sticking_speed: float = 0.0,
     outliers: float = OUTLIERS,
 ) -> NDArray[np.float64]:
-    """How likely some collisions are for each of some restitutions of the beads.
+    """Log likelihood of collisions for each restitution of the beads.
 
     See `pair_table`.
     """
@@ -145,44 +144,46 @@ def pair_table(
     sticking_speed: float = 0.0,
     outliers: float = OUTLIERS,
 ) -> NDArray[np.float64]:
-    """How likely collisions are for each restitution, and each pair of what is not known.
+    """Log likelihood of collisions for each restitution, vertical ratio and radius error.
 
     Parameters
     ----------
     collisions : sequence of PairCollision
     restitution : array_like (n,), 0 to 1
     vertical_ratios : sequence of float, > 0
-        Mean square of the vertical over that of a horizontal velocity component, one of them,
-        of all collisions; each as likely.
+        Ratio of the mean squares of a vertical and a horizontal velocity component, common to
+        all collisions; the values are equally likely.
     radius_errors : sequence of float
-        By what share all radii that were measured are wrong, one of them, each as likely.
+        Relative error common to all measured radii; the values are equally likely.
     sticking_speed : float, [m/s]
-        Beads that meet more slowly along the line of centres merge, and are not among these.
+        Beads with a smaller approach speed along the line of centres merge, so that their
+        collisions are missing.
     outliers : float, 0 to 1
-        Share of collisions that were something else.
+        Fraction of outliers.
 
     Returns
     -------
     ndarray (m, n)
-        Log likelihood but for a constant; 0 without collisions. Those of more collisions are to
-        be added.
+        Log likelihood up to a constant; 0 without collisions. Tables of more collisions add up.
     """
     grid = checked_grid('restitution', restitution)
     _check_share(outliers)
     if not collisions:
         return np.zeros((len(vertical_ratios) * len(radius_errors), grid.size))
-    seen = SeenCollisions.of(collisions).with_errors(_PAIR_ERRORS)
-    # In parts, so that memory does not grow with the number of collisions.
+    seen = ProjectedCollisions.of(collisions).with_errors(_PAIR_ERRORS)
+    # In batches, so that memory does not grow with the number of collisions.
     parts = [
-        SeenCollisions(*(one[k : k + _AT_ONCE] for one in seen))
+        ProjectedCollisions(*(column[k : k + _AT_ONCE] for column in seen))
         for k in range(0, len(collisions), _AT_ONCE)
     ]
     limits = sticking_speed, outliers
-    # Where no radius was measured, it does not matter how wrong they are.
+    # Without a measured radius the radius error has no effect.
     errors = radius_errors if seen.measured.any() else (0.0,)
     ratios = np.array(vertical_ratios, dtype=np.float64)
     by_error = [
-        np.sum([pairs_given(part, grid, ratios, error, limits) for part in parts], axis=0)
+        np.sum(
+            [projected_log_likelihood(part, grid, ratios, error, limits) for part in parts], axis=0
+        )
         for error in errors
     ]
     table = np.stack(by_error, axis=1).reshape(-1, grid.size)
@@ -191,4 +192,4 @@ def pair_table(
 
 def _check_share(outliers: float) -> None:
     if not 0.0 < outliers < 1.0:
-        raise FitError('outliers', f'a share of {outliers!r}', 'give one between 0 and 1')
+        raise FitError('outliers', f'a fraction of {outliers!r}', 'give one between 0 and 1')

@@ -1,4 +1,4 @@
-"""What all rebounds and collisions of some cycles say, kept so that more can be added."""
+"""Log-likelihood tables of all rebounds and collisions of some cycles, which add up."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_likelihood import marginal, pair_table, rebound_table
 from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL
-from nanorocks_ros.inference.likelihood_1d import SingleTerm
+from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 from nanorocks_ros.records import PairCollision, Rebound
 
 if TYPE_CHECKING:
@@ -17,23 +17,23 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Single contacts say no more than some 0.02 of the beads, and some 0.003 of the walls: between
-# these nodes a spline tells sums of their log likelihoods.
+# A single contact determines the bead restitution to 0.02 and the wall restitution to 0.003 at
+# best: a spline through these nodes represents sums of log likelihoods.
 _BEADS = np.linspace(0.0, 1.0, 101)
 _WALLS = np.linspace(LOWEST_WALL, 1.0, 221)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactTerms:
-    """Log likelihoods of both restitutions by single contacts.
+    """Log likelihoods of both restitutions from single contacts.
 
     Parameters
     ----------
     rebounds, collisions : int
-        How many there were.
+        Their numbers.
     walls, beads : ndarray (m, n)
-        Tables of `rebound_table` and `pair_table`. What is not known, such as how wrong radii
-        are, is the same in all contacts that are added up.
+        Tables of `rebound_table` and `pair_table`. Nuisances, such as the error of the radii, are
+        common to all contacts that are added.
     """
 
     rebounds: int
@@ -43,7 +43,7 @@ class ContactTerms:
 
     @classmethod
     def of(cls, contacts: Iterable[Rebound | PairCollision]) -> ContactTerms:
-        """Those of some contacts; of none they say nothing."""
+        """Tables of some contacts; 0 everywhere without contacts."""
         contacts = list(contacts)
         rebounds = [contact for contact in contacts if isinstance(contact, Rebound)]
         collisions = [contact for contact in contacts if isinstance(contact, PairCollision)]
@@ -62,22 +62,22 @@ class ContactTerms:
             beads=self.beads + other.beads,
         )
 
-    def of_walls(self, bias: float = 0.0) -> SingleTerm | None:
-        """What rebounds say; None without any.
+    def wall_likelihood(self, bias: float = 0.0) -> Likelihood1D | None:
+        """Log likelihood of the wall restitution from rebounds; None without rebounds.
 
         Parameters
         ----------
         bias : float
-            Standard deviation of what all of them together may be off by.
+            Standard deviation of a systematic error common to all of them.
         """
         if not self.rebounds:
             return None
-        term = SingleTerm(restitution=_WALLS, log_likelihood=marginal(self.walls))
-        return term.off_by(bias)
+        term = Likelihood1D(restitution=_WALLS, log_likelihood=marginal(self.walls))
+        return term.convolved(bias)
 
-    def of_beads(self, bias: float = 0.0) -> SingleTerm | None:
-        """What collisions say, as `of_walls`."""
+    def bead_likelihood(self, bias: float = 0.0) -> Likelihood1D | None:
+        """Log likelihood of the bead restitution from collisions, as `wall_likelihood`."""
         if not self.collisions:
             return None
-        term = SingleTerm(restitution=_BEADS, log_likelihood=marginal(self.beads))
-        return term.off_by(bias)
+        term = Likelihood1D(restitution=_BEADS, log_likelihood=marginal(self.beads))
+        return term.convolved(bias)

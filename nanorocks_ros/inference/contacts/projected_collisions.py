@@ -1,6 +1,8 @@
-"""Collisions as a picture from above shows them, and how likely they are so.
+"""Likelihood of collisions in the projection of the camera.
 
-A line of centres that is tilted is seen too short, and so is the speed along it.
+A tilted line of centres appears shortened, and so does the speed along it.
+
+Tested in test/inference/contacts/test_contact_likelihood.py.
 """
 
 from __future__ import annotations
@@ -19,21 +21,21 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import PairCollision
 
 RANGE = 2.0
-"""Range of speeds after a contact of the other kind, over the speed before."""
+"""Range of speeds after an outlier, in units of the speed before."""
 
 _HEIGHTS = 20
-# Of so many the arrays of all heights, restitutions and vertical speeds stay in the cache.
+# Collisions per batch: their arrays over all tilts, restitutions and ratios stay in the cache.
 _IN_CACHE = 4
-# Standard deviations beyond which the tail of a Gaussian is less than what doubles resolve.
+# Standard deviations beyond which the tail of a Gaussian is below the precision of a double.
 _ALL_ABOVE = 9.0
 _TINY = 1e-300
-# Vertical parts of the line of centres that are less likely are left out.
+# Tilts of the line of centres with a smaller weight are left out.
 _UNLIKELY = 1e-9
 _SQRT_2_PI = math.sqrt(2.0 * math.pi)
 
 
-class SeenCollisions(NamedTuple):
-    """What is seen of collisions, each (m,): along the projected line of centres.
+class ProjectedCollisions(NamedTuple):
+    """Collisions along the projected line of centres, arrays (m,).
 
     Parameters
     ----------
@@ -43,7 +45,7 @@ class SeenCollisions(NamedTuple):
     distance, distance_error : ndarray, [m]
         Projected, of the centres at contact; the error of the sum of radii is in its error.
     reach, measured, height : ndarray, [m]
-        Sum of radii, of those that were measured alone, and height of the tray.
+        Sum of radii, sum of the measured radii alone, and height of the tray.
     radii : ndarray (m, 2), [m]
     temperature : ndarray, [m^2/s^2]
         Sum over both beads.
@@ -63,8 +65,8 @@ class SeenCollisions(NamedTuple):
     temperature: NDArray[np.float64]
 
     @classmethod
-    def of(cls, collisions: Sequence[PairCollision]) -> SeenCollisions:
-        """What is seen of some collisions."""
+    def of(cls, collisions: Sequence[PairCollision]) -> ProjectedCollisions:
+        """Arrays of some collisions."""
         separation = np.array([collision.separation for collision in collisions])
         distance = np.hypot(*separation.T)
         normal = separation / distance[:, None]
@@ -74,9 +76,9 @@ class SeenCollisions(NamedTuple):
         radii = np.array([collision.radii for collision in collisions])
         radius_errors = np.array([collision.radius_errors for collision in collisions])
         across = np.column_stack([-normal[:, 1], normal[:, 0]])
-        # A line of centres that is turned by its error mixes in the speed across it.
+        # An error of the direction of the line of centres mixes in the speed across it.
         turned = error / distance
-        slip = [np.sum(one * across, axis=1) * turned for one in (before, after)]
+        slip = [np.sum(velocity * across, axis=1) * turned for velocity in (before, after)]
         noise = [
             np.array([np.sum(getattr(collision, name) ** 2) for collision in collisions])
             for name in ('before_errors', 'after_errors')
@@ -96,8 +98,8 @@ class SeenCollisions(NamedTuple):
             temperature=np.array([collision.temperatures.sum() for collision in collisions]),
         )
 
-    def with_errors(self, scale: float) -> SeenCollisions:
-        """The same with so many times the errors."""
+    def with_errors(self, scale: float) -> ProjectedCollisions:
+        """The collisions with all errors multiplied by a factor."""
         return self._replace(
             approach_variance=scale**2 * self.approach_variance,
             parting_variance=scale**2 * self.parting_variance,
@@ -107,12 +109,12 @@ class SeenCollisions(NamedTuple):
 
 
 def _tilts(
-    seen: SeenCollisions, radius_error: float
+    seen: ProjectedCollisions, radius_error: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Vertical parts of the line of centres, (1, h), and how likely they are, (m, h).
+    """Tilts (vertical components of the line of centres), (1, h), and their probabilities, (m, h).
 
-    Lines of centres point anywhere alike, as far as the height of the tray lets them; what they
-    leave of the distance in the picture is seen, with its error.
+    Lines of centres are isotropic within the height of the tray; the projected distance is
+    measured with its error.
     """
     tilt = (np.arange(_HEIGHTS) + 0.5)[None, :] / _HEIGHTS
     reach = (seen.reach - radius_error * seen.measured)[:, None]
@@ -125,60 +127,60 @@ def _tilts(
     return tilt, weight / weight.sum(axis=1)[:, None]
 
 
-def pairs_given(
-    seen: SeenCollisions,
+def projected_log_likelihood(
+    seen: ProjectedCollisions,
     grid: NDArray[np.float64],
     ratios: NDArray[np.float64],
     radius_error: float,
     limits: tuple[float, float],
 ) -> NDArray[np.float64]:
-    """Log likelihood, (r, n), of collisions for vertical speeds, (r,), when radii are known."""
+    """Log likelihood, (r, n), of collisions for vertical ratios, (r,), at a given radius error."""
     sticking_speed, outliers = limits
     tilt, weight = _tilts(seen, radius_error)
     likely = weight.max(axis=0) > _UNLIKELY
     tilt, weight = tilt[:, likely], weight[:, likely]
     total = np.zeros((ratios.size, grid.size))
     for k in range(0, len(weight), _IN_CACHE):
-        some = slice(k, k + _IN_CACHE)
-        one = SeenCollisions(*(each[some] for each in seen))
-        density = _density(one, grid, ratios, tilt[0, :, np.newaxis], sticking_speed)
-        found = np.einsum('mh,rmhn->rmn', weight[some], density)
-        other = outliers / (RANGE * one.approach[:, np.newaxis])
-        total += np.log((1.0 - outliers) * found + other).sum(axis=1)
+        rows = slice(k, k + _IN_CACHE)
+        batch = ProjectedCollisions(*(column[rows] for column in seen))
+        densities = _density(batch, grid, ratios, tilt[0, :, np.newaxis], sticking_speed)
+        density = np.einsum('mh,rmhn->rmn', weight[rows], densities)
+        outlier_density = outliers / (RANGE * batch.approach[:, np.newaxis])
+        total += np.log((1.0 - outliers) * density + outlier_density).sum(axis=1)
     return total
 
 
 def _density(
-    seen: SeenCollisions,
+    seen: ProjectedCollisions,
     grid: NDArray[np.float64],
     ratios: NDArray[np.float64],
     tilt: NDArray[np.float64],
     sticking_speed: float,
 ) -> NDArray[np.float64]:
-    """Of the speeds after collisions, (r, m, h, n), for tilts (h, 1) of the line of centres.
+    """Density of the speeds after collisions, (r, m, h, n), for tilts (h, 1).
 
-    The speed w along the line of centres is that seen times its part in the picture, p, and the
-    vertical one, a Gaussian, times the other part; the more often beads meet, the larger w. All
-    is Gaussian but for that factor w, w above the sticking speed, which leaves a closed form.
+    The speed w along the line of centres is the projected speed times its horizontal component p,
+    plus the vertical speed, a Gaussian, times the tilt. Collisions are weighted with w, for w
+    above the sticking speed. All other factors are Gaussian, so that the integral is closed.
     """
     part = np.sqrt(1.0 - tilt**2)
     a, c, aa, cc, ac = (
-        one[:, None, None]
-        for one in (seen.approach, seen.parting, seen.approach_variance,
+        column[:, None, None]
+        for column in (seen.approach, seen.parting, seen.approach_variance,
                     seen.parting_variance, seen.covariance)
     )  # fmt: skip
     vertical = tilt**2 * ratios[:, None, None, None] * seen.temperature[:, None, None]
     gain = (1.0 + grid) * part
     left = gain * part - 1.0
     speed, speed_variance = part * a, part**2 * aa + vertical
-    both = gain * vertical
-    both += part * left * aa - part * ac
+    shared = gain * vertical
+    shared += part * left * aa - part * ac
     variance = gain**2 * vertical
     variance += left**2 * aa + cc - 2.0 * left * ac
     miss = c - (gain * speed - a)
-    share = both / variance
+    share = shared / variance
     given = speed + share * miss
-    share *= both
+    share *= shared
     given_variance = np.maximum(speed_variance - share, 0.0)
     density = np.exp(-0.5 * miss**2 / variance)
     density *= _mean_above(sticking_speed, given, given_variance)
@@ -190,16 +192,16 @@ def _density(
 def _mean_above(
     least: float, mean: NDArray[np.float64], variance: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Integral of x over a Gaussian density of x from the least x up; never quite 0."""
+    """Integral of x over a Gaussian density of x from `least` to infinity; never exactly 0."""
     spread = np.sqrt(variance) + _TINY
     ratio = (mean - least) / spread
-    found = np.empty(ratio.shape)
-    found[:] = mean
-    # Higher up there is nothing below the least.
+    integral = np.empty(ratio.shape)
+    integral[:] = mean
+    # Far above `least` the integral is the mean.
     near = np.flatnonzero(ratio < _ALL_ABOVE)
     if near.size:
         x = ratio.ravel()[near]
         density = np.exp(-0.5 * np.minimum(x**2, 1e3)) / _SQRT_2_PI
-        found.ravel()[near] = found.ravel()[near] * ndtr(x) + spread.ravel()[near] * density
-    found += _TINY
-    return found
+        integral.ravel()[near] = integral.ravel()[near] * ndtr(x) + spread.ravel()[near] * density
+    integral += _TINY
+    return integral

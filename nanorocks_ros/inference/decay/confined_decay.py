@@ -1,9 +1,8 @@
-"""Restitutions from measured decays by the confined theory, before its steady state too.
+"""Restitution from a measured decay by the confined theory, in and before the steady state.
 
-`confined_restitution` takes the steady state, within the range in which the theory was found good,
-see `confined`. `windowed_restitution` starts from the velocities that shaking leaves and fits
-Haff's law to the window in which it was fitted to the data, which is better where walls are
-nearly elastic.
+`confined_restitution` assumes the steady state, within the tested range of the theory, see
+`confined_theory`. `windowed_restitution` starts from the velocities after shaking and fits Haff's
+law in the same window as the data, which is better for nearly elastic walls.
 """
 
 from __future__ import annotations
@@ -27,10 +26,10 @@ if TYPE_CHECKING:
 
 LOWEST_RESTITUTION = 0.7
 LOWEST_WALL_RESTITUTION = 0.9
-# A gas whose speed is lost over less than a quarter of the tray does not stay even: simulated
-# trays 6 and 8 at 0.8 form clusters, and decay half as fast as an even gas would.
+# A gas that loses its speed over less than a quarter of the tray does not stay homogeneous:
+# simulated trays 6 and 8 at 0.8 form clusters, and decay half as fast as a homogeneous gas.
 MOST_DECAY = 4.0
-# Times in a window that is fitted.
+# Number of times in the window of the fit.
 _TIMES = 33
 _LOWEST_TRIED = 0.3
 _PRECISION = 1e-5
@@ -44,8 +43,8 @@ def confined_restitution(
 ) -> Estimate:
     """Restitution between the beads of a tray, from the decay of their mean projected speed.
 
-    Errors are propagated to first order. What the theory itself is off by, 0.01 to 0.03, is not
-    among them.
+    Errors are propagated to first order. The error of the theory itself, 0.01 to 0.03, is not
+    included.
 
     Parameters
     ----------
@@ -54,7 +53,7 @@ def confined_restitution(
         1 / (v0 tau), v0 being the mean projected speed.
     wall_restitution : Estimate or float, [0.9, 1]
     height : Estimate or float, optional, [m]
-        Of the tray, where it is not known exactly.
+        Of the tray, with its error.
 
     Raises
     ------
@@ -62,7 +61,7 @@ def confined_restitution(
         When a value cannot be used.
     FitError
         When no restitution in the range of the theory, 0.7 to 1, makes this decay, or it is so
-        fast (beyond 4 over the longest side) that the gas cannot stay even.
+        fast (beyond 4 over the longest side) that the gas cannot stay homogeneous.
     """
 
     def relation(decay_rate: float, wall_restitution: float, height: float) -> float:
@@ -87,13 +86,13 @@ def confined_restitution(
     if rate * max(tray.dimensions) > MOST_DECAY:
         raise FitError(
             'confined theory',
-            f'at {rate:.3g} /m tray {tray.number} forms clusters, and the theory reads too much',
+            f'at {rate:.3g} /m tray {tray.number} forms clusters, and the theory is too high',
             f'use the decay library above {MOST_DECAY / max(tray.dimensions):.3g} /m',
         )
     if estimate.value < LOWEST_RESTITUTION:
         raise FitError(
             'confined theory',
-            f'reads a restitution of {estimate.value:.2f}, outside its range',
+            f'a restitution of {estimate.value:.2f} is outside its range',
             f'use the decay library below {LOWEST_RESTITUTION}',
         )
     return estimate
@@ -139,10 +138,10 @@ def windowed_decay_rate(
     log_speed = np.log(gas.speeds(times, restitution, wall_restitution, start))
 
     def residual(logs: NDArray[np.float64]) -> NDArray[np.float64]:
-        found: NDArray[np.float64] = (
+        difference: NDArray[np.float64] = (
             log_speed - logs[0] + np.log1p(math.exp(logs[0] + logs[1]) * times)
         )
-        return found
+        return difference
 
     return math.exp(optimize.least_squares(residual, (log_speed[0], math.log(50.0))).x[1])
 

@@ -1,13 +1,13 @@
-"""How likely a measured decay is, for every pair of restitutions on a grid.
+"""Likelihood of a measured decay for every pair of restitutions on a grid.
 
 A decay is a series of ln v with errors. Against the mean ln f of the library, the deviations of
 the gas from its mean have the library's covariance, and the errors of the speeds add to it. The
-amplitude is free: v(t) = a f(a t) holds exactly, and the best a is found for each place of the
-grid by Newton's method (a profile likelihood: integrating over ln a instead would favour low
-restitutions, of which a fast gas soon forgets how fast it was). What is not known exactly of
-the tray or the camera (`nuisances`) is left in: for every place the result holds how the
-likelihood depends on it, to second order, so that many decays of one tray can be added up before
-it is integrated over; unlike noise it does not average out.
+amplitude is free: v(t) = a f(a t) holds exactly, and the best a is computed at each point of the
+grid by Newton's method (a profile likelihood: integrating over ln a would favour low
+restitutions, at which a gas soon loses the memory of its initial speed). The nuisances of tray
+and camera stay free: the result holds the dependence of the likelihood on them to second order,
+so that many decays of one tray can be added before the integration over the nuisances, which,
+unlike noise, do not average out.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.inference.decay.decay_library import DecayLibrary
 
-# Nothing is measured better than that, relative.
+# Smallest relative error of a speed.
 _LEAST_ERROR = 2e-3
-# One of so many places is looked at to find about the best.
+# Step through the grid in the search for the approximate maximum.
 _EVERY = 4
-# A scale known no better than this is no linear nuisance: it is tried at so many of its standard
-# deviations, and linear by half of one between them.
+# A scale with a larger error is not linear: it is sampled at these multiples of its standard
+# deviation, and linear within half of one around each.
 _WIDE = 0.1
 _SCALES = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
 # Nuisances of the camera, beside those of the library: scale of lengths, and a relative error of
@@ -42,7 +42,7 @@ CAMERA_NUISANCES = ('scale', 'speed_bias')
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecayTables:
-    """The library at the places of a grid of restitutions.
+    """The library on a grid of restitutions.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class DecayTables:
     slopes : ndarray (n_c * n_w, n_z, n_x)
         Change of ln f for one standard deviation of each nuisance; without those of the camera.
     corners : ndarray of int64, (n_c * n_w, 4)
-        Places around each, in the grid of the covariances.
+        Corners around each point, in the grid of the covariances.
     shares : ndarray (n_c * n_w, 4)
         Their weights.
     """
@@ -70,23 +70,23 @@ class DecayTables:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecayLikelihood:
-    """What decays say, at the places of the grid; those of several decays add up.
+    """Likelihood of decays on the grid; those of several decays add up.
 
-    Where the scale is hardly known every array has one axis more before those named here: one
-    likelihood for each scale that is tried.
+    If the error of the scale is large, every array has one more axis in front: one likelihood for
+    each sampled scale.
 
     Parameters
     ----------
     log_likelihood : ndarray (n_places,)
-        For nuisances as they are expected.
+        At the expected nuisances.
     gradient : ndarray (n_places, n_z)
-        Of it with the nuisances, in units of their standard deviations.
+        Its derivative by the nuisances, in units of their standard deviations.
     information : ndarray (n_places, n_z, n_z)
         Minus its second derivative.
     deviation : ndarray (n_places,)
         Sum of the squares of the whitened residuals.
     samples : int
-        Independent of how many speeds went into each: binned.
+        Number of bins, whatever the number of speeds in each.
     """
 
     log_likelihood: NDArray[np.float64]
@@ -106,21 +106,21 @@ class DecayLikelihood:
 
     def integrated(self) -> NDArray[np.float64]:
         """Log likelihood (n_places,) with the nuisances integrated over their Gaussian priors."""
-        each = np.empty(self.log_likelihood.shape)
+        log_likelihood = np.empty(self.log_likelihood.shape)
         n_z = self.gradient.shape[-1]
         integrate(
             np.ascontiguousarray(self.gradient).reshape(-1, n_z),
             np.ascontiguousarray(self.information).reshape(-1, n_z, n_z),
-            each.reshape(-1),
+            log_likelihood.reshape(-1),
         )
-        each += self.log_likelihood
-        if each.ndim == 1:
-            return np.asarray(each)
+        log_likelihood += self.log_likelihood
+        if log_likelihood.ndim == 1:
+            return np.asarray(log_likelihood)
         weight = np.exp(-0.5 * _SCALES**2)
-        return np.asarray(log_sum(each, weight / weight.sum()))
+        return np.asarray(log_sum(log_likelihood, weight / weight.sum()))
 
     def deviation_at(self, place: int) -> float:
-        """Sum of the squares of the whitened residuals at a place, for the likeliest scale."""
+        """Sum of the squares of the whitened residuals at a point, for the likeliest scale."""
         deviation = np.atleast_2d(self.deviation)[:, place]
         return float(deviation[np.atleast_2d(self.log_likelihood)[:, place].argmax()])
 
@@ -138,8 +138,8 @@ def decay_likelihood(
     ----------
     tables : DecayTables
     time : ndarray (n,), [s], > 0
-        Since the shaking event; rising. Of times further apart than the ends of the library are,
-        the first count.
+        Since the shaking event; rising. Times beyond the range of the library, counted from the
+        first, are left out.
     speed, error : ndarray (n,), [m/s], > 0
         Mean projected speeds and one standard error of each.
     camera : tuple of 2 floats
@@ -151,29 +151,29 @@ def decay_likelihood(
         library.step, time[within], speed[within], error[within]
     )
     data = (log_time, log_speed, variance)
-    # First with the covariance of each place, then at all of them with that of the best one: how
-    # strongly the gas fluctuates is known too roughly to tell restitutions by.
-    some = slice(None, None, _EVERY)
-    corners, shares = tables.corners[some], tables.shares[some]
-    rough = _over(tables, data, cells, camera, (some, corners, shares), derivatives=False)
+    # First with the covariance of each point, then at all points with that of the best one: the
+    # strength of the fluctuations is known too roughly to determine restitutions.
+    subset = slice(None, None, _EVERY)
+    corners, shares = tables.corners[subset], tables.shares[subset]
+    rough = _over(tables, data, cells, camera, (subset, corners, shares), derivatives=False)
     best = int(np.argmax(rough.log_likelihood)) * _EVERY
-    every = slice(None), tables.corners[best, np.newaxis], tables.shares[best, np.newaxis]
+    all_places = slice(None), tables.corners[best, np.newaxis], tables.shares[best, np.newaxis]
     scale, bias = camera
     if scale <= _WIDE:
-        return _over(tables, data, cells, camera, every)
-    each = [
+        return _over(tables, data, cells, camera, all_places)
+    likelihoods = [
         _over(
             tables,
             (log_time, log_speed - step * scale, variance),
             cells,
             (0.5 * scale, bias),
-            every,
+            all_places,
         )
         for step in _SCALES
     ]
     return DecayLikelihood(
         **{
-            name: np.stack([getattr(likelihood, name) for likelihood in each])
+            name: np.stack([getattr(likelihood, name) for likelihood in likelihoods])
             for name in ('log_likelihood', 'gradient', 'information', 'deviation')
         },
         samples=cells.size,
@@ -189,10 +189,10 @@ def _over(
     *,
     derivatives: bool = True,
 ) -> DecayLikelihood:
-    """The likelihood at some places, with covariances between given corners, in given shares."""
+    """Likelihood at some points, with covariances interpolated between given corners."""
     library = tables.decays
-    which, corners, shares = places
-    mean = tables.mean[which]
+    subset, corners, shares = places
+    mean = tables.mean[subset]
     n_z = tables.slopes.shape[1] + len(CAMERA_NUISANCES)
     numbers = np.empty((len(mean), 2))
     gradient = np.empty((len(mean) if derivatives else 0, n_z))
@@ -204,7 +204,7 @@ def _over(
         np.ascontiguousarray(corners),
         np.ascontiguousarray(shares),
         np.ascontiguousarray(mean),
-        np.ascontiguousarray(tables.slopes[which]),
+        np.ascontiguousarray(tables.slopes[subset]),
         np.array(camera),
         math.log(library.distances[0]),
         library.step,
@@ -222,7 +222,7 @@ def _over(
 def _binned(
     step: float, time: NDArray[np.float64], speed: NDArray[np.float64], error: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Number, ln t, ln v and its variance of each bin as wide as the step of the library."""
+    """Index, ln t, ln v and its variance of bins as wide as the step of the library."""
     bins = np.floor(np.log(time / time[0]) / step + ROUNDING).astype(np.int64)
     starts = np.flatnonzero(np.diff(bins, prepend=-1))
     counts = np.diff(np.append(starts, time.size))
@@ -230,5 +230,5 @@ def _binned(
     log_time = np.add.reduceat(np.log(time), starts) / counts
     log_speed = np.add.reduceat(np.log(speed), starts) / counts
     variance = np.add.reduceat(relative**2, starts) / counts**2
-    # No two of them at one place: their covariance would be that of one and the same.
+    # One speed per bin: two in a bin would have a singular covariance.
     return bins[starts], log_time, log_speed, variance

@@ -1,7 +1,7 @@
-"""Fit of Haff's law to measured mean speeds, with an interval that means what it says.
+"""Fit of Haff's law to measured mean speeds, with an interval of the stated probability.
 
 A gas of a few beads does not follow the mean decay: each collision takes a random share of
-the energy, and what one collision took is missing for ever after. Linearising
+the energy, which does not come back. Linearising
 dv/dt = -v^2 / (v0 tau) about its solution, a deviation of ln v dies out as 1 / (1 + t/tau)
 while collisions keep adding to it at a constant rate per unit of s = ln(1 + t/tau): an
 Ornstein-Uhlenbeck process in s, that starts from zero because v0 is free,
@@ -32,24 +32,24 @@ from nanorocks_ros.physics.haff_law import haff_speed
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# A dense covariance of more points than this costs time and tells nothing new.
+# Number of groups of speeds: more cost time and add no information.
 _POINTS = 40
-# A Haff time of so many windows is no decay that could be told from none.
+# Longest Haff time, in windows: beyond it a decay cannot be distinguished from none.
 _LONGEST_HAFF_TIME = 30.0
 _FEWEST_DEGREES = 3.0
 _LOG_HAFF_TIME = (math.log(1e-3), math.log(1e5))
-# Of q and of the quick part, times the number of beads: what simulated gases in trays 1, 3 and 5
-# have, at restitutions from 0.6 to 0.95; see `haff_likelihood` for their spread.
+# Prior means of q and of the quick part, times the number of beads: from simulated gases in trays
+# 1, 3 and 5 at restitutions from 0.6 to 0.95; see `haff_likelihood` for their spread.
 USUAL_TIMES_BEADS = np.array([0.4, 0.1])
-# In ln(1 + t/tau), after which the quick part is forgotten; `haff_likelihood` takes the power 10.
+# Correlation range of the quick part in ln(1 + t/tau); `haff_likelihood` uses the power 10.
 QUICK_RANGE = 0.1
 _LOG_NOISE = (math.log(1e-12), math.log(10.0))
-# The errors given are trusted in proportion only.
+# The stated errors are known up to a common factor.
 _LOG_SCALE = (math.log(0.05), math.log(20.0))
 
-# Two standard deviations of the logarithms of q and of the quick part: beyond them something else
-# than a gas is taken for noise. Then fits begin from these kinds of it, q or the quick part being
-# stronger, and Haff times of so many windows.
+# Two standard deviations of the logarithms of q and of the quick part: beyond them the noise is
+# not that of a gas. Then fits start from these changes of both logarithms, and from Haff times of
+# these multiples of the window.
 _UNUSUAL = np.array([1.0, 2.0])
 _KINDS_OF_NOISE = np.array([[0.0, 0.0], [0.0, 5.0], [4.0, 0.0]])
 _SPREAD_OF_TIMES = np.array([5e-4, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0])
@@ -64,11 +64,11 @@ class HaffFit:
     initial_speed, initial_speed_error : float, [m/s]
     haff_time, haff_time_error : float, [s]
     decay_rate : float, [1/m]
-        1 / (v0 tau), which is what a restitution is read from.
+        1 / (v0 tau), from which the restitution follows.
     log_decay_rate_error : float
-        One standard error of its logarithm.
+        One standard error of the logarithm of `decay_rate`.
     degrees_of_freedom : float
-        Of Student's distribution that this error belongs to.
+        Of the Student distribution of this error.
     reduced_chi_square : float
         With the errors of the speeds alone; above 1 where the gas itself fluctuates.
     samples : int
@@ -100,7 +100,7 @@ def fit_haff(
     speed, error : ndarray (n,), [m/s], > 0
         Mean speeds and one standard error of each.
     beads : int, > 0
-        Number of beads: how strongly the gas itself fluctuates.
+        Number of beads, which determines the fluctuations of the gas.
 
     Returns
     -------
@@ -140,21 +140,21 @@ def fit_haff(
 
 
 def _best(data: Decay, start: float) -> NDArray[np.float64]:
-    """Parameters of the least cost, from a Haff time to start with, [s].
+    """Parameters of the lowest cost, from an initial Haff time, [s].
 
-    Where speeds follow Haff's law this finds them at once. Where they do not, the noise must
-    stand for the rest: as one of several kinds, and each with a Haff time of its own.
+    If the speeds follow Haff's law, one minimisation is enough. If not, the noise takes up the
+    deviation: then several kinds of noise are tried, each with its own Haff time.
     """
     first = _lowest(data, np.array([math.log(start), *data.usual, 0.0]))
     unusual = np.abs(first.x[1:3] - data.usual) > _UNUSUAL
     if not unusual.any() and first.x[0] > _LOG_HAFF_TIME[0]:
         return np.asarray(first.x)
-    found = [first]
+    fits = [first]
     taus = np.log(_SPREAD_OF_TIMES * data.time[-1])
-    for kind in _KINDS_OF_NOISE:
-        starts = [np.array([one, *(data.usual + kind), 0.0]) for one in taus]
-        found.append(_lowest(data, min(starts, key=data.cost)))
-    return np.asarray(min(found, key=lambda one: float(one.fun)).x)
+    for noise in _KINDS_OF_NOISE:
+        starts = [np.array([log_tau, *(data.usual + noise), 0.0]) for log_tau in taus]
+        fits.append(_lowest(data, min(starts, key=data.cost)))
+    return np.asarray(min(fits, key=lambda log_tau: float(log_tau.fun)).x)
 
 
 def _lowest(data: Decay, start: NDArray[np.float64]) -> optimize.OptimizeResult:
@@ -163,14 +163,14 @@ def _lowest(data: Decay, start: NDArray[np.float64]) -> optimize.OptimizeResult:
         start,
         method='L-BFGS-B',
         jac=True,
-        # So far down that speeds rounded to float32 give the same fit to 1e-6.
+        # Low enough that speeds rounded to float32 give the same fit to 1e-6.
         options={'ftol': 1e-15, 'gtol': 1e-9},
         bounds=(_LOG_HAFF_TIME, _LOG_NOISE, _LOG_NOISE, _LOG_SCALE),
     )
 
 
 def _degrees_of_freedom(data: Decay, best: NDArray[np.float64]) -> float:
-    """How well the variance of the decay rate is itself known, after Satterthwaite.
+    """Degrees of freedom of the variance of the decay rate, after Satterthwaite.
 
     The noise is estimated from one decay, so that a Gaussian interval would be too narrow;
     Student's distribution with 2 / var(ln variance) degrees of freedom takes its place.
@@ -181,8 +181,8 @@ def _degrees_of_freedom(data: Decay, best: NDArray[np.float64]) -> float:
     down = np.array([data.cost(best - shift) for shift in shifts])
     hessian = np.diag(up - 2.0 * centre + down)
     for i, j in itertools.combinations(range(len(shifts)), 2):
-        both = data.cost(best + shifts[i] + shifts[j]) - up[i] - up[j] + centre
-        hessian[i, j] = hessian[j, i] = both
+        mixed = data.cost(best + shifts[i] + shifts[j]) - up[i] - up[j] + centre
+        hessian[i, j] = hessian[j, i] = mixed
     slope = np.array(
         [
             0.5 * math.log(data.rate_variance(best + shift) / data.rate_variance(best - shift))

@@ -1,10 +1,8 @@
-"""How likely the mean speeds of a gas that cools are, for a Haff time and the noise of the gas.
+"""Likelihood of the mean speeds of a cooling gas, for a Haff time and the noise of the gas.
 
-The model and where it comes from stand in :mod:`nanorocks_ros.inference.decay.haff_fit`.
-A live graph
-fits each tray twice a second with hundreds of evaluations each, so one evaluation is one
-compiled call, with no exponential for the elements of the covariance: exp(-|s - s'|) is a ratio
-of (1 + t/tau).
+The model is derived in :mod:`nanorocks_ros.inference.decay.haff_fit`. A live graph fits each tray
+twice a second with hundreds of evaluations each, so one evaluation is one compiled call, without
+exponentials in the covariance: exp(-|s - s'|) is a ratio of (1 + t/tau).
 """
 
 from __future__ import annotations
@@ -15,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.inference.decay.covariance_solver import inverse_with_columns, whiten
 from nanorocks_ros.numerics.compiled import compiled
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
         NDArray[np.float64],
     ]
 
-# Spread of the logarithms of the strength q and of the quick part, about what is usual.
+# Prior standard deviations of the logarithms of the strength q and of the quick part.
 _SPREAD_STRENGTH, _SPREAD_QUICK = 0.5, 1.0
 # Step of the numerical derivative: the third root of the precision.
 _STEP = 6e-6
@@ -52,7 +51,7 @@ class Decay:
     inner_distance : ndarray (m,), [s]
         Mean time between two members of a group.
     usual : ndarray (2,)
-        Logarithms of the strength q and of the quick part that are usual for so many beads.
+        Prior means of the logarithms of the strength q and of the quick part.
     """
 
     time: NDArray[np.float64]
@@ -82,7 +81,7 @@ class Decay:
         return self.generalised(parameters)[0]
 
     def cost_and_slope(self, parameters: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        """The same and its derivatives by the parameters, (4,)."""
+        """The cost and its derivatives by the parameters, (4,)."""
         slope = np.empty(_PARAMETERS)
         return _cost_and_slope(parameters, slope, *self._arrays()), slope
 
@@ -114,7 +113,7 @@ def _cost_and_slope(
     inner_distance: NDArray[np.float64],
     usual: NDArray[np.float64],
 ) -> float:
-    """See `Decay.cost_and_slope`; by tau, on which all depends, it is done by differences."""
+    """See `Decay.cost_and_slope`; the derivative by tau, which enters everywhere, is numerical."""
     data = (time, starts, counts, log_speed, variance, inner_distance, usual)
     near = parameters.copy()
     step = _STEP * max(1.0, abs(parameters[0]))
@@ -128,9 +127,9 @@ def _cost_and_slope(
     )
     factor = smooth + rough
     known = columns.copy()
-    log_determinant = _whiten(factor, white, known)
+    log_determinant = whiten(factor, white, known)
     cost, log_v0, i00, i01, i11 = _summed(parameters, known, log_determinant, usual)
-    solved = _solved(factor, columns)
+    solved = inverse_with_columns(factor, columns)
     slope[1], slope[2], slope[3] = 0.0, 0.0, 0.0
     determinant = i00 * i11 - i01 * i01
     n = growth.size
@@ -170,7 +169,7 @@ def _generalised(
     smooth, rough, white = _covariances(
         parameters, growth, time, starts, counts, variance, inner_distance
     )
-    log_determinant = _whiten(smooth + rough, white, columns)
+    log_determinant = whiten(smooth + rough, white, columns)
     return _summed(parameters, columns, log_determinant, usual)
 
 
@@ -182,7 +181,7 @@ def _columns(
     counts: NDArray[np.intp],
     log_speed: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """1 + t/tau of each group, (m,); and (3, m): by ln v0, by ln tau, what is to be explained."""
+    """1 + t/tau of each group, (m,); and (3, m): derivatives by ln v0 and ln tau, and the data."""
     tau = math.exp(log_tau)
     n = starts.size
     growth, columns = np.empty(n), np.ones((3, n))
@@ -255,82 +254,3 @@ def _summed(
     # depends on tau itself, and would pull it up.
     cost += math.log(i00 * i11 - i01 * i01) + 2.0 * (log_v0 + parameters[0])
     return cost, log_v0, i00, i01, i11
-
-
-@compiled
-def _whiten(
-    covariance: NDArray[np.float64], white: NDArray[np.float64], columns: NDArray[np.float64]
-) -> float:
-    """Solve with the Cholesky factor of a covariance, in place; its log determinant.
-
-    Matrices this small are no work for a threaded BLAS: its threads wait for one another, which
-    on a busy machine made a fit take seconds, and their order may change the last digit.
-
-    Parameters
-    ----------
-    covariance : ndarray (n, n)
-        The part on and above the diagonal is used; the factor is left there.
-    white : ndarray (n,)
-        Added to the diagonal.
-    columns : ndarray (k, n)
-        Each row is replaced by its solution.
-    """
-    n = covariance.shape[0]
-    # Flat, with unsigned places, several elements are done at once.
-    flat = covariance.reshape(-1)
-    log_determinant = 0.0
-    for j in range(n):
-        row = np.uint64(j * n)
-        pivot = math.sqrt(covariance[j, j] + white[j])
-        log_determinant += 2.0 * math.log(pivot)
-        covariance[j, j] = pivot
-        for i in range(j + 1, n):
-            flat[row + np.uint64(i)] /= pivot
-        for k in range(j + 1, n):
-            factor, other = flat[row + np.uint64(k)], np.uint64(k * n)
-            for i in range(k, n):
-                flat[other + np.uint64(i)] -= flat[row + np.uint64(i)] * factor
-        for c in range(columns.shape[0]):
-            columns[c, j] /= pivot
-            factor = columns[c, j]
-            for i in range(j + 1, n):
-                columns[c, i] -= flat[row + np.uint64(i)] * factor
-    return log_determinant
-
-
-@compiled
-def _solved(factor: NDArray[np.float64], columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The inverse of a covariance times columns (3, n), and itself: (n, 3 + n)."""
-    n = factor.shape[0]
-    width = 3 + n
-    found = np.zeros((n, width))
-    flat = found.reshape(-1)
-    for j in range(n):
-        found[j, 3 + j] = 1.0
-        for c in range(3):
-            found[j, c] = columns[c, j]
-    for j in range(n):
-        _take_off(flat, factor, width, j, range(j), True)
-    for j in range(n - 1, -1, -1):
-        _take_off(flat, factor, width, j, range(j + 1, n), False)
-    return found
-
-
-@compiled
-def _take_off(
-    flat: NDArray[np.float64],
-    factor: NDArray[np.float64],
-    width: int,
-    j: int,
-    known: range,
-    forward: bool,
-) -> None:
-    """Row j of a solution from those that are known."""
-    row = np.uint64(j * width)
-    for k in known:
-        share, other = factor[k, j] if forward else factor[j, k], np.uint64(k * width)
-        for i in range(width):
-            flat[row + np.uint64(i)] -= share * flat[other + np.uint64(i)]
-    pivot = factor[j, j]
-    for i in range(width):
-        flat[row + np.uint64(i)] /= pivot

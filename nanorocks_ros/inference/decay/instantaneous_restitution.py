@@ -1,8 +1,8 @@
-"""Restitution against speed along one decay, and what noise alone makes of it.
+"""Restitution against speed along one decay, with the bands expected from noise alone.
 
 The decay rate at an instant is the slope of 1/v over time. The paper takes the logarithm of the
-ratio of two speeds instead, which noise spreads ever more widely as beads become slow: the bands
-say how widely where one restitution holds at all speeds and no bead rotates.
+ratio of two speeds instead, whose noise grows as beads become slow: the bands show its spread for
+one restitution at all speeds and beads without rotation.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ if TYPE_CHECKING:
     from nanorocks_ros.physics.confined_theory import ConfinedGas
 
 DRAWS = 1000
-# Outer and inner ends of the bands: 95 and 68 %.
+# Ends of the 95 % and 68 % bands.
 QUANTILES = (0.025, 0.16, 0.84, 0.975)
-# Below, the closed form says too little to draw.
+# Lowest restitution of the closed form in a figure.
 _LOWEST = 0.5
 _STEPS = 51
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LocalCor:
-    """Restitution over windows of one decay, read by a closed form.
+    """Restitution in windows of one decay, by a closed form.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class LocalCor:
     decay_rate, decay_rate_error : ndarray (n,), [1/m]
         Slope of 1/v, and one standard error.
     restitution : ndarray (n,)
-        NaN where none between 0.5 and 1 makes this decay.
+        NaN where no value from 0.5 to 1 gives this decay.
     lower, upper : ndarray (n,)
         For a decay rate one error higher and lower; 0 and 1 where the form has none.
     """
@@ -65,7 +65,7 @@ class LocalCor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InstantaneousCor:
-    """Figure 13 of the paper, and what it leaves out.
+    """Figure 13 of the paper, with the bands of noise and fluctuations.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class InstantaneousCor:
 def gas_covariance(
     times: NDArray[np.float64], haff_time: float, beads: int
 ) -> NDArray[np.float64]:
-    """Covariance of ln v of a cooling gas of so many beads, (n, n); derived in `haff_fit`.
+    """Covariance of ln v of a cooling gas of some beads, (n, n); derived in `haff_fit`.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def gas_covariance(
         Since the start of the cooling.
     haff_time : float, [s]
     beads : int
-        Of all runs that the speed is a mean over.
+        Number in all runs of the mean.
     """
     strength, quick = USUAL_TIMES_BEADS / beads
     s = np.log1p(times / haff_time)
@@ -123,8 +123,8 @@ def local_slopes(
 ) -> NDArray[np.float64]:
     """Slope of 1/v over time in each window, (..., n_windows), [1/m].
 
-    1/v of a slow, noisy speed has no mean; so it is taken to first order about the fitted decay,
-    1/v = 1/u - (v - u)/u^2. Points count by u^2, as equal relative errors would have it.
+    1/v of a slow, noisy speed has no mean; so it is expanded to first order about the fitted
+    decay, 1/v = 1/u - (v - u)/u^2. Points have the weight u^2, that of equal relative errors.
 
     Parameters
     ----------
@@ -136,13 +136,13 @@ def local_slopes(
         Number of the window of each point, rising from 0; three points or more in each.
     """
     slowness = (2.0 - speeds / law) / law
-    found = []
+    slopes = []
     for number in range(int(windows[-1]) + 1):
         inside = windows == number
         weights = law[inside] ** 2 / (law[inside] ** 2).sum()
-        off = times[inside] - weights @ times[inside]
-        found.append(slowness[..., inside] @ (weights * off) / (weights @ off**2))
-    return np.stack(found, axis=-1)
+        centred = times[inside] - weights @ times[inside]
+        slopes.append(slowness[..., inside] @ (weights * centred) / (weights @ centred**2))
+    return np.stack(slopes, axis=-1)
 
 
 def instantaneous_cor(
@@ -230,7 +230,7 @@ def _drawn(
     beads: int,
     seed: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Decays with one rate at all speeds: with errors, and with fluctuations and errors."""
+    """Random decays with one rate at all speeds: with errors; with fluctuations and errors."""
     times, _, error = curve
     law = haff_speed(times, fit.initial_speed, fit.haff_time)
     random = np.random.default_rng(seed)
@@ -255,16 +255,16 @@ def _windows(fit: HaffFit, times: NDArray[np.float64], windows: int) -> NDArray[
 
 
 def _table(gas: ConfinedGas, walls: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rising decay rates [1/m] and the restitutions they stand for."""
+    """Rising decay rates [1/m] and their restitutions."""
     grid = np.linspace(1.0, _LOWEST, _STEPS)
     rates: list[float] = []
-    for one in grid:
+    for restitution in grid:
         try:
-            rate = gas.decay_rate(float(one), walls)
+            rate = gas.decay_rate(float(restitution), walls)
         except FitError:
             break
         if rates and rate <= rates[-1]:
-            # Where walls are elastic, slow directions can make lower restitutions cool no faster.
+            # With elastic walls a lower restitution may not cool faster.
             break
         rates.append(rate)
     return np.array(rates), grid[: len(rates)]

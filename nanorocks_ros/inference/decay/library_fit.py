@@ -1,4 +1,7 @@
-"""Smooth functions through simulated decays: how a decay library is made of runs."""
+"""Fit of a decay library: smooth functions through simulated decays.
+
+Tested in test/inference/decay/test_decay_library.py.
+"""
 
 from __future__ import annotations
 
@@ -24,11 +27,11 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
 
 FIRST_DISTANCE, LAST_DISTANCE, N_DISTANCES = 0.003, 1.0, 60
-# Where the covariance is worked out, and over what part of the ranges it is averaged.
+# Grid of the covariance, and the fraction of the ranges it is averaged over.
 _COVARIANCE_RESTITUTION = np.array([1.0, 0.94, 0.84, 0.65, 0.4, 0.0])
 _COVARIANCE_WALL = np.array([0.80, 0.87, 0.94, 0.99])
 _REACH = 0.12
-# The weight of a node whose runs happen to be alike.
+# Smallest error of a node, over the median: runs of a node may agree by chance.
 _LEAST_ERROR = 1.0 / 3.0
 _ZERO = 1e-9
 
@@ -58,14 +61,14 @@ def distances() -> NDArray[np.float64]:
 
 
 def fit_library(tray: Tray, decays: Decays, made_by: str) -> DecayLibrary:
-    """A library through decays.
+    """Fit a library to decays.
 
     Parameters
     ----------
     tray : Tray
     decays : Decays
     made_by : str
-        JSON, kept with it.
+        JSON, stored in the library.
 
     Returns
     -------
@@ -121,15 +124,15 @@ def fit_library(tray: Tray, decays: Decays, made_by: str) -> DecayLibrary:
 
 
 def fewest_nodes() -> int:
-    """Nodes that a library needs: with fewer, functions go through the noise of the runs."""
+    """Smallest number of nodes of a library: with fewer, the functions fit the noise."""
     return 2 * term_count()
 
 
 def rough_rates(tray: Tray) -> NDArray[np.float64]:
-    """About what a full loss adds to the rate of decay, (3,), [1/m].
+    """Approximate decay rates for a full loss, (3,), [1/m].
 
-    Kinetic theory of a dilute isotropic gas, in pairs, at side walls, at floor and lid; the
-    polynomials of the library make up for what is missing.
+    Kinetic theory of a dilute isotropic gas, for pairs, side walls, floor and lid; the polynomials
+    of the library correct the rest.
     """
     free = [max(side - tray.diameter, 0.1 * tray.diameter) for side in tray.dimensions]
     pair = math.sqrt(2.0) / 6.0 * tray.count * math.pi * tray.diameter**2 / math.prod(free)
@@ -138,31 +141,31 @@ def rough_rates(tray: Tray) -> NDArray[np.float64]:
 
 
 def _covariances(decays: Decays) -> NDArray[np.float64]:
-    """Covariance between runs, averaged over the nodes around each of a grid of places."""
+    """Covariance between runs, averaged over the nodes around each point of the grid."""
     _, runs, n_x = decays.log_speed.shape
     deviation = decays.log_speed - decays.log_speed.mean(axis=1, keepdims=True)
     of_node = np.einsum('nrx,nry->nxy', deviation, deviation) / (runs - 1)
     across = _even(decays.restitution)
     up = (1.0 - decays.wall_restitution) / (1.0 - LOWEST_WALL)
-    found = np.empty((_COVARIANCE_RESTITUTION.size, _COVARIANCE_WALL.size, n_x, n_x))
+    covariance = np.empty((_COVARIANCE_RESTITUTION.size, _COVARIANCE_WALL.size, n_x, n_x))
     for i, restitution in enumerate(_even(_COVARIANCE_RESTITUTION)):
         for j, wall in enumerate((1.0 - _COVARIANCE_WALL) / (1.0 - LOWEST_WALL)):
             square = ((across - restitution) ** 2 + (up - wall) ** 2) / _REACH**2
             weight = np.exp(-0.5 * square)
-            found[i, j] = np.tensordot(weight / weight.sum(), of_node, axes=1)
-    return found
+            covariance[i, j] = np.tensordot(weight / weight.sum(), of_node, axes=1)
+    return covariance
 
 
 def _even(restitution: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The measure in which covariances are averaged, 0 for a restitution of 1."""
+    """Coordinate in which covariances are averaged, 0 for a restitution of 1."""
     return np.asarray((1.0 - restitution) ** (1.0 / 1.5))
 
 
 def node_of(number: int) -> dict[str, float]:
-    """Restitutions and nuisances of a node of the library: evenly spread for any number of them.
+    """Restitutions and nuisances of a node of the library, evenly spread for any number of nodes.
 
     An additive recurrence with the powers of the generalised golden ratio (Roberts 2018, "The
-    unreasonable effectiveness of quasirandom sequences"), so more nodes leave those there were.
+    unreasonable effectiveness of quasirandom sequences"): more nodes keep the earlier ones.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""The loops of `decay_likelihood`, compiled: place by place of the grid of restitutions."""
+"""Compiled loops of `decay_likelihood` over the points of the grid of restitutions.
+
+Tested in test/inference/decay/test_decay_likelihood.py.
+"""
 
 from __future__ import annotations
 
@@ -16,15 +19,14 @@ if TYPE_CHECKING:
 ROUNDING = 1e-9
 _NEWTON_STEPS = 15
 _LONGEST_STEP, _SMALL = 0.5, 3e-3
-# Before anything is measured the gas is taken to have been faster at the shaking event than at the
-# first speed used by a factor of 1.6, give or take a factor of e, where that is within four
-# seconds of the event. What it did before a first speed that comes later is known the less the
-# later that is: both rise with the logarithm of that time.
+# Prior of the amplitude: the speed at the shaking event is 1.6 times the first speed used, with a
+# standard deviation of a factor of e, if that is within four seconds of the event. For a later
+# first speed both logarithms rise with that of its time.
 _AMPLITUDE_LEAD, _AMPLITUDE_SPREAD = 0.5, 1.0
 _EARLY, _LEAD_PER_LOG_TIME = math.log(4.0), 1.0
-# The search begins where the first speeds are matched, however fast the gas was.
+# The search starts from the amplitude that matches the first speeds; largest ln of it over them.
 _MOST_LEAD = 8.0
-# Speeds from which the amplitude is guessed.
+# Number of speeds for the initial amplitude.
 _FIRST_SPEEDS = 3
 
 
@@ -40,9 +42,9 @@ def evaluate(
     camera: NDArray[np.float64],
     first: float,
     step: float,
-    found: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    results: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
 ) -> None:
-    """Fill in the likelihood at every place, for its best amplitude.
+    """Compute the likelihood at every point of the grid, for its best amplitude.
 
     Parameters
     ----------
@@ -52,17 +54,17 @@ def evaluate(
         Bins of the data, counted from the first.
     covariances : ndarray (n_corners, n_x, n_x)
     corners, shares : ndarray (n_places or 1, 4)
-        One for all places, or one of each.
+        One for all points, or one for each.
     means, slopes : ndarray (n_places, n_x), (n_places, n_z, n_x)
     camera : ndarray (2,)
     first, step : float
-        Logarithm of the first distance of the library, and from each to the next.
-    found : tuple of 3 ndarrays
+        Logarithm of the first distance of the library, and its step.
+    results : tuple of 3 ndarrays
         Log likelihood and deviation, (n_places, 2); gradient, (n_places, n_z + 2), and
-        information, (n_places, n_z + 2, n_z + 2): without entries where nobody asks for them.
+        information, (n_places, n_z + 2, n_z + 2): empty if not needed.
     """
     log_time, log_speed, variance = data
-    numbers, gradients, informations = found
+    numbers, gradients, informations = results
     n = log_time.size
     n_z = slopes.shape[1] + camera.size
     mixed = np.empty(covariances.shape[1:])
@@ -90,9 +92,9 @@ def evaluate(
         best, cost = _best_amplitude(
             data, means[place], (first, step), factor, (amplitude, expected, spread), columns
         )
-        off = (best - expected) / spread
+        deviation = (best - expected) / spread
         if gradients.shape[0] == 0:
-            numbers[place, 1] = cost - off * off
+            numbers[place, 1] = cost - deviation * deviation
             numbers[place, 0] = -0.5 * (cost + log_determinant)
             continue
         _compare(log_time, log_speed, means[place], first, step, best, columns)
@@ -101,8 +103,10 @@ def evaluate(
         columns[n_z] = camera[0] * (columns[1] - 1.0)
         columns[n_z + 1] = camera[1] * (log_speed - middle)
         whiten(factor, columns, 2 + n_z)
-        _sum_up(columns, (off, spread), numbers[place], gradients[place], informations[place])
-        numbers[place, 0] -= 0.5 * (log_determinant + off * off)
+        _sum_up(
+            columns, (deviation, spread), numbers[place], gradients[place], informations[place]
+        )
+        numbers[place, 0] -= 0.5 * (log_determinant + deviation * deviation)
 
 
 @kernel
@@ -114,9 +118,9 @@ def _best_amplitude(
     amplitudes: tuple[float, float, float],
     columns: NDArray[np.float64],
 ) -> tuple[float, float]:
-    """The likeliest ln a and what it costs, by Newton's method.
+    """The likeliest ln a and its cost, by Newton's method.
 
-    The amplitudes are that to begin with, the expected one and the spread of what is expected.
+    `amplitudes` are the initial ln a, and the mean and standard deviation of its prior.
     """
     log_time, log_speed, _ = data
     first, step = axis
@@ -128,19 +132,19 @@ def _best_amplitude(
     for _ in range(_NEWTON_STEPS):
         _compare(log_time, log_speed, mean, first, step, amplitude, columns)
         whiten(factor, columns, 2)
-        off = (amplitude - expected) / spread
-        now = off * off
-        pull = -off / spread
+        deviation = (amplitude - expected) / spread
+        new_cost = deviation * deviation
+        pull = -deviation / spread
         stiffness = 1.0 / spread**2
         for i in range(log_time.size):
-            now += residual[i] ** 2
+            new_cost += residual[i] ** 2
             pull += residual[i] * slope[i]
             stiffness += slope[i] ** 2
-        if now > cost:
-            # Too far: the mean is curved.
+        if new_cost > cost:
+            # The step was too long: the mean is curved.
             change *= 0.3
         else:
-            cost, best = now, amplitude
+            cost, best = new_cost, amplitude
             change = min(max(pull / stiffness, -_LONGEST_STEP), _LONGEST_STEP)
         amplitude = best + change
         if abs(change) < _SMALL:
@@ -156,7 +160,7 @@ def _matching(
     first: float,
     step: float,
 ) -> float:
-    """The amplitude with which the first speeds are the expected ones, if there is one."""
+    """The amplitude that matches the first speeds, if there is one."""
     n = min(_FIRST_SPEEDS, log_time.size)
     low, high = log_speed[0], log_speed[0] + _MOST_LEAD
     while high - low > _SMALL:
@@ -178,18 +182,18 @@ def _mix(
     corners: NDArray[np.int64],
     shares: NDArray[np.float64],
     part: tuple[int, int],
-    found: NDArray[np.float64],
+    covariance: NDArray[np.float64],
 ) -> None:
-    """The covariance of the library between four corners, from one distance to another."""
-    one, two = covariances[corners[0]], covariances[corners[1]]
-    three, four = covariances[corners[2]], covariances[corners[3]]
+    """Covariance of the library interpolated between four corners, in a range of distances."""
+    first, second = covariances[corners[0]], covariances[corners[1]]
+    third, fourth = covariances[corners[2]], covariances[corners[3]]
     for i in range(part[0], part[1]):
         for j in range(part[0], part[1]):
-            found[i, j] = (
-                shares[0] * one[i, j]
-                + shares[1] * two[i, j]
-                + shares[2] * three[i, j]
-                + shares[3] * four[i, j]
+            covariance[i, j] = (
+                shares[0] * first[i, j]
+                + shares[1] * second[i, j]
+                + shares[2] * third[i, j]
+                + shares[3] * fourth[i, j]
             )
 
 
@@ -198,18 +202,18 @@ def _covariance(
     table: NDArray[np.float64],
     cells: NDArray[np.int64],
     offset: float,
-    found: NDArray[np.float64],
+    covariance: NDArray[np.float64],
 ) -> None:
-    """Lower half of the covariance of data at some cells after an offset."""
+    """Lower half of the covariance of data in some cells, shifted by an offset."""
     whole = math.floor(offset)
     high = offset - whole
     low = 1.0 - high
     for i in range(cells.size):
         row = max(whole + cells[i], 0)
-        here, next_one, into = table[row], table[row + 1], found[i]
+        row_below, row_above, target = table[row], table[row + 1], covariance[i]
         for j in range(i + 1):
             column = max(whole + cells[j], 0)
-            into[j] = low * here[column] + high * next_one[column + 1]
+            target[j] = low * row_below[column] + high * row_above[column + 1]
 
 
 @kernel
@@ -231,7 +235,7 @@ def _compare(
 
 @kernel
 def _between(values: NDArray[np.float64], at: float) -> tuple[float, float]:
-    """Value and slope between two entries, straight on beyond the ends."""
+    """Linear interpolation and its slope, extrapolated beyond the ends."""
     cell = min(max(math.floor(at), 0), values.size - 2)
     slope = values[cell + 1] - values[cell]
     return values[cell] + (at - cell) * slope, slope
@@ -239,17 +243,17 @@ def _between(values: NDArray[np.float64], at: float) -> tuple[float, float]:
 
 @kernel
 def _look_up(
-    slopes: NDArray[np.float64], places: NDArray[np.float64], found: NDArray[np.float64]
+    slopes: NDArray[np.float64], places: NDArray[np.float64], changes: NDArray[np.float64]
 ) -> None:
     """Changes of ln f with nuisances, (n_z, n_x), between distances; (n_z, n)."""
     for i in range(places.size):
-        # Beyond its ends the library's slopes stay as they are there.
+        # Beyond the ends of the library its slopes are constant.
         at = min(max(places[i], 0.0), slopes.shape[1] - 1.0)
         cell = min(int(at), slopes.shape[1] - 2)
         share = at - cell
         for z in range(slopes.shape[0]):
             value = slopes[z, cell]
-            found[z, i] = value + share * (slopes[z, cell + 1] - value)
+            changes[z, i] = value + share * (slopes[z, cell + 1] - value)
 
 
 @kernel
@@ -264,7 +268,7 @@ def _sum_up(
     n = columns.shape[1]
     off, spread = amplitude
     deviation = 0.0
-    # At the best amplitude there is no pull left, but where the mean has a kink or an end.
+    # At the best amplitude the gradient vanishes, except at kinks and ends of the mean.
     pull = -off / spread
     stiffness = 1.0 / spread**2
     for i in range(n):
@@ -277,16 +281,16 @@ def _sum_up(
         shared = 0.0
         for i in range(n):
             shared += with_amplitude[i] * own[i]
-        # Kept here until all of them are needed no more.
+        # Stored here until all of them have been used.
         gradient[z] = shared
         for first in range(0, z + 1, 2):
-            # Two side by side; an odd one at the end goes with itself.
+            # Two columns at a time; an odd last one is paired with itself.
             second = min(first + 1, z)
-            one, two = columns[2 + first], columns[2 + second]
+            column, next_column = columns[2 + first], columns[2 + second]
             a, b = -shared * gradient[first] / stiffness, -shared * gradient[second] / stiffness
             for i in range(n):
-                a += own[i] * one[i]
-                b += own[i] * two[i]
+                a += own[i] * column[i]
+                b += own[i] * next_column[i]
             information[z, first] = information[first, z] = a
             information[z, second] = information[second, z] = b
     for z in range(gradient.size):
@@ -294,7 +298,7 @@ def _sum_up(
         slope = 0.0
         for i in range(n):
             slope += residual[i] * own[i]
-        # What the amplitude would take over is no gain of a nuisance.
+        # The part that the amplitude can absorb is no gain of a nuisance.
         gradient[z] = slope - gradient[z] * pull / stiffness
     numbers[0] = -0.5 * deviation
     numbers[1] = deviation

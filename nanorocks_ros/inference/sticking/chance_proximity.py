@@ -1,7 +1,7 @@
-"""How improbable it is that two free beads stay beside each other by chance.
+"""Probability that two free beads stay side by side by chance.
 
-A camera sees beads in projection: any two may pass, or touch, and some do so slowly. What tells
-a body of two beads from that is how far beads of that gas would have come apart meanwhile.
+A camera sees beads in projection: any two may pass or touch, and some do so slowly. A body of two
+beads stays together while free beads of that gas would have separated.
 Derived in docs/method/clusters.md.
 """
 
@@ -38,14 +38,14 @@ def encounter_rate(tray: Tray) -> float:
 
     Discs that move at random over the floor; passing above counts as much as a collision.
     """
-    radii = 0.5 * np.array([one.diameter for one in tray.species])
-    counts = np.array([one.count for one in tray.species], dtype=np.float64)
+    radii = 0.5 * np.array([species.diameter for species in tray.species])
+    counts = np.array([species.count for species in tray.species], dtype=np.float64)
     reach = (counts @ (radii[:, None] + radii) @ counts) / counts.sum() ** 2
     room = math.prod(side - tray.diameter for side in tray.dimensions[:2])
     return float(2.0 * math.sqrt(2.0) * reach * max(counts.sum() - 1.0, 0.0) / room)
 
 
-def chance(way: ArrayLike, tolerance: ArrayLike, rate: float) -> NDArray[np.float64]:
+def chance_probability(way: ArrayLike, tolerance: ArrayLike, rate: float) -> NDArray[np.float64]:
     """Probability that an encounter of two free beads looks like a body of two.
 
     Parameters
@@ -68,27 +68,27 @@ def chance(way: ArrayLike, tolerance: ArrayLike, rate: float) -> NDArray[np.floa
     return np.asarray(slow * np.exp(-_DISTURBED * rate * gone))
 
 
-def encounters(tray: Tray) -> float:
+def expected_encounters(tray: Tray) -> float:
     """Encounters of all beads between two shaking events, each pair's once."""
     return 0.5 * tray.count * encounter_rate(tray) * _CYCLE
 
 
-def largest_chance(tray: Tray, false_alarms: float) -> float:
-    """The chance of an encounter below which it is a body, at some rate of false alarms a cycle.
+def max_chance_probability(tray: Tray, false_alarm_rate: float) -> float:
+    """Largest chance probability of a body, at a rate of false alarms per cycle.
 
     Parameters
     ----------
     tray : Tray
-    false_alarms : float, 0 to 1
-        Share of cycles without sticking in which any two beads are called a body.
+    false_alarm_rate : float, 0 to 1
+        Fraction of cycles without sticking in which a body is reported.
 
     Raises
     ------
     ConfigurationError
         When the rate is not between 0 and 1.
     """
-    if not 0.0 < false_alarms < 1.0:
+    if not 0.0 < false_alarm_rate < 1.0:
         raise ConfigurationError(
-            'bodies.false_alarms', f'{false_alarms!r}', 'give a rate between 0 and 1'
+            'bodies.false_alarm_rate', f'{false_alarm_rate!r}', 'give a rate between 0 and 1'
         )
-    return false_alarms / max(encounters(tray), 1.0)
+    return false_alarm_rate / max(expected_encounters(tray), 1.0)

@@ -1,4 +1,4 @@
-"""What the merges of a cycle say of each of some sticking speeds, also while the cycle grows."""
+"""Likelihood of the merges of a cycle for a grid of sticking speeds, also of a growing cycle."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
     from nanorocks_ros.physics.sticking_rates import SlowContacts
 
-# Sticking speeds that are tried; they lie closer near 0.
+# Size of the grid of sticking speeds, which is denser near 0.
 _NODES = 600
 _HIGHEST = 0.03
 _LEAST_SHARE = 0.3
-# What is further back than this seldom changes, [s]: merges are known later than they happen.
+# Merges are reported late; those further back than this rarely change, [s].
 _SETTLED = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MergeTerms:
-    """The parts of a Poisson likelihood at some sticking speeds; those of cycles add up.
+class MergeLikelihood:
+    """Terms of a Poisson likelihood on a grid of sticking speeds; those of cycles add up.
 
     Parameters
     ----------
@@ -33,11 +33,11 @@ class MergeTerms:
         Sticking speeds, rising.
     merges : int
     exposed : bool
-        Whether there was anything that could have merged.
+        Whether there were bodies that could have merged.
     logs : ndarray (n,)
         Sum of the logarithms of the rates of the merges.
     expected : ndarray (n,)
-        Merges that were to be expected.
+        Expected number of merges.
     """
 
     speeds: NDArray[np.float64]
@@ -46,8 +46,8 @@ class MergeTerms:
     logs: NDArray[np.float64]
     expected: NDArray[np.float64]
 
-    def __add__(self, other: MergeTerms) -> MergeTerms:
-        return MergeTerms(
+    def __add__(self, other: MergeLikelihood) -> MergeLikelihood:
+        return MergeLikelihood(
             speeds=self.speeds,
             merges=self.merges + other.merges,
             exposed=self.exposed or other.exposed,
@@ -57,29 +57,30 @@ class MergeTerms:
 
 
 class MergeRates:
-    """The theory of one tray, held against its cycles.
+    """Merge rates of one tray by kinetic theory, compared with its cycles.
 
-    What was worked out for a cycle is kept: the same one, grown since, costs what is new in it.
+    The integral over a cycle is kept: if the same cycle has grown, only its new part is computed.
 
     Parameters
     ----------
     contacts : SlowContacts
         Of the tray.
     beads : int
-        In the tray.
+        Number in the tray.
     measure : 'normal' or 'total'
-        Which relative speed decides whether beads stick.
+        Relative speed that is compared with the sticking speed.
     highest : float, [m/s]
-        Of the sticking speeds that are tried.
+        Upper end of the grid of sticking speeds.
     least_share : float, 0 to 1
-        Of the beads; with fewer bodies, large ones, the theory of single beads says too little.
+        Smallest ratio of bodies to beads; with fewer, larger bodies the theory of single beads
+        does not hold.
 
     Attributes
     ----------
     speeds : ndarray (n,), [m/s]
-        Sticking speeds that are tried.
-    nothing : MergeTerms
-        What no cycles say.
+        Grid of sticking speeds.
+    nothing : MergeLikelihood
+        Likelihood of no cycles.
     """
 
     def __init__(
@@ -95,14 +96,14 @@ class MergeRates:
         self._fewest = least_share * beads
         self.speeds = highest * (np.arange(1, _NODES + 1) / _NODES) ** 2
         nothing = np.zeros(_NODES)
-        self.nothing = MergeTerms(
+        self.nothing = MergeLikelihood(
             speeds=self.speeds, merges=0, exposed=False, logs=nothing, expected=nothing
         )
         self._known: StickingCycle | None = None
         self._expected = np.zeros(_NODES)
 
-    def terms(self, cycle: StickingCycle) -> MergeTerms:
-        """What a cycle says.
+    def terms(self, cycle: StickingCycle) -> MergeLikelihood:
+        """Likelihood of a cycle.
 
         Raises
         ------
@@ -111,85 +112,87 @@ class MergeRates:
         FitError
             For speeds or times that cannot be used.
         """
-        one = _first_part(_checked(cycle), self._fewest)
-        if one.times.size < 2 or one.bodies[0] <= 1.0:
-            return replace(self.nothing, merges=one.merges.size)
-        speeds = np.interp(one.merges, one.times, one.speeds)
-        logs = self._contacts.log_slower_sum(self.speeds, speeds, self._measure)
-        return MergeTerms(
+        usable = _first_part(_checked(cycle), self._fewest)
+        if usable.times.size < 2 or usable.bodies[0] <= 1.0:
+            return replace(self.nothing, merges=usable.merges.size)
+        speeds = np.interp(usable.merges, usable.times, usable.speeds)
+        logs = self._contacts.summed_log_rate_below(self.speeds, speeds, self._measure)
+        return MergeLikelihood(
             speeds=self.speeds,
-            merges=one.merges.size,
+            merges=usable.merges.size,
             exposed=True,
             logs=logs + np.log(speeds).sum(),
-            expected=self._expected_in(one),
+            expected=self._expected_in(usable),
         )
 
-    def _expected_in(self, one: StickingCycle) -> NDArray[np.float64]:
-        """Merges expected at each sticking speed, (n,): an integral by the trapezoidal rule."""
-        if self._known is None or not _begins_with(one, self._known):
+    def _expected_in(self, cycle: StickingCycle) -> NDArray[np.float64]:
+        """Expected merges at each sticking speed, (n,), by the trapezoidal rule."""
+        if self._known is None or not _begins_with(cycle, self._known):
             self._known, self._expected = None, np.zeros(_NODES)
         first = self._known.times.size - 1 if self._known is not None else 0
-        settled = int(np.searchsorted(one.times, one.times[-1] - _SETTLED))
+        settled = int(np.searchsorted(cycle.times, cycle.times[-1] - _SETTLED))
         if settled > first:
-            self._expected = self._expected + self._between(one, first, settled)
+            self._expected = self._expected + self._between(cycle, first, settled)
             self._known = replace(
-                one,
-                times=one.times[: settled + 1],
-                speeds=one.speeds[: settled + 1],
-                bodies=one.bodies[: settled + 1],
+                cycle,
+                times=cycle.times[: settled + 1],
+                speeds=cycle.speeds[: settled + 1],
+                bodies=cycle.bodies[: settled + 1],
             )
             first = settled
-        return self._expected + self._between(one, first, one.times.size - 1)
+        return self._expected + self._between(cycle, first, cycle.times.size - 1)
 
-    def _between(self, one: StickingCycle, first: int, last: int) -> NDArray[np.float64]:
+    def _between(self, cycle: StickingCycle, first: int, last: int) -> NDArray[np.float64]:
         """The part of the integral from one node to another."""
         part = slice(first, last + 1)
-        bodies, speeds = one.bodies[part], one.speeds[part]
-        halves = 0.5 * np.diff(one.times[part])
+        bodies, speeds = cycle.bodies[part], cycle.speeds[part]
+        halves = 0.5 * np.diff(cycle.times[part])
         width = np.append(halves, 0.0) + np.append(0.0, halves)
-        # Bodies meet as beads do: pairs of them, at the speed of the beads.
+        # Bodies collide like beads: in pairs, at the speed of the beads.
         weights = width * 0.5 * bodies**2 / self._beads * speeds * (bodies > 1.0)
-        return self._contacts.slower_sum(self.speeds, speeds, weights, self._measure)
+        return self._contacts.summed_rate_below(self.speeds, speeds, weights, self._measure)
 
 
-def _begins_with(one: StickingCycle, known: StickingCycle) -> bool:
-    n = known.times.size
+def _begins_with(cycle: StickingCycle, start: StickingCycle) -> bool:
+    n = start.times.size
     return (
-        np.array_equal(one.times[:n], known.times)
-        and np.array_equal(one.speeds[:n], known.speeds)
-        and np.array_equal(one.bodies[:n], known.bodies)
+        np.array_equal(cycle.times[:n], start.times)
+        and np.array_equal(cycle.speeds[:n], start.speeds)
+        and np.array_equal(cycle.bodies[:n], start.bodies)
     )
 
 
-def _first_part(one: StickingCycle, fewest: float) -> StickingCycle:
-    """The cycle as long as there are enough bodies."""
-    used = one.bodies >= max(fewest, 1.0 + 1e-9)
+def _first_part(cycle: StickingCycle, fewest: float) -> StickingCycle:
+    """The cycle up to the last time with enough bodies."""
+    used = cycle.bodies >= max(fewest, 1.0 + 1e-9)
     end = int(np.argmin(used)) if not used.all() else used.size
     if end == 0:
         nothing = np.empty(0)
-        return replace(one, times=nothing, speeds=nothing, bodies=nothing, merges=nothing)
-    last = one.times[end - 1] if end < used.size else np.inf
+        return replace(cycle, times=nothing, speeds=nothing, bodies=nothing, merges=nothing)
+    last = cycle.times[end - 1] if end < used.size else np.inf
     return replace(
-        one,
-        times=one.times[:end],
-        speeds=one.speeds[:end],
-        bodies=one.bodies[:end],
-        merges=one.merges[one.merges <= last],
+        cycle,
+        times=cycle.times[:end],
+        speeds=cycle.speeds[:end],
+        bodies=cycle.bodies[:end],
+        merges=cycle.merges[cycle.merges <= last],
     )
 
 
-def _checked(one: StickingCycle) -> StickingCycle:
-    sizes = {one.times.size, one.speeds.size, one.bodies.size}
-    if len(sizes) > 1 or not one.times.size:
+def _checked(cycle: StickingCycle) -> StickingCycle:
+    sizes = {cycle.times.size, cycle.speeds.size, cycle.bodies.size}
+    if len(sizes) > 1 or not cycle.times.size:
         raise FitError(
             'sticking',
-            f'{one.times.size} times, {one.speeds.size} speeds, {one.bodies.size} numbers',
+            f'{cycle.times.size} times, {cycle.speeds.size} speeds, {cycle.bodies.size} numbers',
             'give as many of each, one at least',
         )
-    if not (np.diff(one.times) >= 0.0).all():
+    if not (np.diff(cycle.times) >= 0.0).all():
         raise FitError('sticking', 'times that do not rise', 'sort them')
-    if not (np.isfinite(one.speeds).all() and (one.speeds > 0.0).all()):
+    if not (np.isfinite(cycle.speeds).all() and (cycle.speeds > 0.0).all()):
         raise FitError(
-            'sticking', 'a speed that is not positive', 'leave out what is not known, or at rest'
+            'sticking',
+            'a speed that is not positive',
+            'leave out unknown speeds and beads at rest',
         )
-    return one
+    return cycle

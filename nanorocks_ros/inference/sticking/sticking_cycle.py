@@ -1,4 +1,7 @@
-"""One cycle as the inference of the sticking speed needs it: merges of bodies, and speeds."""
+"""Input of the sticking-speed inference: merges and speeds of one cycle.
+
+Tested in test/inference/sticking/test_sticking_speed.py.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +22,12 @@ _NS = 1e9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StickingCycle:
-    """Merges of the bodies of a cycle, and how fast the beads were.
+    """Merges of the bodies of a cycle, and the speeds of the beads.
 
     Parameters
     ----------
     times : ndarray (n,), [s]
-        Rising; merges are looked for from the first to the last.
+        Rising; merges are counted from the first to the last.
     speeds : ndarray (n,), [m/s]
         Mean projected speed of the beads.
     bodies : ndarray (n,)
@@ -46,7 +49,7 @@ def sticking_cycle(
     speeds: NDArray[np.float64],
     start_ns: int,
 ) -> StickingCycle:
-    """What a `BodyCounter` found in a cycle, with speeds of the beads.
+    """Cycle from the merges of a `BodyCounter` and the speeds of the beads.
 
     Parameters
     ----------
@@ -54,21 +57,22 @@ def sticking_cycle(
         In the tray.
     merges : sequence of Merge
     stamps_ns : ndarray of int64, (n,), [ns]
-        Of the speeds, rising. Nothing is asked of later times.
+        Of the speeds, rising. Later merges are ignored.
     speeds : ndarray (n,), [m/s]
     start_ns : int, [ns]
-        The shaking event: until the first speed they are taken to be that.
+        The shaking event; the speed is constant from there to the first stamp.
     """
     end = (int(stamps_ns[-1]) - start_ns) / _NS
-    found = sorted((merge.stamp_ns - start_ns) / _NS for merge in merges if merge.joins)
-    inside = np.array([max(one, 0.0) for one in found if one <= end])
+    merge_times = sorted((merge.stamp_ns - start_ns) / _NS for merge in merges if merge.joins)
+    inside = np.array([max(time, 0.0) for time in merge_times if time <= end])
     known = np.concatenate([[0.0], (stamps_ns - start_ns) / _NS])
-    # Bodies are constant between merges: both values of each are nodes of the integral.
+    # The number of bodies is constant between merges: the values just before and after each
+    # merge are nodes of the integral.
     times = np.sort(np.concatenate([known, inside, np.nextafter(inside, np.inf)]))
-    fallen = np.searchsorted(inside, times, side='left')
+    merged = np.searchsorted(inside, times, side='left')
     return StickingCycle(
         times=times,
         speeds=np.interp(times, known[1:], speeds),
-        bodies=beads - fallen.astype(np.float64),
+        bodies=beads - merged.astype(np.float64),
         merges=inside,
     )

@@ -1,4 +1,4 @@
-"""The speed below which beads stick, from when bodies merged: a Poisson likelihood.
+"""Sticking speed from the times at which bodies merged: a Poisson likelihood.
 
 Derived in docs/method/clusters.md; accuracy in docs/validation/sticking_accuracy.md.
 """
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.inference.sticking.merge_likelihood import MergeRates, MergeTerms
+from nanorocks_ros.inference.sticking.merge_likelihood import MergeLikelihood, MergeRates
 from nanorocks_ros.numerics.log_sums import log_sum
 from nanorocks_ros.records import StickingStatus
 
@@ -37,10 +37,10 @@ class StickingEstimate:
     ----------
     status : StickingStatus
     sticking_speed : float, [m/s]
-        Median of what is probable; NaN unless measured.
+        Median of the posterior; NaN unless measured.
     lower, upper : float, [m/s]
-        Interval; from 0 to an upper limit without a merge, from a lower limit to the highest
-        speed considered where all that met stuck.
+        Interval. Without a merge it runs from 0 to an upper limit; if all colliding bodies stuck,
+        from a lower limit to the highest speed of the grid.
     merges : int
     probability : float, 0 to 1
         Of the interval.
@@ -65,16 +65,16 @@ def sticking_estimate(
     rate_error: float = 0.1,
     probability: float = 0.95,
 ) -> StickingEstimate:
-    """The sticking speed that merges of bodies prefer; any up to the highest is as likely before.
+    """Sticking speed from the merges of bodies, with a flat prior up to `highest`.
 
     Parameters
     ----------
     cycles : sequence of StickingCycle
-        One or many; each independent of the others.
+        One or more independent cycles.
     contacts, beads, measure, highest, least_share
         See `MergeRates`.
     rate_error, probability : float
-        See `estimate_by`.
+        See `sticking_estimate_of`.
 
     Raises
     ------
@@ -85,20 +85,22 @@ def sticking_estimate(
     """
     rates = MergeRates(contacts, beads, measure, highest=highest, least_share=least_share)
     terms = reduce(add, [rates.terms(cycle) for cycle in cycles], rates.nothing)
-    return estimate_by(terms, rate_error=rate_error, probability=probability)
+    return sticking_estimate_of(terms, rate_error=rate_error, probability=probability)
 
 
-def estimate_by(terms: MergeTerms, *, rate_error: float, probability: float) -> StickingEstimate:
-    """The same by what cycles say.
+def sticking_estimate_of(
+    terms: MergeLikelihood, *, rate_error: float, probability: float
+) -> StickingEstimate:
+    """Sticking speed from the likelihood of the merges.
 
     Parameters
     ----------
-    terms : MergeTerms
-        Of all of them together.
+    terms : MergeLikelihood
+        Sum over all cycles.
     rate_error : float
-        Standard deviation of the logarithm of all rates, by which the theory may be wrong.
+        Standard deviation of the logarithm of a common error of all rates.
     probability : float, 0 to 1
-        Of the interval; one-sided limits have it, too.
+        Of the interval, and of one-sided limits.
     """
     grid, merges = terms.speeds, terms.merges
     if not terms.exposed:
@@ -119,11 +121,11 @@ def _posterior(
     total /= total[-1]
     tail = 0.5 * (1.0 - probability)
     quantiles = (tail, 0.5, 1.0 - tail, probability, 1.0 - probability)
-    low, median, high, limit, least = (float(one) for one in np.interp(quantiles, total, grid))
+    low, median, high, limit, least = (float(value) for value in np.interp(quantiles, total, grid))
     if merges == 0:
         status, low, median, high = StickingStatus.NO_MERGE, 0.0, math.nan, limit
     elif likelihood[-1] > likelihood.max() - _UNLIMITED:
-        # All that met stuck: any higher speed explains it as well.
+        # All colliding bodies stuck: any higher speed fits as well.
         status, low, median = StickingStatus.NO_UPPER_LIMIT, least, math.nan
         high = float(grid[-1])
     else:
@@ -138,7 +140,7 @@ def _posterior(
     )
 
 
-# A log likelihood at the highest speed within this of the largest limits nothing.
+# With a log likelihood at the highest speed within this of the maximum there is no upper limit.
 _UNLIMITED = 2.0
 
 

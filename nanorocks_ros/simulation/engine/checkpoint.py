@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import zipfile
 import zlib
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.outputs.npz_archive import write_archive
 from nanorocks_ros.simulation.engine.collision_rules import Rules
 from nanorocks_ros.simulation.engine.gas_state import State
 
@@ -45,14 +45,7 @@ def save(path: Path, state: State, rules: Rules, n_species: int) -> None:
     arrays = {f'state.{name}': value for name, value in state._asdict().items()}
     arrays |= {f'rules.{name}': np.asarray(value) for name, value in rules._asdict().items()}
     arrays['form'] = np.asarray([_FORM, n_species])
-    partial = path.with_name(f'.{path.name}.part')
-    try:
-        with partial.open('wb') as file:
-            np.savez(file, **{**arrays, _DIGEST: _digest(arrays)})
-        os.replace(partial, path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise SimulationError(str(path), f'{error.strerror}', 'write elsewhere') from error
+    write_archive(path, {**arrays, _DIGEST: _digest(arrays)}, SimulationError)
 
 
 def load(path: Path) -> tuple[State, Rules, int]:

@@ -10,7 +10,7 @@ import numpy as np
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.counter_rng import hashed
-from nanorocks_ros.numerics.stable_sort import rising
+from nanorocks_ros.numerics.stable_sort import stable_argsort
 from nanorocks_ros.simulation.packing.cell_list import Packing, new_packing
 from nanorocks_ros.simulation.packing.grow_while_moving import grown
 from nanorocks_ros.simulation.packing.monte_carlo import insert
@@ -174,4 +174,4 @@ def _packing(
     for axis in range(3):
         box[axis] = sides[axis]
         around[axis] = periodic[axis]
-    return new_packing(radii.copy(), box, around, rising(radii))
+    return new_packing(radii.copy(), box, around, stable_argsort(radii))

@@ -9,7 +9,7 @@ import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.counter_rng import hashed, nearly_normal
-from nanorocks_ros.numerics.stable_sort import rising
+from nanorocks_ros.numerics.stable_sort import stable_argsort
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -117,7 +117,7 @@ def draw_beads(
     looks : ndarray (n, 9)
     width : float, [px]
     """
-    order = rising(heights)
+    order = stable_argsort(heights)
     for k in range(order.size):
         draw_bead(canvas, discs[order[k]], looks[order[k]], width)
 

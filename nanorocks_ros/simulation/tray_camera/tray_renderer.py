@@ -83,23 +83,6 @@ class TrayCamera:
         """Where the floor of the tray is in the picture."""
         return self._region
 
-    def to_pixels(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points of the tray are in the picture.
-
-        Parameters
-        ----------
-        positions : ndarray (n, 2 or 3), [m]
-            From the corner of the tray.
-
-        Returns
-        -------
-        ndarray (n, 2), [px]
-            Column and row, counted from the corner of the picture: the centre of the first
-            pixel is at (0.5, 0.5).
-        """
-        corner = np.array([self._region.x, self._region.y], dtype=np.float64)
-        return np.asarray(positions)[:, :2] * self._scale + corner
-
     def picture(self, positions: NDArray[np.float64], number: int) -> NDArray[np.uint8]:
         """Draw the scene.
 

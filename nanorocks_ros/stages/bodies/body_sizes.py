@@ -1,44 +1,73 @@
-"""Numbers and sizes of bodies, from which beads stick to which."""
+"""Numbers and sizes of bodies, from the bonds between beads."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-# Upper ends of the sizes counted together; larger ones are the last.
+# Upper limits of the size classes; larger bodies are the last class.
 _SIZE_CLASSES = (1, 2, 3, 6)
 
 
 def bodies_of(beads: Iterable[int], bonds: Iterable[tuple[int, int]]) -> dict[int, int]:
-    """For each bead the least number of a bead of its body.
+    """Connected components of the bonds: for each bead the lowest number of a bead of its body.
 
     Parameters
     ----------
     beads : iterable of int
     bonds : iterable of (int, int)
-        Beads that stick together; those not among `beads` may join others.
+        Bonds. Beads that are not among `beads` may join others.
     """
     root = {bead: bead for bead in beads}
-    wanted = list(root)
+    members = list(root)
 
-    def find(one: int) -> int:
-        while root.setdefault(one, one) != one:
-            root[one] = root[root[one]]
-            one = root[one]
-        return one
+    def find_root(bead: int) -> int:
+        while root.setdefault(bead, bead) != bead:
+            root[bead] = root[root[bead]]
+            bead = root[bead]
+        return bead
 
     for first, second in bonds:
-        low, high = sorted((find(first), find(second)))
+        low, high = sorted((find_root(first), find_root(second)))
         root[high] = low
-    return {one: find(one) for one in wanted}
+    return {bead: find_root(bead) for bead in members}
+
+
+def possible_merges(
+    body_of: Mapping[int, int],
+    pairs: NDArray[np.int64],
+    chances: NDArray[np.float64],
+    odds: float,
+) -> list[tuple[int, int, float]]:
+    """Sizes of two bodies that may have merged, and the probability of it.
+
+    Parameters
+    ----------
+    body_of : mapping of int to int
+        See `bodies_of`.
+    pairs : ndarray of int64, (n, 2)
+        Beads that may be bonded.
+    chances : ndarray (n,)
+        Probability that free beads stay together for as long.
+    odds : float
+        Merges per encounter: the prior odds.
+    """
+    sizes = Counter(body_of.values())
+    probabilities: dict[tuple[int, int], float] = {}
+    for (first, second), chance in zip(pairs.tolist(), chances.tolist(), strict=True):
+        if first in body_of and second in body_of and body_of[first] != body_of[second]:
+            key = min(body_of[first], body_of[second]), max(body_of[first], body_of[second])
+            probabilities[key] = max(probabilities.get(key, 0.0), odds / (odds + chance))
+    return [(sizes[a], sizes[b], probability) for (a, b), probability in probabilities.items()]
 
 
 def size_fields(
@@ -46,16 +75,16 @@ def size_fields(
     beads: int,
     merges: Sequence[tuple[int, int, float]],
 ) -> dict[str, Any]:
-    """Fields of a `BodyEstimate` for bodies of some sizes.
+    """Fields of a `BodyEstimate` for bodies of given sizes.
 
     Parameters
     ----------
     sizes : ndarray of int, (n,)
-        Beads of each body that is known.
+        Number of beads of each known body.
     beads : int
-        In the tray.
+        Number of beads in the tray.
     merges : sequence of (size, size, probability)
-        Bodies that may have joined, and how probable that is.
+        Bodies that may have merged, and the probability of it.
     """
     known = int(sizes.sum())
     if known == 0:
@@ -65,7 +94,7 @@ def size_fields(
     values = {
         'bodies': scale * sizes.size,
         'mean_size': known / sizes.size,
-        # Beads counted twice make bodies too large; those that are missing, none larger.
+        # Beads detected twice make bodies too large; missing beads are taken for single ones.
         'weighted_size': float(np.sum(sizes**2)) / known * min(scale, 1.0),
         'clustered_share': 1.0 - share_single,
         'clusters': scale * np.count_nonzero(sizes > 1),
@@ -87,8 +116,8 @@ def _errors(
     beads: int,
     merges: Sequence[tuple[int, int, float]],
 ) -> dict[str, float]:
-    """Standard errors, from merges that may have been and from beads that are not known."""
-    probability = np.array([one for _, _, one in merges])
+    """Standard errors from possible merges and from unknown beads."""
+    probability = np.array([chance for _, _, chance in merges])
     pairs = np.array([(a, b) for a, b, _ in merges], dtype=np.float64).reshape(-1, 2)
     effects = {
         'bodies': np.ones(len(pairs)),
@@ -97,7 +126,7 @@ def _errors(
         'clustered_share': (np.where(pairs == 1.0, 1.0, 0.0).sum(axis=1)) / known,
         'clusters': np.abs(1.0 - np.sum(pairs > 1.0, axis=1)),
     }
-    # A bead that is not known is one of its own, part of a known body, or was counted twice.
+    # An unknown bead is a body of its own, part of a known body, or a double detection.
     missing = abs(beads - known)
     unseen = {
         'bodies': missing * math.sqrt(1.0 / 12.0),
@@ -106,9 +135,9 @@ def _errors(
         'clustered_share': missing / (math.sqrt(12.0) * known),
         'clusters': missing / (math.sqrt(12.0) * 2.0),
     }
-    found = {}
+    errors = {}
     for name in _VALUES:
         expected = float(probability @ effects[name])
-        scatter = float((probability * (1.0 - probability)) @ effects[name] ** 2)
-        found[f'{name}_error'] = math.sqrt(expected**2 + scatter + unseen[name] ** 2)
-    return found
+        variance = float((probability * (1.0 - probability)) @ effects[name] ** 2)
+        errors[f'{name}_error'] = math.sqrt(expected**2 + variance + unseen[name] ** 2)
+    return errors

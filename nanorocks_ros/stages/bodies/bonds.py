@@ -1,4 +1,4 @@
-"""Pairs of beads beside each other in the picture, and for how long their separation stays."""
+"""Bonds: pairs of beads whose separation stays constant for longer than chance allows."""
 
 from __future__ import annotations
 
@@ -10,31 +10,30 @@ from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.stages.bodies.bond_kernels import (
     HIGH,
     LAST,
+    LAST_TOGETHER,
     LOW,
     OFFSET,
-    SHIFT,
+    PATH,
     START,
-    STAYED,
     TOLERANCE,
-    WAY,
-    Beads,
     PairTable,
-    adopted,
-    advanced,
-    restart,
+    add_bonds,
+    restart_pair,
+    update_pairs,
 )
+from nanorocks_ros.stages.bodies.touching_pairs import SHIFT, SeenBeads
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-# Jitter alone makes it this part of that.
-_LEAST_RANGE = 0.25
-# Beads of a body are apart so long before it is called broken, [s].
-_BROKEN_TIME = 0.7
-# No body is younger, [s].
-_YOUNGEST = 0.3
+# Smallest range of a separation, in tolerances: what position noise alone makes.
+_MIN_RANGE = 0.25
+# Time for which bonded beads must be apart before the bond counts as broken, [s].
+_BREAK_TIME = 0.7
+# Smallest age of a bond, [s].
+_MIN_AGE = 0.3
 
 
 class Bond(NamedTuple):
@@ -44,7 +43,7 @@ class Bond(NamedTuple):
     ----------
     ids : tuple of 2 int
     start : float, [s]
-        Since when they stay beside each other.
+        Time since which the separation is constant.
     offset : tuple of 2 floats, [m]
         From the first centre to the second.
     tolerance : float, [m]
@@ -56,13 +55,13 @@ class Bond(NamedTuple):
     tolerance: float
 
 
-class Pairs:
-    """Follows all pairs of beads that touch in the picture.
+class BondFinder:
+    """Tracks all pairs of beads that touch in the image and finds bonds among them.
 
     Parameters
     ----------
     chance : callable
-        Of ways (n,) and ranges (n,), the chance that free beads do the same.
+        Probability that two free beads stay within ranges (n,) over paths (n,).
     """
 
     def __init__(
@@ -77,88 +76,88 @@ class Pairs:
         self._table = PairTable.empty()
 
     def push(
-        self, time: float, beads: Beads, largest: float
+        self, time: float, beads: SeenBeads, max_chance: float
     ) -> tuple[list[Bond], list[tuple[int, int]]]:
-        """Take the beads of the next picture.
+        """Add the beads of the next frame.
 
         Parameters
         ----------
         time : float, [s]
-        beads : Beads
-        largest : float
-            Pairs are a body when the chance that free beads do the same is lower.
+        beads : SeenBeads
+        max_chance : float
+            A pair is a bond if the probability that free beads do the same is lower.
 
         Returns
         -------
         bonds : list of Bond
-            New ones.
+            New bonds.
         broken : list of (int, int)
-            Bodies that are none any more.
+            Bonds that broke.
         """
-        self._table = advanced(self._table, time, beads)
-        return self._bonds(time, largest), self._fallen(time)
+        self._table = update_pairs(self._table, time, beads)
+        return self._new_bonds(time, max_chance), self._broken_bonds(time)
 
-    def adopt(self, time: float, beads: Beads, bonds: list[Bond]) -> None:
-        """Follow pairs that are bodies for other reasons, until they come apart."""
+    def add_bonds(self, time: float, beads: SeenBeads, bonds: list[Bond]) -> None:
+        """Add bonds that were found elsewhere; they are tracked until they break."""
         if bonds:
             pairs = np.array([bond.ids for bond in bonds], dtype=np.int64)
-            self._table = adopted(self._table, time, beads, pairs)
+            self._table = add_bonds(self._table, time, beads, pairs)
 
-    def pending(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Pairs that may yet turn out to be bodies, (n, 2), and the chance that free beads do so.
+    def unconfirmed(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Pairs that may become bonds, (n, 2), and the probability that free beads do the same.
 
-        Only those that stay long enough for it to be improbable.
+        Only pairs with a probability below 0.1.
         """
         free = ~self._table.bonded
-        chances = self._chances(self._table.numbers[free])
-        some = chances < 0.1
-        keys = self._table.keys[free][some]
-        return np.column_stack([keys >> SHIFT, keys & ((1 << SHIFT) - 1)]), chances[some]
+        chances = self._chances(self._table.values[free])
+        is_unlikely = chances < 0.1
+        keys = self._table.keys[free][is_unlikely]
+        return np.column_stack([keys >> SHIFT, keys & ((1 << SHIFT) - 1)]), chances[is_unlikely]
 
     def _chances(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         ranges = 0.5 * (rows[:, HIGH : HIGH + 2] - rows[:, LOW : LOW + 2]).max(axis=1)
-        return self._chance(rows[:, WAY], np.maximum(ranges, _LEAST_RANGE * rows[:, TOLERANCE]))
+        return self._chance(rows[:, PATH], np.maximum(ranges, _MIN_RANGE * rows[:, TOLERANCE]))
 
-    def _bonds(self, time: float, largest: float) -> list[Bond]:
-        keys, numbers, bonded = self._table
-        # Few stay beside each other for so long.
-        old = _free_for(numbers, bonded, time, _YOUNGEST)
-        if not old.size:
+    def _new_bonds(self, time: float, max_chance: float) -> list[Bond]:
+        keys, values, bonded = self._table
+        # Few pairs are that old.
+        rows = _unbonded_since(values, bonded, time, _MIN_AGE)
+        if not rows.size:
             return []
-        old = old[self._chances(numbers[old]) < largest]
+        rows = rows[self._chances(values[rows]) < max_chance]
         bonds = []
-        for k in old.tolist():
-            row = numbers[k]
-            bonded[k], row[STAYED] = True, time
+        for k in rows.tolist():
+            row = values[k]
+            bonded[k], row[LAST_TOGETHER] = True, time
             row[OFFSET : OFFSET + 2] = 0.5 * (row[LOW : LOW + 2] + row[HIGH : HIGH + 2])
             offset = (float(row[OFFSET]), float(row[OFFSET + 1]))
-            bonds.append(Bond(_ids(keys[k]), float(row[START]), offset, float(row[TOLERANCE])))
+            bonds.append(Bond(_ids_of(keys[k]), float(row[START]), offset, float(row[TOLERANCE])))
         return bonds
 
-    def _fallen(self, time: float) -> list[tuple[int, int]]:
-        """Bodies whose beads, both seen, are apart for too long; they are free pairs again."""
-        keys, numbers, bonded = self._table
+    def _broken_bonds(self, time: float) -> list[tuple[int, int]]:
+        """Bonds whose beads are seen apart for too long; they become free pairs."""
+        keys, values, bonded = self._table
         if not bonded.any():
             return []
-        fall = bonded & (numbers[:, LAST] - numbers[:, STAYED] > _BROKEN_TIME)
-        for k in np.flatnonzero(fall).tolist():
+        is_broken = bonded & (values[:, LAST] - values[:, LAST_TOGETHER] > _BREAK_TIME)
+        for k in np.flatnonzero(is_broken).tolist():
             bonded[k] = False
-            restart(numbers[k], time)
-        return [_ids(keys[k]) for k in np.flatnonzero(fall).tolist()]
+            restart_pair(values[k], time)
+        return [_ids_of(keys[k]) for k in np.flatnonzero(is_broken).tolist()]
 
 
 @compiled
-def _free_for(
-    numbers: NDArray[np.float64], bonded: NDArray[np.bool_], time: float, least: float
+def _unbonded_since(
+    values: NDArray[np.float64], bonded: NDArray[np.bool_], time: float, min_age: float
 ) -> NDArray[np.int64]:
-    """Rows of pairs that are no bodies and have been followed for so long, [s]."""
-    found, count = np.empty(bonded.size, dtype=np.int64), 0
+    """Rows of pairs that are no bonds and at least `min_age` old, [s]."""
+    rows, count = np.empty(bonded.size, dtype=np.int64), 0
     for k in range(bonded.size):
-        if not bonded[k] and time - numbers[k, START] >= least:
-            found[count] = k
+        if not bonded[k] and time - values[k, START] >= min_age:
+            rows[count] = k
             count += 1
-    return found[:count]
+    return rows[:count]
 
 
-def _ids(key: int) -> tuple[int, int]:
+def _ids_of(key: int) -> tuple[int, int]:
     return int(key) >> SHIFT, int(key) & ((1 << SHIFT) - 1)

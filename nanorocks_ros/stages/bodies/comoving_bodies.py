@@ -1,4 +1,4 @@
-"""Bodies beside each other that move as one: clusters that hang together by beads nobody sees."""
+"""Adjacent bodies that move together: clusters joined by beads that are hidden."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nanorocks_ros.inference.sticking.chance_proximity import chance
+from nanorocks_ros.inference.sticking.chance_proximity import chance_probability
 from nanorocks_ros.stages.bodies.bonds import Bond
 
 if TYPE_CHECKING:
@@ -16,25 +16,25 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.stages.bodies.bond_kernels import Beads
+    from nanorocks_ros.stages.bodies.touching_pairs import SeenBeads
 
-# Bodies are compared so often, [s].
-_INTERVAL = 0.1
-# Sums of radii within which beads of two bodies may touch; beads that are not seen may lie
-# between, each that many radii wide.
-_REACH, _BETWEEN = 1.15, 2.0
-# Half of the range in which each component of the separation stays, in errors of it: a place is
-# known to no better than this part of its error, however many are averaged.
-_TOLERANCE, _IN_COMMON = 3.0, 0.5
-# No body is younger, [s].
-_YOUNGEST = 0.3
-# Of the range, what jitter alone makes.
-_LEAST_RANGE = 0.25
+# Interval at which bodies are compared, [s].
+_COMPARISON_INTERVAL = 0.1
+# Largest distance of two beads that may touch, in sums of radii; width in radii of a hidden bead
+# that may lie between them.
+_MAX_DISTANCE, _GAP_RADII = 1.15, 2.0
+# Half of the range of each component of the separation, in its errors; and the smallest error of a
+# mean position over the error of one bead, however many beads are averaged.
+_TOLERANCE_SIGMAS, _MIN_ERROR_SHARE = 3.0, 0.5
+# Smallest age of a bond, [s].
+_MIN_AGE = 0.3
+# Smallest range, in tolerances: what position noise alone makes.
+_MIN_RANGE = 0.25
 
 
 @dataclass(slots=True)
-class _Row:
-    """Two bodies: where their beads were at first, and how their separation changed since."""
+class _BodyPair:
+    """Two bodies: first positions of their beads, and the range of their separation since."""
 
     start: float
     last: float
@@ -42,182 +42,192 @@ class _Row:
     speed: float
     low: NDArray[np.float64]
     high: NDArray[np.float64]
-    way: float = 0.0
+    path: float = 0.0
     tolerance: float = 0.0
 
 
-class Companions:
-    """Follows all pairs of bodies beside each other, of which one at least has several beads.
+class ComovingBodies:
+    """Compares adjacent bodies, at least one of them of several beads.
 
-    By the means of their beads, bodies are known better than beads, and beads between them need
-    not be seen.
+    The mean position of a body is more precise than that of a bead, and beads between two bodies
+    need not be visible.
 
     Parameters
     ----------
     rate : float, [1/m]
-        Encounters of a bead per way, from `encounter_rate`.
+        Encounters of a bead per path length, from `encounter_rate`.
     """
 
     def __init__(self, rate: float) -> None:
         self._rate = rate
-        self._rows: dict[tuple[int, int], _Row] = {}
+        self._pairs: dict[tuple[int, int], _BodyPair] = {}
         self._next = 0.0
 
     def due(self, time: float) -> bool:
-        """Whether bodies are to be compared again."""
+        """Whether the next comparison is due."""
         return time >= self._next
 
     def push(
         self,
         time: float,
-        beads: Beads,
-        body: Mapping[int, int],
+        beads: SeenBeads,
+        body_of: Mapping[int, int],
         hidden: bool,
-        largest: float,
+        max_chance: float,
     ) -> list[Bond]:
-        """Take the beads of the next picture in which bodies are compared.
+        """Compare the bodies of a frame with those of the frames before.
 
         Parameters
         ----------
         time : float, [s]
-        beads : Beads
-            With the variances of free bodies of their sizes.
-        body : mapping of int to int
-            For each bead the least number of a bead of its body.
+        beads : SeenBeads
+            With the velocity variances of free bodies of their sizes.
+        body_of : mapping of int to int
+            For each bead the lowest number of a bead of its body.
         hidden : bool
-            Whether there are beads that are not seen.
-        largest : float
-            Bodies are one when the chance that free ones do the same is lower.
+            Whether beads of the tray are not visible.
+        max_chance : float
+            Two bodies are one if the probability that free bodies do the same is lower.
 
         Returns
         -------
         list of Bond
-            New ones, of the two beads that are nearest to each other.
+            New bonds, each between the two nearest beads of the bodies.
         """
-        self._next = time + _INTERVAL
-        nearest = _neighbours(beads, body, hidden)
+        self._next = time + _COMPARISON_INTERVAL
+        nearest = _nearest_beads(beads, body_of, hidden)
         members: dict[int, list[int]] = {}
-        for place, one in enumerate(beads.ids.tolist()):
-            members.setdefault(body[one], []).append(place)
-        self._rows = self._kept(body, nearest)
+        for row, bead in enumerate(beads.ids.tolist()):
+            members.setdefault(body_of[bead], []).append(row)
+        self._pairs = self._relabelled(body_of, nearest)
         bonds = []
-        for pair, (near, other) in nearest.items():
-            row = self._rows.get(pair)
-            if row is None:
-                self._rows[pair] = _begun(time, beads, members, pair)
+        for key, (first, second) in nearest.items():
+            body_pair = self._pairs.get(key)
+            if body_pair is None:
+                self._pairs[key] = _start_pair(time, beads, members, key)
                 continue
-            stays = self._follows(row, time, beads, members, pair)
-            if stays and self._is_one(row, time, largest):
-                del self._rows[pair]
-                bonds.append(_bond(row, beads, near, other))
+            stays = self._update(body_pair, time, beads, members, key)
+            if stays and self._is_bonded(body_pair, time, max_chance):
+                del self._pairs[key]
+                bonds.append(_bond(body_pair, beads, first, second))
         return bonds
 
-    def _kept(
-        self, body: Mapping[int, int], nearest: Mapping[tuple[int, int], tuple[int, int]]
-    ) -> dict[tuple[int, int], _Row]:
-        """Rows under the names that bodies have now; of several the oldest."""
-        rows: dict[tuple[int, int], _Row] = {}
-        for row in self._rows.values():
-            roots = [{body[one] for one in part if one in body} for part in row.beads]
+    def _relabelled(
+        self, body_of: Mapping[int, int], nearest: Mapping[tuple[int, int], tuple[int, int]]
+    ) -> dict[tuple[int, int], _BodyPair]:
+        """Pairs under the current numbers of the bodies; of several, the longest path."""
+        pairs: dict[tuple[int, int], _BodyPair] = {}
+        for body_pair in self._pairs.values():
+            roots = [
+                {body_of[bead] for bead in positions if bead in body_of}
+                for positions in body_pair.beads
+            ]
             if len(roots[0]) != 1 or len(roots[1]) != 1 or roots[0] == roots[1]:
                 continue
             a, b = roots[0].pop(), roots[1].pop()
             if a > b:
                 a, b = b, a
-                row.beads = row.beads[1], row.beads[0]
-                row.low, row.high = -row.high, -row.low
-            if (a, b) in nearest and ((a, b) not in rows or row.way > rows[a, b].way):
-                rows[a, b] = row
-        return rows
+                body_pair.beads = body_pair.beads[1], body_pair.beads[0]
+                body_pair.low, body_pair.high = -body_pair.high, -body_pair.low
+            if (a, b) in nearest and ((a, b) not in pairs or body_pair.path > pairs[a, b].path):
+                pairs[a, b] = body_pair
+        return pairs
 
-    def _follows(
+    def _update(
         self,
-        row: _Row,
+        body_pair: _BodyPair,
         time: float,
-        beads: Beads,
+        beads: SeenBeads,
         members: Mapping[int, list[int]],
         pair: tuple[int, int],
     ) -> bool:
-        """Take the separation as it is now; False when it changed, or cannot be told."""
-        moved = []
+        """Update the separation; False if it left its range or no bead is visible."""
+        shifts = []
         errors = []
-        for part, root in zip(row.beads, pair, strict=True):
-            here = [k for k in members[root] if int(beads.ids[k]) in part]
-            if not here:
+        for start, root in zip(body_pair.beads, pair, strict=True):
+            rows = [row for row in members[root] if int(beads.ids[row]) in start]
+            if not rows:
                 return False
-            steps = [beads.places[k] - part[int(beads.ids[k])] for k in here]
-            moved.append(np.median(steps, axis=0))
-            error = float(np.median(beads.errors[here]))
-            errors.append(error * max(1.25 / np.sqrt(len(here)), _IN_COMMON))
-        apart = moved[1] - moved[0]
-        row.low, row.high = np.minimum(row.low, apart), np.maximum(row.high, apart)
-        row.tolerance = _TOLERANCE * float(np.hypot(*errors))
-        row.speed = max(row.speed, _speed(beads, members, pair))
-        row.way += row.speed * (time - row.last)
-        row.last = time
-        if (row.high - row.low > 2.0 * row.tolerance).any():
-            self._rows[pair] = _begun(time, beads, members, pair)
+            moves = [beads.positions[row] - start[int(beads.ids[row])] for row in rows]
+            shifts.append(np.median(moves, axis=0))
+            error = float(np.median(beads.errors[rows]))
+            errors.append(error * max(1.25 / np.sqrt(len(rows)), _MIN_ERROR_SHARE))
+        separation = shifts[1] - shifts[0]
+        body_pair.low, body_pair.high = (
+            np.minimum(body_pair.low, separation),
+            np.maximum(body_pair.high, separation),
+        )
+        body_pair.tolerance = _TOLERANCE_SIGMAS * float(np.hypot(*errors))
+        body_pair.speed = max(body_pair.speed, _relative_speed(beads, members, pair))
+        body_pair.path += body_pair.speed * (time - body_pair.last)
+        body_pair.last = time
+        if (body_pair.high - body_pair.low > 2.0 * body_pair.tolerance).any():
+            self._pairs[pair] = _start_pair(time, beads, members, pair)
             return False
         return True
 
-    def _is_one(self, row: _Row, time: float, largest: float) -> bool:
-        if time - row.start < _YOUNGEST:
+    def _is_bonded(self, body_pair: _BodyPair, time: float, max_chance: float) -> bool:
+        if time - body_pair.start < _MIN_AGE:
             return False
-        ranged = max(0.5 * float((row.high - row.low).max()), _LEAST_RANGE * row.tolerance)
-        return float(chance(row.way, ranged, self._rate)) < largest
+        half_range = max(
+            0.5 * float((body_pair.high - body_pair.low).max()), _MIN_RANGE * body_pair.tolerance
+        )
+        return float(chance_probability(body_pair.path, half_range, self._rate)) < max_chance
 
 
-def _begun(
-    time: float, beads: Beads, members: Mapping[int, list[int]], pair: tuple[int, int]
-) -> _Row:
+def _start_pair(
+    time: float, beads: SeenBeads, members: Mapping[int, list[int]], pair: tuple[int, int]
+) -> _BodyPair:
     first, second = (
-        {int(beads.ids[k]): beads.places[k].copy() for k in members[root]} for root in pair
+        {int(beads.ids[k]): beads.positions[k].copy() for k in members[root]} for root in pair
     )
-    return _Row(
+    return _BodyPair(
         start=time,
         last=time,
         beads=(first, second),
-        speed=_speed(beads, members, pair),
+        speed=_relative_speed(beads, members, pair),
         low=np.zeros(2),
         high=np.zeros(2),
     )
 
 
-def _speed(beads: Beads, members: Mapping[int, list[int]], pair: tuple[int, int]) -> float:
+def _relative_speed(
+    beads: SeenBeads, members: Mapping[int, list[int]], pair: tuple[int, int]
+) -> float:
     """Standard deviation of a component of the relative velocity of two free bodies."""
     return float(np.sqrt(sum(beads.variances[members[root]].mean() for root in pair)))
 
 
-def _bond(row: _Row, beads: Beads, first: int, second: int) -> Bond:
-    offset = beads.places[second] - beads.places[first]
+def _bond(body_pair: _BodyPair, beads: SeenBeads, first: int, second: int) -> Bond:
+    offset = beads.positions[second] - beads.positions[first]
     return Bond(
         (int(beads.ids[first]), int(beads.ids[second])),
-        row.start,
+        body_pair.start,
         (float(offset[0]), float(offset[1])),
-        _TOLERANCE * float(np.hypot(beads.errors[first], beads.errors[second])),
+        _TOLERANCE_SIGMAS * float(np.hypot(beads.errors[first], beads.errors[second])),
     )
 
 
-def _neighbours(
-    beads: Beads, body: Mapping[int, int], hidden: bool
+def _nearest_beads(
+    beads: SeenBeads, body_of: Mapping[int, int], hidden: bool
 ) -> dict[tuple[int, int], tuple[int, int]]:
-    """For each two bodies beside each other the rows of their nearest beads."""
+    """Rows of the two nearest beads, for each pair of adjacent bodies."""
     if beads.ids.size < 2:
         return {}
-    roots = np.array([body[one] for one in beads.ids.tolist()])
-    sizes = np.unique(roots, return_inverse=True, return_counts=True)
-    many = sizes[2][sizes[1]] > 1
-    between = _BETWEEN * beads.radii.max() if hidden else 0.0
-    furthest = 2.0 * _REACH * beads.radii.max() + between
-    found = cKDTree(beads.places).query_pairs(furthest, output_type='ndarray')
-    found = found[roots[found[:, 0]] != roots[found[:, 1]]]
-    found = found[many[found[:, 0]] | many[found[:, 1]]]
-    apart = np.hypot(*(beads.places[found[:, 1]] - beads.places[found[:, 0]]).T)
-    apart -= _REACH * (beads.radii[found[:, 0]] + beads.radii[found[:, 1]])
+    roots = np.array([body_of[bead] for bead in beads.ids.tolist()])
+    bodies = np.unique(roots, return_inverse=True, return_counts=True)
+    in_cluster = bodies[2][bodies[1]] > 1
+    gap = _GAP_RADII * beads.radii.max() if hidden else 0.0
+    max_distance = 2.0 * _MAX_DISTANCE * beads.radii.max() + gap
+    pairs = cKDTree(beads.positions).query_pairs(max_distance, output_type='ndarray')
+    pairs = pairs[roots[pairs[:, 0]] != roots[pairs[:, 1]]]
+    pairs = pairs[in_cluster[pairs[:, 0]] | in_cluster[pairs[:, 1]]]
+    gaps = np.hypot(*(beads.positions[pairs[:, 1]] - beads.positions[pairs[:, 0]]).T)
+    gaps -= _MAX_DISTANCE * (beads.radii[pairs[:, 0]] + beads.radii[pairs[:, 1]])
     nearest: dict[tuple[int, int], tuple[int, int]] = {}
-    for k in np.argsort(-apart):
-        if apart[k] < between or apart[k] < 0.0:
-            i, j = found[k].tolist()
+    for k in np.argsort(-gaps):
+        if gaps[k] < gap or gaps[k] < 0.0:
+            i, j = pairs[k].tolist()
             first, second = sorted((i, j))
             a, b = int(roots[i]), int(roots[j])
             nearest[min(a, b), max(a, b)] = (first, second)

@@ -1,4 +1,4 @@
-"""How warm the gas of a tray is, on the whole and around each bead."""
+"""Granular temperature of a tray: energy of each species, and local temperature at each bead."""
 
 from __future__ import annotations
 
@@ -12,79 +12,79 @@ from nanorocks_ros.numerics.compiled import compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# So many beads make the surroundings of one; they are not taken for colder than this, against
-# the gas, since beads that stick together move alike.
-_NEIGHBOURS = 12
-_COLDEST = 0.1
-# Share of a new mean energy taken over in each picture.
-_ENERGY_SHARE = 0.2
+# Number of neighbours in a local temperature, and its smallest ratio to the mean: beads that stick
+# together move alike and look cold.
+_N_NEIGHBOURS = 12
+_MIN_RATIO = 0.1
+# Weight of a frame in the exponential mean of the energy.
+_ENERGY_WEIGHT = 0.2
 
 
 @compiled
-def _excess(velocity: NDArray[np.float64], error: float, radius: float) -> float:
-    """Energy of a component of the motion of a bead, less what errors add.
+def _energy(velocity: NDArray[np.float64], error: float, radius: float) -> float:
+    """Energy of a bead per component, less the contribution of errors, over its density.
 
-    Up to the density, which beads of a species share, [m^5/s^2]; NaN when it is not known.
+    In [m^5/s^2]; NaN for an unknown velocity.
     """
     square = 0.5 * (velocity[0] * velocity[0] + velocity[1] * velocity[1])
     return float((square - error * error) * (radius * radius * radius))
 
 
 @compiled
-def learn_energies(
+def update_energies(
     velocities: NDArray[np.float64],
-    errors: NDArray[np.float64],
+    velocity_errors: NDArray[np.float64],
     radii: NDArray[np.float64],
     species: NDArray[np.int32],
     seen: NDArray[np.bool_],
     energies: NDArray[np.float64],
 ) -> float:
-    """Follow the mean energy of each species; mean speed of all beads that are seen, [m/s].
+    """Update the mean energy of each species; return the mean speed of visible beads, [m/s].
 
     Parameters
     ----------
     velocities : ndarray (n, 2), [m/s]
-        NaN where not known, as are their errors; such beads count as resting in the mean speed.
-    errors, radii : ndarray (n,), [m/s], [m]
+        NaN if unknown, as are their errors; such beads count as resting in the mean speed.
+    velocity_errors, radii : ndarray (n,), [m/s], [m]
     species : ndarray of int32, (n,)
     seen : ndarray of bool, (n,)
     energies : ndarray (species,), [m^5/s^2]
-        Of a component, less what errors add, as of `_excess`; changed where beads are known.
+        Mean of `_energy`; changed for species with known velocities.
     """
-    known, sums = np.zeros(energies.size, dtype=np.int64), np.zeros(energies.size)
-    speed, beads = 0.0, 0
+    counts, sums = np.zeros(energies.size, dtype=np.int64), np.zeros(energies.size)
+    speed, n_seen = 0.0, 0
     for k in range(species.size):
         if not seen[k]:
             continue
-        beads += 1
+        n_seen += 1
         u, v = velocities[k]
-        own = math.sqrt(u * u + v * v)
-        speed += own if own == own else 0.0
-        energy = _excess(velocities[k], errors[k], radii[k])
+        bead_speed = math.sqrt(u * u + v * v)
+        speed += bead_speed if bead_speed == bead_speed else 0.0
+        energy = _energy(velocities[k], velocity_errors[k], radii[k])
         if abs(energy) < np.inf:
-            known[species[k]] += 1
+            counts[species[k]] += 1
             sums[species[k]] += energy
     for k in range(energies.size):
-        if known[k]:
+        if counts[k]:
             last = energies[k]
-            share = _ENERGY_SHARE if last > 0.0 else 1.0
-            energies[k] = last + share * (max(sums[k] / known[k], 0.0) - last)
-    return speed / max(beads, 1)
+            weight = _ENERGY_WEIGHT if last > 0.0 else 1.0
+            energies[k] = last + weight * (max(sums[k] / counts[k], 0.0) - last)
+    return speed / max(n_seen, 1)
 
 
 @compiled
-def of_seen(
-    usual: NDArray[np.float64],
+def select_seen(
+    energies: NDArray[np.float64],
     ids: NDArray[np.int64],
-    places: NDArray[np.float64],
-    place_errors: NDArray[np.float64],
+    positions: NDArray[np.float64],
+    position_errors: NDArray[np.float64],
     velocities: NDArray[np.float64],
-    errors: NDArray[np.float64],
+    velocity_errors: NDArray[np.float64],
     radii: NDArray[np.float64],
     radius_errors: NDArray[np.float64],
     species: NDArray[np.int32],
     seen: NDArray[np.bool_],
-    alike: NDArray[np.bool_],
+    equal_sizes: NDArray[np.bool_],
 ) -> tuple[
     NDArray[np.int64],
     NDArray[np.int64],
@@ -94,110 +94,123 @@ def of_seen(
     NDArray[np.float64],
     NDArray[np.float64],
 ]:
-    """The beads that are seen, in the order of their numbers.
+    """Select the visible beads, sorted by number.
 
     Parameters
     ----------
-    usual, places, velocities, errors, radii, species, seen
-        As of `variances`.
+    energies, positions, velocities, velocity_errors, radii, species, seen
+        As in `velocity_variances`.
     ids : ndarray of int64, (n,)
-    place_errors, radius_errors : ndarray (n,), [m]
-    alike : ndarray of bool, (species,)
-        Whose beads are all of one size, which is known better than measured.
+    position_errors, radius_errors : ndarray (n,), [m]
+    equal_sizes : ndarray of bool, (species,)
+        Species whose beads have one known size: their radius error is set to 0.
 
     Returns
     -------
     rows : ndarray of int64, (k,)
-        Which beads these are.
-    ids, places, errors, radii, radius_errors, variances
-        As in `nanorocks_ros.stages.bodies.bond_kernels.Beads`.
+        Rows of the visible beads.
+    ids, positions, velocity_errors, radii, radius_errors, velocity_variances
+        As in `nanorocks_ros.stages.bodies.touching_pairs.SeenBeads`.
     """
-    found = variances(usual, places, velocities, errors, radii, species, seen)
+    variances = velocity_variances(
+        energies, positions, velocities, velocity_errors, radii, species, seen
+    )
     rows = np.flatnonzero(seen)
     rows = rows[np.argsort(ids[rows], kind='mergesort')]
     measured = radius_errors[rows]
     for k in range(rows.size):
-        if alike[species[rows[k]]]:
+        if equal_sizes[species[rows[k]]]:
             measured[k] = 0.0
     return (
         rows,
         ids[rows],
-        places[rows],
-        place_errors[rows],
+        positions[rows],
+        position_errors[rows],
         radii[rows],
         measured,
-        found[rows],
+        variances[rows],
     )
 
 
 @compiled
-def variances(
-    usual: NDArray[np.float64],
-    places: NDArray[np.float64],
+def velocity_variances(
+    energies: NDArray[np.float64],
+    positions: NDArray[np.float64],
     velocities: NDArray[np.float64],
-    errors: NDArray[np.float64],
+    velocity_errors: NDArray[np.float64],
     radii: NDArray[np.float64],
     species: NDArray[np.int32],
     seen: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
-    """Mean square of a component of the velocity that a bead has in this gas, there, (n,).
+    """Mean square of a velocity component of a free bead at the position of each bead, (n,).
 
-    A gas of inelastic beads is cold where it is dense, and there beads stay together.
+    An inelastic gas is colder where it is denser, and there free beads stay together longer.
 
     Parameters
     ----------
-    usual : ndarray (species,), [m^5/s^2]
-        Energies of `learn_energies`, followed from picture to picture.
-    places : ndarray (n, 2), [m]
-    velocities, errors, radii, species, seen
-        As there.
+    energies : ndarray (species,), [m^5/s^2]
+        Mean energies of `update_energies`.
+    positions : ndarray (n, 2), [m]
+    velocities, velocity_errors, radii, species, seen
+        As in `update_energies`.
     """
     n = species.size
-    ratios, known, beads = np.empty(n), np.empty(n, dtype=np.int64), 0
-    found = np.empty(n)
+    ratios, rows, count = np.empty(n), np.empty(n, dtype=np.int64), 0
+    variances = np.empty(n)
     for k in range(n):
-        own = usual[species[k]]
-        found[k] = own / (radii[k] * radii[k] * radii[k])
-        excess = _excess(velocities[k], errors[k], radii[k])
-        ratio = excess / own if own > 0.0 else 0.0 * excess
+        mean_energy = energies[species[k]]
+        variances[k] = mean_energy / (radii[k] * radii[k] * radii[k])
+        energy = _energy(velocities[k], velocity_errors[k], radii[k])
+        ratio = energy / mean_energy if mean_energy > 0.0 else 0.0 * energy
         if seen[k] and abs(ratio) < np.inf:
-            known[beads], ratios[beads] = k, ratio
-            beads += 1
-    if beads <= _NEIGHBOURS:
-        return found
-    # From left to right, so that only those beside a bead are looked at.
-    across = places[known[:beads], 0].copy()
-    order = np.argsort(across)
-    across, known, ratios = across[order], known[order], ratios[order]
-    near, those = np.empty(_NEIGHBOURS), np.empty(_NEIGHBOURS)
+            rows[count], ratios[count] = k, ratio
+            count += 1
+    if count <= _N_NEIGHBOURS:
+        return variances
+    # Sorted by column, so that only beads nearby are compared.
+    columns = positions[rows[:count], 0].copy()
+    order = np.argsort(columns)
+    columns, rows, ratios = columns[order], rows[order], ratios[order]
+    squared_distances, nearest_ratios = np.empty(_N_NEIGHBOURS), np.empty(_N_NEIGHBOURS)
     for k in range(n):
-        near[:] = np.inf
-        right = np.searchsorted(across, places[k, 0])
+        squared_distances[:] = np.inf
+        right = np.searchsorted(columns, positions[k, 0])
         left = right - 1
         while True:
-            to_left = places[k, 0] - across[left] if left >= 0 else np.inf
-            to_right = across[right] - places[k, 0] if right < beads else np.inf
-            step = min(to_left, to_right)
-            if step * step >= near[-1]:
+            to_left = positions[k, 0] - columns[left] if left >= 0 else np.inf
+            to_right = columns[right] - positions[k, 0] if right < count else np.inf
+            column_step = min(to_left, to_right)
+            if column_step * column_step >= squared_distances[-1]:
                 break
-            next_one = left if to_left < to_right else right
+            neighbour = left if to_left < to_right else right
             left -= to_left < to_right
             right += to_left >= to_right
-            down = places[known[next_one], 1] - places[k, 1]
-            _insert(near, those, step * step + down * down, ratios[next_one])
-        found[k] *= min(max(those.mean(), _COLDEST), 1.0)
-    return found
+            row_step = positions[rows[neighbour], 1] - positions[k, 1]
+            _insert_neighbour(
+                squared_distances,
+                nearest_ratios,
+                column_step * column_step + row_step * row_step,
+                ratios[neighbour],
+            )
+        variances[k] *= min(max(nearest_ratios.mean(), _MIN_RATIO), 1.0)
+    return variances
 
 
 @compiled
-def _insert(
-    near: NDArray[np.float64], those: NDArray[np.float64], square: float, ratio: float
+def _insert_neighbour(
+    squared_distances: NDArray[np.float64],
+    nearest_ratios: NDArray[np.float64],
+    square: float,
+    ratio: float,
 ) -> None:
-    """Add a bead at a square distance to the nearest ones, with its ratio."""
-    if square >= near[-1]:
+    """Insert a bead into the list of nearest neighbours, sorted by squared distance."""
+    if square >= squared_distances[-1]:
         return
-    place = near.size - 1
-    while place > 0 and near[place - 1] > square:
-        near[place], those[place] = near[place - 1], those[place - 1]
-        place -= 1
-    near[place], those[place] = square, ratio
+    slot = squared_distances.size - 1
+    while slot > 0 and squared_distances[slot - 1] > square:
+        squared_distances[slot], nearest_ratios[slot] = (
+            squared_distances[slot - 1],
+            nearest_ratios[slot - 1],
+        )
+        slot -= 1
+    squared_distances[slot], nearest_ratios[slot] = square, ratio

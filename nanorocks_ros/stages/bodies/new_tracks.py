@@ -1,4 +1,4 @@
-"""Tracks that begin within a cycle: how often, and which are of beads that were found twice."""
+"""Tracks that begin within a cycle: their rate, and which of them are double detections."""
 
 from __future__ import annotations
 
@@ -11,33 +11,33 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.records import Tracks
 
-# Sums of radii within which a bead that was not there before is the one that was.
-_WITHIN = 0.8
-# A rate is not asked over less, [s].
-_LEAST_TIME = 1.0
+# A new track within this distance of another, in sums of radii, is a double detection.
+_DOUBLE_DISTANCE = 0.8
+# Shortest time over which a rate is taken, [s].
+_MIN_TIME = 1.0
 
 
-class Births:
-    """Follows which beads were not there before."""
+class NewTracks:
+    """Counts tracks that begin within a cycle, and remembers double detections."""
 
     def __init__(self) -> None:
-        # In this cycle, and before that.
+        # Tracks of this cycle, and all tracks so far.
         self._seen: set[int] = set()
         self._known: set[int] = set()
-        self._twice: set[tuple[int, int]] = set()
+        self._doubles: set[tuple[int, int]] = set()
         self._count = 0
         self._last: NDArray[np.int64] | None = None
 
     def next_cycle(self) -> None:
-        """Count anew, and forget beads that were not there in the whole cycle that is over."""
+        """Reset the count, and forget tracks that the last cycle did not contain."""
         self._count = 0
-        self._twice = {pair for pair in self._twice if self._seen.issuperset(pair)}
+        self._doubles = {pair for pair in self._doubles if self._seen.issuperset(pair)}
         self._known = self._seen
         self._seen = set()
         self._last = None
 
     def push(self, tracks: Tracks, ids: NDArray[np.int64]) -> None:
-        """Take the next picture, with the numbers of its beads, (n,)."""
+        """Add the next frame, with the numbers of its beads, (n,)."""
         if ids is self._last:
             return
         self._last = ids
@@ -45,27 +45,27 @@ class Births:
         self._seen.update(numbers)
         if self._known.issuperset(numbers):
             return
-        fresh = [row for row, number in enumerate(numbers) if number not in self._known]
+        new_rows = [row for row, number in enumerate(numbers) if number not in self._known]
         if self._known:
-            self._count += len(fresh)
-            for row in fresh:
-                apart = np.hypot(*(tracks.positions - tracks.positions[row]).T)
-                near = apart < _WITHIN * (tracks.radii + tracks.radii[row])
-                here = numbers[row]
-                self._twice |= {
-                    (min(here, other), max(here, other))
-                    for other in ids[near].tolist()
-                    if other != here
+            self._count += len(new_rows)
+            for row in new_rows:
+                distances = np.hypot(*(tracks.positions - tracks.positions[row]).T)
+                is_near = distances < _DOUBLE_DISTANCE * (tracks.radii + tracks.radii[row])
+                new = numbers[row]
+                self._doubles |= {
+                    (min(new, other), max(new, other))
+                    for other in ids[is_near].tolist()
+                    if other != new
                 }
         self._known.update(numbers)
 
-    def one_bead(self, pair: tuple[int, int]) -> bool:
-        """Whether one of a pair appeared over the other: most likely a bead found twice.
+    def is_double_detection(self, pair: tuple[int, int]) -> bool:
+        """Whether one track of a pair began on top of the other: most likely the same bead.
 
-        An uneven bead often is, and then the two stay together for as long as anything does.
+        Beads with an uneven surface are often detected twice; the two tracks stay together.
         """
-        return (min(pair), max(pair)) in self._twice
+        return (min(pair), max(pair)) in self._doubles
 
     def rate(self, time: float) -> float:
-        """Tracks that began in a second of this cycle, [1/s], so long after its start, [s]."""
-        return self._count / max(time, _LEAST_TIME)
+        """Tracks that began per second of this cycle, [1/s], at a time after its start, [s]."""
+        return self._count / max(time, _MIN_TIME)

@@ -1,4 +1,4 @@
-"""Tracks that begin over a body and stay there: most likely beads of it that were hidden."""
+"""Tracks that begin at a body and stay there: most likely beads of it that reappear."""
 
 from __future__ import annotations
 
@@ -13,61 +13,63 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.records import Tracks
 
-# Sums of radii within which a bead is over another, or beside it.
-_REACH = 1.15
+# Largest distance of a bead that is at a body, in sums of radii.
+_MAX_DISTANCE = 1.15
 
 
-class Clinging:
-    """Follows beads that were first seen at a body, until they are seen apart from it.
+class ReappearingBeads:
+    """Attaches beads that were first seen at a body to it, until they are seen apart from it.
 
-    All beads are seen after a shaking event. Who turns up later was hidden, and clusters hide
-    their beads: counted as bodies of their own, they would make clusters too small.
+    All beads are visible after a shaking event. A track that begins later is of a bead that a
+    cluster had hidden. Counted as a body of its own, it would make the mean cluster too small.
     """
 
     def __init__(self) -> None:
         self._known: set[int] = set()
-        self._over: dict[int, int] = {}
+        self._attached: dict[int, int] = {}
         self._last: NDArray[np.int64] | None = None
 
     def push(
         self, tracks: Tracks, ids: NDArray[np.int64], members: AbstractSet[int]
     ) -> tuple[tuple[int, int], ...]:
-        """Take the next picture.
+        """Add the next frame.
 
         Parameters
         ----------
         tracks : Tracks
         ids : ndarray (n,)
-            Numbers of its beads.
+            Numbers of the beads.
         members : set of int
-            Beads of bodies of two and more.
+            Beads of bodies of two or more.
 
         Returns
         -------
         tuple of (int, int)
-            Each bead that clings, and the bead of the body that is nearest to it.
+            Each attached bead, and the nearest bead of the body.
         """
-        # Nobody turned up, and nobody clings.
-        if ids is self._last and not self._over:
+        # No new track, and no attached bead.
+        if ids is self._last and not self._attached:
             return ()
         self._last = ids
         numbers = ids.tolist()
         rows = {number: row for row, number in enumerate(numbers)}
-        asked = [number for number in numbers if number in self._over or number not in self._known]
+        candidates = [
+            number for number in numbers if number in self._attached or number not in self._known
+        ]
         self._known.update(numbers)
-        bodies = np.array(
+        members_rows = np.array(
             [row for row, number in enumerate(numbers) if number in members], dtype=int
         )
-        over: dict[int, int] = {}
-        for one in asked:
-            row = rows[one]
-            others = bodies[bodies != row]
-            if not others.size:
+        attached: dict[int, int] = {}
+        for bead in candidates:
+            row = rows[bead]
+            body_rows = members_rows[members_rows != row]
+            if not body_rows.size:
                 continue
-            apart = np.hypot(*(tracks.positions[others] - tracks.positions[row]).T)
-            ratio = apart / (tracks.radii[others] + tracks.radii[row])
+            distances = np.hypot(*(tracks.positions[body_rows] - tracks.positions[row]).T)
+            ratio = distances / (tracks.radii[body_rows] + tracks.radii[row])
             nearest = int(np.argmin(ratio))
-            if ratio[nearest] < _REACH:
-                over[one] = numbers[others[nearest]]
-        self._over = over
-        return tuple(over.items())
+            if ratio[nearest] < _MAX_DISTANCE:
+                attached[bead] = numbers[body_rows[nearest]]
+        self._attached = attached
+        return tuple(attached.items())

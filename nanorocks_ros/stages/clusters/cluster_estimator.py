@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.records import (
-    UNKNOWN,
+    UNKNOWN_MEASURED,
+    UNKNOWN_MEASURED_INTERVAL,
     Autocorrelation,
     BodyEstimate,
     ClusterEstimate,
+    Interval,
+    Measured,
     Merge,
     Notice,
     Quality,
@@ -135,11 +137,9 @@ class ClusterEstimator(RestartingStage[Input, Clusters]):
         bodies = self._sticking.bodies(cycle, stamp_ns)
         if bodies is not None and stamp_ns - bodies.stamp_ns <= _RECENT_NS:
             fields = {
-                'bodies': bodies.bodies,
-                'bodies_error': bodies.bodies_error,
+                'bodies': Measured(bodies.bodies, bodies.bodies_error),
                 'mean_size': bodies.mean_size,
-                'weighted_size': bodies.weighted_size,
-                'weighted_size_error': bodies.weighted_size_error,
+                'weighted_size': Measured(bodies.weighted_size, bodies.weighted_size_error),
                 'clustered_share': bodies.clustered_share,
             }
         onset = self._sticking.onset(cycle, stamp_ns)
@@ -149,22 +149,20 @@ class ClusterEstimator(RestartingStage[Input, Clusters]):
         if of_cycle is not None:
             fields |= {
                 'sticking_status': StickingStatus(of_cycle.status),
-                'sticking_speed': of_cycle.sticking_speed,
-                'sticking_speed_lower': of_cycle.lower,
-                'sticking_speed_upper': of_cycle.upper,
+                'sticking_speed': Interval(
+                    of_cycle.sticking_speed, of_cycle.lower, of_cycle.upper
+                ),
             }
         of_all = self._sticking.of_all(cycle, stamp_ns)
         if of_all is not None:
             fields |= {
-                'mean_sticking_speed': of_all.sticking_speed,
-                'mean_sticking_speed_lower': of_all.lower,
-                'mean_sticking_speed_upper': of_all.upper,
+                'mean_sticking_speed': Interval(of_all.sticking_speed, of_all.lower, of_all.upper),
             }
-        size, error = _combined(
-            (estimate.cluster_size, estimate.cluster_size_error),
-            (fields.get('weighted_size', math.nan), fields.get('weighted_size_error', math.nan)),
+        size = _combined(
+            Measured(estimate.cluster_size.value, estimate.cluster_size.error),
+            fields.get('weighted_size', UNKNOWN_MEASURED),
         )
-        return replace(estimate, combined_size=size, combined_size_error=error, **fields)
+        return replace(estimate, combined_size=size, **fields)
 
     def _sticking_speed_of(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
         """Sticking speed of the cycle, as of the last full second."""
@@ -180,19 +178,16 @@ def _without_size(estimate: ClusterEstimate) -> ClusterEstimate:
     return replace(
         estimate,
         size_status=SizeStatus.NOTHING,
-        cluster_size=UNKNOWN,
-        cluster_size_error=UNKNOWN,
-        cluster_size_lower=UNKNOWN,
-        cluster_size_upper=UNKNOWN,
+        cluster_size=UNKNOWN_MEASURED_INTERVAL,
     )
 
 
-def _combined(*sizes: tuple[float, float]) -> tuple[float, float]:
-    """Mean of the known values, weighted by their errors, and its error."""
-    known = [(value, error) for value, error in sizes if math.isfinite(value + error)]
+def _combined(*sizes: Measured) -> Measured:
+    """Mean of the known sizes, weighted by their errors."""
+    known = [size for size in sizes if size.known]
     if not known:
-        return math.nan, math.nan
+        return UNKNOWN_MEASURED
     # An error of 0 would give an infinite weight.
-    weights = [1.0 / max(error, _SMALLEST_ERROR) ** 2 for _, error in known]
-    mean = sum(w * value for w, (value, _) in zip(weights, known, strict=True)) / sum(weights)
-    return mean, sum(weights) ** -0.5
+    weights = [1.0 / max(size.error, _SMALLEST_ERROR) ** 2 for size in known]
+    mean = sum(w * size.value for w, size in zip(weights, known, strict=True)) / sum(weights)
+    return Measured(mean, sum(weights) ** -0.5)

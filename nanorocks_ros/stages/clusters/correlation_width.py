@@ -20,6 +20,7 @@ from nanorocks_ros.records import (
     UNKNOWN,
     Autocorrelation,
     ClusterEstimate,
+    MeasuredInterval,
     Notice,
     SizeStatus,
     TrayImage,
@@ -133,7 +134,7 @@ class ClusterAutocorrelator(RestartingStage[TrayImage, Correlations]):
     def _restart(self, stamp_ns: int | None = None) -> None:
         del stamp_ns
         speed = self._settings.speed
-        self._cycles = CycleFollower(speed.shake_ratio, speed.shortest_cycle)
+        self._cycles = CycleFollower(speed.shake_ratio, speed.min_cycle_duration)
         self._next_ns: int | None = None
 
     def _process(self, record: TrayImage) -> tuple[Correlations, ...]:
@@ -169,10 +170,7 @@ class ClusterAutocorrelator(RestartingStage[TrayImage, Correlations]):
             axes_ratio=region.axes_ratio,
             direction=region.direction,
             breadth=area / inner if inner > 0.0 else UNKNOWN,
-            cluster_size=size.size,
-            cluster_size_error=size.error,
-            cluster_size_lower=size.lower,
-            cluster_size_upper=size.upper,
+            cluster_size=MeasuredInterval(size.size, size.error, size.lower, size.upper),
             size_status=size.status,
         )
 

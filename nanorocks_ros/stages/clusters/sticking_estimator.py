@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from nanorocks_ros.errors import NanorocksError
-from nanorocks_ros.inference.sticking.merge_likelihood import MergeRates, MergeTerms
+from nanorocks_ros.inference.sticking.merge_likelihood import MergeLikelihood, MergeRates
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
-from nanorocks_ros.inference.sticking.sticking_speed import StickingEstimate, estimate_by
+from nanorocks_ros.inference.sticking.sticking_speed import StickingEstimate, sticking_estimate_of
 from nanorocks_ros.physics.sticking_rates import slow_contacts
 from nanorocks_ros.records import BodyEstimate, Merge, Quality, SpeedEstimate
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
@@ -76,7 +76,7 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
             contacts = slow_contacts(tray)
             # The curve is worked out now, while no image waits; a single bead has none.
             if contacts.rates.any():
-                contacts.slower_between(1.0, settings.sticking.measure)
+                contacts.interpolated_rate_below(1.0, settings.sticking.measure)
             self._make_rates = partial(MergeRates, contacts, tray.count, settings.sticking.measure)
         self.reset()
 
@@ -84,7 +84,7 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
         del stamp_ns
         self._cycles = {0: _Cycle(0)}
         self._finished: dict[int, StickingCycle] = {}
-        self._terms: list[MergeTerms | None] = []
+        self._terms: list[MergeLikelihood | None] = []
         self._all: StickingEstimate | None = None
         self._rates = self._make_rates() if self._make_rates else None
 
@@ -102,9 +102,9 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
             cycle.start_ns = record.cycle_start_ns
             cycle.wrong_scale |= bool(record.quality & Quality.WRONG_SCALE)
             # Before the first shaking event there may be hours, and no cycle.
-            if cycle.start_ns is not None and np.isfinite(record.mean_projected_speed):
+            if cycle.start_ns is not None and np.isfinite(record.mean_projected_speed.value):
                 cycle.stamps_ns.append(record.stamp_ns)
-                cycle.speeds.append(record.mean_projected_speed)
+                cycle.speeds.append(record.mean_projected_speed.value)
         # Two cycles back nothing is asked any more.
         for number in [number for number in self._cycles if number < record.cycle - 1]:
             del self._cycles[number]
@@ -190,19 +190,19 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
 
     def _terms_of(
         self, cycle: StickingCycle, rates: MergeRates | None = None
-    ) -> MergeTerms | None:
+    ) -> MergeLikelihood | None:
         """Likelihood terms of a cycle for each sticking speed; None where there is no theory."""
         rates = rates or self._rates
         with suppress(NanorocksError):
             return rates.terms(cycle) if rates else None
         return None
 
-    def _estimate_by(self, terms: Sequence[MergeTerms | None]) -> StickingEstimate | None:
+    def _estimate_by(self, terms: Sequence[MergeLikelihood | None]) -> StickingEstimate | None:
         """Estimate from the terms of several cycles; None where one of them is missing."""
         known = [term for term in terms if term is not None]
         if len(known) < len(terms):
             return None
-        return estimate_by(
+        return sticking_estimate_of(
             reduce(add, known),
             rate_error=self._settings.rate_error,
             probability=self._settings.probability,

@@ -1,4 +1,4 @@
-"""From tracks to single contacts: rebounds from the side walls, and collisions of two beads."""
+"""Detection of single contacts in tracks: rebounds from side walls and collisions of two beads."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.records import PairCollision, Rebound
-from nanorocks_ros.stages.contacts.flight_segments import LONGEST, Histories, Kink
-from nanorocks_ros.stages.contacts.line_fits import Meeting, when_met
-from nanorocks_ros.stages.contacts.pair_tests import FAR, LEAST_SIGNAL, only_these_two
-from nanorocks_ros.stages.contacts.tray_history import Surroundings
-from nanorocks_ros.stages.contacts.unmatched_jumps import Waiting
+from nanorocks_ros.stages.contacts.flight_segments import FlightSegments, VelocityJump
+from nanorocks_ros.stages.contacts.line_fits import Intersection, intersect_lines
+from nanorocks_ros.stages.contacts.pair_tests import MAX_SIGMAS, MIN_SIGNAL, is_isolated_collision
+from nanorocks_ros.stages.contacts.segmentation_kernels import MAX_FLIGHT_POINTS
+from nanorocks_ros.stages.contacts.tray_history import TrayHistory
+from nanorocks_ros.stages.contacts.unmatched_jumps import UnmatchedJumps
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,18 +24,18 @@ if TYPE_CHECKING:
 
 _NS = 1e9
 
-# Intervals between two pictures: a bead not seen for longer may have done anything; and a contact
-# while it was not seen is not used.
-_GAP = 3.5
-_CONTACT_GAP = 1.5
-# Flights used are as straight as chance leaves all but one in a thousand.
-_STRAIGHT = 4.0
-# How far off the wall a rebound may be seen, in radii; and in sums of radii, how close or far
-# two beads: less is one over the other, whose places are not good then.
-_WALL_SLACK = 0.15
-_NEAREST, _FURTHEST = 0.9, 1.05
-# Part of an interval by which the contact may lie outside the pictures around it.
-_EARLY = 0.3
+# In intervals between frames: longest gap within a flight (a bead may collide unseen in a longer
+# one), and longest gap at a contact.
+_MAX_GAP_FRAMES = 3.5
+_MAX_CONTACT_FRAMES = 1.5
+# Largest excess of chi square of a flight, in standard deviations: noise exceeds it once in 1000.
+_MAX_CHI_SQUARE_SIGMAS = 4.0
+# Tolerance of the distance to the wall at a rebound, in radii; and distance of two beads at a
+# collision, in sums of radii: nearer beads overlap in the image, and their positions are biased.
+_WALL_TOLERANCE = 0.15
+_MIN_DISTANCE, _MAX_DISTANCE = 0.9, 1.05
+# Tolerance of the time of a contact around its two frames, in intervals between frames.
+_TIME_TOLERANCE = 0.3
 
 
 class ContactFinder:
@@ -47,180 +48,198 @@ class ContactFinder:
 
     def __init__(self, tray: Tray) -> None:
         self._tray = tray
-        self._restart()
+        self.reset()
 
-    def _restart(self) -> None:
+    def reset(self) -> None:
+        """Forget all tracks; contacts that are held back are lost."""
         self._first_ns = 0
         self._last_ns: int | None = None
-        self._histories = Histories(self._tray)
-        self._around = Surroundings(3 * LONGEST)
-        self._waiting = Waiting()
+        self._segments = FlightSegments(self._tray)
+        self._history = TrayHistory(3 * MAX_FLIGHT_POINTS)
+        self._unmatched = UnmatchedJumps()
 
     def push(self, tracks: Tracks) -> tuple[Rebound | PairCollision, ...]:
-        """Take the next picture; a contact is known when the flights after it are.
+        """Add the tracks of the next frame and return the contacts that are complete now.
 
-        That is a second and a half later at most. A stamp that goes back starts all afresh.
+        A contact is complete when the flight after it ends, or is 48 positions long: at most
+        1.6 s later at 30 frames/s. A stamp that goes back resets the stage.
         """
         if self._last_ns is not None and tracks.stamp_ns <= self._last_ns:
-            self._restart()
+            self.reset()
         if self._last_ns is None:
             self._first_ns = tracks.stamp_ns
         self._last_ns = tracks.stamp_ns
         time = (tracks.stamp_ns - self._first_ns) / _NS
-        self._around.push(time, tracks)
-        kinks = self._histories.push(time, tracks, _GAP * self._around.interval)
-        self._waiting.forget(time - 2 * LONGEST * self._around.interval)
-        return tuple(found for kink in kinks for found in self._contact(kink))
+        self._history.push(time, tracks)
+        jumps = self._segments.push(time, tracks, _MAX_GAP_FRAMES * self._history.interval)
+        self._unmatched.drop_before(time - 2 * MAX_FLIGHT_POINTS * self._history.interval)
+        return tuple(contact for jump in jumps for contact in self._contact_at(jump))
 
     def flush(self) -> tuple[Rebound | PairCollision, ...]:
-        """The contacts whose flights afterwards end with the recording."""
-        kinks = self._histories.flush()
-        return tuple(found for kink in kinks for found in self._contact(kink))
+        """Give out the contacts that are held back, at the end of a recording.
 
-    def _mass(self, kink: Kink) -> float:
-        return self._tray.species[kink.species].density * 4.0 / 3.0 * math.pi * kink.radius**3
+        A contact is held back until the flight after it ends, or is 48 positions long. Here every
+        flight ends with the last frame: the contacts before flights of at least 4 positions are
+        given out, as far as they pass the tests of `push`. Tracks that go on begin new flights.
+        """
+        jumps = self._segments.flush()
+        return tuple(contact for jump in jumps for contact in self._contact_at(jump))
 
-    def _contact(self, kink: Kink) -> tuple[Rebound | PairCollision, ...]:
-        when = Meeting(*when_met(kink.lines[None]))
-        if not (_straight(kink.lines) and self._between(kink, when)):
+    def _mass(self, jump: VelocityJump) -> float:
+        return self._tray.species[jump.species].density * 4.0 / 3.0 * math.pi * jump.radius**3
+
+    def _contact_at(self, jump: VelocityJump) -> tuple[Rebound | PairCollision, ...]:
+        crossing = Intersection(*intersect_lines(jump.lines[None]))
+        if not (_are_straight(jump.lines) and self._is_between_frames(jump, crossing)):
             return ()
-        rebound = self._rebound(kink, when)
+        rebound = self._rebound(jump, crossing)
         if rebound is not None:
             return (rebound,)
-        for other in self._waiting.partners(kink, when, self._around.interval):
-            pair = self._pair((other, kink))
+        for earlier in self._unmatched.candidates(jump, crossing, self._history.interval):
+            pair = self._pair((earlier, jump))
             if pair is not None:
-                self._waiting.remove(other)
+                self._unmatched.remove(earlier)
                 return (pair,)
-        self._waiting.add(kink, when, self._around.interval)
+        self._unmatched.add(jump, crossing, self._history.interval)
         return ()
 
-    def _between(self, kink: Kink, when: Meeting) -> bool:
-        """Whether the contact was between two pictures, one right after the other."""
-        slack = _EARLY * self._around.interval + FAR * when.error
-        if kink.first - kink.last > _CONTACT_GAP * self._around.interval:
+    def _is_between_frames(self, jump: VelocityJump, crossing: Intersection) -> bool:
+        """Whether the contact lies between two consecutive frames."""
+        slack = _TIME_TOLERANCE * self._history.interval + MAX_SIGMAS * crossing.error
+        if jump.first - jump.last > _MAX_CONTACT_FRAMES * self._history.interval:
             return False
-        return kink.last - slack < when.time < kink.first + slack
+        return jump.last - slack < crossing.time < jump.first + slack
 
     def _stamp_ns(self, time: float) -> int:
         return self._first_ns + round(time * _NS)
 
-    def _rebound(self, kink: Kink, when: Meeting) -> Rebound | None:
-        x, y, variance = _place(kink.lines, when.time)
-        shift_x, shift_y = self._around.displacement(when.time)
-        place = x - shift_x, y - shift_y
-        slack = _WALL_SLACK * kink.radius + FAR * math.sqrt(variance)
+    def _rebound(self, jump: VelocityJump, crossing: Intersection) -> Rebound | None:
+        x, y, variance = _contact_position(jump.lines, crossing.time)
+        shift_x, shift_y = self._history.displacement(crossing.time)
+        position = x - shift_x, y - shift_y
+        slack = _WALL_TOLERANCE * jump.radius + MAX_SIGMAS * math.sqrt(variance)
         for wall in range(4):
             axis, high = divmod(wall, 2)
-            room = self._tray.dimensions[axis] - place[axis] if high else place[axis]
-            if abs(room - kink.radius) < slack:
-                change = float(kink.lines[1, 4 - axis] - kink.lines[0, 4 - axis])
-                if abs(change) < FAR * math.hypot(*_errors(kink)) and self._alone(when, [kink]):
-                    return self._rebound_from(wall, kink, when, np.array(place))
+            gap = self._tray.dimensions[axis] - position[axis] if high else position[axis]
+            if abs(gap - jump.radius) < slack:
+                change = float(jump.lines[1, 4 - axis] - jump.lines[0, 4 - axis])
+                limit = MAX_SIGMAS * math.hypot(*_velocity_errors(jump))
+                if abs(change) < limit and self._is_isolated(crossing, [jump]):
+                    return self._rebound_record(wall, jump, crossing, np.array(position))
         return None
 
-    def _rebound_from(
-        self, wall: int, kink: Kink, when: Meeting, place: NDArray[np.float64]
+    def _rebound_record(
+        self, wall: int, jump: VelocityJump, crossing: Intersection, position: NDArray[np.float64]
     ) -> Rebound | None:
         axis, high = divmod(wall, 2)
         outward = 1.0 if high else -1.0
-        motion, motion_error = self._around.motion(when.time)
-        incoming_error, outgoing_error = _errors(kink)
-        before, after = kink.before.velocity, kink.after.velocity
+        wall_motion, wall_error = self._history.velocity(crossing.time)
+        incoming_error, outgoing_error = _velocity_errors(jump)
+        before, after = jump.before.velocity, jump.after.velocity
         rebound = Rebound(
-            stamp_ns=self._stamp_ns(when.time),
+            stamp_ns=self._stamp_ns(crossing.time),
             tray=self._tray.number,
-            track=kink.track,
-            species=kink.species,
+            track=jump.track,
+            species=jump.species,
             wall=wall,
-            incoming=outward * float(before[axis] - motion[axis]),
+            incoming=outward * float(before[axis] - wall_motion[axis]),
             incoming_error=incoming_error,
-            outgoing=outward * float(motion[axis] - after[axis]),
+            outgoing=outward * float(wall_motion[axis] - after[axis]),
             outgoing_error=outgoing_error,
             tangential_incoming=float(before[1 - axis]),
             tangential_outgoing=float(after[1 - axis]),
             tangential_error=math.hypot(incoming_error, outgoing_error),
-            wall_velocity=outward * float(motion[axis]),
-            wall_velocity_error=motion_error,
-            place=place,
+            wall_velocity=outward * float(wall_motion[axis]),
+            wall_velocity_error=wall_error,
+            place=position,
         )
-        signal = LEAST_SIGNAL * math.hypot(incoming_error, motion_error)
+        signal = MIN_SIGNAL * math.hypot(incoming_error, wall_error)
         return rebound if rebound.incoming > signal and rebound.outgoing > 0.0 else None
 
-    def _alone(self, when: Meeting, kinks: list[Kink]) -> bool:
-        beads = np.empty((len(kinks), 4))
-        for bead, kink in zip(beads, kinks, strict=True):
-            speed = max(math.hypot(*line[3:5]) for line in kink.lines.tolist())
-            bead[:] = *_place(kink.lines, when.time)[:2], kink.radius, speed
-        return self._around.alone(when.time, [kink.track for kink in kinks], beads)
+    def _is_isolated(self, crossing: Intersection, jumps: list[VelocityJump]) -> bool:
+        beads = np.empty((len(jumps), 4))
+        for bead, jump in zip(beads, jumps, strict=True):
+            speed = max(math.hypot(*line[3:5]) for line in jump.lines.tolist())
+            bead[:] = *_contact_position(jump.lines, crossing.time)[:2], jump.radius, speed
+        return self._history.is_isolated(crossing.time, [jump.track for jump in jumps], beads)
 
-    def _pair(self, kinks: tuple[Kink, Kink]) -> PairCollision | None:
-        when = Meeting(*when_met(np.array([kink.lines for kink in kinks])))
-        if not all(self._between(kink, when) for kink in kinks):
+    def _pair(self, jumps: tuple[VelocityJump, VelocityJump]) -> PairCollision | None:
+        crossing = Intersection(*intersect_lines(np.array([jump.lines for jump in jumps])))
+        if not all(self._is_between_frames(jump, crossing) for jump in jumps):
             return None
-        (x, y, _), (its_x, its_y, _) = (_place(kink.lines, when.time) for kink in kinks)
-        distance = math.hypot(its_x - x, its_y - y)
-        reach = kinks[0].radius + kinks[1].radius
+        (x, y, _), (second_x, second_y, _) = (
+            _contact_position(jump.lines, crossing.time) for jump in jumps
+        )
+        distance = math.hypot(second_x - x, second_y - y)
+        reach = jumps[0].radius + jumps[1].radius
         if (
-            not _NEAREST * reach < distance < _FURTHEST * reach
-            or when.chi_square > FAR**2 + 3.0
-            or not self._alone(when, list(kinks))
+            not _MIN_DISTANCE * reach < distance < _MAX_DISTANCE * reach
+            or crossing.chi_square > MAX_SIGMAS**2 + 3.0
+            or not self._is_isolated(crossing, list(jumps))
         ):
             return None
-        collision = self._collision(kinks, when)
-        return collision if only_these_two(collision) else None
+        collision = self._collision_record(jumps, crossing)
+        return collision if is_isolated_collision(collision) else None
 
-    def _collision(self, kinks: tuple[Kink, Kink], when: Meeting) -> PairCollision:
-        places = [_place(kink.lines, when.time) for kink in kinks]
-        here, there = (np.array(place[:2]) for place in places)
-        before = np.array([kink.before.velocity for kink in kinks])
+    def _collision_record(
+        self, jumps: tuple[VelocityJump, VelocityJump], crossing: Intersection
+    ) -> PairCollision:
+        positions = [_contact_position(jump.lines, crossing.time) for jump in jumps]
+        first, second = (np.array(position[:2]) for position in positions)
+        before = np.array([jump.before.velocity for jump in jumps])
         approach = before[1] - before[0]
-        shared = sum(kink.shared_error**2 for kink in kinks)
-        mistimed = when.error**2 * float(approach @ approach)
-        temperatures = [self._around.temperature(when.time, kink.species) for kink in kinks]
-        errors = np.array([_errors(kink) for kink in kinks])
+        shared_variance = sum(jump.shared_error**2 for jump in jumps)
+        timing_variance = crossing.error**2 * float(approach @ approach)
+        temperatures = [self._history.temperature(crossing.time, jump.species) for jump in jumps]
+        errors = np.array([_velocity_errors(jump) for jump in jumps])
         return PairCollision(
-            stamp_ns=self._stamp_ns(when.time),
+            stamp_ns=self._stamp_ns(crossing.time),
             tray=self._tray.number,
-            tracks=np.array([kink.track for kink in kinks], dtype=np.int32),
-            species=np.array([kink.species for kink in kinks], dtype=np.int32),
-            radii=np.array([kink.radius for kink in kinks]),
-            radius_errors=np.array([kink.radius_error for kink in kinks]),
-            masses=np.array([self._mass(kink) for kink in kinks]),
+            tracks=np.array([jump.track for jump in jumps], dtype=np.int32),
+            species=np.array([jump.species for jump in jumps], dtype=np.int32),
+            radii=np.array([jump.radius for jump in jumps]),
+            radius_errors=np.array([jump.radius_error for jump in jumps]),
+            masses=np.array([self._mass(jump) for jump in jumps]),
             before=before,
-            after=np.array([kink.after.velocity for kink in kinks]),
+            after=np.array([jump.after.velocity for jump in jumps]),
             before_errors=errors[:, 0],
             after_errors=errors[:, 1],
-            separation=there - here,
-            separation_error=math.sqrt(sum(place[2] for place in places) + shared + mistimed),
+            separation=second - first,
+            separation_error=math.sqrt(
+                sum(position[2] for position in positions) + shared_variance + timing_variance
+            ),
             temperatures=np.array(temperatures),
             height=self._tray.dimensions[2],
-            place=here - np.array(self._around.displacement(when.time)),
+            place=first - np.array(self._history.displacement(crossing.time)),
         )
 
 
 @compiled
-def _place(lines: NDArray[np.float64], time: float) -> tuple[float, float, float]:
-    """Where the bead was at the contact, by both flights, and the variance of a coordinate."""
+def _contact_position(lines: NDArray[np.float64], time: float) -> tuple[float, float, float]:
+    """Position of the bead at the contact from both flights, and the variance of a coordinate."""
     before, after = lines[0], lines[1]
-    since, to = time - before[0], time - after[0]
-    variance = before[5] + before[6] * since * since
-    its = after[5] + after[6] * to * to
-    share = its / (variance + its)
-    x = share * (before[1] + before[3] * since) + (1.0 - share) * (after[1] + after[3] * to)
-    y = share * (before[2] + before[4] * since) + (1.0 - share) * (after[2] + after[4] * to)
-    return x, y, share * variance
+    since_before, since_after = time - before[0], time - after[0]
+    variance = before[5] + before[6] * since_before * since_before
+    after_variance = after[5] + after[6] * since_after * since_after
+    weight = after_variance / (variance + after_variance)
+    x = weight * (before[1] + before[3] * since_before) + (1.0 - weight) * (
+        after[1] + after[3] * since_after
+    )
+    y = weight * (before[2] + before[4] * since_before) + (1.0 - weight) * (
+        after[2] + after[4] * since_after
+    )
+    return x, y, weight * variance
 
 
-def _errors(kink: Kink) -> tuple[float, float]:
-    """Of a component of the velocities before and after, [m/s]."""
-    return math.sqrt(kink.lines[0, 6]), math.sqrt(kink.lines[1, 6])
+def _velocity_errors(jump: VelocityJump) -> tuple[float, float]:
+    """Errors of a component of the velocities before and after, [m/s]."""
+    return math.sqrt(jump.lines[0, 6]), math.sqrt(jump.lines[1, 6])
 
 
 @compiled
-def _straight(lines: NDArray[np.float64]) -> bool:
+def _are_straight(lines: NDArray[np.float64]) -> bool:
     for k in range(2):
         freedom = 2.0 * lines[k, 8] - 4.0
-        if lines[k, 7] > freedom + _STRAIGHT * math.sqrt(2.0 * freedom):
+        if lines[k, 7] > freedom + _MAX_CHI_SQUARE_SIGMAS * math.sqrt(2.0 * freedom):
             return False
     return True

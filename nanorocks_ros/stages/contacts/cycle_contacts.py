@@ -1,4 +1,4 @@
-"""Rebounds and collisions of the cycle that is cooling: which of them count, and what they say."""
+"""Rebounds and collisions of the current cooling cycle, summed for the restitution fit."""
 
 from __future__ import annotations
 
@@ -14,52 +14,52 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.settings import CoolingSettings
 
-# Between two windows contacts come that nobody asks for.
-_MOST_WAITING = 5000
+# Between two cooling windows contacts come in that no fit uses.
+_MAX_WAITING = 5000
 
 
-class ContactsOfCycle:
-    """Gathers the contacts from the end of the shaking to that of the cooling window.
+class CycleContacts:
+    """Sums the contacts from the end of the shaking to the end of the cooling window.
 
-    One is known a second and a half after it happened. Those of the last two seconds before the
-    last speed never count: so it does not matter in which order speeds and contacts come in.
+    A contact is known 1.5 s after it happened. Contacts of the last 2 s before the last speed are
+    not used: the result does not depend on the order in which speeds and contacts come in.
 
     Parameters
     ----------
     settings : CoolingSettings
-        Which kinds are used.
+        Which kinds of contacts are used.
     """
 
     def __init__(self, settings: CoolingSettings) -> None:
         used = {Rebound: settings.rebounds, PairCollision: settings.collisions}
-        self._used = tuple(kind for kind, wanted in used.items() if wanted)
-        self._waiting: deque[Rebound | PairCollision] = deque(maxlen=_MOST_WAITING)
+        self._used = tuple(kind for kind, enabled in used.items() if enabled)
+        self._waiting: deque[Rebound | PairCollision] = deque(maxlen=_MAX_WAITING)
         self.terms = ContactTerms.of(())
 
     def push(self, contact: Rebound | PairCollision) -> None:
-        """Take a contact, before or after the speeds of that time."""
+        """Add a contact; it may come before or after the speeds of that time."""
         if isinstance(contact, self._used):
             self._waiting.append(contact)
 
     def count(self, first_ns: int, last_ns: int) -> None:
-        """Count those between the end of the shaking and the last speed so far."""
+        """Sum the contacts between the end of the shaking and 2 s before the last speed."""
         latest = last_ns - KNOWN_AFTER_NS[Rebound]
-        ripe = [one for one in self._waiting if one.stamp_ns <= latest]
+        ripe = [contact for contact in self._waiting if contact.stamp_ns <= latest]
         self._keep(lambda stamp_ns: stamp_ns > latest)
-        within = [one for one in ripe if one.stamp_ns >= first_ns]
+        within = [contact for contact in ripe if contact.stamp_ns >= first_ns]
         if within:
             self.terms += ContactTerms.of(within)
 
     def next_cycle(self) -> None:
-        """Begin anew; contacts of the cycle before may still come in, and are too early then."""
+        """Clear the sums; late contacts of the cycle before are too early to be summed."""
         self.terms = ContactTerms.of(())
 
     def restart(self, stamp_ns: int) -> None:
-        """Time went back to this stamp: what is later comes from before that."""
+        """Handle time that went back to a stamp: drop the sums and all later contacts."""
         self.next_cycle()
-        self._keep(lambda its_ns: its_ns <= stamp_ns)
+        self._keep(lambda contact_ns: contact_ns <= stamp_ns)
 
-    def _keep(self, wanted: Callable[[int], bool]) -> None:
-        kept = [one for one in self._waiting if wanted(one.stamp_ns)]
+    def _keep(self, keep: Callable[[int], bool]) -> None:
+        kept = [contact for contact in self._waiting if keep(contact.stamp_ns)]
         self._waiting.clear()
         self._waiting.extend(kept)

@@ -1,4 +1,4 @@
-"""The ways of the beads of a tray, cut into straight flights, and the kinks between them."""
+"""Segmentation of tracks into straight flights, with the velocity jumps between them."""
 
 from __future__ import annotations
 
@@ -8,44 +8,41 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nanorocks_ros.stages.contacts.line_fits import LINE, Line
-from nanorocks_ros.stages.contacts.residual_variance import Scatter
+from nanorocks_ros.stages.contacts.line_fits import LINE_SIZE, Line
+from nanorocks_ros.stages.contacts.residual_variance import ResidualVariance
 from nanorocks_ros.stages.contacts.segmentation_kernels import (
-    KINK,
-    LONGEST,
-    Places,
-    Ways,
-    begin,
-    finish,
-    follow,
+    JUMP_SIZE,
+    FrameBeads,
+    TrackBuffer,
+    append_positions,
+    finish_flight,
+    reset_slot,
 )
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.records import Tracks
 
-__all__ = ['LONGEST', 'Histories', 'Kink']
-
-# Of grains with corners a collision says nothing of the kind.
-_NOT_ROUND = ('JSC-1',)
-# Error of a measured radius, over it, that outlines leave besides the stated one.
-_OUTLINE = 0.02
-_SLOTS = 64
+# Angular grains: the change of velocity in a collision does not follow the line of centres.
+_ANGULAR_MATERIALS = ('JSC-1',)
+# Relative error of a measured radius from the shape of the outline, beside the stated error.
+_OUTLINE_ERROR = 0.02
+_INITIAL_SLOTS = 64
 
 
-class Kink(NamedTuple):
-    """Where one flight of a bead ends and the next begins.
+class VelocityJump(NamedTuple):
+    """A change of velocity between two straight flights of a bead.
 
     Parameters
     ----------
     track, species : int
     radius, radius_error : float, [m]
     lines : ndarray (2, LINE)
-        Numbers of the flights before and after, through places past the camera.
+        Lines of the flights before and after, in the camera frame.
     last, first : float, [s]
-        Times of the last picture before and of the first after.
+        Times of the last frame before the jump and of the first after it.
     shared_error : float, [m]
-        Of a coordinate of all places alike, which their scatter does not show.
+        Error of a coordinate that all positions share; their residuals do not show it.
     """
 
     track: int
@@ -59,17 +56,17 @@ class Kink(NamedTuple):
 
     @property
     def before(self) -> Line:
-        """The flight before."""
-        return Line.of(self.lines[0])
+        """Line of the flight before."""
+        return Line.from_row(self.lines[0])
 
     @property
     def after(self) -> Line:
-        """The flight after."""
-        return Line.of(self.lines[1])
+        """Line of the flight after."""
+        return Line.from_row(self.lines[1])
 
 
-class Histories:
-    """The last flights of all tracks of a tray that are of round beads.
+class FlightSegments:
+    """The last flights of the tracks of all round beads of a tray.
 
     Parameters
     ----------
@@ -78,47 +75,47 @@ class Histories:
 
     def __init__(self, tray: Tray) -> None:
         species = tray.species
-        self._round = np.array([one.material not in _NOT_ROUND for one in species])
-        alike = [one.diameter_low == one.diameter_high for one in species]
+        self._is_round = np.array([kind.material not in _ANGULAR_MATERIALS for kind in species])
+        equal_sizes = [kind.diameter_low == kind.diameter_high for kind in species]
         self._known_radii = np.array(
-            [0.5 * one.diameter if same else math.nan
-             for one, same in zip(species, alike, strict=True)]
+            [0.5 * kind.diameter if equal_size else math.nan
+             for kind, equal_size in zip(species, equal_sizes, strict=True)]
         )  # fmt: skip
-        self._scatter = Scatter.unknown(len(species))
+        self._residuals = ResidualVariance.initial(len(species))
         self._slots: dict[int, int] = {}
-        self._free = list(range(_SLOTS))[::-1]
-        self._ways = Ways.empty(_SLOTS)
-        # Of each slot; sizes are radii and the errors they were measured with.
-        self._species = np.zeros(_SLOTS, dtype=np.int32)
-        self._sizes = np.zeros((_SLOTS, 2))
-        # Tracks and their species in the last picture, and where they are; -1 is nowhere.
-        self._named = b'', b''
-        self._rows = np.empty(0, dtype=np.int64)
+        self._free = list(range(_INITIAL_SLOTS))[::-1]
+        self._buffer = TrackBuffer.empty(_INITIAL_SLOTS)
+        # Species, radius and measurement error of the radius of each slot.
+        self._species = np.zeros(_INITIAL_SLOTS, dtype=np.int32)
+        self._sizes = np.zeros((_INITIAL_SLOTS, 2))
+        # Tracks and species in the last frame, and the slot of each; -1 without a slot.
+        self._last_tracks = b'', b''
+        self._track_slots = np.empty(0, dtype=np.int64)
 
-    def push(self, time: float, tracks: Tracks, gap: float) -> list[Kink]:
-        """Take the next picture, at a time in s.
+    def push(self, time: float, tracks: Tracks, max_gap: float) -> list[VelocityJump]:
+        """Append the positions of the next frame.
 
         Parameters
         ----------
         time : float, [s]
         tracks : Tracks
-        gap : float, [s]
-            Without a place for longer, what happened to a bead is not known.
+        max_gap : float, [s]
+            A track without a position for longer is cut.
 
         Returns
         -------
-        list of Kink
-            Those of which the flights before and after are both known now.
+        list of VelocityJump
+            Jumps whose flights before and after are complete now.
         """
-        gone = self._assigned(tracks)
-        lines = np.empty((tracks.ids.size, KINK))
-        turned = follow(
-            self._ways,
-            self._scatter,
+        ended = self._assign_slots(tracks)
+        lines = np.empty((tracks.ids.size, JUMP_SIZE))
+        rows = append_positions(
+            self._buffer,
+            self._residuals,
             time,
-            gap,
-            self._rows,
-            Places(
+            max_gap,
+            self._track_slots,
+            FrameBeads(
                 tracks.species,
                 tracks.positions,
                 tracks.displacement,
@@ -131,62 +128,70 @@ class Histories:
             self._sizes,
             lines,
         )
-        kinks = [self._kink(int(tracks.ids[k]), lines[k].copy()) for k in turned.tolist()]
-        return kinks + self._finished(gone)
+        jumps = [self._velocity_jump(int(tracks.ids[k]), lines[k].copy()) for k in rows.tolist()]
+        return jumps + self._finish(ended)
 
-    def flush(self) -> list[Kink]:
-        """The kinks whose flights afterwards end with the recording."""
-        return self._finished(sorted(self._slots))
+    def flush(self) -> list[VelocityJump]:
+        """End all flights and return the jumps before them; later positions begin new flights."""
+        jumps = self._finish(sorted(self._slots))
+        # No track has a slot now: the next frame assigns new ones, even to the same tracks.
+        self._last_tracks = b'', b''
+        self._track_slots = np.empty(0, dtype=np.int64)
+        return jumps
 
-    def _assigned(self, tracks: Tracks) -> list[int]:
-        """Give each round bead a slot, and say which tracks are no more; few pictures differ."""
-        named = tracks.ids.tobytes(), tracks.species.tobytes()
-        if named == self._named:
+    def _assign_slots(self, tracks: Tracks) -> list[int]:
+        """Assign a slot to each round bead; return the tracks that ended. Few frames differ."""
+        tracks_now = tracks.ids.tobytes(), tracks.species.tobytes()
+        if tracks_now == self._last_tracks:
             return []
-        self._named = named
-        numbers = tracks.ids.tolist()
-        rounds = self._round[tracks.species].tolist()
-        rows = [
-            self._slot(number) if fit else -1 for number, fit in zip(numbers, rounds, strict=True)
+        self._last_tracks = tracks_now
+        track_ids = tracks.ids.tolist()
+        is_round = self._is_round[tracks.species].tolist()
+        slots = [
+            self._slot_of(track) if round_bead else -1
+            for track, round_bead in zip(track_ids, is_round, strict=True)
         ]
-        self._rows = np.array(rows, dtype=np.int64)
-        used = self._rows >= 0
-        self._species[self._rows[used]] = tracks.species[used]
-        return sorted(self._slots.keys() - set(numbers))
+        self._track_slots = np.array(slots, dtype=np.int64)
+        used = self._track_slots >= 0
+        self._species[self._track_slots[used]] = tracks.species[used]
+        return sorted(self._slots.keys() - set(track_ids))
 
-    def _slot(self, number: int) -> int:
-        slot = self._slots.get(number)
+    def _slot_of(self, track: int) -> int:
+        slot = self._slots.get(track)
         if slot is None:
             if not self._free:
                 self._grow()
-            slot = self._slots[number] = self._free.pop()
-            begin(self._ways, slot)
+            slot = self._slots[track] = self._free.pop()
+            reset_slot(self._buffer, slot)
         return slot
 
     def _grow(self) -> None:
         slots = self._species.size
-        self._ways = self._ways.larger()
+        self._buffer = self._buffer.doubled()
         self._species = np.concatenate([self._species, np.zeros_like(self._species)])
         self._sizes = np.concatenate([self._sizes, np.zeros_like(self._sizes)])
         self._free = list(range(slots, 2 * slots))[::-1]
 
-    def _kink(self, number: int, row: NDArray[np.float64]) -> Kink:
-        slot = self._slots[number]
-        radius, measured = self._sizes[slot].tolist()
+    def _velocity_jump(self, track: int, numbers: NDArray[np.float64]) -> VelocityJump:
+        slot = self._slots[track]
+        radius, measured_error = self._sizes[slot].tolist()
         species = int(self._species[slot])
-        # The size of a species whose beads are alike is known.
+        # The size is known where all beads of a species have the same.
         alike = not math.isnan(self._known_radii[species])
-        error = 0.0 if alike else float(np.hypot(measured, _OUTLINE * radius))
-        lines, rest = row[: 2 * LINE].reshape(2, LINE), row[2 * LINE :].tolist()
-        return Kink(number, species, radius, error, lines, *rest)
+        error = 0.0 if alike else float(np.hypot(measured_error, _OUTLINE_ERROR * radius))
+        lines, times_and_error = (
+            numbers[: 2 * LINE_SIZE].reshape(2, LINE_SIZE),
+            numbers[2 * LINE_SIZE :].tolist(),
+        )
+        return VelocityJump(track, species, radius, error, lines, *times_and_error)
 
-    def _finished(self, numbers: list[int]) -> list[Kink]:
-        """The last kinks of tracks that have ended."""
-        kinks = []
-        for number in numbers:
-            slot, row = self._slots[number], np.empty(KINK)
-            variance = float(self._scatter.variances[self._species[slot]])
-            if finish(self._ways, slot, variance, float(self._sizes[slot, 0]), row):
-                kinks.append(self._kink(number, row))
-            self._free.append(self._slots.pop(number))
-        return kinks
+    def _finish(self, track_ids: list[int]) -> list[VelocityJump]:
+        """Free the slots of tracks that ended; return their last jumps."""
+        jumps = []
+        for track in track_ids:
+            slot, row = self._slots[track], np.empty(JUMP_SIZE)
+            variance = float(self._residuals.variances[self._species[slot]])
+            if finish_flight(self._buffer, slot, variance, float(self._sizes[slot, 0]), row):
+                jumps.append(self._velocity_jump(track, row))
+            self._free.append(self._slots.pop(track))
+        return jumps

@@ -1,4 +1,4 @@
-"""Straight flights in a track: where one ends and the next begins, and the lines through them."""
+"""Line fits to straight flights: break points between them and where two lines intersect."""
 
 from __future__ import annotations
 
@@ -11,71 +11,74 @@ from numpy.typing import NDArray
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.stages.tracking.linking.free_flight import fit_line as _fit
 
-_SUMS = 8
-LINE = 10
-"""Numbers of a line in an array, in the order of the fields of `Line`."""
+_N_SUMS = 8
+LINE_SIZE = 10
+"""Length of the array that holds a `Line`, in the order of its fields."""
 
 
 class Line(NamedTuple):
-    """A straight line through the places of a flight.
+    """A straight line through the positions of a flight.
 
     Parameters
     ----------
     time : float, [s]
-        Centre of the line, where the errors of place and velocity are independent.
-    place, velocity : ndarray (2,), [m], [m/s]
-    place_variance, velocity_variance : float, [m^2], [m^2/s^2]
-        Of a component.
+        Centre of the line, where the errors of position and velocity are independent.
+    position, velocity : ndarray (2,), [m], [m/s]
+    position_variance, velocity_variance : float, [m^2], [m^2/s^2]
+        Of one component.
     chi_square : float
-        Of the residuals, with ``2 used - 4`` degrees of freedom.
-    used : int
-        Places it goes through.
+        Of the residuals, with ``2 points - 4`` degrees of freedom.
+    points : int
+        Number of positions.
     duration : float, [s]
-        From the first to the last of them.
+        From the first to the last position.
     """
 
     time: float
-    place: NDArray[np.float64]
+    position: NDArray[np.float64]
     velocity: NDArray[np.float64]
-    place_variance: float
+    position_variance: float
     velocity_variance: float
     chi_square: float
-    used: int
+    points: int
     duration: float
 
     @classmethod
-    def of(cls, row: NDArray[np.float64]) -> Line:
-        """The line whose numbers are in an array, (LINE,)."""
-        *_, place, velocity, chi_square, used, duration = row.tolist()
+    def from_row(cls, row: NDArray[np.float64]) -> Line:
+        """Read a line from an array, (LINE_SIZE,)."""
+        *_, position, velocity, chi_square, points, duration = row.tolist()
         return cls(
-            float(row[0]), row[1:3], row[3:5], place, velocity, chi_square, int(used), duration
+            float(row[0]),
+            row[1:3],
+            row[3:5],
+            position,
+            velocity,
+            chi_square,
+            int(points),
+            duration,
         )
 
     @property
     def row(self) -> NDArray[np.float64]:
-        """Its numbers in an array, (LINE,)."""
+        """The fields in an array, (LINE_SIZE,)."""
         return np.hstack(self)
 
     def at(self, time: float) -> NDArray[np.float64]:
-        """Place at a time, (2,), [m]."""
-        return self.place + self.velocity * (time - self.time)
-
-    def variance_at(self, time: float) -> float:
-        """Variance of a coordinate of that place, [m^2]."""
-        return self.place_variance + self.velocity_variance * (time - self.time) ** 2
+        """Position at a time, (2,), [m]."""
+        return self.position + self.velocity * (time - self.time)
 
 
 @compiled
 def _chi_square(sums: NDArray[np.float64], first: int, end: int) -> float:
-    """Of a line in both coordinates; sums of w, wt, wtt, wx, wxt, wy, wyt, w(xx+yy)."""
+    """Chi square of a line, from sums of w, wt, wtt, wx, wxt, wy, wyt, w(xx+yy)."""
     w = sums[end, 0] - sums[first, 0]
     t = sums[end, 1] - sums[first, 1]
     x = sums[end, 3] - sums[first, 3]
     y = sums[end, 5] - sums[first, 5]
     spread = sums[end, 2] - sums[first, 2] - t * t / w
-    across = sums[end, 4] - sums[first, 4] - t * x / w
-    down = sums[end, 6] - sums[first, 6] - t * y / w
-    slope = (across * across + down * down) / spread if spread > 0.0 else 0.0
+    cross_x = sums[end, 4] - sums[first, 4] - t * x / w
+    cross_y = sums[end, 6] - sums[first, 6] - t * y / w
+    slope = (cross_x * cross_x + cross_y * cross_y) / spread if spread > 0.0 else 0.0
     chi_square: float = sums[end, 7] - sums[first, 7] - (x * x + y * y) / w - slope
     return chi_square
 
@@ -83,102 +86,104 @@ def _chi_square(sums: NDArray[np.float64], first: int, end: int) -> float:
 @compiled
 def best_break(
     times: NDArray[np.float64],
-    places: NDArray[np.float64],
+    positions: NDArray[np.float64],
     errors: NDArray[np.float64],
-    fewest: int,
+    min_points: int,
 ) -> tuple[int, float]:
-    """Where two straight lines explain some places best.
+    """Find the break at which two straight lines fit the positions best.
 
     Parameters
     ----------
     times : ndarray (n,), [s]
-    places : ndarray (n, 2), [m]
+    positions : ndarray (n, 2), [m]
     errors : ndarray (n,), [m]
-        Of a coordinate.
-    fewest : int, >= 2
-        Places on each side.
+        Of one coordinate.
+    min_points : int, >= 2
+        Positions on each side.
 
     Returns
     -------
     first : int
-        First place of the second line; 0 when there are too few places.
+        First position of the second line; 0 when there are too few positions.
     gain : float
-        By how much chi square falls below that of a single line.
+        Decrease of chi square against a single line.
     """
     n = times.size
-    if n < 2 * fewest:
+    if n < 2 * min_points:
         return 0, 0.0
-    sums = np.zeros((n + 1, _SUMS))
+    sums = np.zeros((n + 1, _N_SUMS))
     for k in range(n):
-        # From the first place, so that squares stay small.
+        # Relative to the first position, so that squares stay small.
         t = times[k] - times[0]
-        x, y = places[k, 0] - places[0, 0], places[k, 1] - places[0, 1]
+        x, y = positions[k, 0] - positions[0, 0], positions[k, 1] - positions[0, 1]
         w = 1.0 / (errors[k] * errors[k])
         for c, term in enumerate((1.0, t, t * t, x, x * t, y, y * t, x * x + y * y)):
             sums[k + 1, c] = sums[k, c] + w * term
-    least, first = np.inf, 0
-    for k in range(fewest, n - fewest + 1):
-        both = _chi_square(sums, 0, k) + _chi_square(sums, k, n)
-        if both < least:
-            least, first = both, k
-    return first, _chi_square(sums, 0, n) - least
+    lowest, first = np.inf, 0
+    for k in range(min_points, n - min_points + 1):
+        chi_square = _chi_square(sums, 0, k) + _chi_square(sums, k, n)
+        if chi_square < lowest:
+            lowest, first = chi_square, k
+    return first, _chi_square(sums, 0, n) - lowest
 
 
 @compiled
-def line_through(
+def write_line(
     times: NDArray[np.float64],
-    places: NDArray[np.float64],
+    positions: NDArray[np.float64],
     errors: NDArray[np.float64],
     row: NDArray[np.float64],
 ) -> None:
-    """The line through places (n, 2), n >= 2, weighted by their errors, into an array (LINE,)."""
-    _fit(times, places, errors, row)
+    """Fit a line to positions (n, 2), n >= 2, weighted by errors, into an array (LINE_SIZE,)."""
+    _fit(times, positions, errors, row)
     row[9] = times[-1] - times[0]
 
 
 @compiled
-def set_errors(row: NDArray[np.float64], variance: float, drift: float, length: float) -> None:
-    """Give a line other errors of its places.
+def rescale_errors(
+    row: NDArray[np.float64], variance: float, shared_error: float, correlation_length: float
+) -> None:
+    """Rescale the variances of a line to the residual variance, and add shared errors.
 
     Parameters
     ----------
-    row : ndarray (LINE,)
+    row : ndarray (LINE_SIZE,)
         Changed.
     variance : float
-        Of what scatters from place to place, over what was said.
-    drift : float, [m]
-        Standard error that is another one further on.
-    length : float, [m]
-        How far on; along a shorter way before and after a contact it tilts both lines alike,
-        which their ratio does not feel.
+        Residual variance over the stated one.
+    shared_error : float, [m]
+        Standard error that neighbouring positions have in common.
+    correlation_length : float, [m]
+        Path over which that error changes. Along a shorter path before and after a contact it
+        tilts both lines alike, and their ratio stays the same.
     """
     duration = row[9]
-    square = (row[3] * row[3] + row[4] * row[4]) * duration * duration
-    apart = square / (square + length * length)
-    tilt = drift / duration
+    squared_path = (row[3] * row[3] + row[4] * row[4]) * duration * duration
+    decorrelated = squared_path / (squared_path + correlation_length * correlation_length)
+    tilt = shared_error / duration
     row[5] *= variance
-    # Slopes feel the ends most: one whole wave along a flight tilts it by nearly this.
-    row[6] = variance * row[6] + apart * 4.0 * tilt * tilt
+    # The ends weigh most in a slope: one wave of the error along a flight tilts it by about this.
+    row[6] = variance * row[6] + decorrelated * 4.0 * tilt * tilt
     row[7] /= variance
 
 
 def fit_line(
-    times: NDArray[np.float64], places: NDArray[np.float64], errors: NDArray[np.float64]
+    times: NDArray[np.float64], positions: NDArray[np.float64], errors: NDArray[np.float64]
 ) -> Line:
-    """The line through places (n, 2), n >= 2, weighted by their errors."""
-    row = np.empty(LINE)
-    line_through(times, places, errors, row)
-    return Line.of(row)
+    """Fit a line to positions (n, 2), n >= 2, weighted by their errors."""
+    row = np.empty(LINE_SIZE)
+    write_line(times, positions, errors, row)
+    return Line.from_row(row)
 
 
-class Meeting(NamedTuple):
-    """When two lines of one bead meet, or those of several beads all at once.
+class Intersection(NamedTuple):
+    """Time at which the lines before and after a contact intersect, for one or more beads.
 
     Parameters
     ----------
     time, error : float, [s]
     chi_square : float
-        Of the places that do not agree then; ``2 beads - 1`` degrees of freedom.
+        Of the positions at that time; ``2 beads - 1`` degrees of freedom.
     """
 
     time: float
@@ -187,8 +192,8 @@ class Meeting(NamedTuple):
 
 
 @compiled
-def when_met(lines: NDArray[np.float64]) -> tuple[float, float, float]:
-    """Time, error and chi square of a `Meeting` of lines, (beads, 2, LINE)."""
+def intersect_lines(lines: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Time, error and chi square of an `Intersection` of lines, (beads, 2, LINE_SIZE)."""
     beads = lines.shape[0]
     time = 0.0
     for k in range(beads):
@@ -197,23 +202,23 @@ def when_met(lines: NDArray[np.float64]) -> tuple[float, float, float]:
     error, chi_square = np.inf, 0.0
     # The errors of the lines depend on the instant; two rounds are enough.
     for _ in range(2):
-        top, bottom, rest = 0.0, 0.0, 0.0
+        numerator, denominator, total = 0.0, 0.0, 0.0
         for k in range(beads):
             before, after = lines[k, 0], lines[k, 1]
-            since, to = time - before[0], time - after[0]
-            variance = before[5] + before[6] * since * since + after[5] + after[6] * to * to
-            x = after[1] + after[3] * to - before[1] - before[3] * since
-            y = after[2] + after[4] * to - before[2] - before[4] * since
+            since_before, since_after = time - before[0], time - after[0]
+            variance = (
+                before[5]
+                + before[6] * since_before * since_before
+                + after[5]
+                + after[6] * since_after * since_after
+            )
+            x = after[1] + after[3] * since_after - before[1] - before[3] * since_before
+            y = after[2] + after[4] * since_after - before[2] - before[4] * since_before
             u, v = after[3] - before[3], after[4] - before[4]
-            top -= (x * u + y * v) / variance
-            bottom += (u * u + v * v) / variance
-            rest += (x * x + y * y) / variance
-        step = top / bottom
+            numerator -= (x * u + y * v) / variance
+            denominator += (u * u + v * v) / variance
+            total += (x * x + y * y) / variance
+        step = numerator / denominator
         time += step
-        error, chi_square = 1.0 / math.sqrt(bottom), max(rest - top * step, 0.0)
+        error, chi_square = 1.0 / math.sqrt(denominator), max(total - numerator * step, 0.0)
     return time, error, chi_square
-
-
-def meeting(pairs: list[tuple[Line, Line]]) -> Meeting:
-    """The instant at which the lines before and after agree best on where the beads are."""
-    return Meeting(*when_met(np.array([[before.row, after.row] for before, after in pairs])))

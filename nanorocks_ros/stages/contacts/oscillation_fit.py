@@ -1,4 +1,4 @@
-"""How fast a tray moves at an instant, from its places around it: the terms that are fitted."""
+"""Fits of polynomials and damped oscillations to tray positions, for the velocity at one time."""
 
 from __future__ import annotations
 
@@ -10,113 +10,117 @@ from numpy.typing import NDArray
 
 from nanorocks_ros.numerics.compiled import compiled
 
-# Frequencies of a swing that are tried, [1/s].
+# Trial frequencies of the oscillation, [1/s].
 _FREQUENCIES = np.geomspace(0.5, 6.0, 40)
-# Share of a term that the others before it must leave, or they are all but the same.
-_LEAST_PIVOT = 1e-4
+# Smallest part of a term that is independent of the terms before it.
+_MIN_PIVOT = 1e-4
 
 
 class Slope(NamedTuple):
-    """Slope at time 0 of what was fitted.
+    """Slope at time 0 of a least-squares fit.
 
     Parameters
     ----------
     velocity : ndarray (2,), [m/s]
-    left : float, [m^2]
-        Sum of the squares that are left.
-    factor : float, [1/s]
-        Error of the slope over that of a place.
+    residual : float, [m^2]
+        Sum of the squared residuals.
+    error_factor : float, [1/s]
+        Error of the slope over the error of a position.
     """
 
     velocity: NDArray[np.float64]
-    left: float
-    factor: float
+    residual: float
+    error_factor: float
 
 
-def slope_of(terms: NDArray[np.float64], places: NDArray[np.float64]) -> Slope:
-    """Fit terms, (pictures, n), of which the second alone has a slope at 0, of 1."""
+def fit_slope(terms: NDArray[np.float64], positions: NDArray[np.float64]) -> Slope:
+    """Fit terms, (frames, n); only the second has a slope at time 0, and it is 1."""
     inverse = np.linalg.pinv(terms)
-    found = inverse @ places
-    left = float(np.sum((places - terms @ found) ** 2))
-    return Slope(found[1], left, float(np.linalg.norm(inverse[1])))
+    coefficients = inverse @ positions
+    residual = float(np.sum((positions - terms @ coefficients) ** 2))
+    return Slope(coefficients[1], residual, float(np.linalg.norm(inverse[1])))
 
 
-def powers(times: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
-    """Terms 1, t, ... up to a degree, (pictures, degree + 1)."""
+def polynomial_terms(times: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
+    """Terms 1, t, ... up to a degree, (frames, degree + 1)."""
     return np.vander(times, degree + 1, increasing=True)
 
 
-def swing_terms(times: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Terms of a swing that dies away about a resting place, of the frequency that fits best.
+def oscillation_terms(
+    times: NDArray[np.float64], positions: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Terms of a damped oscillation about a fixed position, at the frequency that fits best.
 
-    The first slope is that of its sine, divided by the angular frequency.
+    The term with slope 1 at time 0 is the sine divided by the angular frequency.
     """
     omega = 2.0 * math.pi * _FREQUENCIES[:, None]
     sine, cosine = np.sin(omega * times), np.cos(omega * times)
     slope = sine / omega
-    # Terms in t sin have no slope at 0; that in t cos has one, and is taken off the sine's.
-    parts = np.stack([np.ones_like(sine), slope, cosine, times * cosine - slope, times * sine])
-    best = _best_fit(parts, places)
+    # The t sin term has no slope at 0; the t cos term has slope 1: the sine is subtracted from it.
+    terms = np.stack([np.ones_like(sine), slope, cosine, times * cosine - slope, times * sine])
+    best = _best_fit(terms, positions)
     if best < 0:
-        terms = parts.transpose(1, 2, 0)
-        turned = terms.transpose(0, 2, 1)
-        projected = turned @ places
-        explained = projected * (np.linalg.pinv(turned @ terms, hermitian=True) @ projected)
+        term_sets = terms.transpose(1, 2, 0)
+        transposed = term_sets.transpose(0, 2, 1)
+        projected = transposed @ positions
+        explained = projected * (
+            np.linalg.pinv(transposed @ term_sets, hermitian=True) @ projected
+        )
         best = int(np.argmax(explained.sum(axis=(1, 2))))
-    return np.ascontiguousarray(parts[:, best].T)
+    return np.ascontiguousarray(terms[:, best].T)
 
 
 @compiled
-def _best_fit(parts: NDArray[np.float64], places: NDArray[np.float64]) -> int:
-    """Which of some sets of terms, (terms, sets, pictures), explains most of the places.
+def _best_fit(terms: NDArray[np.float64], positions: NDArray[np.float64]) -> int:
+    """Index of the set of terms, (terms, sets, frames), that explains most of the positions.
 
-    -1 where that is not sure, since the terms of a set are all but the same.
+    -1 if the terms of a set are nearly dependent.
     """
-    count, sets, pictures = parts.shape
-    normal, factor = np.empty((count, count)), np.empty((count, count))
+    count, sets, frames = terms.shape
+    normal, cholesky = np.empty((count, count)), np.empty((count, count))
     projected = np.empty((count, 2))
-    most, best = -np.inf, -1
+    largest, best = -np.inf, -1
     for k in range(sets):
         for i in range(count):
             for j in range(i + 1):
                 total = 0.0
-                for n in range(pictures):
-                    total += parts[i, k, n] * parts[j, k, n]
+                for n in range(frames):
+                    total += terms[i, k, n] * terms[j, k, n]
                 normal[i, j] = total
             for c in range(2):
                 total = 0.0
-                for n in range(pictures):
-                    total += parts[i, k, n] * places[n, c]
+                for n in range(frames):
+                    total += terms[i, k, n] * positions[n, c]
                 projected[i, c] = total
-        explained = _explained(normal, projected, factor)
+        explained = _explained(normal, projected, cholesky)
         if not explained >= 0.0:
             return -1
-        if explained > most:
-            most, best = explained, k
+        if explained > largest:
+            largest, best = explained, k
     return best
 
 
 @compiled
 def _explained(
-    normal: NDArray[np.float64], projected: NDArray[np.float64], factor: NDArray[np.float64]
+    normal: NDArray[np.float64], projected: NDArray[np.float64], cholesky: NDArray[np.float64]
 ) -> float:
-    """Sum of squares that a fit explains, by Cholesky; NaN where that loses too many digits."""
+    """Sum of squares that a fit explains, by Cholesky; NaN for an ill-conditioned matrix."""
     explained = 0.0
     for i in range(normal.shape[0]):
         for j in range(i + 1):
             value = normal[i, j]
             for m in range(j):
-                value -= factor[i, m] * factor[j, m]
+                value -= cholesky[i, m] * cholesky[j, m]
             if j < i:
-                factor[i, j] = value / factor[j, j]
-            elif value > _LEAST_PIVOT * normal[i, i]:
-                factor[i, i] = math.sqrt(value)
+                cholesky[i, j] = value / cholesky[j, j]
+            elif value > _MIN_PIVOT * normal[i, i]:
+                cholesky[i, i] = math.sqrt(value)
             else:
                 return math.nan
         for c in range(projected.shape[1]):
             value = projected[i, c]
             for m in range(i):
-                value -= factor[i, m] * projected[m, c]
-            projected[i, c] = value / factor[i, i]
+                value -= cholesky[i, m] * projected[m, c]
+            projected[i, c] = value / cholesky[i, i]
             explained += projected[i, c] * projected[i, c]
     return explained

@@ -1,4 +1,4 @@
-"""Whether two kinks were one collision of two beads, and of nobody else."""
+"""Tests that two velocity jumps are one collision of two beads without a third body."""
 
 from __future__ import annotations
 
@@ -10,37 +10,40 @@ import numpy as np
 if TYPE_CHECKING:
     from nanorocks_ros.records import PairCollision
 
-FAR = 4.0
-"""Standard errors beyond which a contact is no such contact."""
+MAX_SIGMAS = 4.0
+"""Largest deviation, in standard errors, that a contact may have from its model."""
 
-LEAST_SIGNAL = 12.0
-"""Least speed of a contact, in its errors: below, its own error bends the ratio."""
+MIN_SIGNAL = 12.0
+"""Smallest speed of a contact in its standard errors; below, the ratio of speeds is biased."""
 
-# Beads that go on together have merged.
-_MERGED = 0.1
+# Ratio of the relative speeds after and before; beads below it have merged.
+_MAX_MERGED_RATIO = 0.1
 
 
-def only_these_two(pair: PairCollision) -> bool:
-    """Whether they met, exchanged momentum along their line of centres, and with nobody else.
+def is_isolated_collision(pair: PairCollision) -> bool:
+    """Whether two beads approached, conserved momentum, and changed it along the normal only.
 
-    And did not merge, which leaves them at rest to each other.
+    The normal is the line of centres. Beads at relative rest afterwards have merged and fail.
     """
     normal = pair.separation / math.hypot(*pair.separation)
-    across = np.array([-normal[1], normal[0]])
+    tangent = np.array([-normal[1], normal[0]])
     errors = np.hypot(pair.before_errors, pair.after_errors)
     change = pair.after - pair.before
     approach = -float((pair.before[1] - pair.before[0]) @ normal)
-    error = float(np.hypot(*pair.before_errors))
-    lost = pair.masses @ change
-    lost_error = math.hypot(*(pair.masses * errors))
-    slip = float((change[1] - change[0]) @ across)
-    # A line of centres that is turned a little makes a slip of the change along it.
-    turned = pair.separation_error / math.hypot(*pair.separation)
-    slip_error = math.hypot(*errors, turned * float((change[1] - change[0]) @ normal))
-    relative = [float(np.hypot(*(one[1] - one[0]))) for one in (pair.before, pair.after)]
+    approach_error = float(np.hypot(*pair.before_errors))
+    momentum_loss = pair.masses @ change
+    momentum_error = math.hypot(*(pair.masses * errors))
+    slip = float((change[1] - change[0]) @ tangent)
+    # An error in the direction of the normal turns part of the normal change into slip.
+    normal_error = pair.separation_error / math.hypot(*pair.separation)
+    slip_error = math.hypot(*errors, normal_error * float((change[1] - change[0]) @ normal))
+    relative_speeds = [
+        float(np.hypot(*(velocities[1] - velocities[0])))
+        for velocities in (pair.before, pair.after)
+    ]
     return bool(
-        relative[1] > _MERGED * relative[0]
-        and approach > LEAST_SIGNAL * error
-        and float(lost @ lost) < FAR**2 * lost_error**2
-        and abs(slip) < FAR * slip_error
+        relative_speeds[1] > _MAX_MERGED_RATIO * relative_speeds[0]
+        and approach > MIN_SIGNAL * approach_error
+        and float(momentum_loss @ momentum_loss) < MAX_SIGMAS**2 * momentum_error**2
+        and abs(slip) < MAX_SIGMAS * slip_error
     )

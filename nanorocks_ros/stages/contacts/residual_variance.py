@@ -1,4 +1,4 @@
-"""How places scatter about straight flights: learnt from the flights themselves."""
+"""Residual variance of positions about straight flights, estimated from the flights."""
 
 from __future__ import annotations
 
@@ -11,49 +11,49 @@ from nanorocks_ros.numerics.compiled import compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Flights from which the scatter of places is learnt, their fewest places, and how far they lead
-# in errors of a place: beads at rest are always misplaced alike.
-_FLIGHTS, _FEWEST_PLACES, _LEAST_WAY = 200, 8, 8.0
-_FEWEST_FLIGHTS = 10
+# Number of flights in the estimate, smallest number of positions in a flight, and shortest path in
+# errors of a position: a bead at rest always has the same position error.
+_MAX_FLIGHTS, _MIN_POINTS, _MIN_PATH = 200, 8, 8.0
+_MIN_FLIGHTS = 10
 
 
-class Scatter(NamedTuple):
-    """How places scatter about straight flights, over what their errors say, by species.
+class ResidualVariance(NamedTuple):
+    """Variance of positions about straight flights over the stated variance, for each species.
 
     Parameters
     ----------
-    known : ndarray (species, flights)
-        Of the last flights, one after the other and then round again.
+    samples : ndarray (species, flights)
+        Ring buffer of the last flights.
     counts : ndarray of int64, (species,)
-        Flights so far.
+        Number of flights so far.
     variances : ndarray (species,)
-        Their median.
+        Median of the samples; 1 before there are 10.
     """
 
-    known: NDArray[np.float64]
+    samples: NDArray[np.float64]
     counts: NDArray[np.int64]
     variances: NDArray[np.float64]
 
     @classmethod
-    def unknown(cls, species: int) -> Scatter:
-        """Before the first flight."""
+    def initial(cls, species: int) -> ResidualVariance:
+        """State before the first flight."""
         return cls(
-            np.zeros((species, _FLIGHTS)),
+            np.zeros((species, _MAX_FLIGHTS)),
             np.zeros(species, dtype=np.int64),
             np.ones(species),
         )
 
 
 @compiled
-def learn(scatter: Scatter, species: int, flight: NDArray[np.float64]) -> None:
-    """Scatter of places over what their errors say; those hold what pictures share, too."""
-    used = flight[8]
-    speed2 = flight[3] * flight[3] + flight[4] * flight[4]
-    if used < _FEWEST_PLACES or speed2 < _LEAST_WAY * _LEAST_WAY * flight[6]:
+def add_flight(residuals: ResidualVariance, species: int, flight: NDArray[np.float64]) -> None:
+    """Add the reduced chi square of a flight; stated errors include what frames share, too."""
+    points = flight[8]
+    squared_speed = flight[3] * flight[3] + flight[4] * flight[4]
+    if points < _MIN_POINTS or squared_speed < _MIN_PATH * _MIN_PATH * flight[6]:
         return
-    count = scatter.counts[species]
-    scatter.known[species, count % _FLIGHTS] = flight[7] / (2.0 * used - 4.0)
-    scatter.counts[species] = count + 1
-    if count + 1 >= _FEWEST_FLIGHTS:
-        known = scatter.known[species, : min(count + 1, _FLIGHTS)]
-        scatter.variances[species] = np.median(known)
+    count = residuals.counts[species]
+    residuals.samples[species, count % _MAX_FLIGHTS] = flight[7] / (2.0 * points - 4.0)
+    residuals.counts[species] = count + 1
+    if count + 1 >= _MIN_FLIGHTS:
+        samples = residuals.samples[species, : min(count + 1, _MAX_FLIGHTS)]
+        residuals.variances[species] = np.median(samples)

@@ -1,4 +1,4 @@
-"""Compiled part of the history of tracks: ways cut into straight flights, kinks between them."""
+"""Compiled piecewise linear segmentation of tracks: straight flights and velocity jumps."""
 
 from __future__ import annotations
 
@@ -9,84 +9,85 @@ import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.stages.contacts.line_fits import (
-    LINE,
+    LINE_SIZE,
     best_break,
-    line_through,
-    set_errors,
+    rescale_errors,
+    write_line,
 )
-from nanorocks_ros.stages.contacts.residual_variance import Scatter, learn
+from nanorocks_ros.stages.contacts.residual_variance import ResidualVariance, add_flight
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-LONGEST = 48
-"""Places of a flight that are used at most."""
+MAX_FLIGHT_POINTS = 48
+"""Largest number of positions that a line is fitted to."""
 
-FEWEST = 4
-"""Places of a flight below which it says nothing of being straight."""
+MIN_FLIGHT_POINTS = 4
+"""Smallest number of positions of a flight on each side of a velocity jump."""
 
-KINK = 2 * LINE + 3
-"""Numbers of a kink in an array: lines before and after, `last`, `first`, `shared_error`."""
+JUMP_SIZE = 2 * LINE_SIZE + 3
+"""Length of the array that holds a velocity jump: two lines, `last`, `first`, `shared_error`."""
 
-_ROOM = 4 * LONGEST
-# On each side of a break that is looked for; two lines through fewer would fit anything.
-_FEWEST_BREAK = 2
-# What a break must gain in chi square: chance reaches 30 once in some ten thousand flights.
-_GAIN = 30.0
-# Scatter that is believed at least, over the stated variance: errors that a bead keeps for some
-# pixels bend its way a little, and would cut it into pieces.
-_LEAST_VARIANCE = 0.25
-# Way over which light, shadow and outline misplace a bead alike, in radii.
-_SAME = 0.5
-# Places that the best break may move when all of the flight behind it is known.
-_MOVED = 2
+_CAPACITY = 4 * MAX_FLIGHT_POINTS
+# Positions on each side of a break point: two lines through fewer would fit anything.
+_MIN_SIDE_POINTS = 2
+# Decrease of chi square that makes a break: noise reaches 30 once in about 10,000 flights.
+_MIN_GAIN = 30.0
+# Smallest residual variance, relative to the stated one. Errors that a bead keeps over some pixels
+# bend its trajectory slightly; without this limit they would cut it into pieces.
+_MIN_VARIANCE = 0.25
+# Length over which light, shadow and outline displace a bead by the same amount, in radii.
+_SHARED_LENGTH = 0.5
+# Positions by which the best break may shift once the whole flight after it is known.
+_MAX_SHIFT = 2
 
 
-class Ways(NamedTuple):
-    """The last places of some tracks, each in a slot of its own.
+class TrackBuffer(NamedTuple):
+    """The last positions of several tracks; each track has a slot.
 
     Parameters
     ----------
-    times, errors : ndarray (slots, places), [s], [m]
-    places : ndarray (slots, places, 2), [m]
-        Past the camera.
+    times, errors : ndarray (slots, capacity), [s], [m]
+    positions : ndarray (slots, capacity, 2), [m]
+        In the camera frame.
     ends : ndarray of int64, (slots,)
-        How many places there are.
-    firsts, befores : ndarray of int64, (slots,)
-        First place of this flight and of the one before; -1 when that is not known.
+        Number of positions.
+    flight_starts, previous_starts : ndarray of int64, (slots,)
+        Index of the first position of the current flight and of the previous one; -1 when there
+        is no previous one.
     """
 
     times: NDArray[np.float64]
-    places: NDArray[np.float64]
+    positions: NDArray[np.float64]
     errors: NDArray[np.float64]
     ends: NDArray[np.int64]
-    firsts: NDArray[np.int64]
-    befores: NDArray[np.int64]
+    flight_starts: NDArray[np.int64]
+    previous_starts: NDArray[np.int64]
 
     @classmethod
-    def empty(cls, slots: int) -> Ways:
-        """Room for so many tracks."""
+    def empty(cls, slots: int) -> TrackBuffer:
+        """Allocate an empty buffer."""
         return cls(
-            np.empty((slots, _ROOM)),
-            np.empty((slots, _ROOM, 2)),
-            np.empty((slots, _ROOM)),
+            np.empty((slots, _CAPACITY)),
+            np.empty((slots, _CAPACITY, 2)),
+            np.empty((slots, _CAPACITY)),
             *(np.zeros(slots, dtype=np.int64) for _ in range(3)),
         )
 
-    def larger(self) -> Ways:
-        """The same with room for twice as many."""
-        return Ways(*(np.concatenate([one, np.zeros_like(one)]) for one in self))
+    def doubled(self) -> TrackBuffer:
+        """Return a copy with twice as many slots."""
+        return TrackBuffer(*(np.concatenate([column, np.zeros_like(column)]) for column in self))
 
 
 @compiled
-def begin(ways: Ways, slot: int) -> None:
-    """Forget what was in a slot."""
-    ways.ends[slot] = ways.firsts[slot] = 0
-    ways.befores[slot] = -1
+def reset_slot(buffer: TrackBuffer, slot: int) -> None:
+    """Empty a slot."""
+    buffer.ends[slot] = buffer.flight_starts[slot] = 0
+    buffer.previous_starts[slot] = -1
 
 
-class Places(NamedTuple):
-    """The beads of a picture, as `nanorocks_ros.records.Tracks` has them."""
+class FrameBeads(NamedTuple):
+    """Arrays of the beads in one frame, as in `nanorocks_ros.records.Tracks`."""
 
     species: NDArray[np.int32]
     positions: NDArray[np.float64]
@@ -98,43 +99,43 @@ class Places(NamedTuple):
 
 
 @compiled
-def follow(
-    ways: Ways,
-    scatter: Scatter,
+def append_positions(
+    buffer: TrackBuffer,
+    residuals: ResidualVariance,
     time: float,
-    gap: float,
+    max_gap: float,
     slots: NDArray[np.int64],
-    beads: Places,
+    beads: FrameBeads,
     known_radii: NDArray[np.float64],
     sizes: NDArray[np.float64],
-    kinks: NDArray[np.float64],
+    jumps: NDArray[np.float64],
 ) -> NDArray[np.int64]:
-    """Take the next places of the tracks that are seen.
+    """Append the positions of the visible beads of a frame to their tracks.
 
     Parameters
     ----------
-    ways, scatter
+    buffer, residuals
         Changed.
     time : float, [s]
-    gap : float, [s]
-        Without a place for longer, what happened is not known.
+    max_gap : float, [s]
+        A track without a position for longer is cut: the bead may have collided unseen.
     slots : ndarray of int64, (n,)
-        Of each track; -1 for one that is not followed.
-    beads : Places
+        Slot of each track; -1 for a track that is left out.
+    beads : FrameBeads
     known_radii : ndarray (species,), [m]
-        NaN where the beads of a species are not alike.
+        NaN for a species whose beads differ in size.
     sizes : ndarray (slots, 2), [m]
-        Written: radii, and the errors they are measured with.
-    kinks : ndarray (n, KINK)
-        Written where flights before and after a kink are both known now.
+        Written: radii and their measurement errors.
+    jumps : ndarray (n, JUMP_SIZE)
+        Written for each velocity jump whose flights before and after are complete now.
 
     Returns
     -------
-    ndarray of int64, (kinks,)
-        Which of the tracks these are.
+    ndarray of int64, (jumps,)
+        Rows of `jumps` that were written.
     """
-    found, count = np.empty(slots.size, dtype=np.int64), 0
-    flight, place = np.empty(LINE), np.empty(2)
+    rows, count = np.empty(slots.size, dtype=np.int64), 0
+    flight, position = np.empty(LINE_SIZE), np.empty(2)
     for k in range(slots.size):
         slot = slots[k]
         if slot < 0 or not beads.seen[k]:
@@ -144,140 +145,153 @@ def follow(
             radius = beads.radii[k]
         sizes[slot, 0], sizes[slot, 1] = radius, beads.radius_errors[k]
         for c in range(2):
-            place[c] = beads.positions[k, c] + beads.displacement[c]
-        variance = scatter.variances[beads.species[k]]
-        turned = _lost(ways, slot, time, gap, variance, radius, kinks[k])
-        _add(ways, slot, time, place, beads.errors[k])
-        if not turned:
-            turned, ended = _cut(ways, slot, variance, radius, kinks[k], flight)
+            position[c] = beads.positions[k, c] + beads.displacement[c]
+        variance = residuals.variances[beads.species[k]]
+        jumped = _end_after_gap(buffer, slot, time, max_gap, variance, radius, jumps[k])
+        _append(buffer, slot, time, position, beads.errors[k])
+        if not jumped:
+            jumped, ended = _split_flight(buffer, slot, variance, radius, jumps[k], flight)
             if ended:
-                learn(scatter, beads.species[k], flight)
-        if turned:
-            found[count] = k
+                add_flight(residuals, beads.species[k], flight)
+        if jumped:
+            rows[count] = k
             count += 1
-    return found[:count]
+    return rows[:count]
 
 
 @compiled
-def _lost(
-    ways: Ways,
+def _end_after_gap(
+    buffer: TrackBuffer,
     slot: int,
     time: float,
-    gap: float,
+    max_gap: float,
     variance: float,
     radius: float,
-    kink: NDArray[np.float64],
+    jump: NDArray[np.float64],
 ) -> bool:
-    """Whether a track that was not seen for too long ends with a kink; it starts afresh."""
-    end = ways.ends[slot]
-    if end == 0 or not time - ways.times[slot, end - 1] > gap:
+    """End a track that was not seen for `max_gap`; whether its last jump was written."""
+    end = buffer.ends[slot]
+    if end == 0 or not time - buffer.times[slot, end - 1] > max_gap:
         return False
-    turned = finish(ways, slot, variance, radius, kink)
-    begin(ways, slot)
-    return turned
+    jumped = finish_flight(buffer, slot, variance, radius, jump)
+    reset_slot(buffer, slot)
+    return jumped
 
 
 @compiled
-def _add(ways: Ways, slot: int, time: float, place: NDArray[np.float64], error: float) -> None:
-    if ways.ends[slot] == _ROOM:
-        _make_room(ways, slot)
-    end = ways.ends[slot]
-    ways.times[slot, end], ways.errors[slot, end] = time, error
-    ways.places[slot, end] = place
-    ways.ends[slot] += 1
+def _append(
+    buffer: TrackBuffer, slot: int, time: float, position: NDArray[np.float64], error: float
+) -> None:
+    if buffer.ends[slot] == _CAPACITY:
+        _discard_oldest(buffer, slot)
+    end = buffer.ends[slot]
+    buffer.times[slot, end], buffer.errors[slot, end] = time, error
+    buffer.positions[slot, end] = position
+    buffer.ends[slot] += 1
 
 
 @compiled
-def finish(
-    ways: Ways, slot: int, variance: float, radius: float, kink: NDArray[np.float64]
+def finish_flight(
+    buffer: TrackBuffer, slot: int, variance: float, radius: float, jump: NDArray[np.float64]
 ) -> bool:
-    """Write the kink before the last flight of a track, which ends here; whether there is one."""
-    return _kink(ways, slot, ways.ends[slot], variance, radius, kink)
+    """Write the jump before the last flight of a track, which ends here; whether there is one."""
+    return _write_jump(buffer, slot, buffer.ends[slot], variance, radius, jump)
 
 
 @compiled
-def _cut(
-    ways: Ways,
+def _split_flight(
+    buffer: TrackBuffer,
     slot: int,
     variance: float,
     radius: float,
-    kink: NDArray[np.float64],
+    jump: NDArray[np.float64],
     flight: NDArray[np.float64],
 ) -> tuple[bool, bool]:
-    """Whether there is a kink of which all is known, and whether a flight ended."""
-    begun, end = ways.firsts[slot], ways.ends[slot]
-    first, gain = _break(ways, slot, begun, end)
-    # The first place after a turn alone would take the last one before it along.
-    settled = begun + first + _FEWEST_BREAK < end
-    if settled and gain > _GAIN * max(variance, _LEAST_VARIANCE):
-        turn = begun + first
-        _line(ways, slot, begun, turn, flight)
-        found = _kink(ways, slot, turn, variance, radius, kink)
-        ways.befores[slot], ways.firsts[slot] = begun, turn
-        return found, True
-    if end - begun <= LONGEST:
+    """Cut the current flight at its best break; whether a jump was written and a flight ended."""
+    start, end = buffer.flight_starts[slot], buffer.ends[slot]
+    offset, gain = _break_point(buffer, slot, start, end)
+    # With one position after the jump, the fit would move the last one before it across.
+    is_settled = start + offset + _MIN_SIDE_POINTS < end
+    if is_settled and gain > _MIN_GAIN * max(variance, _MIN_VARIANCE):
+        break_row = start + offset
+        _write_line(buffer, slot, start, break_row, flight)
+        jumped = _write_jump(buffer, slot, break_row, variance, radius, jump)
+        buffer.previous_starts[slot], buffer.flight_starts[slot] = start, break_row
+        return jumped, True
+    if end - start <= MAX_FLIGHT_POINTS:
         return False, False
-    found = _kink(ways, slot, end, variance, radius, kink)
-    ways.befores[slot] = -1
-    ways.firsts[slot] += 1
-    if found:
-        _line(ways, slot, begun + 1, end, flight)
-    return found, found
+    jumped = _write_jump(buffer, slot, end, variance, radius, jump)
+    buffer.previous_starts[slot] = -1
+    buffer.flight_starts[slot] += 1
+    if jumped:
+        _write_line(buffer, slot, start + 1, end, flight)
+    return jumped, jumped
 
 
 @compiled
-def _break(ways: Ways, slot: int, first: int, end: int) -> tuple[int, float]:
+def _break_point(buffer: TrackBuffer, slot: int, first: int, end: int) -> tuple[int, float]:
     return best_break(
-        ways.times[slot, first:end],
-        ways.places[slot, first:end],
-        ways.errors[slot, first:end],
-        _FEWEST_BREAK,
+        buffer.times[slot, first:end],
+        buffer.positions[slot, first:end],
+        buffer.errors[slot, first:end],
+        _MIN_SIDE_POINTS,
     )
 
 
 @compiled
-def _line(ways: Ways, slot: int, first: int, end: int, row: NDArray[np.float64]) -> None:
-    line_through(
-        ways.times[slot, first:end],
-        ways.places[slot, first:end],
-        ways.errors[slot, first:end],
+def _write_line(
+    buffer: TrackBuffer, slot: int, first: int, end: int, row: NDArray[np.float64]
+) -> None:
+    write_line(
+        buffer.times[slot, first:end],
+        buffer.positions[slot, first:end],
+        buffer.errors[slot, first:end],
         row,
     )
 
 
 @compiled
-def _kink(
-    ways: Ways, slot: int, end: int, variance: float, radius: float, kink: NDArray[np.float64]
+def _write_jump(
+    buffer: TrackBuffer,
+    slot: int,
+    end: int,
+    variance: float,
+    radius: float,
+    jump: NDArray[np.float64],
 ) -> bool:
-    """Write the kink where this flight began, when it ends at a place; whether there is one."""
-    before, begun = ways.befores[slot], ways.firsts[slot]
-    if before < 0:
+    """Write the jump at the start of the flight that ends at `end`; whether there is one."""
+    previous, start = buffer.previous_starts[slot], buffer.flight_starts[slot]
+    if previous < 0:
         return False
-    ways.befores[slot] = -1
-    start = max(before, begun - LONGEST)
-    first = start + _break(ways, slot, start, end)[0]
-    if min(first - start, end - first) < FEWEST or abs(first - begun) > _MOVED:
+    buffer.previous_starts[slot] = -1
+    window_start = max(previous, start - MAX_FLIGHT_POINTS)
+    first = window_start + _break_point(buffer, slot, window_start, end)[0]
+    shortest = min(first - window_start, end - first)
+    if shortest < MIN_FLIGHT_POINTS or abs(first - start) > _MAX_SHIFT:
         return False
-    # What places share for some pixels differs between the ends of a flight.
-    shared = math.sqrt(max(1.0 - variance, 0.0)) * ways.errors[slot, start:end].mean()
-    _line(ways, slot, start, first, kink[:LINE])
-    _line(ways, slot, first, end, kink[LINE : 2 * LINE])
-    for line in (kink[:LINE], kink[LINE : 2 * LINE]):
-        set_errors(line, variance, shared, _SAME * radius)
-    kink[2 * LINE] = ways.times[slot, first - 1]
-    kink[2 * LINE + 1] = ways.times[slot, first]
-    kink[2 * LINE + 2] = shared
+    # The error that neighbouring positions share differs between the ends of a flight.
+    shared_error = (
+        math.sqrt(max(1.0 - variance, 0.0)) * buffer.errors[slot, window_start:end].mean()
+    )
+    _write_line(buffer, slot, window_start, first, jump[:LINE_SIZE])
+    _write_line(buffer, slot, first, end, jump[LINE_SIZE : 2 * LINE_SIZE])
+    for line in (jump[:LINE_SIZE], jump[LINE_SIZE : 2 * LINE_SIZE]):
+        rescale_errors(line, variance, shared_error, _SHARED_LENGTH * radius)
+    jump[2 * LINE_SIZE] = buffer.times[slot, first - 1]
+    jump[2 * LINE_SIZE + 1] = buffer.times[slot, first]
+    jump[2 * LINE_SIZE + 2] = shared_error
     return True
 
 
 @compiled
-def _make_room(ways: Ways, slot: int) -> None:
-    first, before, end = ways.firsts[slot], ways.befores[slot], ways.ends[slot]
-    keep = max(before if before >= 0 else first, first - LONGEST)
-    left = end - keep
-    for k in range(left):
-        ways.times[slot, k] = ways.times[slot, keep + k]
-        ways.errors[slot, k] = ways.errors[slot, keep + k]
-        ways.places[slot, k] = ways.places[slot, keep + k]
-    ways.firsts[slot], ways.ends[slot] = first - keep, left
-    ways.befores[slot] = 0 if before >= 0 else -1
+def _discard_oldest(buffer: TrackBuffer, slot: int) -> None:
+    start, end = buffer.flight_starts[slot], buffer.ends[slot]
+    previous = buffer.previous_starts[slot]
+    first_kept = max(previous if previous >= 0 else start, start - MAX_FLIGHT_POINTS)
+    kept = end - first_kept
+    for k in range(kept):
+        buffer.times[slot, k] = buffer.times[slot, first_kept + k]
+        buffer.errors[slot, k] = buffer.errors[slot, first_kept + k]
+        buffer.positions[slot, k] = buffer.positions[slot, first_kept + k]
+    buffer.flight_starts[slot], buffer.ends[slot] = start - first_kept, kept
+    buffer.previous_starts[slot] = 0 if previous >= 0 else -1

@@ -1,4 +1,4 @@
-"""The last pictures of a tray: how it moved, how warm its gas was, who else was near."""
+"""The last frames of a tray: its velocity, its granular temperature, and beads near a contact."""
 
 from __future__ import annotations
 
@@ -10,85 +10,89 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.stages.contacts.oscillation_fit import powers, slope_of, swing_terms
+from nanorocks_ros.stages.contacts.oscillation_fit import (
+    fit_slope,
+    oscillation_terms,
+    polynomial_terms,
+)
 
 if TYPE_CHECKING:
     from nanorocks_ros.records import Tracks
 
-# Pictures on each side from which the motion of a tray is measured when it swings or rests, and
-# when it does anything else.
-_WIDE, _NARROW = 45, 4
-_FEWEST = 2 * _NARROW
-# By how much a swing must lower chi square to be believed: it has eight numbers more.
-_SWINGS = 20.0
-# Fourth differences see noise but no swing; their variance is so many times that of the noise.
-_FOURTH = 70.0
-# What a swing may leave of the displacements: a share of their power, or times the noise from
-# picture to picture; errors of the registration that last for some pictures are in it.
-_EXPLAINED = 0.02
-_QUIET = 3.0
-# Errors of a velocity: over that of independent pictures; and as a share of it, since small
+# Frames on each side that the velocity of the tray is fitted to: for an oscillation or a line, and
+# for a cubic.
+_WIDE_FRAMES, _NARROW_FRAMES = 45, 4
+_MIN_FRAMES = 2 * _NARROW_FRAMES
+# Smallest decrease of chi square by an oscillation: it has eight more parameters.
+_MIN_OSCILLATION_GAIN = 20.0
+# Fourth differences contain noise but no oscillation; their variance over that of the noise.
+_FOURTH_DIFFERENCE_VARIANCE = 70.0
+# Largest residual of an oscillation: a share of the power of the displacements, or a multiple of
+# the noise between frames, since registration errors last for several frames.
+_MAX_RESIDUAL_SHARE = 0.02
+_MAX_RESIDUAL_NOISE = 3.0
+# Error of a velocity: factor over that of independent frames, and relative error, since small
 # displacements were registered up to a tenth too small or too large.
-_LASTING = 2.0
-_MISSCALED = 0.08
-# Pictures on each side over which a gas is called equally warm.
-_WARM = 15
+_CORRELATION_FACTOR = 2.0
+_SCALE_ERROR = 0.08
+# Frames on each side over which the temperature is averaged.
+_TEMPERATURE_FRAMES = 15
 
 
-class Surroundings:
-    """What is known of the tray besides single tracks, for as long as a flight may last.
+class TrayHistory:
+    """Displacements, velocities and tracks of a tray over the last frames.
 
     Parameters
     ----------
-    pictures : int
-        How many are kept.
+    frames : int
+        Number of frames that are kept.
     """
 
-    def __init__(self, pictures: int) -> None:
-        self._pictures = pictures
-        self._records: deque[Tracks] = deque(maxlen=pictures)
-        # Twice as many fit in: what is kept is moved to the front now and then.
-        self._all_times = np.empty(2 * pictures)
-        self._all_displacements = np.empty((2 * pictures, 2))
-        # Of each species: sum of the squares of known velocities, and how many these are.
-        self._all_squares = np.empty((2 * pictures, 0, 2))
+    def __init__(self, frames: int) -> None:
+        self._frames = frames
+        self._tracks: deque[Tracks] = deque(maxlen=frames)
+        # Buffers of twice the length: the valid half is moved to the front when they are full.
+        self._time_buffer = np.empty(2 * frames)
+        self._displacement_buffer = np.empty((2 * frames, 2))
+        # For each species: sum of the squares of the known velocities, and their number.
+        self._square_buffer = np.empty((2 * frames, 0, 2))
         self._end = 0
         self.interval = math.inf
 
     @property
-    def _kept(self) -> slice:
-        return slice(max(self._end - self._pictures, 0), self._end)
+    def _valid(self) -> slice:
+        return slice(max(self._end - self._frames, 0), self._end)
 
     @property
     def _times(self) -> NDArray[np.float64]:
-        return self._all_times[self._kept]
+        return self._time_buffer[self._valid]
 
     @property
     def _displacements(self) -> NDArray[np.float64]:
-        return self._all_displacements[self._kept]
+        return self._displacement_buffer[self._valid]
 
     def push(self, time: float, tracks: Tracks) -> None:
-        """Take the next picture, at a time in s."""
-        if self._end == 2 * self._pictures:
-            for values in (self._all_times, self._all_displacements, self._all_squares):
-                values[: self._pictures] = values[self._pictures :]
-            self._end = self._pictures
-        if self._all_squares.shape[1] != tracks.expected.size:
-            self._all_squares = np.zeros((2 * self._pictures, tracks.expected.size, 2))
+        """Add the tracks of the next frame; `time` in s."""
+        if self._end == 2 * self._frames:
+            for values in (self._time_buffer, self._displacement_buffer, self._square_buffer):
+                values[: self._frames] = values[self._frames :]
+            self._end = self._frames
+        if self._square_buffer.shape[1] != tracks.expected.size:
+            self._square_buffer = np.zeros((2 * self._frames, tracks.expected.size, 2))
         end, self._end = self._end, self._end + 1
-        self._all_times[end] = time
-        self._all_displacements[end] = tracks.displacement
-        self._records.append(tracks)
-        first = max(end - _WARM, self._kept.start)
-        times = self._all_times[first : self._end]
-        squares = self._all_squares[end]
-        self.interval = _learn(times, tracks.velocities, tracks.species, squares)
+        self._time_buffer[end] = time
+        self._displacement_buffer[end] = tracks.displacement
+        self._tracks.append(tracks)
+        first = max(end - _TEMPERATURE_FRAMES, self._valid.start)
+        times = self._time_buffer[first : self._end]
+        squares = self._square_buffer[end]
+        self.interval = _frame_statistics(times, tracks.velocities, tracks.species, squares)
 
-    def _around(self, time: float, pictures: int) -> slice:
+    def _window(self, time: float, frames: int) -> slice:
         middle = int(np.searchsorted(self._times, time))
-        return slice(max(middle - pictures, 0), middle + pictures)
+        return slice(max(middle - frames, 0), middle + frames)
 
-    def motion(self, time: float) -> tuple[NDArray[np.float64], float]:
+    def velocity(self, time: float) -> tuple[NDArray[np.float64], float]:
         """Velocity of the tray at a time, and the error of a component.
 
         Returns
@@ -96,51 +100,58 @@ class Surroundings:
         velocity : ndarray (2,), [m/s]
         error : float, [m/s]
         """
-        wide, narrow = self._around(time, _WIDE), self._around(time, _NARROW)
+        wide, narrow = self._window(time, _WIDE_FRAMES), self._window(time, _NARROW_FRAMES)
         times = self._times - time
-        places = self._displacements
-        if times[wide].size < _FEWEST:
+        displacements = self._displacements
+        if times[wide].size < _MIN_FRAMES:
             return np.zeros(2), math.inf
-        noise = float(np.sqrt(np.mean(np.diff(places[wide], 4, axis=0) ** 2) / _FOURTH))
-        rest = slope_of(powers(times[wide], 1), places[wide])
-        swing = slope_of(swing_terms(times[wide], places[wide]), places[wide])
-        if rest.left - swing.left < _SWINGS * noise**2:
-            # A swing too weak to be seen may still be there.
-            return rest.velocity, noise * math.hypot(rest.factor, 0.5 * swing.factor)
-        quiet = 2 * times[wide].size * (_QUIET * noise) ** 2
-        if swing.left < max(_EXPLAINED * rest.left, quiet):
-            scatter = math.sqrt(swing.left / (2 * times[wide].size))
-            error = _LASTING * max(noise, scatter) * swing.factor
-            return swing.velocity, math.hypot(error, _MISSCALED * math.hypot(*swing.velocity))
-        other = slope_of(powers(times[narrow], 3), places[narrow])
-        return other.velocity, _LASTING * noise * other.factor
+        differences = np.diff(displacements[wide], 4, axis=0)
+        noise = float(np.sqrt(np.mean(differences**2) / _FOURTH_DIFFERENCE_VARIANCE))
+        line = fit_slope(polynomial_terms(times[wide], 1), displacements[wide])
+        oscillation = fit_slope(
+            oscillation_terms(times[wide], displacements[wide]), displacements[wide]
+        )
+        if line.residual - oscillation.residual < _MIN_OSCILLATION_GAIN * noise**2:
+            # An oscillation below the noise may still be there.
+            return line.velocity, noise * math.hypot(
+                line.error_factor, 0.5 * oscillation.error_factor
+            )
+        noise_limit = 2 * times[wide].size * (_MAX_RESIDUAL_NOISE * noise) ** 2
+        if oscillation.residual < max(_MAX_RESIDUAL_SHARE * line.residual, noise_limit):
+            residual_rms = math.sqrt(oscillation.residual / (2 * times[wide].size))
+            error = _CORRELATION_FACTOR * max(noise, residual_rms) * oscillation.error_factor
+            return oscillation.velocity, math.hypot(
+                error, _SCALE_ERROR * math.hypot(*oscillation.velocity)
+            )
+        cubic = fit_slope(polynomial_terms(times[narrow], 3), displacements[narrow])
+        return cubic.velocity, _CORRELATION_FACTOR * noise * cubic.error_factor
 
     def displacement(self, time: float) -> tuple[float, float]:
-        """Of the tray at a time, [m]; the jitter of its registration is in it."""
-        return _between(time, self._times, self._displacements)
+        """Displacement of the tray at a time, [m], with the noise of its registration."""
+        return _interpolate(time, self._times, self._displacements)
 
     def temperature(self, time: float, species: int) -> float:
-        """Mean square of a horizontal component of velocity of a species, [m^2/s^2]."""
-        known = self._all_squares[self._kept][self._around(time, _WARM)]
-        sums = np.sum(known[:, species], axis=0)
+        """Mean square of a velocity component in the image plane of a species, [m^2/s^2]."""
+        squares = self._square_buffer[self._valid][self._window(time, _TEMPERATURE_FRAMES)]
+        sums = np.sum(squares[:, species], axis=0)
         return 0.5 * float(sums[0] / sums[1]) if sums[1] else math.nan
 
-    def alone(self, time: float, own: list[int], beads: NDArray[np.float64]) -> bool:
-        """Whether nobody else can have hit some beads between the pictures around a time.
+    def is_isolated(self, time: float, tracks: list[int], beads: NDArray[np.float64]) -> bool:
+        """Whether no other bead can have hit the given beads between the frames around a time.
 
         Parameters
         ----------
         time : float, [s]
-        own : list of int
-            Their tracks.
+        tracks : list of int
+            Track numbers of these beads.
         beads : ndarray (k, 4)
-            Place past the camera, radius [m] and speed [m/s] of each.
+            Position in the camera frame [m], radius [m] and speed [m/s] of each.
         """
-        here = self._around(time, 1)
-        last = min(here.stop, len(self._records))
+        window = self._window(time, 1)
+        last = min(window.stop, len(self._tracks))
         return all(
-            _nobody_near(
-                np.array(own),
+            _none_in_reach(
+                np.array(tracks),
                 beads,
                 record.ids,
                 record.positions,
@@ -149,13 +160,13 @@ class Surroundings:
                 record.radii,
                 self.interval,
             )
-            for record in (self._records[k] for k in range(here.start, last))
+            for record in (self._tracks[k] for k in range(window.start, last))
         )
 
 
 @compiled
-def _nobody_near(
-    own: NDArray[np.int64],
+def _none_in_reach(
+    tracks: NDArray[np.int64],
     beads: NDArray[np.float64],
     ids: NDArray[np.int32],
     positions: NDArray[np.float64],
@@ -165,7 +176,7 @@ def _nobody_near(
     interval: float,
 ) -> bool:
     for k in range(ids.size):
-        if (own == ids[k]).any():
+        if (tracks == ids[k]).any():
             continue
         u, v = velocities[k]
         speed = math.sqrt(u * u + v * v)
@@ -181,31 +192,31 @@ def _nobody_near(
 
 
 @compiled
-def _between(
-    time: float, times: NDArray[np.float64], places: NDArray[np.float64]
+def _interpolate(
+    time: float, times: NDArray[np.float64], positions: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """Place at a time, straight between two that are known; the last one after it."""
+    """Linear interpolation of positions; constant before the first and after the last."""
     k = int(np.searchsorted(times, time))
     if k == 0 or k == times.size:
         k = min(k, times.size - 1)
-        return places[k, 0], places[k, 1]
-    share = (time - times[k - 1]) / (times[k] - times[k - 1])
-    x = places[k - 1, 0] + share * (places[k, 0] - places[k - 1, 0])
-    y = places[k - 1, 1] + share * (places[k, 1] - places[k - 1, 1])
+        return positions[k, 0], positions[k, 1]
+    fraction = (time - times[k - 1]) / (times[k] - times[k - 1])
+    x = positions[k - 1, 0] + fraction * (positions[k, 0] - positions[k - 1, 0])
+    y = positions[k - 1, 1] + fraction * (positions[k, 1] - positions[k - 1, 1])
     return x, y
 
 
 @compiled
-def _learn(
+def _frame_statistics(
     times: NDArray[np.float64],
     velocities: NDArray[np.float64],
     species: NDArray[np.int32],
     sums: NDArray[np.float64],
 ) -> float:
-    """Time between two pictures, [s]: the middle one of some.
+    """Median time between two frames, [s].
 
-    Writes for each species the sum of the squares of the velocities and their number,
-    (species, 2).
+    Writes into `sums`, (species, 2), the sum of the squared velocities of each species and their
+    number.
     """
     sums[:] = 0.0
     for k in range(species.size):

@@ -1,4 +1,4 @@
-"""Turns of beads whose partner in the collision is not known yet."""
+"""Velocity jumps that wait for the jump of the collision partner."""
 
 from __future__ import annotations
 
@@ -8,90 +8,101 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.stages.contacts.pair_tests import FAR
+from nanorocks_ros.stages.contacts.pair_tests import MAX_SIGMAS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.stages.contacts.flight_segments import Kink
-    from nanorocks_ros.stages.contacts.line_fits import Meeting
+    from nanorocks_ros.stages.contacts.flight_segments import VelocityJump
+    from nanorocks_ros.stages.contacts.line_fits import Intersection
 
-# How close or far two beads are at a quick look, over the sum of their radii.
-_ABOUT = 0.3
-# Of each: when it turned and the error of that, by how much more or less another may have turned
-# at the same time, its radius, and of its flight before: time, place and velocity.
-_NUMBERS = 9
+# Tolerance of the distance of two beads in a first test, over the sum of their radii.
+_DISTANCE_TOLERANCE = 0.3
+# Columns: time of the jump, its error, tolerance of the time of a partner, radius, and of the
+# flight before: time, position and velocity.
+_COLUMNS = 9
 
 
-class Waiting:
-    """Turns whose other bead has not turned yet, with plain numbers for a quick look."""
+class UnmatchedJumps:
+    """Jumps without a partner, with a table of numbers for a first test."""
 
     def __init__(self) -> None:
-        self._kinks: list[Kink] = []
-        self._table = np.empty((0, _NUMBERS))
+        self._jumps: list[VelocityJump] = []
+        self._table = np.empty((0, _COLUMNS))
         self._earliest = math.inf
 
-    def forget(self, horizon: float) -> None:
-        """Give up those before a time, [s]."""
+    def drop_before(self, horizon: float) -> None:
+        """Remove jumps at or before a time, [s]."""
         if self._earliest <= horizon:
-            self._keep(self._table[:, 0] > horizon)
+            self._select(self._table[:, 0] > horizon)
 
-    def _keep(self, which: NDArray[np.bool_]) -> None:
-        self._kinks = [self._kinks[k] for k in np.flatnonzero(which).tolist()]
-        self._table = self._table[which]
+    def _select(self, kept: NDArray[np.bool_]) -> None:
+        self._jumps = [self._jumps[k] for k in np.flatnonzero(kept).tolist()]
+        self._table = self._table[kept]
         self._earliest = float(self._table[:, 0].min(initial=math.inf))
 
-    def add(self, kink: Kink, when: Meeting, interval: float) -> None:
-        """Wait for the other bead of a turn; pictures are that far apart, [s]."""
-        self._kinks.append(kink)
-        row = _row(kink, when)
+    def add(self, jump: VelocityJump, crossing: Intersection, interval: float) -> None:
+        """Add a jump; `interval` is the time between two frames, [s]."""
+        self._jumps.append(jump)
+        row = _row(jump, crossing)
         row[2] += interval
-        self._earliest = min(self._earliest, when.time)
+        self._earliest = min(self._earliest, crossing.time)
         self._table = np.concatenate([self._table, row[None]])
 
-    def remove(self, kink: Kink) -> None:
-        """Its other bead was found."""
-        self._keep(np.array([one is not kink for one in self._kinks], dtype=np.bool_))
+    def remove(self, jump: VelocityJump) -> None:
+        """Remove a jump whose partner was found."""
+        self._select(np.array([other is not jump for other in self._jumps], dtype=np.bool_))
 
-    def partners(self, kink: Kink, when: Meeting, interval: float) -> list[Kink]:
-        """Those that turned at the same time about a diameter away, those first that wait longest.
+    def candidates(
+        self, jump: VelocityJump, crossing: Intersection, interval: float
+    ) -> list[VelocityJump]:
+        """Jumps at the same time, about one sum of radii away; the oldest first.
 
         Parameters
         ----------
-        kink : Kink
-        when : Meeting
-            Of its flights.
+        jump : VelocityJump
+        crossing : Intersection
+            Of the flights of `jump`.
         interval : float, [s]
-            Between two pictures.
+            Time between two frames.
         """
-        return [self._kinks[k] for k in _near(self._table, _row(kink, when), interval).tolist()]
+        return [
+            self._jumps[k]
+            for k in _candidate_rows(self._table, _row(jump, crossing), interval).tolist()
+        ]
 
 
-def _row(kink: Kink, when: Meeting) -> NDArray[np.float64]:
-    slack = FAR * when.error
-    return np.array([when.time, when.error, slack, kink.radius, *kink.lines[0, :5].tolist()])
+def _row(jump: VelocityJump, crossing: Intersection) -> NDArray[np.float64]:
+    slack = MAX_SIGMAS * crossing.error
+    return np.array(
+        [crossing.time, crossing.error, slack, jump.radius, *jump.lines[0, :5].tolist()]
+    )
 
 
 @compiled
-def _near(
-    table: NDArray[np.float64], this: NDArray[np.float64], interval: float
+def _candidate_rows(
+    table: NDArray[np.float64], new: NDArray[np.float64], interval: float
 ) -> NDArray[np.int64]:
-    found, count = np.empty(table.shape[0], dtype=np.int64), 0
-    time = this[0]
+    rows, count = np.empty(table.shape[0], dtype=np.int64), 0
+    time = new[0]
     for k in range(table.shape[0]):
-        # Hundreds wait: a quick look at each.
-        apart = abs(table[k, 0] - time)
-        if not apart < this[2] + table[k, 2]:
+        # Hundreds wait: the cheapest test comes first.
+        interval_apart = abs(table[k, 0] - time)
+        if not interval_apart < new[2] + table[k, 2]:
             continue
-        since, its_since = time - table[k, 4], time - this[4]
-        x = this[5] + this[7] * its_since - table[k, 5] - table[k, 7] * since
-        y = this[6] + this[8] * its_since - table[k, 6] - table[k, 8] * since
+        dt_row, dt_new = time - table[k, 4], time - new[4]
+        x = new[5] + new[7] * dt_new - table[k, 5] - table[k, 7] * dt_row
+        y = new[6] + new[8] * dt_new - table[k, 6] - table[k, 8] * dt_row
         distance = math.sqrt(x * x + y * y)
-        reach = table[k, 3] + this[3]
-        if not (1.0 - _ABOUT) * reach < distance < (1.0 + _ABOUT) * reach:
+        reach = table[k, 3] + new[3]
+        if (
+            not (1.0 - _DISTANCE_TOLERANCE) * reach
+            < distance
+            < (1.0 + _DISTANCE_TOLERANCE) * reach
+        ):
             continue
-        error = math.sqrt(this[1] * this[1] + table[k, 1] * table[k, 1])
-        if apart < interval + FAR * error:
-            found[count] = k
+        error = math.sqrt(new[1] * new[1] + table[k, 1] * table[k, 1])
+        if interval_apart < interval + MAX_SIGMAS * error:
+            rows[count] = k
             count += 1
-    return found[:count]
+    return rows[:count]

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.numerics.quantiles import Quantile, middle
+from nanorocks_ros.numerics.quantiles import Quantile, median
 from nanorocks_ros.records import Notice, Quality
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ class FrameChecks:
         cut, smallest = 0, max(_FEWEST_ROWS, _HALF * height)
         for count, usual, history in ((filled, self._ends, 1), (same, self._same, _HISTORY)):
             # A scene without noise may end in equal rows in every frame.
-            if count >= smallest and len(usual) >= history and count - middle(usual) >= smallest:
+            if count >= smallest and len(usual) >= history and count - median(usual) >= smallest:
                 cut = max(cut, count)
             usual.append(count)
         return int(height - cut)

@@ -11,7 +11,7 @@ from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.experiment.calibration_file import calibrated, load_calibration
 from nanorocks_ros.experiment.plate import Region, regions_on_plate
 from nanorocks_ros.experiment.view import Straight, View
-from nanorocks_ros.numerics.quantiles import middle
+from nanorocks_ros.numerics.quantiles import median
 from nanorocks_ros.records import Frame, Notice, Quality, TrayImage
 from nanorocks_ros.stages.preprocess.frame_checks import FrameChecks
 from nanorocks_ros.stages.preprocess.gray_image_checks import picture_quality
@@ -128,7 +128,7 @@ class Preprocessor:
         self._suspects: frozenset[int] = frozenset()
         self._misplaced: frozenset[int] = frozenset()
         self._checks = FrameChecks(self._camera)
-        self._counter = ShakeCounter(speed.shortest_cycle)
+        self._counter = ShakeCounter(speed.min_cycle_duration)
         self._plate = PlateMeter(speed.shake_ratio, self._settings.shake_speed)
         self._crops = tuple(
             TrayCrop(
@@ -145,7 +145,7 @@ class Preprocessor:
     def _check_positions(self, frame: Frame) -> tuple[Notice, ...]:
         """Check the positions of the trays, early in the recording and once more."""
         self._frames += 1
-        if self._frames not in _POSITION_CHECKS or not self._settings.check_map:
+        if self._frames not in _POSITION_CHECKS or not self._settings.check_tray_positions:
             return ()
         view = self._view or self._straight
         image = np.ascontiguousarray(frame.image).reshape(*frame.image.shape[:2], -1)
@@ -192,8 +192,8 @@ class Preprocessor:
         known = [crop for crop in self._crops if math.isfinite(crop.velocity_error)]
         if not known:
             return math.nan, math.nan
-        across, down = (middle([crop.velocity[axis] for crop in known]) for axis in (0, 1))
-        return math.hypot(across, down), middle([crop.velocity_error for crop in known])
+        across, down = (median([crop.velocity[axis] for crop in known]) for axis in (0, 1))
+        return math.hypot(across, down), median([crop.velocity_error for crop in known])
 
     def _tray_image(
         self,

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.numerics.quantiles import Quantile, middle
+from nanorocks_ros.numerics.quantiles import Quantile, median
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -170,7 +170,7 @@ class MotionMeter:
         step, self._last_ns = stamp_ns - self._last_ns, stamp_ns
         if last is None:
             return False
-        usual = middle(self._steps) if self._steps else step
+        usual = median(self._steps) if self._steps else step
         self._steps.append(step)
         # Beads move further while frames are missing, which is no jump. A jump during the gap is
         # seen with the next image.

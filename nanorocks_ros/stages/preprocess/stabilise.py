@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.experiment.plate import Region
-from nanorocks_ros.numerics.quantiles import middle
+from nanorocks_ros.numerics.quantiles import median
 from nanorocks_ros.stages.preprocess.image_registration import (
     register,
     sample,
@@ -71,9 +71,9 @@ def shift_of_plate(shifts: Sequence[Shift]) -> Shift | None:
     if len(shifts) < _FEWEST_TRAYS:
         return None
     return Shift(
-        middle([shift.x for shift in shifts]),
-        middle([shift.y for shift in shifts]),
-        middle([shift.error for shift in shifts]),
+        median([shift.x for shift in shifts]),
+        median([shift.y for shift in shifts]),
+        median([shift.error for shift in shifts]),
     )
 
 

@@ -228,4 +228,4 @@ def _remedy(settings: PreprocessSettings, scale: float = 0.0) -> str:
         remedy = 'set it to about that and see with nanorocks look that the floor fills the crop'
     else:
         remedy = 'set preprocess.regions_px'
-    return f'{remedy}, or set preprocess.check_map to false'
+    return f'{remedy}, or set preprocess.check_tray_positions to false'

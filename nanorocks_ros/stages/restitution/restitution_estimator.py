@@ -21,10 +21,11 @@ from nanorocks_ros.records import (
     SpeedEstimate,
     SpeedMethod,
 )
-from nanorocks_ros.stages.contacts.cycle_contacts import ContactsOfCycle
+from nanorocks_ros.stages.contacts.cycle_contacts import CycleContacts
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 from nanorocks_ros.stages.preprocess.shake_detection import NS
 from nanorocks_ros.stages.restitution.restitution_methods import (
+    UNDETERMINED,
     Decay,
     DecayLibraryMethod,
     PaperMethod,
@@ -35,7 +36,7 @@ from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.inference.cycle_likelihoods import Evidence, MeanRestitution
+    from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRestitution
     from nanorocks_ros.settings import PipelineSettings
 
 
@@ -76,7 +77,7 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
         method = DecayLibraryMethod if self._settings.relation == 'library' else PaperMethod
         self._make_method = partial(method, settings, tray)
         self._grains = any(hue_of(species.material) == 0 for species in tray.species)
-        self._contacts = ContactsOfCycle(self._settings)
+        self._contacts = CycleContacts(self._settings)
         self.reset()
 
     def _restart(self, stamp_ns: int | None = None) -> None:
@@ -90,11 +91,11 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
         self._method: RestitutionMethod = self._make_method()
 
     @property
-    def evidence(self) -> Evidence | None:
+    def evidence(self) -> CycleLikelihoods | None:
         """Evidence of the cycles finished since time last went back; None without any."""
         return self._method.evidence
 
-    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+    def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
         """Mean restitution of several cycles, also of other recordings of the tray.
 
         Raises
@@ -163,7 +164,7 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
 
     def _driven(self, speed: SpeedEstimate) -> bool:
         """Whether the tray still oscillates too fast for the gas in it to cool freely."""
-        calm = self._settings.calm_share * speed.mean_projected_speed
+        calm = self._settings.max_tray_to_bead_speed * speed.mean_projected_speed.value
         return speed.tray_speed > calm
 
     def _start_ns(self, first: SpeedEstimate) -> int:
@@ -190,7 +191,7 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
         return self._estimate(CorStatus.FINAL)
 
     def _update_due(self, stamp_ns: int) -> bool:
-        if len(self._samples) < self._settings.fewest_samples:
+        if len(self._samples) < self._settings.min_samples:
             return False
         last = self._last_update_ns
         interval = self._settings.update_interval * NS - _STAMP_ROUNDING_NS
@@ -211,21 +212,20 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
                 cycle=self._cycle,
                 status=CorStatus.UNDETERMINED,
                 relation=self._method.relation,
-                restitution_lower=0.0,
-                restitution_upper=1.0,
+                restitution=UNDETERMINED,
                 samples=len(self._samples),
             ),
         )
 
     def _estimate(self, status: CorStatus) -> tuple[CorEstimate, ...]:
-        if len(self._samples) < self._settings.fewest_samples:
+        if len(self._samples) < self._settings.min_samples:
             return self._undetermined() if status is CorStatus.FINAL else ()
         last = self._samples[-1]
         shake_ns, start_ns = last.cycle_start_ns or 0, self._start_ns(self._samples[0])
         decay = Decay(
             time=np.array([(sample.stamp_ns - start_ns) / NS for sample in self._samples]),
-            speed=np.array([sample.mean_projected_speed for sample in self._samples]),
-            error=np.array([sample.mean_projected_speed_error for sample in self._samples]),
+            speed=np.array([sample.mean_projected_speed.value for sample in self._samples]),
+            error=np.array([sample.mean_projected_speed.error for sample in self._samples]),
             of_grains=self._grains
             and any(sample.method is SpeedMethod.STRUCTURE_FUNCTION for sample in self._samples),
         )
@@ -242,8 +242,9 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
             # The restitution is published as unknown.
             fields = _unknown(CorStatus.NO_DECAY)
         if status is CorStatus.FINAL:
-            few = self._settings.fewest_samples
-            fields.update(species_decays(self._tray, decay.time, self._samples, few))
+            few = self._settings.min_samples
+            decays = species_decays(self._tray, decay.time, self._samples, few)
+            fields['species_initial_speeds'], fields['species_haff_times'] = decays
         if fields.get('tension', 0.0) > _TENSE:
             quality |= Quality.INCONSISTENT
         return (
@@ -263,9 +264,9 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
 
 
 def _unknown(status: CorStatus) -> dict[str, Any]:
-    return {'status': status, 'restitution_lower': 0.0, 'restitution_upper': 1.0}
+    return {'status': status, 'restitution': UNDETERMINED}
 
 
 def _usable(speed: SpeedEstimate) -> bool:
-    value, error = speed.mean_projected_speed, speed.mean_projected_speed_error
+    value, error = speed.mean_projected_speed.value, speed.mean_projected_speed.error
     return math.isfinite(value) and math.isfinite(error) and value > 0.0 and error > 0.0

@@ -11,13 +11,20 @@ import numpy as np
 from scipy import special
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.inference.cycle_likelihoods import Evidence, MeanRestitution
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRestitution
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
-from nanorocks_ros.inference.posterior import Posterior, check_walls, posterior_of, tables_of
+from nanorocks_ros.inference.posterior import Posterior, check_walls, posterior_of
 from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
-from nanorocks_ros.records import CorRelation, CorStatus
+from nanorocks_ros.records import (
+    UNKNOWN_MEASURED,
+    CorRelation,
+    CorStatus,
+    Interval,
+    Measured,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,11 +36,9 @@ if TYPE_CHECKING:
 
 # Largest standard deviation of a restitution that is given: a uniform one from 0 to 1 has 0.29.
 _LARGEST_DEVIATION = 0.2
-_UNKNOWN_FIELDS = {
-    'status': CorStatus.UNDETERMINED,
-    'restitution_lower': 0.0,
-    'restitution_upper': 1.0,
-}
+UNDETERMINED = Interval(lower=0.0, upper=1.0)
+"""The restitution of a cycle that does not determine it: any."""
+_UNKNOWN_FIELDS = {'status': CorStatus.UNDETERMINED, 'restitution': UNDETERMINED}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,12 +64,12 @@ class RestitutionMethod(Protocol):
     """A method that turns decays into restitutions; it keeps the evidence of finished cycles."""
 
     relation: CorRelation
-    evidence: Evidence | None
+    evidence: CycleLikelihoods | None
 
     def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate; raises FitError where there is no decay."""
 
-    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+    def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
         """Mean restitution of the cycles of some evidence, also of other recordings."""
 
 
@@ -82,7 +87,7 @@ class PaperMethod:
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._probability = settings.cooling.probability
         self._tray = tray
-        self.evidence: Evidence | None = None
+        self.evidence: CycleLikelihoods | None = None
 
     def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate; the method of the paper does not use contacts.
@@ -101,21 +106,22 @@ class PaperMethod:
             for rate in (fit.decay_rate, fit.decay_rate * spread, fit.decay_rate / spread)
         )
         if final:
-            own = Evidence(cycles=1, by_form=((value, (upper - lower) / (2.0 * quantile)),))
+            own = CycleLikelihoods(
+                cycles=1, by_form=((value, (upper - lower) / (2.0 * quantile)),)
+            )
             self.evidence = self.evidence + own if self.evidence else own
         mean = self.mean_of(self.evidence) if self.evidence else None
         return {
-            'restitution': value,
-            'restitution_lower': lower,
-            'restitution_upper': upper,
+            'restitution': Interval(value, lower, upper),
             'paper_restitution': value,
             'reduced_chi_square': fit.reduced_chi_square,
-            'mean_restitution': mean.restitution if mean else math.nan,
-            'mean_restitution_error': mean.restitution_error if mean else math.nan,
+            'mean_restitution': (
+                Measured(mean.restitution, mean.restitution_error) if mean else UNKNOWN_MEASURED
+            ),
             **_haff_fields(fit),
         }
 
-    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+    def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
         """Mean and standard error by the scatter of the cycles; of one, its own error."""
         values, errors = np.array(evidence.by_form).T
         mean, error, freedom = float(values.mean()), float(errors[0]), math.inf
@@ -160,12 +166,12 @@ class DecayLibraryMethod:
             True: (math.hypot(scale, prior.grain_scale_error), prior.grain_speed_bias),
         }
         self._biases = (prior.collision_bias, prior.rebound_bias)
-        self._walls = (prior.wall_low, prior.wall_high)
+        self._walls = (prior.min_wall_restitution, prior.max_wall_restitution)
         check_walls(self._walls)
         half = 0.5 * settings.cooling.probability
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
-        self.evidence: Evidence | None = None
-        self._mean_so_far: dict[str, float] = {}
+        self.evidence: CycleLikelihoods | None = None
+        self._mean_so_far: dict[str, Measured] = {}
 
     def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate.
@@ -207,28 +213,26 @@ class DecayLibraryMethod:
             self._tables,
             integrated,
             self._walls,
-            of_beads=contacts.of_beads(self._biases[0]),
-            of_walls=contacts.of_walls(self._biases[1]),
+            bead_likelihood=contacts.bead_likelihood(self._biases[0]),
+            wall_likelihood=contacts.wall_likelihood(self._biases[1]),
         )
 
     def _mean(
         self, likelihood: DecayLikelihood, contacts: ContactTerms, *, final: bool
-    ) -> dict[str, float]:
+    ) -> dict[str, Measured]:
         """Mean restitution of all finished cycles; a final one is among them."""
         if not final:
             return self._mean_so_far
-        own = Evidence(cycles=1, decay=likelihood, contacts=contacts)
+        own = CycleLikelihoods(cycles=1, decay=likelihood, contacts=contacts)
         self.evidence = self.evidence + own if self.evidence else own
         mean = self.mean_of(self.evidence)
         self._mean_so_far = {
-            'mean_restitution': mean.restitution,
-            'mean_restitution_error': mean.restitution_error,
-            'mean_wall_restitution': mean.wall_restitution,
-            'mean_wall_restitution_error': mean.wall_restitution_error,
+            'mean_restitution': Measured(mean.restitution, mean.restitution_error),
+            'mean_wall_restitution': Measured(mean.wall_restitution, mean.wall_restitution_error),
         }
         return self._mean_so_far
 
-    def mean_of(self, evidence: Evidence) -> MeanRestitution:
+    def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
         """Mean restitution of several cycles, whose systematic errors are the same.
 
         Raises
@@ -249,7 +253,7 @@ class DecayLibraryMethod:
             )
         posterior = self._posterior(decay.integrated(), contacts)
         error, wall_error = np.sqrt(np.diag(posterior.covariance)).tolist()
-        fields = _restitution_fields(posterior, self._ends)
+        restitution, wall_restitution = _intervals(posterior, self._ends)
         return MeanRestitution(
             cycles=evidence.cycles,
             restitution=posterior.mean[0],
@@ -259,14 +263,13 @@ class DecayLibraryMethod:
             tension=posterior.tension,
             rebounds=contacts.rebounds,
             collisions=contacts.collisions,
-            **{
-                f'{name}_{end}': fields[f'{name}_{end}']
-                for name in ('restitution', 'wall_restitution')
-                for end in ('lower', 'upper')
-            },
+            restitution_lower=restitution.lower,
+            restitution_upper=restitution.upper,
+            wall_restitution_lower=wall_restitution.lower,
+            wall_restitution_upper=wall_restitution.upper,
         )
 
-    def _speeds(self, decay: Decay, *, final: bool) -> dict[str, float]:
+    def _speeds(self, decay: Decay, *, final: bool) -> dict[str, Any]:
         """Initial speed and Haff time, with errors once the cycle is over."""
         if final:
             with suppress(FitError):
@@ -280,34 +283,34 @@ class DecayLibraryMethod:
         slope, offset = (float(number) for number in np.polyfit(decay.time, 1.0 / decay.speed, 1))
         falling = slope > 0.0 and offset > 0.0
         return {
-            'initial_speed': 1.0 / offset if falling else math.nan,
-            'haff_time': offset / slope if falling else math.nan,
+            'initial_speed': Measured(1.0 / offset if falling else math.nan),
+            'haff_time': Measured(offset / slope if falling else math.nan),
             'paper_restitution': _paper_restitution(max(slope, 0.0), self._tray),
         }
 
 
-def _restitution_fields(posterior: Posterior, ends: NDArray[np.float64]) -> dict[str, float]:
+def _intervals(posterior: Posterior, ends: NDArray[np.float64]) -> tuple[Interval, Interval]:
+    """The restitution of two beads, and of beads and walls."""
     lower, value, upper = (float(quantile) for quantile in posterior.quantiles(ends))
     wall_lower, wall, wall_upper = (float(quantile) for quantile in posterior.wall_quantiles(ends))
+    return Interval(value, lower, upper), Interval(wall, wall_lower, wall_upper)
+
+
+def _restitution_fields(posterior: Posterior, ends: NDArray[np.float64]) -> dict[str, Any]:
+    restitution, wall_restitution = _intervals(posterior, ends)
     spread = posterior.covariance
     product = math.sqrt(spread[0, 0] * spread[1, 1])
     return {
-        'restitution': value,
-        'restitution_lower': lower,
-        'restitution_upper': upper,
-        'wall_restitution': wall,
-        'wall_restitution_lower': wall_lower,
-        'wall_restitution_upper': wall_upper,
+        'restitution': restitution,
+        'wall_restitution': wall_restitution,
         'correlation': float(spread[0, 1]) / product if product > 0.0 else 0.0,
     }
 
 
-def _haff_fields(fit: HaffFit) -> dict[str, float]:
+def _haff_fields(fit: HaffFit) -> dict[str, Measured]:
     return {
-        'initial_speed': fit.initial_speed,
-        'initial_speed_error': fit.initial_speed_error,
-        'haff_time': fit.haff_time,
-        'haff_time_error': fit.haff_time_error,
+        'initial_speed': Measured(fit.initial_speed, fit.initial_speed_error),
+        'haff_time': Measured(fit.haff_time, fit.haff_time_error),
     }
 
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.inference.decay.haff_fit import fit_haff
+from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
+from nanorocks_ros.records import UNKNOWN_MEASURED, Measured
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,14 +22,14 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.records import SpeedEstimate
 
-# Names of the species in a SpeedEstimate, in the order of `Tray.species`.
-SPECIES = ('first', 'second')
+# A SpeedEstimate holds the speeds of this many of `Tray.species`.
+_SPECIES = 2
 
 
 def species_decays(
     tray: Tray, time: NDArray[np.float64], speeds: Sequence[SpeedEstimate], fewest: int
-) -> dict[str, float]:
-    """Initial speed and Haff time of each species, as fields of a CorEstimate.
+) -> tuple[tuple[Measured, ...], tuple[Measured, ...]]:
+    """Initial speed and Haff time of each of the first two species.
 
     Parameters
     ----------
@@ -42,26 +43,41 @@ def species_decays(
 
     Returns
     -------
-    dict of str to float
-        ``first_species_initial_speed`` and ``first_species_haff_time``, each with its error
-        (``..._error``), and the same of the second species. Species whose speeds are unknown
-        or do not fall are left out; empty for a tray with a single species.
+    initial_speeds, haff_times : tuple of Measured, [m/s], [s]
+        Unknown for a species whose speeds are unknown or do not fall; empty for a tray with a
+        single species.
     """
-    fields: dict[str, float] = {}
     if len(tray.species) < 2:
-        return fields
-    for name, species in zip(SPECIES, tray.species, strict=False):
-        speed = np.array([getattr(estimate, f'{name}_species_speed') for estimate in speeds])
-        error = np.array([getattr(estimate, f'{name}_species_speed_error') for estimate in speeds])
-        known = np.isfinite(speed) & np.isfinite(error) & (speed > 0.0) & (error > 0.0)
-        if int(known.sum()) < fewest:
-            continue
-        try:
-            fit = fit_haff(time[known], speed[known], error[known], species.count)
-        except FitError:
-            continue
-        fields[f'{name}_species_initial_speed'] = fit.initial_speed
-        fields[f'{name}_species_initial_speed_error'] = fit.initial_speed_error
-        fields[f'{name}_species_haff_time'] = fit.haff_time
-        fields[f'{name}_species_haff_time_error'] = fit.haff_time_error
-    return fields
+        return (), ()
+    fits = [
+        _fit(time, [_speed_of(estimate, place) for estimate in speeds], species.count, fewest)
+        for place, species in enumerate(tray.species[:_SPECIES])
+    ]
+    initial_speeds = (
+        Measured(fit.initial_speed, fit.initial_speed_error) if fit else UNKNOWN_MEASURED
+        for fit in fits
+    )
+    haff_times = (
+        Measured(fit.haff_time, fit.haff_time_error) if fit else UNKNOWN_MEASURED for fit in fits
+    )
+    return tuple(initial_speeds), tuple(haff_times)
+
+
+def _speed_of(estimate: SpeedEstimate, place: int) -> Measured:
+    speeds = estimate.species_speeds
+    return speeds[place] if place < len(speeds) else UNKNOWN_MEASURED
+
+
+def _fit(
+    time: NDArray[np.float64], speeds: Sequence[Measured], count: int, fewest: int
+) -> HaffFit | None:
+    """Haff's law for one species; None where its speeds are not known or do not fall."""
+    speed = np.array([measured.value for measured in speeds])
+    error = np.array([measured.error for measured in speeds])
+    known = np.isfinite(speed) & np.isfinite(error) & (speed > 0.0) & (error > 0.0)
+    if int(known.sum()) < fewest:
+        return None
+    try:
+        return fit_haff(time[known], speed[known], error[known], count)
+    except FitError:
+        return None

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.physics.moving_area import mean_displacement
-from nanorocks_ros.records import MotionMask, Quality, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.records import (
+    Measured,
+    MotionMask,
+    Quality,
+    SpeedEstimate,
+    SpeedMethod,
+    TrayImage,
+)
 from nanorocks_ros.stages.preprocess.shake_detection import NS
 from nanorocks_ros.stages.speed.motion_mask import MotionMasker
 
@@ -94,9 +101,10 @@ class AreaSpeed:
             tray=self._tray.number,
             cycle=image.cycle or 0,
             cycle_start_ns=image.cycle_start_ns,
-            mean_projected_speed=speed,
-            # The spread over the beads; the bias is larger (docs/method/speed.md).
-            mean_projected_speed_error=abs(speed) * _RAYLEIGH_SPREAD / math.sqrt(self._tray.count),
+            # The error is the spread over the beads; the bias is larger (docs/method/speed.md).
+            mean_projected_speed=Measured(
+                speed, abs(speed) * _RAYLEIGH_SPREAD / math.sqrt(self._tray.count)
+            ),
             window=(last - first) / NS,
             method=SpeedMethod.BINARISED_AREA,
             quality=image.quality | self._range(raw),

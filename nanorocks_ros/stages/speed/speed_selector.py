@@ -119,7 +119,7 @@ class SpeedSelector:
 
 def _flag_uncertain(estimate: SpeedEstimate) -> SpeedEstimate:
     """The estimate, flagged where its error is more than 20 % or not known."""
-    speed, error = estimate.mean_projected_speed, estimate.mean_projected_speed_error
+    speed, error = estimate.mean_projected_speed.value, estimate.mean_projected_speed.error
     if error <= _LARGEST_ERROR * abs(speed) or abs(speed) + error <= _REST:
         return estimate
     return replace(estimate, quality=estimate.quality | Quality.UNCERTAIN)

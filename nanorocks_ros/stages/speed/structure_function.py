@@ -93,11 +93,11 @@ class StructureFunction:
         self._settings = settings
         self._centred = centred
         self._diameter_px = diameter_px
-        self._lags = _ladder(settings.longest_lag_frames)
+        self._lags = _ladder(settings.max_lag_frames)
         self._images: deque[tuple[int, NDArray[np.uint8]]] = deque(
-            maxlen=settings.longest_lag_frames + 1
+            maxlen=settings.max_lag_frames + 1
         )
-        self._shifts: deque[tuple[float, float]] = deque(maxlen=settings.longest_lag_frames + 1)
+        self._shifts: deque[tuple[float, float]] = deque(maxlen=settings.max_lag_frames + 1)
         self._keys: list[tuple[int, NDArray[np.uint8]]] = []
         self._key_interval_ns = _KEY_INTERVAL_NS
         self._response = StructureCalibration(diameter_px, beads)

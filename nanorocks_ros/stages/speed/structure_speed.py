@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.records import Quality, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.records import Measured, Quality, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.stages.preprocess.shake_detection import NS, NoiseMeter
 from nanorocks_ros.stages.speed.species_images import SpeciesImages
 from nanorocks_ros.stages.speed.species_speeds import PictureSpeed, SpeciesSpeeds
@@ -159,13 +159,12 @@ class StructureSpeed:
             tray=self._tray.number,
             cycle=speed.cycle,
             cycle_start_ns=speed.cycle_start_ns,
-            mean_projected_speed=speed.speed / scale,
-            mean_projected_speed_error=speed.error / scale,
+            mean_projected_speed=Measured(speed.speed / scale, speed.error / scale),
             window=speed.window_ns / NS,
             method=SpeedMethod.STRUCTURE_FUNCTION,
             quality=self._flags | out_of_range,
-            **SpeedEstimate.by_species(
-                [(value / scale, error / scale) for value, error in species]
+            species_speeds=tuple(
+                Measured(value / scale, error / scale) for value, error in species[:2]
             ),
         )
 

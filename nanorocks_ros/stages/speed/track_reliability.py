@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.numerics.quantiles import middle
+from nanorocks_ros.numerics.quantiles import median
 from nanorocks_ros.stages.tracking.mean_speed import RELIABLE_SHARE
 
 if TYPE_CHECKING:
@@ -98,12 +98,12 @@ class TrackReliability:
         intervals_ns : ndarray of int64, [ns]
             Between the pictures of the window.
         """
-        interval = middle(intervals_ns.tolist()) / 1_000_000_000
+        interval = median(intervals_ns.tolist()) / 1_000_000_000
         step = float(np.max(np.nan_to_num(speeds) * interval / self._neighbours))
         self._tracked.append(share)
         self._steps.append(step)
-        self._usual_tracked = middle(self._tracked)
-        self._usual_step = middle(self._steps)
+        self._usual_tracked = median(self._tracked)
+        self._usual_step = median(self._steps)
 
     def without_colour(self) -> None:
         """Judge by an image without colour, in which nothing can be tracked."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from nanorocks_ros.experiment.colours import hue_of
 from nanorocks_ros.records import (
-    UNKNOWN,
+    UNKNOWN_MEASURED,
+    Measured,
     Quality,
     SpeedEstimate,
     SpeedMethod,
@@ -18,11 +19,11 @@ from nanorocks_ros.records import (
 from nanorocks_ros.stages.preprocess.shake_detection import NS
 from nanorocks_ros.stages.speed.track_reliability import TrackReliability
 from nanorocks_ros.stages.tracking.mean_speed import (
-    JITTER_PICTURES,
+    NOISE_FRAMES,
     RELIABLE_SHARE,
-    mean_speeds_in,
+    mean_speeds_of_series,
 )
-from nanorocks_ros.stages.tracking.track_window import RecentTracks
+from nanorocks_ros.stages.tracking.track_window import TrackWindow
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
@@ -66,7 +67,7 @@ class TrackSpeed:
         """Start afresh."""
         del stamp_ns
         self.reliability = TrackReliability(self._tray, crowded=self._crowded)
-        self._recent = RecentTracks()
+        self._recent = TrackWindow()
         self._next_ns: int | None = None
         self._last_ns: int | None = None
         self._flags = Quality(0)
@@ -107,9 +108,9 @@ class TrackSpeed:
 
     def _speeds(self, tracks: Tracks) -> tuple[SpeedEstimate, ...]:
         series = self._recent.series()
-        mean, *of_species = mean_speeds_in(
+        mean, *of_species = mean_speeds_of_series(
             series,
-            self._recent.series(JITTER_PICTURES),
+            self._recent.series(NOISE_FRAMES),
             tracks.expected,
             least_distance=self._shortest_path,
             species=(None, *range(len(self._tray.species))),
@@ -120,14 +121,14 @@ class TrackSpeed:
             return ()
         self._last_ns = mean.stamp_ns
         speeds = [
-            (speed.mean_projected_speed, speed.mean_projected_speed_error)
+            Measured(speed.mean_projected_speed, speed.mean_projected_speed_error)
             if speed
-            else (UNKNOWN, UNKNOWN)
+            else UNKNOWN_MEASURED
             for speed in of_species
         ]
         self.reliability.push_speeds(
             min(speed.share if speed else 0.0 for speed in of_species),
-            np.array([speed for speed, _ in speeds]),
+            np.array([speed.value for speed in speeds]),
             np.diff(series.stamps),
         )
         flags, self._flags = self._flags, Quality(0)
@@ -143,11 +144,12 @@ class TrackSpeed:
                 tray=self._tray.number,
                 cycle=self._cycle or 0,
                 cycle_start_ns=self._cycle_start_ns,
-                mean_projected_speed=mean.mean_projected_speed,
-                mean_projected_speed_error=mean.mean_projected_speed_error,
+                mean_projected_speed=Measured(
+                    mean.mean_projected_speed, mean.mean_projected_speed_error
+                ),
                 window=mean.window,
                 method=SpeedMethod.TRACKING,
                 quality=flags,
-                **SpeedEstimate.by_species(speeds),
+                species_speeds=tuple(speeds[:2]),
             ),
         )

@@ -1,4 +1,4 @@
-"""How far beads came between three pictures, from their tracks."""
+"""Displacements of beads between three frames, from their tracks."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.records import Tracks
 
-# Times the usual error of a place, with which a bead is still used.
-_WORST = 5.0
-# By how much the distances in time of three pictures may differ to measure the jitter.
-_UNEVEN = 0.2
-# Of a Gaussian of unit variance, the median of the squares.
+# Largest position error of a bead that is used, over the median.
+_MAX_ERROR_RATIO = 5.0
+# Largest relative difference of the two intervals between three frames for the noise.
+_MAX_INTERVAL_DIFFERENCE = 0.2
+# Median of the square of a Gaussian variable of unit variance.
 _MEDIAN_SQUARE = 0.4549
-# Pictures that the jitter takes.
-_EVENLY_APART = 3
+# Smallest number of frames that the noise can be measured from.
+_MIN_NOISE_FRAMES = 3
 
-ALL = -1
+ALL_SPECIES = -1
 """Beads of every species."""
 
 
-class Series(NamedTuple):
-    """Tracks of one tray in a series of m pictures, one after the other in the same arrays.
+class TrackSeries(NamedTuple):
+    """Tracks of one tray in m successive frames, concatenated.
 
     Parameters
     ----------
     stamps : ndarray of int64, (m,), [ns]
     first : ndarray of int64, (m + 1,)
-        Where the beads of each picture begin.
+        First row of each frame.
     ids, species : ndarray of int32, (n,)
-        Numbers rise within each picture.
+        Numbers ascend within each frame.
     seen : ndarray of bool, (n,)
-    places : ndarray (n, 2), [m]
-        Past the camera: the tray may swing under the beads.
+    positions : ndarray (n, 2), [m]
+        In the camera frame: the tray may swing under the beads.
     errors : ndarray (n,), [m]
     """
 
@@ -51,82 +51,82 @@ class Series(NamedTuple):
     ids: NDArray[np.int32]
     species: NDArray[np.int32]
     seen: NDArray[np.bool_]
-    places: NDArray[np.float64]
+    positions: NDArray[np.float64]
     errors: NDArray[np.float64]
 
 
-class Wanted(NamedTuple):
-    """How far beads should come, on average of the squares, in half of a window.
+class MinDisplacement(NamedTuple):
+    """Smallest mean square displacement of the beads in half of a window.
 
     Parameters
     ----------
     square : float, [m^2]
-    variances, place_variances : float
-        At least so many times those of a coordinate: as it differs from picture to picture, and
-        as a whole.
+    variances, position_variances : float
+        Smallest ratio to the variance of a coordinate: of the part that differs between frames,
+        and of the whole.
     beads : int
-        Fewer say nothing.
+        Smallest number of beads.
     """
 
     square: float
     variances: float
-    place_variances: float
+    position_variances: float
     beads: int
 
 
-def joined(tracks: Sequence[Tracks]) -> Series:
-    """The same records, at least one, in one set of arrays."""
-    counts = [one.ids.size for one in tracks]
-    moved = np.repeat(np.array([one.displacement for one in tracks]), counts, axis=0)
-    return Series(
-        stamps=np.array([one.stamp_ns for one in tracks], dtype=np.int64),
+def join_tracks(tracks: Sequence[Tracks]) -> TrackSeries:
+    """Concatenate records, at least one."""
+    counts = [record.ids.size for record in tracks]
+    displacements = np.repeat(np.array([record.displacement for record in tracks]), counts, axis=0)
+    return TrackSeries(
+        stamps=np.array([record.stamp_ns for record in tracks], dtype=np.int64),
         first=np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]),
-        ids=np.concatenate([one.ids for one in tracks]),
-        species=np.concatenate([one.species for one in tracks]),
-        seen=np.concatenate([one.seen for one in tracks]),
-        places=np.concatenate([one.positions for one in tracks]) + moved,
-        errors=np.concatenate([one.position_errors for one in tracks]),
+        ids=np.concatenate([record.ids for record in tracks]),
+        species=np.concatenate([record.species for record in tracks]),
+        seen=np.concatenate([record.seen for record in tracks]),
+        positions=np.concatenate([record.positions for record in tracks]) + displacements,
+        errors=np.concatenate([record.position_errors for record in tracks]),
     )
 
 
 @compiled
-def _shown(series: Series, picture: int, species: int) -> NDArray[np.int64]:
-    """The beads of a picture that are seen, where they are placed well enough."""
-    first, last = series.first[picture], series.first[picture + 1]
-    found = np.empty(last - first, dtype=np.int64)
+def _usable_beads(series: TrackSeries, frame: int, species: int) -> NDArray[np.int64]:
+    """Rows of the visible beads of a frame with small position errors."""
+    first, last = series.first[frame], series.first[frame + 1]
+    rows = np.empty(last - first, dtype=np.int64)
     errors = np.empty(last - first)
     n = 0
     for k in range(first, last):
-        if series.seen[k] and (species == ALL or series.species[k] == species):
-            found[n], errors[n] = k, series.errors[k]
+        if series.seen[k] and (species == ALL_SPECIES or series.species[k] == species):
+            rows[n], errors[n] = k, series.errors[k]
             n += 1
     if n == 0:
-        return found[:0]
-    # A bead half hidden is placed badly; who is hidden does not depend on the speed.
-    worst = _WORST * median_of(errors[:n])
+        return rows[:0]
+    # The position of a half hidden bead is poor; being hidden does not depend on the speed.
+    max_error = _MAX_ERROR_RATIO * median_of(errors[:n])
     kept = 0
     for k in range(n):
-        if errors[k] <= worst:
-            found[kept] = found[k]
+        if errors[k] <= max_error:
+            rows[kept] = rows[k]
             kept += 1
-    return found[:kept]
+    return rows[:kept]
 
 
 @kernel
-def _common(
+def _common_beads(
     ids: NDArray[np.int32],
     a: NDArray[np.int64],
     b: NDArray[np.int64],
     c: NDArray[np.int64],
-    found: NDArray[np.int64],
+    rows: NDArray[np.int64],
 ) -> int:
-    """How many beads are shown in all of three pictures; where each is in each, (3, n)."""
+    """Write the rows of the beads present in three frames, (3, n); return their number."""
     i, j, k, n = 0, 0, 0, 0
     while i < a.size and j < b.size and k < c.size:
         x, y, z = ids[a[i]], ids[b[j]], ids[c[k]]
         largest = max(x, y, z)
         if x == largest and y == largest and z == largest:
-            found[0, n], found[1, n], found[2, n] = a[i], b[j], c[k]
+            rows[0, n], rows[1, n], rows[2, n] = a[i], b[j], c[k]
             n, i, j, k = n + 1, i + 1, j + 1, k + 1
             continue
         i += x < largest
@@ -136,26 +136,26 @@ def _common(
 
 
 @compiled
-def jitter_of(series: Series, species: int) -> float:
-    """Variance of a coordinate from picture to picture, as the places themselves show it, [m^2].
+def position_noise(series: TrackSeries, species: int) -> float:
+    """Variance of a coordinate between frames, measured from the positions, [m^2].
 
-    Half of the beads fly straight through three pictures; a place off the middle of its
-    neighbours has 3/2 of that variance. What all pictures are off by together is no part of it.
-    Infinite when there are no three pictures evenly apart.
+    Half of the beads fly straight through three frames. The distance of the middle position from
+    the midpoint of the others has 3/2 of the variance. Errors that all frames share do not count.
+    Infinite without three frames at equal intervals.
     """
-    if series.stamps.size < _EVENLY_APART:
+    if series.stamps.size < _MIN_NOISE_FRAMES:
         return math.inf
     squares = np.empty(2 * series.ids.size)
-    found = np.empty((3, series.ids.size), dtype=np.int64)
+    rows = np.empty((3, series.ids.size), dtype=np.int64)
     n = 0
-    first, second = _shown(series, 0, species), _shown(series, 1, species)
-    for picture in range(series.stamps.size - 2):
-        third = _shown(series, picture + 2, species)
-        before = series.stamps[picture + 1] - series.stamps[picture]
-        after = series.stamps[picture + 2] - series.stamps[picture + 1]
-        if abs(before - after) <= _UNEVEN * before:
-            count = _common(series.ids, first, second, third, found)
-            n += _off_the_middle(series.places, found[:, :count], squares[n:])
+    first, second = _usable_beads(series, 0, species), _usable_beads(series, 1, species)
+    for frame in range(series.stamps.size - 2):
+        third = _usable_beads(series, frame + 2, species)
+        before = series.stamps[frame + 1] - series.stamps[frame]
+        after = series.stamps[frame + 2] - series.stamps[frame + 1]
+        if abs(before - after) <= _MAX_INTERVAL_DIFFERENCE * before:
+            count = _common_beads(series.ids, first, second, third, rows)
+            n += _midpoint_residuals(series.positions, rows[:, :count], squares[n:])
         first, second = second, third
     if n == 0:
         return math.inf
@@ -163,125 +163,127 @@ def jitter_of(series: Series, species: int) -> float:
 
 
 @kernel
-def _off_the_middle(
-    places: NDArray[np.float64], found: NDArray[np.int64], squares: NDArray[np.float64]
+def _midpoint_residuals(
+    positions: NDArray[np.float64], rows: NDArray[np.int64], squares: NDArray[np.float64]
 ) -> int:
-    """Squares of what the second place of each is off the middle of the others; how many."""
+    """Write the squared residuals of the middle positions; return their number."""
     n = 0
-    for k in range(found.shape[1]):
+    for k in range(rows.shape[1]):
         for axis in range(2):
-            ends = places[found[0, k], axis] + places[found[2, k], axis]
-            off = places[found[1, k], axis] - 0.5 * ends
-            squares[n] = off * off
+            ends = positions[rows[0, k], axis] + positions[rows[2, k], axis]
+            residual = positions[rows[1, k], axis] - 0.5 * ends
+            squares[n] = residual * residual
             n += 1
     return n
 
 
 @inlined
-def _apart(series: Series, here: int, there: int) -> float:
-    dx = series.places[here, 0] - series.places[there, 0]
-    dy = series.places[here, 1] - series.places[there, 1]
+def _distance(series: TrackSeries, row: int, other: int) -> float:
+    dx = series.positions[row, 0] - series.positions[other, 0]
+    dy = series.positions[row, 1] - series.positions[other, 1]
     return math.sqrt(dx * dx + dy * dy)
 
 
 @compiled
-def distances_of(
-    series: Series, pictures: tuple[int, int, int], species: int, jitter: float
+def displacements_between(
+    series: TrackSeries, frames: tuple[int, int, int], species: int, noise: float
 ) -> tuple[NDArray[np.float64], float, float, float]:
-    """How far each bead came that was seen in three pictures.
+    """Distances that each bead moved between three frames in which it is visible.
 
     Parameters
     ----------
-    series : Series
-    pictures : tuple of 3 ints
+    series : TrackSeries
+    frames : tuple of 3 ints
         Later, middle, earlier.
     species : int
         Index of the species, or ALL.
-    jitter : float, [m^2]
-        Errors that places share from picture to picture move no bead: variances are no more.
+    noise : float, [m^2]
+        Upper limit of the variances: errors that frames share do not displace a bead.
 
     Returns
     -------
     distances : ndarray (3, n), [m]
-        Of each bead from the middle to the later, from the earlier to the middle, from the
-        earlier to the later picture.
+        For each bead from the middle to the later, from the earlier to the middle, and from the
+        earlier to the later frame.
     square : float, [m^2]
-        Mean of the squares of the first two; NaN without beads, as are the others.
+        Mean square of the first two; NaN without beads, like the others.
     variance : float, [m^2]
-        Mean variance of a coordinate of a place, as far as it differs from picture to picture.
-    place_variance : float, [m^2]
-        Median of the whole.
+        Mean variance of a coordinate, as far as it differs between frames.
+    position_variance : float, [m^2]
+        Median of the whole variance of a coordinate.
     """
-    later = _shown(series, pictures[0], species)
-    middle = _shown(series, pictures[1], species)
-    earlier = _shown(series, pictures[2], species)
-    found = np.empty((3, min(later.size, middle.size, earlier.size)), dtype=np.int64)
-    n = _common(series.ids, later, middle, earlier, found)
+    later = _usable_beads(series, frames[0], species)
+    middle = _usable_beads(series, frames[1], species)
+    earlier = _usable_beads(series, frames[2], species)
+    rows = np.empty((3, min(later.size, middle.size, earlier.size)), dtype=np.int64)
+    n = _common_beads(series.ids, later, middle, earlier, rows)
     distances, variances = np.empty((3, n)), np.empty(n)
     if n == 0:
         return distances, math.nan, math.nan, math.nan
-    square, variance = _measure(series, found, jitter, distances, variances)
+    square, variance = _write_distances(series, rows, noise, distances, variances)
     return distances, square / (2.0 * n), variance / n, median_of(variances)
 
 
 @kernel
-def _measure(
-    series: Series,
-    found: NDArray[np.int64],
-    jitter: float,
+def _write_distances(
+    series: TrackSeries,
+    rows: NDArray[np.int64],
+    noise: float,
     distances: NDArray[np.float64],
     variances: NDArray[np.float64],
 ) -> tuple[float, float]:
-    """Write distances and variances of the beads found; sums over squares and variances."""
+    """Write distances and variances of the beads; return the sums of squares and variances."""
     square, variance = 0.0, 0.0
     for k in range(variances.size):
-        distances[0, k] = _apart(series, found[0, k], found[1, k])
-        distances[1, k] = _apart(series, found[1, k], found[2, k])
-        distances[2, k] = _apart(series, found[0, k], found[2, k])
+        distances[0, k] = _distance(series, rows[0, k], rows[1, k])
+        distances[1, k] = _distance(series, rows[1, k], rows[2, k])
+        distances[2, k] = _distance(series, rows[0, k], rows[2, k])
         square += distances[0, k] ** 2 + distances[1, k] ** 2
         total = 0.0
-        for one in range(3):
-            total += series.errors[found[one, k]] ** 2
+        for frame in range(3):
+            total += series.errors[rows[frame, k]] ** 2
         variances[k] = total / 3.0
-        variance += min(variances[k], jitter)
+        variance += min(variances[k], noise)
     return square, variance
 
 
 @compiled
-def far_enough(
-    series: Series, species: int, jitter: float, wanted: Wanted
+def displacements_beyond_noise(
+    series: TrackSeries, species: int, noise: float, minimum: MinDisplacement
 ) -> tuple[int, NDArray[np.float64], float, float, float]:
-    """Distances over the shortest time in which beads come far enough, or the longest there is.
+    """Distances over the shortest lag at which displacements exceed the noise, or the longest lag.
 
     Parameters
     ----------
-    series, species, jitter
-        See `distances_of`.
-    wanted : Wanted
+    series, species, noise
+        See `displacements_between`.
+    minimum : MinDisplacement
 
     Returns
     -------
     int
-        Pictures between the later and the middle one, and between that and the earlier: it
-        grows by a quarter from trial to trial. 0 when there are too few pictures or beads.
-    distances, square, variance, place_variance
-        See `distances_of`.
+        Lag in frames between the later and the middle frame, and between that and the earlier. It
+        grows by a quarter from trial to trial; 0 with too few frames or beads.
+    distances, square, variance, position_variance
+        See `displacements_between`.
     """
     last = series.stamps.size - 1
-    longest = last // 2
-    lag, square, variance, place_variance = 0, math.nan, math.nan, math.nan
+    max_lag = last // 2
+    lag, square, variance, position_variance = 0, math.nan, math.nan, math.nan
     distances = np.empty((3, 0))
-    while lag < longest:
-        tried = min(longest, max(lag + 1, lag * 5 // 4))
-        pictures = (last, last - tried, last - 2 * tried)
-        found, found_square, found_variance, found_place_variance = distances_of(
-            series, pictures, species, jitter
+    while lag < max_lag:
+        new_lag = min(max_lag, max(lag + 1, lag * 5 // 4))
+        frames = (last, last - new_lag, last - 2 * new_lag)
+        new_distances, new_square, new_variance, new_position_variance = displacements_between(
+            series, frames, species, noise
         )
-        if found.shape[1] < wanted.beads:
+        if new_distances.shape[1] < minimum.beads:
             break
-        lag, distances = tried, found
-        square, variance, place_variance = found_square, found_variance, found_place_variance
-        enough = max(wanted.variances * variance, wanted.place_variances * place_variance)
-        if square >= max(wanted.square, enough):
+        lag, distances = new_lag, new_distances
+        square, variance, position_variance = new_square, new_variance, new_position_variance
+        noise_square = max(
+            minimum.variances * variance, minimum.position_variances * position_variance
+        )
+        if square >= max(minimum.square, noise_square):
             break
-    return lag, distances, square, variance, place_variance
+    return lag, distances, square, variance, position_variance

@@ -1,9 +1,9 @@
 """Mean projected speed of the beads from their tracks.
 
-The distance between two places of a bead is longer than its way by the jitter of the places,
-and shorter where it collided in between. So it is taken over a time in which beads move well
-beyond the jitter; what the jitter adds is subtracted in squares; and from the same beads over
-twice the time follows how much collisions shorten it.
+Noise makes the distance between two positions of a bead longer than its path, collisions make it
+shorter. The distance is taken over a lag at which displacements are well above the noise. The
+variance of the noise is subtracted. Displacements over twice the lag give the shortening by
+collisions.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.stages.tracking.displacements import (
-    ALL,
-    Series,
-    Wanted,
-    far_enough,
-    jitter_of,
-    joined,
+    ALL_SPECIES,
+    MinDisplacement,
+    TrackSeries,
+    displacements_beyond_noise,
+    join_tracks,
+    position_noise,
 )
 
 if TYPE_CHECKING:
@@ -31,24 +31,23 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import Tracks
 
 RELIABLE_SHARE = 0.7
-"""Of the beads, to be followed through the window: with fewer, simulated speeds were off by more
-than 20 % now and then."""
+"""Smallest share of the beads with tracks through the window. With fewer, simulated speeds were
+sometimes wrong by more than 20 %."""
 
 _NS = 1e9
-# Least distance wanted, in units of the error of a coordinate: the jitter then adds 2 % to the
-# mean square.
-_LEAST_ERRORS = 14.0
-# The same for the errors that places share for a while, as those by patches of chalk; and the
-# part of it without which a speed is not to be relied upon.
-_PLACE_ERRORS = 4.0
-_SOME = 0.8
-# Fast beads are lost more often than slow ones: of the share that is lost, what the mean may be
-# too low by. Of grains a quarter was lost at 2 mm/s, and the mean was 10 % too low.
-_MISSING = 0.4
-# Fewer beads than this say nothing of a mean.
-_FEWEST = 3
-JITTER_PICTURES = 10
-"""Pictures from which the jitter is measured."""
+# Smallest displacement over the error of a coordinate: the noise then adds 2 % to the mean square.
+_MIN_NOISE_RATIO = 14.0
+# The same for errors that positions share for some time, such as those from patches of chalk; and
+# the part of it below which a speed is unreliable.
+_MIN_ERROR_RATIO = 4.0
+_RELIABLE_FACTOR = 0.8
+# Relative error of the mean over the share of lost beads: fast beads are lost more often. At
+# 2 mm/s a quarter of the grains was lost, and the mean was 10 % too low.
+_LOSS_BIAS = 0.4
+# Smallest number of beads of a mean.
+_MIN_BEADS = 3
+NOISE_FRAMES = 10
+"""Number of frames from which the noise is measured."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,16 +59,16 @@ class MeanSpeed:
     stamp_ns : int
         Middle of the window.
     mean_projected_speed, mean_projected_speed_error : float, [m/s]
-        The error is that of the measurement of these beads; not how they, as a sample, scatter.
-        NaN when unknown.
+        The error is that of the measurement, without the scatter of the sample of beads. NaN if
+        unknown.
     window : float, [s]
     beads : int
-        Beads followed through the window.
+        Number of beads with tracks through the window.
     share : float
-        Of the beads there are.
+        Share of the expected beads.
     reliable : bool
-        Whether enough beads were followed (where many are lost, others are confused), and far
-        enough to see beyond the errors of their places.
+        Whether enough beads have tracks (where many are lost, others are linked wrongly), and
+        displacements exceed the position errors.
     """
 
     stamp_ns: int
@@ -89,17 +88,16 @@ def mean_speed(
     Parameters
     ----------
     tracks : sequence of Tracks
-        Of one tray and in order, up to the present; the longer the series, the slower the beads
-        that can be measured.
+        Of one tray, in order, up to the present. Slow beads need a long series.
     least_distance : float, [m]
-        Beads should come so far in half of the window, where the series is long enough.
+        Smallest displacement in half of the window, if the series is long enough.
     species : int or None
-        Index of the species; all when None.
+        Index of the species; None for all.
 
     Returns
     -------
     MeanSpeed or None
-        None while there are fewer than three pictures or beads.
+        None with fewer than three frames or beads.
     """
     return mean_speeds(tracks, least_distance=least_distance, species=(species,))[0]
 
@@ -107,133 +105,141 @@ def mean_speed(
 def mean_speeds(
     tracks: Sequence[Tracks], *, least_distance: float, species: Sequence[int | None]
 ) -> list[MeanSpeed | None]:
-    """The same for several species, or all beads where None, of the same tracks."""
+    """Mean speeds of several species of the same tracks; None stands for all beads."""
     if not tracks:
         return [None for _ in species]
-    return mean_speeds_in(
-        joined(tracks),
-        joined(tracks[-JITTER_PICTURES:]),
+    return mean_speeds_of_series(
+        join_tracks(tracks),
+        join_tracks(tracks[-NOISE_FRAMES:]),
         tracks[-1].expected,
         least_distance=least_distance,
         species=species,
     )
 
 
-def mean_speeds_in(
-    series: Series,
-    recent: Series,
+def mean_speeds_of_series(
+    series: TrackSeries,
+    recent: TrackSeries,
     expected: NDArray[np.int32],
     *,
     least_distance: float,
     species: Sequence[int | None],
 ) -> list[MeanSpeed | None]:
-    """The same of tracks that are joined already.
+    """Mean speeds of several species of concatenated tracks.
 
     Parameters
     ----------
-    series : Series
-    recent : Series
-        The last `JITTER_PICTURES` of them.
+    series : TrackSeries
+    recent : TrackSeries
+        The last `NOISE_FRAMES` of them.
     expected : ndarray of int32, (species,)
-        Beads there are.
+        Number of beads in the tray.
     least_distance, species
-        As of `mean_speed`.
+        As in `mean_speed`.
     """
     return [
         _mean_speed(
             series,
             recent,
             least_distance,
-            ALL if one is None else one,
-            int(expected.sum() if one is None else expected[one]),
+            ALL_SPECIES if index is None else index,
+            int(expected.sum() if index is None else expected[index]),
         )
-        for one in species
+        for index in species
     ]
 
 
 def _mean_speed(
-    series: Series, recent: Series, least_distance: float, species: int, expected: int
+    series: TrackSeries, recent: TrackSeries, least_distance: float, species: int, expected: int
 ) -> MeanSpeed | None:
-    wanted = Wanted(least_distance * least_distance, _LEAST_ERRORS**2, _PLACE_ERRORS**2, _FEWEST)
-    lag, each, *means = far_enough(series, species, jitter_of(recent, species), wanted)
+    minimum = MinDisplacement(
+        least_distance * least_distance, _MIN_NOISE_RATIO**2, _MIN_ERROR_RATIO**2, _MIN_BEADS
+    )
+    lag, distance_rows, *means = displacements_beyond_noise(
+        series, species, position_noise(recent, species), minimum
+    )
     if not lag:
         return None
-    distances = _Distances(*each, *means)
+    distances = _Distances(*distance_rows, *means)
     last = series.stamps.size - 1
     first, middle, end = (int(series.stamps[last - k * lag]) for k in (2, 1, 0))
     window = (end - first) / _NS
-    share = distances.both.size / max(expected, 1)
+    share = distances.whole_window.size / max(expected, 1)
     value, error = distances.speed((end - middle) / _NS, (middle - first) / _NS)
-    error = math.hypot(error, _MISSING * max(1.0 - share, 0.0) * value)
+    error = math.hypot(error, _LOSS_BIAS * max(1.0 - share, 0.0) * value)
     return MeanSpeed(
         stamp_ns=(first + end) // 2,
         mean_projected_speed=value,
         mean_projected_speed_error=error,
         window=window,
-        beads=distances.both.size,
+        beads=distances.whole_window.size,
         share=share,
-        reliable=share >= RELIABLE_SHARE and distances.beyond_errors(),
+        reliable=share >= RELIABLE_SHARE and distances.exceed_errors(),
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Distances:
-    """Of each bead: in the later half of the window, in the earlier, in both.
+    """Distances of each bead in the later half of the window, in the earlier half and in both.
 
-    `square` is the mean square distance in half of the window; see `distances_of`.
+    `square` is the mean square distance in half of the window; see `displacements_between`.
     """
 
     later: NDArray[np.float64]
     earlier: NDArray[np.float64]
-    both: NDArray[np.float64]
+    whole_window: NDArray[np.float64]
     square: float
     variance: float
-    place_variance: float
+    position_variance: float
 
-    def beyond_errors(self) -> bool:
-        """Whether distances are beyond what chalk that turns does to places."""
-        return self.square >= (_SOME * _PLACE_ERRORS) ** 2 * self.place_variance
+    def exceed_errors(self) -> bool:
+        """Whether displacements exceed the position errors, such as those from rotating chalk."""
+        return self.square >= (_RELIABLE_FACTOR * _MIN_ERROR_RATIO) ** 2 * self.position_variance
 
     def speed(self, later_time: float, earlier_time: float) -> tuple[float, float]:
         half = 0.5 * (
             _mean_distance(self.later, self.variance) / later_time
             + _mean_distance(self.earlier, self.variance) / earlier_time
         )
-        whole = _mean_distance(self.both, self.variance) / (later_time + earlier_time)
+        full = _mean_distance(self.whole_window, self.variance) / (later_time + earlier_time)
         # Collisions shorten the distance in proportion to the time, to first order.
-        shortened = max(half - whole, 0.0)
-        jitter = self._jitter_error(0.5 * (later_time + earlier_time) * half)
+        shortened = max(half - full, 0.0)
+        noise_error = self._jitter_error(0.5 * (later_time + earlier_time) * half)
         per_time = 2.0 / (later_time + earlier_time)
-        bead = np.hypot(self.later - self.earlier, 1e-3 * self.later) * per_time
-        scatter = 0.5 * math.sqrt(_mean(bead * bead)) / math.sqrt(self.both.size)
-        shared = self._shared_share() * half
-        error = math.hypot(jitter * per_time, 0.5 * shortened, 0.8 * scatter, 0.5 * shared)
+        bead_scatter = np.hypot(self.later - self.earlier, 1e-3 * self.later) * per_time
+        scatter = (
+            0.5 * math.sqrt(_mean(bead_scatter * bead_scatter)) / math.sqrt(self.whole_window.size)
+        )
+        shared_error = self._shared_share() * half
+        error = math.hypot(
+            noise_error * per_time, 0.5 * shortened, 0.8 * scatter, 0.5 * shared_error
+        )
         return max(half + shortened, 0.0), error
 
     def _shared_share(self) -> float:
-        """Of a distance, what errors that places share for a while may add to it."""
-        more = max(self.place_variance - self.variance, 0.0)
-        return 1.0 - math.sqrt(max(1.0 - 4.0 * more / max(self.square, 1e-18), 0.0))
+        """Relative error of a distance from errors that positions share for some time."""
+        shared_variance = max(self.position_variance - self.variance, 0.0)
+        return 1.0 - math.sqrt(max(1.0 - 4.0 * shared_variance / max(self.square, 1e-18), 0.0))
 
     def _jitter_error(self, mean: float) -> float:
-        """What jitter leaves open of a mean distance; less of a long one than of none, [m]."""
-        of_square = 4.0 * self.variance / math.sqrt(self.both.size)
-        of_none = min(math.sqrt(of_square), 0.5 * of_square / max(mean, 1e-12))
-        return math.hypot(math.sqrt(2.0 * self.variance / self.both.size), of_none)
+        """Error of a mean distance from noise, [m]; smaller for a long distance than for none."""
+        square_error = 4.0 * self.variance / math.sqrt(self.whole_window.size)
+        rest_error = min(math.sqrt(square_error), 0.5 * square_error / max(mean, 1e-12))
+        return math.hypot(math.sqrt(2.0 * self.variance / self.whole_window.size), rest_error)
 
 
 def _mean_distance(distances: NDArray[np.float64], variance: float) -> float:
-    """Mean distance without the jitter of its ends, for places that scatter as Gaussians.
+    """Mean distance corrected for Gaussian noise of both positions.
 
-    Exact for a Maxwellian gas, where the jitter widens a Gaussian by another.
+    Exact for a Maxwellian gas.
     """
     square = _mean(distances * distances)
-    left = square - 4.0 * variance
-    if left <= 0.0:
+    corrected = square - 4.0 * variance
+    if corrected <= 0.0:
         return 0.0
-    return _mean(distances) * math.sqrt(left / square)
+    return _mean(distances) * math.sqrt(corrected / square)
 
 
 def _mean(values: NDArray[np.float64]) -> float:
-    """As of numpy, which takes longer to find out over what."""
+    """Mean of an array, faster than `numpy.mean` for short arrays."""
     return float(np.add.reduce(values)) / values.size

@@ -1,4 +1,4 @@
-"""The last tracks of a tray, kept in one set of arrays."""
+"""Sliding window of the tracks of a tray, in contiguous arrays."""
 
 from __future__ import annotations
 
@@ -7,28 +7,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.stages.tracking.displacements import Series
+from nanorocks_ros.stages.tracking.displacements import TrackSeries
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.records import Tracks
 
-# Room that is made at once, in beads; what is kept is moved to the front when that is full.
-_ROOM = 4096
+# Smallest capacity in beads; the valid rows are moved to the front when it is exhausted.
+_MIN_CAPACITY = 4096
 
 
-class RecentTracks:
-    """Tracks up to the present, to which one picture is added at a time.
+class TrackWindow:
+    """Tracks up to the present; one frame is added at a time.
 
-    Joining all of them anew for every speed took a third of its time.
+    Concatenating all records for every speed took a third of its time.
     """
 
     def __init__(self) -> None:
         self._stamps: deque[int] = deque()
         self._counts: deque[int] = deque()
         self._end = 0
-        # Numbers, species, and so on: the fields of a series that have an entry for each bead.
+        # The fields of a `TrackSeries` that have an entry for each bead.
         self._columns: list[NDArray[Any]] = []
 
     def __len__(self) -> int:
@@ -36,17 +36,17 @@ class RecentTracks:
 
     @property
     def stamps(self) -> list[int]:
-        """Of the pictures, [ns]."""
+        """Stamps of the frames, [ns]."""
         return list(self._stamps)
 
     def clear(self) -> None:
-        """Forget them all."""
+        """Remove all frames."""
         self._stamps.clear()
         self._counts.clear()
         self._end = 0
 
     def push(self, tracks: Tracks, since_ns: int) -> None:
-        """Add a picture, and forget those before a stamp."""
+        """Add a frame, and remove those before a stamp."""
         new: list[NDArray[Any]] = [
             tracks.ids,
             tracks.species,
@@ -57,7 +57,7 @@ class RecentTracks:
         while self._stamps and self._stamps[0] < since_ns:
             self._stamps.popleft()
             self._counts.popleft()
-        self._make_room(new)
+        self._grow(new)
         last = self._end + tracks.ids.size
         for column, values in zip(self._columns, new, strict=True):
             column[self._end : last] = values
@@ -65,22 +65,24 @@ class RecentTracks:
         self._stamps.append(tracks.stamp_ns)
         self._counts.append(tracks.ids.size)
 
-    def _make_room(self, new: list[NDArray[Any]]) -> None:
+    def _grow(self, new: list[NDArray[Any]]) -> None:
         kept, needed = sum(self._counts), len(new[0])
         if self._columns and self._end + needed <= len(self._columns[0]):
             return
-        room = max(_ROOM, 3 * (kept + needed))
+        capacity = max(_MIN_CAPACITY, 3 * (kept + needed))
         old = self._columns
-        self._columns = [np.empty((room, *one.shape[1:]), dtype=one.dtype) for one in new]
+        self._columns = [
+            np.empty((capacity, *values.shape[1:]), dtype=values.dtype) for values in new
+        ]
         for column, values in zip(self._columns, old, strict=False):
             column[:kept] = values[self._end - kept : self._end]
         self._end = kept
 
-    def series(self, pictures: int | None = None) -> Series:
-        """The last so many pictures, or all of them; there must be one."""
-        first = 0 if pictures is None else max(len(self._stamps) - pictures, 0)
+    def series(self, frames: int | None = None) -> TrackSeries:
+        """The last `frames` frames, or all; there must be one."""
+        first = 0 if frames is None else max(len(self._stamps) - frames, 0)
         counts = np.array(self._counts, dtype=np.int64)[first:]
-        here = slice(self._end - int(counts.sum()), self._end)
+        rows = slice(self._end - int(counts.sum()), self._end)
         stamps = np.array(self._stamps, dtype=np.int64)[first:]
         ends = np.concatenate([[0], np.cumsum(counts)])
-        return Series._make((stamps, ends, *(values[here] for values in self._columns)))
+        return TrackSeries._make((stamps, ends, *(values[rows] for values in self._columns)))

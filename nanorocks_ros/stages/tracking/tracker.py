@@ -1,4 +1,4 @@
-"""From the colour crops of a tray to its beads, each with a number that it keeps."""
+"""Particle tracking: positions of the beads of a tray, linked from frame to frame."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from nanorocks_ros.records import Quality, Tracks, TrayImage
 from nanorocks_ros.stages.tracking.detection.bead_detector import BeadDetector
 from nanorocks_ros.stages.tracking.linking.track_linker import Linker
 from nanorocks_ros.stages.tracking.linking.track_snapshot import (
+    allocate_snapshot,
     count_seen,
     in_metres,
-    room_in_view,
 )
 
 if TYPE_CHECKING:
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
 
 _NS = 1e9
-# Of the beads of a species, a share below which speeds and counts are not to be relied upon.
-_FEW = 0.85
-# What light, shadow and an uneven outline move a bead by, the same from picture to picture, so
-# that velocities have no part in it, [px]: measured with all effects of the simulated camera;
-# under chalk; and among grains that are not followed.
+# Visible share of a species below which speeds and counts are unreliable.
+_MIN_VISIBLE_SHARE = 0.85
+# Systematic error of a position from light, shadow and an uneven outline, [px]. It is the same in
+# successive frames and does not affect velocities. Measured with all effects of the simulated
+# camera; under chalk; and among grains that are not tracked.
 _SYSTEMATIC_PX = {'acrylic': 0.09, 'glass': 0.09, 'copper': 0.2, 'JSC-1': 0.3}
 _CHALKY_PX = {'acrylic': 0.5, 'glass': 0.6, 'copper': 1.3}
 _CROWDED_PX = 0.6
@@ -36,7 +36,7 @@ _UNKNOWN_PX = 0.3
 
 
 class Tracker:
-    """Follows the beads of one tray.
+    """Tracks the beads of one tray.
 
     Parameters
     ----------
@@ -48,67 +48,76 @@ class Tracker:
         self._settings = settings.tracking
         self._scale = settings.preprocess.pixels_per_metre
         self._tray = tray
-        self._expected = np.array([one.count for one in tray.species], dtype=np.int32)
-        self._restart()
+        self._expected = np.array([species.count for species in tray.species], dtype=np.int32)
+        self.reset()
 
-    def _restart(self) -> None:
+    def reset(self) -> None:
+        """Forget the tracks and the background: the next image is the first one."""
         self._detector = BeadDetector(self._settings, self._tray, self._scale)
         self._linkers: list[Linker] = []
         self._first_ns = 0
         self._last_ns: int | None = None
-        self._next_number = 0
+        self._next_id = 0
 
     @property
     def darkness(self) -> NDArray[np.uint8] | None:
-        """Of the last image, where beads are looked for: 0 floor, 255 black; None before it."""
+        """Darkness map of the last image: 0 background, 255 black; None before the first image."""
         return self._detector.darkness
 
     @property
     def crowded(self) -> bool:
-        """Whether a species has too many grains to be followed."""
+        """Whether a species has too many grains to be tracked."""
         return self._detector.crowded
 
     def push(self, image: TrayImage) -> tuple[Tracks, ...]:
-        """The beads of the next image of the tray.
+        """Detect and link the beads of the next image of the tray.
 
         Returns
         -------
         tuple of Tracks
-            One; none for a gray image, in which species cannot be told apart. A stamp that
-            goes back starts all afresh.
+            One record; none for a gray image, since colour separates the species. A stamp that
+            goes back resets the stage.
         """
         if image.color is None:
             return ()
         if self._last_ns is not None and image.stamp_ns <= self._last_ns:
-            self._restart()
+            self.reset()
         if not self._linkers:
             self._first_ns = image.stamp_ns
-            self._linkers = [self._linker(one, image.gray.shape) for one in self._tray.species]
+            self._linkers = [
+                self._linker_of(species, image.gray.shape) for species in self._tray.species
+            ]
         self._last_ns = image.stamp_ns
         time = (image.stamp_ns - self._first_ns) / _NS
-        # Beads fly straight past the camera, not past a tray that swings.
-        displacement = np.array([_known(one) for one in image.displacement])
+        # Beads fly straight in the camera frame, not in the frame of a swinging tray.
+        displacement = np.array([_zero_if_nan(value) for value in image.displacement])
         shift = displacement * self._scale
-        registration = _known(image.displacement_error) * self._scale
+        registration = _zero_if_nan(image.displacement_error) * self._scale
         hints = [linker.hints(time, shift) for linker in self._linkers]
         detected = self._detector.detect(image.color, hints)
-        for linker, found in zip(self._linkers, detected, strict=True):
-            errors = np.hypot(found.place_errors, registration)
-            moved = replace(found, places=found.places + shift, place_errors=errors)
-            self._next_number += linker.push(time, moved, shift, self._next_number)
+        for linker, detections in zip(self._linkers, detected, strict=True):
+            errors = np.hypot(detections.position_errors, registration)
+            shifted = replace(
+                detections, positions=detections.positions + shift, position_errors=errors
+            )
+            self._next_id += linker.push(time, shifted, shift, self._next_id)
         return (self._tracks(image, time, displacement),)
 
-    def _linker(self, species: Species, shape: tuple[int, ...]) -> Linker:
+    def flush(self) -> tuple[Tracks, ...]:
+        """Give out nothing: `push` returns the tracks of an image at once."""
+        return ()
+
+    def _linker_of(self, species: Species, shape: tuple[int, ...]) -> Linker:
         return Linker(
             species.count,
             (float(shape[1]), float(shape[0])),
-            self._settings.fastest * self._scale,
-            self._settings.longest_gap,
+            self._settings.max_speed * self._scale,
+            self._settings.memory,
             self._settings.window,
-            self._systematic(species.material),
+            self._systematic_error(species.material),
         )
 
-    def _systematic(self, material: str) -> float:
+    def _systematic_error(self, material: str) -> float:
         if self._tray.chalk:
             return _CHALKY_PX.get(material, _CROWDED_PX)
         if self._detector.crowded:
@@ -117,19 +126,19 @@ class Tracker:
 
     def _tracks(self, image: TrayImage, time: float, displacement: NDArray[np.float64]) -> Tracks:
         shift = displacement * self._scale
-        view = room_in_view(sum(len(linker) for linker in self._linkers))
+        snapshot = allocate_snapshot(sum(len(linker) for linker in self._linkers))
         end = 0
         for k, linker in enumerate(self._linkers):
-            end = linker.show(time, shift, k, view, end)
-        order = np.argsort(view.ids[:end], kind='stable')
-        beads = in_metres(view, order, 1.0 / self._scale, displacement)
+            end = linker.write_snapshot(time, shift, k, snapshot, end)
+        order = np.argsort(snapshot.ids[:end], kind='stable')
+        beads = in_metres(snapshot, order, 1.0 / self._scale, displacement)
         return Tracks(
             stamp_ns=image.stamp_ns,
             tray=self._tray.number,
             ids=beads.ids,
             species=beads.species,
             displacement=displacement,
-            positions=beads.places,
+            positions=beads.positions,
             position_errors=beads.errors,
             velocities=beads.velocities,
             velocity_errors=beads.velocity_errors,
@@ -137,16 +146,16 @@ class Tracker:
             radius_errors=beads.radius_errors,
             seen=beads.seen,
             expected=self._expected,
-            quality=image.quality | self._few(beads.species, beads.seen),
+            quality=image.quality | self._quality_of(beads.species, beads.seen),
         )
 
-    def _few(self, species: NDArray[np.int32], seen: NDArray[np.bool_]) -> Quality:
-        """What the species of the beads that are seen say of how many are not."""
+    def _quality_of(self, species: NDArray[np.int32], seen: NDArray[np.bool_]) -> Quality:
+        """FEW_BEADS if too few beads of a species are visible."""
         counts = count_seen(species, seen, self._expected.size)
-        few = (counts < _FEW * self._expected).any()
-        return Quality.FEW_BEADS if few else Quality(0)
+        is_short = (counts < _MIN_VISIBLE_SHARE * self._expected).any()
+        return Quality.FEW_BEADS if is_short else Quality(0)
 
 
-def _known(value: float) -> float:
-    """The value, or 0 where it is not known."""
+def _zero_if_nan(value: float) -> float:
+    """The value, or 0 for NaN."""
     return 0.0 if math.isnan(value) else value

@@ -66,7 +66,7 @@ class BagFrames:
 
     @property
     def where(self) -> str:
-        """What to call these frames in an error."""
+        """Name of the frames in an error message."""
         return f'{self.reader.path}: {self.topic}'
 
     def epoch_ns(self) -> int | None:
@@ -149,17 +149,17 @@ class BagFrames:
             except FrameError as error:
                 yield message, error
             except RecordingError as error:
-                # Of the others nothing is known to be wrong.
+                # The other frames may be intact.
                 yield message, FrameError(error.where, error.what, error.do)
 
     def truth(self, epoch_ns: int) -> dict[int, list[GroundTruth]]:
-        """What the simulator knew, by tray; empty for a real recording."""
+        """The recorded truth of a simulation, by tray; empty for a real recording."""
         names = [
             name
             for name, info in self.reader.topics.items()
             if name.endswith('/truth') and info.type == topics.ARRAY and topics.tray_of(name)
         ]
-        found: dict[int, list[GroundTruth]] = {}
+        by_tray: dict[int, list[GroundTruth]] = {}
         refusals: list[RecordingError | FrameError] = []
         for message in self.reader.messages(names) if names else ():
             tray = topics.tray_of(message.topic) or 0
@@ -171,12 +171,12 @@ class BagFrames:
             except (FrameError, RecordingError) as error:
                 refusals.append(error)
             else:
-                found.setdefault(tray, []).append(record)
+                by_tray.setdefault(tray, []).append(record)
         if refusals:
             self.notices.append(
                 f'{len(refusals)} messages of the truth cannot be used, the first: {refusals[0]}'
             )
-        return found
+        return by_tray
 
 
 def _nanoseconds(time: Any) -> int:

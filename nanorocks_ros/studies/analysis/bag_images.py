@@ -1,4 +1,4 @@
-"""The tray images of a bag: its frames, preprocessed, for whoever looks at images offline."""
+"""The tray images of a bag: its frames, preprocessed."""
 
 from __future__ import annotations
 
@@ -88,16 +88,16 @@ class BagImages:
 
     @property
     def notices(self) -> list[str]:
-        """What the user should hear about, once the frames have been read."""
-        said = [*self.bag.reader.notices, *self._notices]
+        """Notices for the user, complete once the frames have been read."""
+        notices = [*self.bag.reader.notices, *self._notices]
         if self.refused is not None:
-            said.append(str(self.refused))
+            notices.append(str(self.refused))
         if self.view is None:
-            said.append(
+            notices.append(
                 f'{self.bag.where}: no camera_info and no calibration file; the picture is taken '
                 'as straight'
             )
-        return said
+        return notices
 
     def shots(self, progress: Callable[[int, int], None] | None = None) -> Iterator[Shot]:
         """Every frame that can be decoded, in order; once.

@@ -65,7 +65,7 @@ def track_bag(
     image_topic: str = '',
     progress: Callable[[int, int], None] | None = None,
 ) -> TrackedBag:
-    """Follow the beads of a bag.
+    """Track the beads of a bag.
 
     Parameters
     ----------

@@ -78,7 +78,7 @@ class PackingCurve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Compaction:
-    """What becomes of the clusters of one cycle between the widest autocorrelation and the end.
+    """Compaction of the clusters of one cycle between the widest autocorrelation and the end.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What results of an analysis say of each shaking cycle: peak speed, restitution, cluster size."""
+"""Summary of each shaking cycle from the tables: peak speed, restitution, cluster size."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _KNOWN = (CorStatus.COOLING, CorStatus.FINAL)
 
 
 class SizeMeasure(NamedTuple):
-    """What a cluster size is read from: a table, its column, that of the error, and its unit."""
+    """A measure of cluster size: table, column, column of the error, unit."""
 
     table: str
     column: str
@@ -84,11 +84,11 @@ class CycleSummary:
 def size_measure(trays: Mapping[Path, tuple[int, ...]]) -> SizeMeasure:
     """The best measure of cluster size that all results have: folders, and their trays."""
 
-    def has(folder: Path, number: int, one: SizeMeasure) -> bool:
-        path = folder / f'tray_{number}_{one.table}.csv'
+    def has(folder: Path, number: int, measure_checked: SizeMeasure) -> bool:
+        path = folder / f'tray_{number}_{measure_checked.table}.csv'
         if not path.is_file():
             return False
-        values = read_columns(path, (), (one.column,)).get(one.column)
+        values = read_columns(path, (), (measure_checked.column,)).get(measure_checked.column)
         return values is not None and bool(np.isfinite(values).any())
 
     for measure in SIZE_MEASURES[:-1]:
@@ -130,7 +130,7 @@ def cycles_of(folder: Path, tray: int, measure: SizeMeasure) -> list[CycleSummar
     for cycle in np.unique(speeds['cycle'][known]):
         own = known & (speeds['cycle'] == cycle)
         start = float(speeds['cycle_start'][own][0])
-        # Of a recording that was played twice the first time is enough.
+        # If a recording was played twice, the first pass is used.
         own &= speeds['cycle_start'] == start
         end = float(speeds['time'][own].max())
         summaries.append(
@@ -151,7 +151,7 @@ def cycles_of(folder: Path, tray: int, measure: SizeMeasure) -> list[CycleSummar
 def _table(
     path: Path, wanted: Sequence[str], optional: Sequence[str] = ()
 ) -> dict[str, NDArray[np.float64]]:
-    """Columns of a table that need not be there."""
+    """Columns of a table; empty columns if the table is missing."""
     if not path.is_file():
         return {name: np.zeros(0) for name in wanted}
     return read_columns(path, wanted, optional)
@@ -162,7 +162,7 @@ def _peak(
 ) -> dict[str, float]:
     early = own & (speeds['time'] - start <= _PEAK) & np.isfinite(speeds['mean_projected_speed'])
     if 'quality' in speeds:
-        # Wrong by nobody knows how much.
+        # Speeds at a wrong scale have an unknown error.
         early &= (speeds['quality'].astype(np.int64) & Quality.WRONG_SCALE) == 0
     if not early.any():
         return {'peak_speed': math.nan, 'peak_speed_error': math.nan}

@@ -63,15 +63,15 @@ class Campaign:
 
     def values(self, tray: int, quantity: str) -> NDArray[np.float64]:
         """One quantity of one tray by place, (places,); NaN where not known."""
-        found = np.full(self.places, math.nan)
+        values = np.full(self.places, math.nan)
         for cycle in self.cycles:
             if cycle.tray == tray:
-                found[cycle.place] = getattr(cycle, quantity)
-        return found
+                values[cycle.place] = getattr(cycle, quantity)
+        return values
 
 
 def read_campaign(folders: Sequence[Path], false_alarms: float = 0.01) -> Campaign:
-    """Everything that results of `nanorocks analyse` say cycle by cycle.
+    """The cycles in results of `nanorocks analyse`, with trends.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def read_campaign(folders: Sequence[Path], false_alarms: float = 0.01) -> Campai
         {number: cycles_of(folder, number, measure) for number in numbers}
         for folder, numbers in trays.items()
     ]
-    if not any(own for found in recordings for own in found.values()):
+    if not any(own for recording in recordings for own in recording.values()):
         raise RecordingError(
             ', '.join(str(folder) for folder in folders),
             'hold no cycle after a shaking event',
@@ -129,16 +129,16 @@ def campaign_of(
     """
     cycles: list[CycleSummary] = []
     places = 0
-    for found in recordings:
+    for recording in recordings:
         # Trays are filmed together, but a shaking event may be missed in one of them.
-        known = sorted({summary.cycle for own in found.values() for summary in own})
+        known = sorted({summary.cycle for own in recording.values() for summary in own})
         cycles += [
             _placed(summary, places + known.index(summary.cycle))
-            for own in found.values()
+            for own in recording.values()
             for summary in own
         ]
         places += len(known)
-    cycles.sort(key=lambda one: (one.place, one.tray))
+    cycles.sort(key=lambda summary: (summary.place, summary.tray))
     campaign = Campaign(
         cycles=tuple(cycles), places=places, measure=measure, trends={}, periods=()
     )
@@ -196,5 +196,5 @@ def in_period(campaign: Campaign, place: int) -> bool:
     return any(period.first <= place <= period.last for period in campaign.periods)
 
 
-def _placed(one: CycleSummary, place: int) -> CycleSummary:
-    return replace(one, place=place)
+def _placed(summary: CycleSummary, place: int) -> CycleSummary:
+    return replace(summary, place=place)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,51 +25,104 @@ from nanorocks_ros.records import (
     TrayImage,
 )
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+from nanorocks_ros.wire.products import MEASURED, is_measured
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
-    from nanorocks_ros.inference.cycle_likelihoods import Evidence
+    from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
     from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
     from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.pipeline.composition import Result
+    from nanorocks_ros.records import ArrayRecord, RecordType
     from nanorocks_ros.settings import PipelineSettings
 
 NS = 1_000_000_000
 
-# Where the records of a tray are kept.
-_LISTS: dict[type, str] = {
-    SpeedEstimate: 'speeds',
-    ClusterEstimate: 'clusters',
-    CorEstimate: 'cors',
-    Rebound: 'rebounds',
-    PairCollision: 'collisions',
-    BodyEstimate: 'bodies',
-    Merge: 'merges',
-}
 # A gap of more than this many usual intervals means that frames are missing.
 _GAP = 1.5
 
 
-@dataclass(slots=True, kw_only=True)
 class TrayResults:
     """Everything that was measured in one tray, in order of time.
 
-    Beside the records stands what its cycles say of restitutions and sticking, so that those of
-    other recordings can be added: `evidence`, `sticking`.
+    Parameters
+    ----------
+    records : iterable of ArrayRecord
+        Of any kinds that the register of products calls measured.
+    truth : list of GroundTruth
+        Of a simulated recording.
+    spool_file : SpoolFile, optional
+        Where the records are kept; None: in memory.
+
+    Attributes
+    ----------
+    evidence : CycleLikelihoods or None
+        What the cycles say of the restitutions, so that cycles of other recordings can be added.
+    sticking : tuple of StickingCycle
+        What they say of the sticking speed.
     """
 
-    speeds: list[SpeedEstimate] | Spool[SpeedEstimate] = field(default_factory=list)
-    clusters: list[ClusterEstimate] | Spool[ClusterEstimate] = field(default_factory=list)
-    cors: list[CorEstimate] | Spool[CorEstimate] = field(default_factory=list)
-    rebounds: list[Rebound] | Spool[Rebound] = field(default_factory=list)
-    collisions: list[PairCollision] | Spool[PairCollision] = field(default_factory=list)
-    bodies: list[BodyEstimate] | Spool[BodyEstimate] = field(default_factory=list)
-    merges: list[Merge] | Spool[Merge] = field(default_factory=list)
-    truth: list[GroundTruth] = field(default_factory=list)
-    evidence: Evidence | None = None
-    sticking: tuple[StickingCycle, ...] = ()
+    def __init__(
+        self,
+        records: Iterable[ArrayRecord] = (),
+        *,
+        truth: list[GroundTruth] | None = None,
+        spool_file: SpoolFile | None = None,
+    ) -> None:
+        self._by_type: dict[type, Any] = {
+            product.record: [] if spool_file is None else Spool(spool_file) for product in MEASURED
+        }
+        self.truth = truth or []
+        self.evidence: CycleLikelihoods | None = None
+        self.sticking: tuple[StickingCycle, ...] = ()
+        for record in records:
+            self.add(record)
+
+    def add(self, record: ArrayRecord) -> None:
+        """Append a record to those of its kind."""
+        self._by_type[type(record)].append(record)
+
+    def of(self, record_type: type[RecordType]) -> Sequence[RecordType]:
+        """The records of one kind, in the order in which they were added."""
+        records: Sequence[RecordType] = self._by_type[record_type]
+        return records
+
+    @property
+    def speeds(self) -> Sequence[SpeedEstimate]:
+        """Mean projected speeds."""
+        return self.of(SpeedEstimate)
+
+    @property
+    def clusters(self) -> Sequence[ClusterEstimate]:
+        """Cluster sizes and sticking speeds."""
+        return self.of(ClusterEstimate)
+
+    @property
+    def cors(self) -> Sequence[CorEstimate]:
+        """Coefficients of restitution."""
+        return self.of(CorEstimate)
+
+    @property
+    def rebounds(self) -> Sequence[Rebound]:
+        """Rebounds from walls."""
+        return self.of(Rebound)
+
+    @property
+    def collisions(self) -> Sequence[PairCollision]:
+        """Collisions of two beads."""
+        return self.of(PairCollision)
+
+    @property
+    def bodies(self) -> Sequence[BodyEstimate]:
+        """Counts of single beads and clusters."""
+        return self.of(BodyEstimate)
+
+    @property
+    def merges(self) -> Sequence[Merge]:
+        """Merges of two beads."""
+        return self.of(Merge)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -207,20 +260,13 @@ def analyse(
 def _empty(
     trays: Iterable[int], truth: Mapping[int, list[GroundTruth]], scratch: Path | None
 ) -> dict[int, TrayResults]:
-    """A place for the records of each tray."""
-    if scratch is None:
-        return {n: TrayResults(truth=truth.get(n, [])) for n in trays}
-    file = SpoolFile(scratch)
-    found = {}
-    for n in trays:
-        found[n] = TrayResults(truth=truth.get(n, []))
-        for name in _LISTS.values():
-            setattr(found[n], name, Spool(file))
-    return found
+    """Empty results of each tray."""
+    file = None if scratch is None else SpoolFile(scratch)
+    return {tray: TrayResults(truth=truth.get(tray), spool_file=file) for tray in trays}
 
 
 def _remarks(pipeline: Pipeline, where: str) -> list[str]:
-    """What the user should know of the frames as a whole."""
+    """Notices on the frames as a whole."""
     stage = pipeline.preprocessor
     remarks = []
     if stage.view is None:
@@ -243,5 +289,5 @@ def _keep(result: Analysis, records: Iterable[Result]) -> None:
     for record in records:
         if isinstance(record, Notice):
             result.notices.append(record.text)
-        elif type(record) in _LISTS:
-            getattr(result.trays[record.tray], _LISTS[type(record)]).append(record)
+        elif is_measured(record):
+            result.trays[record.tray].add(record)

@@ -29,10 +29,10 @@ def trays_of(folder: Path, table: str) -> tuple[int, ...]:
     if not folder.is_dir():
         raise RecordingError(str(folder), 'is no folder', _FORM)
     names = (path.stem.split('_') for path in folder.glob(f'tray_*_{table}.csv'))
-    found = tuple(sorted(int(name[1]) for name in names if len(name) == 3 and name[1].isdigit()))
-    if not found:
+    trays = tuple(sorted(int(name[1]) for name in names if len(name) == 3 and name[1].isdigit()))
+    if not trays:
         raise RecordingError(str(folder), f'holds no tray_K_{table}.csv', _FORM)
-    return found
+    return trays
 
 
 def read_columns(
@@ -49,7 +49,7 @@ def read_columns(
         with path.open(encoding='utf-8', newline='') as stream:
             lines = (line for line in csv.reader(stream) if line)
             names = [name.split('[')[0].strip() for name in next(lines, [])]
-            missing = [one for one in wanted if one not in names]
+            missing = [name for name in wanted if name not in names]
             if missing:
                 raise RecordingError(str(path), f'has no column {", ".join(missing)}', _FORM)
             kept = [k for k, name in enumerate(names) if name in {*wanted, *optional}]

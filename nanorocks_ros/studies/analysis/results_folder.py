@@ -23,13 +23,14 @@ from nanorocks_ros.recordings.bag.offered_topics import offered
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import float_array_message, time_message
 from nanorocks_ros.settings import rows
-from nanorocks_ros.studies.analysis.offline_analysis import TrayResults
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.array_layouts import ArrayRecord, layout, to_array
+from nanorocks_ros.wire.array_layouts import layout, to_array
+from nanorocks_ros.wire.products import MEASURED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from nanorocks_ros.records import ArrayRecord
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.analysis.offline_analysis import Analysis
 
@@ -46,7 +47,7 @@ _NEVER_NS = np.iinfo(np.int64).max
 
 
 def check_results_folder(folder: Path) -> Path:
-    """See before hours of work that results may go to a folder.
+    """Check, before hours of work, that a folder can take results.
 
     Returns
     -------
@@ -106,9 +107,9 @@ def write_results(
             (fresh / RESULTS_MARK).touch()
             provenance = _provenance(source, settings)
             for number, results in analysis.trays.items():
-                for name, records in _tables(results).items():
-                    if records:
-                        path = fresh / f'tray_{number}_{name}.{form}'
+                for product in MEASURED:
+                    if records := results.of(product.record):
+                        path = fresh / f'tray_{number}_{product.name}.{form}'
                         _write_table(path, records, analysis.epoch_ns, provenance)
             _write_bag(analysis, fresh / BAG_NAME, provenance)
             if more is not None:
@@ -124,9 +125,10 @@ def write_results(
 
 
 def _keep_others(folder: Path, fresh: Path) -> None:
-    """Take over what somebody put beside earlier results: a figure, notes."""
-    # What an earlier analysis wrote, also that of a batch, would not belong to the new one.
-    tables = rf'tray_\d+_({"|".join(_tables(TrayResults()))})\.({"|".join(FORMATS)})'
+    """Keep files that a user put beside earlier results: a figure, notes."""
+    # Files of an earlier analysis, also of a batch, do not belong to the new results.
+    table_names = '|'.join(product.name for product in MEASURED)
+    tables = rf'tray_\d+_({table_names})\.({"|".join(FORMATS)})'
     names = map(re.escape, (RESULTS_MARK, BAG_NAME, SUMMARY, EVIDENCE))
     ours = re.compile('|'.join([tables, *names]))
     for path in folder.iterdir():
@@ -144,18 +146,6 @@ def _linked(source: str | Path, target: str | Path) -> None:
         os.link(source, target, follow_symlinks=False)
     except OSError:
         shutil.copy2(source, target, follow_symlinks=False)
-
-
-def _tables(results: TrayResults) -> dict[str, Sequence[ArrayRecord]]:
-    return {
-        'speed': results.speeds,
-        'cluster': results.clusters,
-        'cor': results.cors,
-        'rebound': results.rebounds,
-        'collision': results.collisions,
-        'bodies': results.bodies,
-        'merge': results.merges,
-    }
 
 
 def _write_table(
@@ -190,18 +180,10 @@ def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> No
     table = {epoch_topic: offered(topics.EPOCH)}
     streams: list[Iterator[tuple[str, ArrayRecord]]] = []
     for number, results in analysis.trays.items():
-        for topic, records in (
-            (topics.SPEED, results.speeds),
-            (topics.CLUSTER, results.clusters),
-            (topics.COR, results.cors),
-            (topics.REBOUND, results.rebounds),
-            (topics.COLLISION, results.collisions),
-            (topics.BODIES, results.bodies),
-            (topics.MERGE, results.merges),
-        ):
-            name = topic.absolute(number)
-            table[name] = offered(topic)
-            streams.append(zip(itertools.repeat(name), _in_order(records)))
+        for product in MEASURED:
+            name = product.topic.absolute(number)
+            table[name] = offered(product.topic)
+            streams.append(zip(itertools.repeat(name), _in_order(results.of(product.record))))
     with BagWriter(path, table, metadata=provenance) as bag:
         bag.write(epoch_topic, analysis.epoch_ns, time_message(analysis.epoch_ns))
         for name, record in heapq.merge(*streams, key=lambda item: item[1].stamp_ns):
@@ -211,7 +193,7 @@ def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> No
 
 
 def _in_order(records: Sequence[ArrayRecord]) -> Iterator[ArrayRecord]:
-    """By their stamps; in memory are only those that wait for earlier ones further on."""
+    """The records sorted by stamp; only records ahead of earlier ones are held in memory."""
     stamps = np.fromiter((record.stamp_ns for record in records), np.int64, len(records))
     # The earliest of those that come later.
     to_come = np.minimum.accumulate(np.append(stamps, _NEVER_NS)[::-1])[::-1][1:]

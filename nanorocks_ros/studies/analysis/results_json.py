@@ -2,20 +2,43 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.records import ClusterEstimate, CorEstimate, CorStatus
 from nanorocks_ros.wire.array_layouts import NS, layout
+from nanorocks_ros.wire.flat_records import flat_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from nanorocks_ros.records import ArrayRecord
     from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
 
 
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+# Elements of the arrays, under the same names in the object.
+_SPEEDS = (
+    'mean_projected_speed',
+    'mean_projected_speed_error',
+    'first_species_speed',
+    'second_species_speed',
+)
+_RESTITUTIONS = (
+    *('initial_speed', 'initial_speed_error', 'haff_time', 'haff_time_error'),
+    *('restitution', 'restitution_lower', 'restitution_upper'),
+    *('wall_restitution', 'wall_restitution_lower', 'wall_restitution_upper'),
+    *('correlation', 'paper_restitution'),
+    *('mean_restitution', 'mean_restitution_error'),
+    *('mean_wall_restitution', 'mean_wall_restitution_error'),
+)
+_SPECIES_DECAYS = tuple(
+    field.name for field in layout(CorEstimate).fields if '_species_' in field.name
+)
+
+
+def _elements(record: ArrayRecord, names: Iterable[str]) -> dict[str, float | None]:
+    """Elements of the array of a record, None where one is not known."""
+    return {name: finite_or_none(flat_value(record, name)) for name in names}
 
 
 def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
@@ -24,7 +47,7 @@ def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
     passes = 0
     last: CorEstimate | None = None
     for cor in cors:
-        # Time went back: cycles are counted from 1 again, and are others.
+        # Time went back: cycles are counted from 1 again.
         if last is not None and cor.stamp_ns < last.stamp_ns and not _ended_by_merge(last, cor):
             passes += 1
         last = cor
@@ -34,13 +57,13 @@ def last_of_each_cycle(cors: Sequence[CorEstimate]) -> list[CorEstimate]:
     return list(latest.values())
 
 
-def _ended_by_merge(last: CorEstimate, one: CorEstimate) -> bool:
+def _ended_by_merge(last: CorEstimate, estimate: CorEstimate) -> bool:
     """Whether an earlier stamp is that of a merge, known later, which ended the cycle's window."""
     final = CorStatus.FINAL
     return (
-        one.cycle == last.cycle
+        estimate.cycle == last.cycle
         and last.status is not final
-        and one.status is not CorStatus.COOLING
+        and estimate.status is not CorStatus.COOLING
     )
 
 
@@ -93,12 +116,10 @@ def _tray_as_json(analysis: Analysis, results: TrayResults, *, series: bool) -> 
 def _series_as_json(results: TrayResults, epoch_ns: int) -> dict[str, Any]:
     return {
         'time': [(speed.stamp_ns - epoch_ns) / NS for speed in results.speeds],
-        'mean_projected_speed': [_known(speed.mean_projected_speed) for speed in results.speeds],
-        'mean_projected_speed_error': [
-            _known(speed.mean_projected_speed_error) for speed in results.speeds
-        ],
-        'first_species_speed': [_known(speed.first_species_speed) for speed in results.speeds],
-        'second_species_speed': [_known(speed.second_species_speed) for speed in results.speeds],
+        **{
+            name: [finite_or_none(flat_value(speed, name)) for speed in results.speeds]
+            for name in _SPEEDS
+        },
         'method': [speed.method.name.lower() for speed in results.speeds],
         'quality': [speed.quality.names() for speed in results.speeds],
     }
@@ -108,20 +129,20 @@ def _ends_of_cycles(
     clusters: Iterable[ClusterEstimate],
 ) -> dict[int, list[tuple[int, ClusterEstimate]]]:
     """Of each cycle, and every time it was played: stamp of the first estimate, and the last."""
-    found: dict[int, list[tuple[int, ClusterEstimate]]] = {}
+    ends: dict[int, list[tuple[int, ClusterEstimate]]] = {}
     for cluster in clusters:
-        parts = found.setdefault(cluster.cycle, [])
+        parts = ends.setdefault(cluster.cycle, [])
         if parts and cluster.stamp_ns > parts[-1][1].stamp_ns:
             parts[-1] = parts[-1][0], cluster
         else:
             parts.append((cluster.stamp_ns, cluster))
-    return found
+    return ends
 
 
 def _end_of_cycle(
     parts: Sequence[tuple[int, ClusterEstimate]], cor: CorEstimate
 ) -> ClusterEstimate | None:
-    """That of the same time, of a recording that was played twice."""
+    """The last estimate of the cycle, in the same pass of a recording that was played twice."""
     near = [last for first, last in parts if first <= cor.stamp_ns <= last.stamp_ns]
     return near[-1] if near else parts[-1][1] if parts else None
 
@@ -132,56 +153,35 @@ def _cycle_as_json(
     return {
         'cycle': cor.cycle,
         'start': start,
-        'initial_speed': _known(cor.initial_speed),
-        'initial_speed_error': _known(cor.initial_speed_error),
-        'haff_time': _known(cor.haff_time),
-        'haff_time_error': _known(cor.haff_time_error),
-        'restitution': _known(cor.restitution),
-        'restitution_lower': _known(cor.restitution_lower),
-        'restitution_upper': _known(cor.restitution_upper),
-        'wall_restitution': _known(cor.wall_restitution),
-        'wall_restitution_lower': _known(cor.wall_restitution_lower),
-        'wall_restitution_upper': _known(cor.wall_restitution_upper),
-        'correlation': _known(cor.correlation),
-        'paper_restitution': _known(cor.paper_restitution),
-        'mean_restitution': _known(cor.mean_restitution),
-        'mean_restitution_error': _known(cor.mean_restitution_error),
-        'mean_wall_restitution': _known(cor.mean_wall_restitution),
-        'mean_wall_restitution_error': _known(cor.mean_wall_restitution_error),
+        **_elements(cor, _RESTITUTIONS),
         'rebounds': cor.rebounds,
         'collisions': cor.collisions,
-        'tension': _known(cor.tension),
+        'tension': finite_or_none(cor.tension),
         'quality': int(cor.quality),
-        'window_start': _known(cor.window_start),
-        'window_end': _known(cor.window_end),
-        'cooling_start': _known(cor.cooling_start),
-        **{
-            name: _known(getattr(cor, name))
-            for name in (field.name for field in layout(CorEstimate).fields)
-            if '_species_' in name
-        },
+        **_elements(cor, ('window_start', 'window_end', 'cooling_start')),
+        **_elements(cor, _SPECIES_DECAYS),
         'relation': cor.relation.name.lower(),
         'status': cor.status.name.lower(),
-        'reduced_chi_square': _known(cor.reduced_chi_square),
+        'reduced_chi_square': finite_or_none(cor.reduced_chi_square),
         'samples': cor.samples,
         **_clusters_as_json(clusters),
     }
 
 
 def _clusters_as_json(last: ClusterEstimate | None) -> dict[str, Any]:
-    """What is known of the clusters at the end of a cycle."""
+    """The clusters at the end of a cycle."""
     if last is None:
         return dict.fromkeys(('cluster_size', 'bodies', 'onset', 'sticking_speed'))
     return {
-        'cluster_size': _known(last.combined_size),
-        'cluster_size_error': _known(last.combined_size_error),
-        'bodies': _known(last.bodies),
-        'bodies_error': _known(last.bodies_error),
-        'onset': _known(last.onset),
+        'cluster_size': finite_or_none(last.combined_size.value),
+        'cluster_size_error': finite_or_none(last.combined_size.error),
+        'bodies': finite_or_none(last.bodies.value),
+        'bodies_error': finite_or_none(last.bodies.error),
+        'onset': finite_or_none(last.onset),
         'sticking_status': last.sticking_status.name.lower(),
-        'sticking_speed': _known(last.sticking_speed),
-        'sticking_speed_lower': _known(last.sticking_speed_lower),
-        'sticking_speed_upper': _known(last.sticking_speed_upper),
+        'sticking_speed': finite_or_none(last.sticking_speed.value),
+        'sticking_speed_lower': finite_or_none(last.sticking_speed.lower),
+        'sticking_speed_upper': finite_or_none(last.sticking_speed.upper),
     }
 
 
@@ -191,13 +191,13 @@ def _truth_as_json(
     truth = results.truth
     if not truth:
         return None
-    found: dict[str, Any] = {
-        'time': [(one.stamp_ns - analysis.epoch_ns) / NS for one in truth],
-        'mean_projected_speed': [one.mean_projected_speed for one in truth],
-        'bodies': [one.bodies for one in truth],
+    series_of_truth: dict[str, Any] = {
+        'time': [(frame.stamp_ns - analysis.epoch_ns) / NS for frame in truth],
+        'mean_projected_speed': [frame.mean_projected_speed for frame in truth],
+        'bodies': [frame.bodies for frame in truth],
     }
     return {
-        **(found if series else {}),
+        **(series_of_truth if series else {}),
         'restitution': truth[-1].restitution,
         'wall_restitution': truth[-1].wall_restitution,
         'sticking_speed': truth[-1].sticking_speed,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros import __version__
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.outputs.parquet import Column, write_parquet
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ _DIGITS = 7
 _NS = 1e9
 
 
-def write_tracks(path: Path, found: TrackedBag) -> None:
+def write_tracks(path: Path, tracked: TrackedBag) -> None:
     """Write the tracks of every tray, frame by frame.
 
     Parameters
@@ -56,7 +56,7 @@ def write_tracks(path: Path, found: TrackedBag) -> None:
     path : Path
         ``.csv`` or ``.parquet``; a file there is replaced, once the new one is complete. CSV
         leaves empty what is not known, and names the units in its first line.
-    found : TrackedBag
+    tracked : TrackedBag
 
     Raises
     ------
@@ -66,31 +66,31 @@ def write_tracks(path: Path, found: TrackedBag) -> None:
         When the file cannot be written.
     """
     if path.suffix == '.parquet':
-        write_parquet(path, COLUMNS, _pieces(found), _provenance(found))
+        write_parquet(path, COLUMNS, _pieces(tracked), _provenance(tracked))
         return
-    with whole_file(path) as part, part.open('w', encoding='utf-8', newline='') as stream:
+    with atomic_file(path) as part, part.open('w', encoding='utf-8', newline='') as stream:
         units = ', '.join(f'{column.name} [{column.unit}]' for column in COLUMNS if column.unit)
         stream.write(f'# {units}\n')
         writer = csv.writer(stream, lineterminator='\n')
         writer.writerow([column.name for column in COLUMNS])
-        for piece in _pieces(found):
+        for piece in _pieces(tracked):
             columns = [_as_text(piece[column.name]) for column in COLUMNS]
             writer.writerows(zip(*columns, strict=True))
 
 
-def _pieces(found: TrackedBag) -> Iterator[dict[str, NDArray[Any]]]:
-    for number in found.trays:
-        frames = zip(found.tracks[number], found.numbers[number], strict=True)
+def _pieces(tracked: TrackedBag) -> Iterator[dict[str, NDArray[Any]]]:
+    for number in tracked.trays:
+        frames = zip(tracked.tracks[number], tracked.numbers[number], strict=True)
         for tracks, frame in frames:
             if tracks.ids.size:
-                yield _rows(tracks, frame, found)
+                yield _rows(tracks, frame, tracked)
 
 
-def _rows(tracks: Tracks, frame: int, found: TrackedBag) -> dict[str, NDArray[Any]]:
+def _rows(tracks: Tracks, frame: int, tracked: TrackedBag) -> dict[str, NDArray[Any]]:
     n = tracks.ids.size
-    materials = np.array([one.material for one in found.trays[tracks.tray].species])
+    materials = np.array([species.material for species in tracked.trays[tracks.tray].species])
     return {
-        'time': np.full(n, (tracks.stamp_ns - found.epoch_ns) / _NS),
+        'time': np.full(n, (tracks.stamp_ns - tracked.epoch_ns) / _NS),
         'frame': np.full(n, frame, dtype=np.int32),
         'tray': np.full(n, tracks.tray, dtype=np.int32),
         'id': tracks.ids,
@@ -113,7 +113,7 @@ def _as_text(values: NDArray[Any]) -> list[str]:
     return ['' if value != value else f'{value:.{_DIGITS}g}' for value in values.tolist()]
 
 
-def _provenance(found: TrackedBag) -> str:
+def _provenance(tracked: TrackedBag) -> str:
     return json.dumps(
-        {'version': __version__, 'trays': sorted(found.trays), 'epoch_ns': found.epoch_ns}
+        {'version': __version__, 'trays': sorted(tracked.trays), 'epoch_ns': tracked.epoch_ns}
     )

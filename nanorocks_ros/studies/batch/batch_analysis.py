@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.jobs.tasks import as_finished_apart
-from nanorocks_ros.outputs.safe_text import shown
+from nanorocks_ros.jobs.tasks import as_completed_isolated
+from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.pipeline.composition import Pipeline
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.recordings.film.natural_sort import natural
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.recordings.bag.find_bags import FoundBags
     from nanorocks_ros.settings import PipelineSettings
-    from nanorocks_ros.studies.batch.batch_task import BagTask
+    from nanorocks_ros.studies.batch.batch_task import BagSummary, BagTask
 
-# Of so many recordings the same is said one by one.
+# A note on more recordings than this becomes one line.
 _MOST_ALIKE = 3
 
 
@@ -74,12 +74,12 @@ class BagResults:
 
     name: str
     folder: Path
-    summary: dict[str, Any]
+    summary: BagSummary
     twin: str = ''
 
     @property
     def notes(self) -> list[str]:
-        """What is to be said of it, one line each."""
+        """Notes on the recording, one line each."""
         same = [f'is the same as {self.twin}, and not counted'] if self.twin else []
         reason = [self.summary['reason']] if self.summary['reason'] else []
         return [*same, *reason, *self.summary['notices']]
@@ -103,7 +103,7 @@ class Failure:
 
 @dataclass(slots=True, kw_only=True)
 class Batch:
-    """What became of all recordings.
+    """The results of all recordings.
 
     Parameters
     ----------
@@ -121,33 +121,33 @@ class Batch:
         return [result for result in self.results if not result.twin]
 
 
-def told(results: Sequence[BagResults]) -> list[str]:
-    """What is to be said of recordings, the same of many in one line."""
-    found: dict[str, list[BagResults]] = {}
+def merged_notes(results: Sequence[BagResults]) -> list[str]:
+    """The notes on recordings; a note on many of them becomes one line."""
+    by_note: dict[str, list[BagResults]] = {}
     for result in results:
         for text in result.notes:
-            what = text.removeprefix(result.name).lstrip(':/ ')
-            found.setdefault(what, []).append(result)
+            note = text.removeprefix(result.name).lstrip(':/ ')
+            by_note.setdefault(note, []).append(result)
     lines = []
-    for what, own in found.items():
+    for note, own in by_note.items():
         if len(own) > _MOST_ALIKE:
-            lines.append(f'{len(own)} recordings, such as {own[0].name}: {what}')
+            lines.append(f'{len(own)} recordings, such as {own[0].name}: {note}')
         else:
-            lines += [f'{one.name}: {what}' for one in own]
+            lines += [f'{result.name}: {note}' for result in own]
     return lines
 
 
 class Watcher(Protocol):
-    """Who is told how it goes."""
+    """Receives the progress of a batch."""
 
     def begin(self, store: BatchStore, sizes: dict[str, int], done: int) -> None:
-        """So many bytes of each recording, by folder, are left to do; so many are done."""
+        """Bytes to analyse per recording, by folder, and the number of finished recordings."""
 
     def finished(self, name: str, outcome: BagOutcome) -> None:
         """A recording is done, or failed."""
 
     def notice(self, text: str) -> None:
-        """One line of what the user should know."""
+        """A notice for the user, one line."""
 
 
 def run_batch(plan: BatchPlan, workers: Workers, watcher: Watcher) -> Batch:
@@ -173,7 +173,7 @@ def run_batch(plan: BatchPlan, workers: Workers, watcher: Watcher) -> Batch:
     KeyboardInterrupt
         Ctrl-C; its text says what is kept.
     """
-    # Before hours of work, and not once for every recording.
+    # Checked once, before hours of work.
     Pipeline(plan.settings, 'settings')
     workers.check()
     with BatchStore(plan.folder, plan.settings, plan.image_topic) as store:
@@ -186,7 +186,7 @@ def run_batch(plan: BatchPlan, workers: Workers, watcher: Watcher) -> Batch:
         except KeyboardInterrupt:
             raise KeyboardInterrupt(_kept(store)) from None
         finally:
-            # On a full disk what came before is the better message.
+            # On a full disk the earlier error is the better message.
             with suppress(RecordingError):
                 store.write()
         return _gathered(plan, store)
@@ -195,17 +195,17 @@ def run_batch(plan: BatchPlan, workers: Workers, watcher: Watcher) -> Batch:
 def _run(store: BatchStore, tasks: dict[str, BagTask], workers: Workers, watcher: Watcher) -> None:
     sizes = {name: _size(task.path) for name, task in tasks.items()}
     watcher.begin(store, sizes, len(store.entries) - len(tasks))
-    # The largest first, so that no worker is left alone with one in the end.
-    ordered = {name: tasks[name] for name in sorted(tasks, key=lambda one: -sizes[one])}
+    # The largest first, so that all workers finish at about the same time.
+    ordered = {name: tasks[name] for name in sorted(tasks, key=lambda name: -sizes[name])}
 
-    def lost(name: str, what: str) -> BagOutcome:
-        return BagOutcome(state=FAILED, reason=f'{shown(tasks[name].path)}: {what}')
+    def lost(name: str, reason: str) -> BagOutcome:
+        return BagOutcome(state=FAILED, reason=f'{printable(tasks[name].path)}: {reason}')
 
-    with closing(as_finished_apart(analyse_bag, ordered, workers, lost)) as outcomes:
+    with closing(as_completed_isolated(analyse_bag, ordered, workers, lost)) as outcomes:
         for name, outcome in outcomes:
             store.finish(name, outcome)
             if outcome.state == UNWRITTEN:
-                # So would all others be, after as much work.
+                # The others would fail in the same way.
                 raise RecordingError(
                     str(store.folder),
                     f'cannot be written any more ({outcome.reason})',
@@ -233,25 +233,25 @@ def _kept(store: BatchStore) -> str:
 def _gathered(plan: BatchPlan, store: BatchStore) -> Batch:
     batch = Batch()
     for text, error in plan.bags.missing.items():
-        batch.failed.append(Failure(name=shown(text), reason=shown(str(error))))
-    entries = sorted(store.entries.values(), key=lambda one: natural(str(one.path)))
-    found: list[tuple[Entry, dict[str, Any]]] = []
+        batch.failed.append(Failure(name=printable(text), reason=printable(str(error))))
+    entries = sorted(store.entries.values(), key=lambda entry: natural(str(entry.path)))
+    analysed: list[tuple[Entry, BagSummary]] = []
     for entry in entries:
         outcome = entry.outcome
         there = outcome.state in (DONE, PARTIAL)
         summary = read_summary(store.place(entry)) if there else None
         if summary is not None:
-            found.append((entry, summary))
+            analysed.append((entry, summary))
         if outcome.state != DONE or summary is None:
             reason = outcome.reason or f'{store.place(entry)}: its results are gone; try again'
             batch.failed.append(
-                Failure(name=shown(entry.path), reason=reason, analysed=summary is not None)
+                Failure(name=printable(entry.path), reason=reason, analysed=summary is not None)
             )
-    found.sort(key=lambda one: one[1]['start_ns'])
+    analysed.sort(key=lambda pair: pair[1]['start_ns'])
     first: dict[str, str] = {}
-    for entry, summary in found:
-        name = shown(entry.path)
-        # A film that was copied and imported twice is no second measurement either.
+    for entry, summary in analysed:
+        name = printable(entry.path)
+        # A film that was imported twice counts once.
         twin = first.setdefault(summary.get('film') or summary['content'], name)
         batch.results.append(
             BagResults(

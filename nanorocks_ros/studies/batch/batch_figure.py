@@ -9,7 +9,7 @@ import matplotlib as mpl
 import numpy as np
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.studies.decays.cooling_curves import read_cycles
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.decays.cooling_curves import CycleSpeeds
 
 _MM = 1e3
-# More lines than this show nothing more.
+# More lines than this cannot be distinguished.
 _MOST = 60
 _EDGES = np.geomspace(0.1, 600.0, 40)
 
@@ -54,37 +54,37 @@ def decays_figure(path: Path, folders: Sequence[Path], trays: Sequence[TrayMeans
     RecordingError
         When the picture cannot be written.
     """
-    found = [(one, _cycles(folders, one.tray)) for one in trays if one.cycles]
-    found = [(one, cycles) for one, cycles in found if cycles]
-    if not found:
+    drawn = [(means, _cycles(folders, means.tray)) for means in trays if means.cycles]
+    drawn = [(means, cycles) for means, cycles in drawn if cycles]
+    if not drawn:
         return False
-    columns = 1 if len(found) == 1 else 2
-    rows = math.ceil(len(found) / columns)
+    columns = 1 if len(drawn) == 1 else 2
+    rows = math.ceil(len(drawn) / columns)
     figure = Figure(figsize=(9.5, 1.0 + 2.6 * rows), layout='constrained')
     panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
-    for axes, (means, cycles) in zip(panels, found, strict=False):
+    for axes, (means, cycles) in zip(panels, drawn, strict=False):
         _draw(axes, means, cycles)
-    for axes in panels[len(found) :]:
+    for axes in panels[len(drawn) :]:
         axes.set_axis_off()
-    for axes in panels[max(len(found) - columns, 0) : len(found)]:
+    for axes in panels[max(len(drawn) - columns, 0) : len(drawn)]:
         axes.set_xlabel('time since the shaking event [s]')
         axes.tick_params(labelbottom=True)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
     return True
 
 
 def _cycles(folders: Sequence[Path], tray: int) -> list[CycleSpeeds]:
-    """Evenly over all recordings, as many as can be told apart."""
+    """At most `_MOST` cycles, evenly over all recordings."""
     step = max(1, math.ceil(len(folders) / _MOST))
-    found: list[CycleSpeeds] = []
+    cycles: list[CycleSpeeds] = []
     for folder in folders[::step]:
         try:
-            found += read_cycles(folder / f'tray_{tray}_speed.csv')
+            cycles += read_cycles(folder / f'tray_{tray}_speed.csv')
         except RecordingError:
-            # Without a cycle of this tray.
+            # The recording has no cycle of this tray.
             continue
-    return found[:: max(1, math.ceil(len(found) / _MOST))]
+    return cycles[:: max(1, math.ceil(len(cycles) / _MOST))]
 
 
 def _draw(axes: Axes, means: TrayMeans, cycles: Sequence[CycleSpeeds]) -> None:

@@ -1,4 +1,4 @@
-"""What a batch leaves in its folder besides the results of each recording."""
+"""Tables and report of a batch, beside the results of each recording."""
 
 from __future__ import annotations
 

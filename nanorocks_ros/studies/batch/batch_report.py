@@ -1,4 +1,4 @@
-"""The report of a batch: one page, with its pictures in it."""
+"""The report of a batch: one HTML page with embedded figures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.html_report import Picture, Section, Table, number, write_report
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.settings import PipelineSettings, rows
-from nanorocks_ros.studies.batch.batch_analysis import told
+from nanorocks_ros.studies.batch.batch_analysis import merged_notes
 from nanorocks_ros.studies.batch.batch_figure import decays_figure
 from nanorocks_ros.studies.batch.campaign_means import means_as_json
 from nanorocks_ros.studies.figures.long_term_figure import long_term_figure
@@ -30,7 +30,7 @@ _SHORTEST_DAY = 86_400 * 365
 def write_batch_report(
     path: Path, batch: Batch, together: Combined, settings: PipelineSettings
 ) -> None:
-    """Write what was analysed, what all cycles say, every cycle, and what failed.
+    """Write the report: recordings, means over all cycles, every cycle, failures.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def _restitutions(together: Combined) -> Section:
         parts=[
             Table(
                 head=('tray', 'cycles', 'beads', 'walls', 'rebounds', 'collisions', 'tension'),
-                rows=[_together(one) for one in _known(together)],
+                rows=[_together(tray) for tray in _known(together)],
                 caption='What decays, rebounds and collisions of all cycles say together. What is '
                 'not known of tray, camera and start is the same in all of them: it is part of '
                 'the interval, and does not become less with more cycles. A dash: hardly known. '
@@ -107,10 +107,10 @@ def _restitutions(together: Combined) -> Section:
                 head=('tray', 'COR of a cycle', "by the paper's closed form", 'v0 [mm/s]',
                       'peak [mm/s]', 'tau [s]'),
                 rows=[
-                    (str(one.tray), *(_mean(one, name, factor) for name, factor in (
+                    (str(tray.tray), *(_mean(tray, name, factor) for name, factor in (
                         ('cycle_restitution', 1.0), ('paper_restitution', 1.0),
                         ('initial_speed', _MM), ('peak_speed', _MM), ('haff_time', 1.0))))
-                    for one in _known(together)
+                    for tray in _known(together)
                 ],
                 caption='Means over the cycles ± scatter of a single cycle, as the paper reports '
                 'them over its 178 runs; in brackets how many cycles are known. v0 and tau count '
@@ -129,10 +129,10 @@ def _known(together: Combined) -> list[TrayMeans]:
     return [tray for _, tray in sorted(together.trays.items()) if tray.cycles]
 
 
-def _together(one: TrayMeans) -> tuple[str, ...]:
-    values = means_as_json(one)
+def _together(tray: TrayMeans) -> tuple[str, ...]:
+    values = means_as_json(tray)
     return (
-        str(one.tray),
+        str(tray.tray),
         str(values['cycles_read']),
         _interval(values, 'restitution'),
         _interval(values, 'wall_restitution'),
@@ -144,14 +144,14 @@ def _together(one: TrayMeans) -> tuple[str, ...]:
 
 def _interval(values: dict[str, Any], name: str, digits: int = 4, factor: float = 1.0) -> str:
     middle, low, high = (values.get(f'{name}{end}') for end in ('', '_lower', '_upper'))
-    ends = ', '.join(number(one, digits, factor) for one in (low, high))
+    ends = ', '.join(number(end, digits, factor) for end in (low, high))
     if low is None and high is None:
         return '–'
     return f'{number(middle, digits, factor)} [{ends}]'
 
 
-def _mean(one: TrayMeans, name: str, factor: float = 1.0) -> str:
-    mean = one.means[name]
+def _mean(tray: TrayMeans, name: str, factor: float = 1.0) -> str:
+    mean = tray.means[name]
     if not mean.cycles:
         return '–'
     scatter = f' ± {number(mean.scatter, 2, factor)}' if mean.cycles > 1 else ''
@@ -162,19 +162,19 @@ def _clusters(together: Combined) -> Section:
     in_mm = together.size_unit == 'm'
     size = 'correlation length [mm]' if in_mm else 'cluster size [beads]'
     rows = []
-    for one in _known(together):
-        values = means_as_json(one)
+    for tray in _known(together):
+        values = means_as_json(tray)
         status = (values['sticking_status'] or 'not looked for').replace('_', ' ')
         merges = values['merges']
         rows.append(
             (
-                str(one.tray),
+                str(tray.tray),
                 _interval(values, 'sticking_speed', 3, _MM),
                 status,
                 '–' if merges is None else str(merges),
-                _mean(one, 'cluster_size', _MM if in_mm else 1.0),
-                _mean(one, 'bodies'),
-                _mean(one, 'onset'),
+                _mean(tray, 'cluster_size', _MM if in_mm else 1.0),
+                _mean(tray, 'bodies'),
+                _mean(tray, 'onset'),
             )
         )
     return Section(
@@ -193,7 +193,7 @@ def _clusters(together: Combined) -> Section:
 
 def _figures(scratch: Path, batch: Batch, together: Combined) -> Section:
     section = Section(title='Figures')
-    folders = [one.folder for one in batch.counted]
+    folders = [result.folder for result in batch.counted]
     decays, long_term = scratch / 'decays.png', scratch / 'long_term.png'
     if decays_figure(decays, folders, _known(together)):
         section.parts.append(
@@ -220,14 +220,14 @@ def _figures(scratch: Path, batch: Batch, together: Combined) -> Section:
 def _cycles(together: Combined) -> list[Section]:
     sections = []
     size, factor = ('length [mm]', _MM) if together.size_unit == 'm' else ('size [beads]', 1.0)
-    for one in _known(together):
-        own = [row for row in together.cycles if row.tray == one.tray]
+    for tray in _known(together):
+        own = [row for row in together.cycles if row.tray == tray.tray]
         table = Table(
             head=('recording', 'cycle', 'start [s]', 'COR', 'walls', "paper's form", 'v0 [mm/s]',
                   'tau [s]', 'peak [mm/s]', size, 'sticking [mm/s]', 'status'),
             rows=[_cycle(row, factor) for row in own],
         )  # fmt: skip
-        sections.append(Section(title=f'Cycles of tray {one.tray}', parts=[table]))
+        sections.append(Section(title=f'Cycles of tray {tray.tray}', parts=[table]))
     return sections
 
 
@@ -264,21 +264,21 @@ def _recordings(batch: Batch, settings: PipelineSettings) -> Section:
             )
         ],
     )
-    for head, found, caption in (
-        (('what is to be said of them',), [(one,) for one in told(batch.results)], ''),
+    for head, lines, caption in (
+        (('notes',), [(note,) for note in merged_notes(batch.results)], ''),
         (('entry', 'value'), metadata, 'Provenance that they hold, and in how many it differs'),
         (('setting', 'value'), changed, 'Settings other than the defaults'),
     ):
-        if found:
-            section.parts.append(Table(head=head, rows=found, caption=caption))
+        if lines:
+            section.parts.append(Table(head=head, rows=lines, caption=caption))
     return section
 
 
-def _recording(one: BagResults) -> tuple[str, ...]:
-    summary = one.summary
+def _recording(result: BagResults) -> tuple[str, ...]:
+    summary = result.summary
     cycles = max((len(tray['cycles']) for tray in summary['trays'].values()), default=0)
     return (
-        one.name,
+        result.name,
         _date(summary['start_ns']),
         str(summary['frames']),
         str(summary['frames_lost']),
@@ -289,7 +289,7 @@ def _recording(one: BagResults) -> tuple[str, ...]:
 
 
 def _date(stamp_ns: int) -> str:
-    """In UTC; a clock that counts from its own start has no date."""
+    """Date in UTC; seconds for a clock that starts at 0."""
     seconds = stamp_ns / 1e9
     if seconds < _SHORTEST_DAY:
         return f'{seconds:.1f} s'
@@ -297,14 +297,14 @@ def _date(stamp_ns: int) -> str:
 
 
 def _metadata(results: Sequence[BagResults]) -> list[tuple[str, str]]:
-    """Entries of all recordings, with the value that most of them have."""
+    """Metadata of all recordings: the most frequent value of each entry."""
     values: dict[str, list[str]] = {}
     for result in results:
         for key, value in result.summary['metadata'].items():
             values.setdefault(key, []).append(value)
-    found = []
+    entries = []
     for key, own in values.items():
         usual = max(set(own), key=own.count)
         others = len(results) - own.count(usual)
-        found.append((key, f'{usual} (other or none in {others})' if others else usual))
-    return found
+        entries.append((key, f'{usual} (other or none in {others})' if others else usual))
+    return entries

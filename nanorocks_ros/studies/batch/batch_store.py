@@ -1,4 +1,4 @@
-"""The folder that a batch keeps its results in, and the manifest that says of what."""
+"""The folder of the results of a batch, and its manifest."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.jobs.folder_lock import hold_folder
-from nanorocks_ros.outputs.npz_archive import write_whole
-from nanorocks_ros.outputs.safe_text import shown
+from nanorocks_ros.jobs.folder_lock import lock_folder
+from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.settings import rows
 from nanorocks_ros.studies.analysis.results_folder import SUMMARY
@@ -86,7 +86,7 @@ class BatchStore:
         self.entries: dict[Path, Entry] = {}
         self._by_task: dict[str, Entry] = {}
         self._check_place()
-        self._lock = hold_folder(self.folder, _MARK)
+        self._lock = lock_folder(self.folder, _MARK)
         try:
             self._known = self._read()
             for name in (BAGS, _NOTES):
@@ -118,7 +118,7 @@ class BatchStore:
             )
 
     def _sweep(self) -> None:
-        """What killed workers left."""
+        """Remove the leftovers of killed workers."""
         for path in (*(self.folder / BAGS).glob('.*'), *(self.folder / _NOTES).iterdir()):
             if path.is_dir() and not path.is_symlink():
                 shutil.rmtree(path, ignore_errors=True)
@@ -130,7 +130,7 @@ class BatchStore:
         return self.folder / BAGS / entry.folder
 
     def add(self, bags: Sequence[Path]) -> dict[str, BagTask]:
-        """Take recordings in.
+        """Add recordings to the batch.
 
         Parameters
         ----------
@@ -139,10 +139,10 @@ class BatchStore:
         Returns
         -------
         dict of str to BagTask
-            What is left to do, by the name of the folder; those that are done and have not
-            been touched since are not in it.
+            The recordings left to analyse, by name of the folder; finished recordings are
+            left out if they have not changed since.
         """
-        taken = {one.folder.casefold(): path for path, one in self._known.items()}
+        taken = {entry.folder.casefold(): path for path, entry in self._known.items()}
         tasks: dict[str, BagTask] = {}
         for bag in bags:
             path = bag.absolute()
@@ -167,7 +167,7 @@ class BatchStore:
         return tasks
 
     def _gone(self, path: Path) -> tuple[Path, ...]:
-        """Results of recordings of this size that are not where they were: it may be this one."""
+        """Results of missing recordings of the same size, which may be this one, moved."""
         try:
             size = total_size(file_states(path))
         except OSError:
@@ -193,26 +193,26 @@ class BatchStore:
         return same and there == (outcome.content, self._question)
 
     def finish(self, name: str, outcome: BagOutcome) -> None:
-        """Say what became of a recording."""
+        """Note the outcome of a recording."""
         entry = self._by_task[name]
         entry.outcome = outcome
         if outcome.folder:
             entry.folder = outcome.folder
-            gone = [path for path, one in self._known.items() if one.folder == outcome.folder]
+            gone = [path for path, known in self._known.items() if known.folder == outcome.folder]
             for path in gone:
                 del self._known[path]
 
     def under_way(self) -> dict[str, tuple[int, int]]:
-        """Frames done and in all of recordings that are being analysed, by folder."""
-        found = {}
+        """Frames done and total of the recordings being analysed, by folder."""
+        frames = {}
         for note in (self.folder / _NOTES).glob('*'):
             with suppress(OSError, ValueError):
                 done, total = (int(word) for word in note.read_text('ascii').split())
-                found[note.name] = done, total
-        return found
+                frames[note.name] = done, total
+        return frames
 
     def write(self) -> None:
-        """Write the manifest, those of earlier calls that are not part of this one included.
+        """Write the manifest, including recordings of earlier calls that are not in this one.
 
         Raises
         ------
@@ -226,7 +226,7 @@ class BatchStore:
             'settings': {row.name: row.default for row in rows(self._settings)},
             'bags': [_as_json(entry) for entry in {**self._known, **self.entries}.values()],
         }
-        write_whole(self.folder / MANIFEST, json.dumps(content, indent=1).encode())
+        write_bytes(self.folder / MANIFEST, json.dumps(content, indent=1).encode())
 
     def _read(self) -> dict[Path, Entry]:
         path = self.folder / MANIFEST
@@ -251,12 +251,12 @@ class BatchStore:
 
 
 def _question(settings: PipelineSettings, image_topic: str) -> str:
-    """A hash of everything besides the recording that results depend on."""
+    """A hash of all that the results depend on besides the recording."""
     digest = hashlib.blake2b(digest_size=16)
     for row in rows(settings):
         digest.update(f'{row.name}={row.default!r}\n'.encode(errors='surrogateescape'))
         if isinstance(row.default, str) and row.default and Path(row.default).is_file():
-            # A calibration, trays or decays in a file of that name may be others next time.
+            # The content of a file may change under the same name.
             with suppress(OSError):
                 digest.update(Path(row.default).read_bytes())
     digest.update(f'{__version__} {image_topic}'.encode(errors='surrogateescape'))
@@ -266,13 +266,13 @@ def _question(settings: PipelineSettings, image_topic: str) -> str:
 def _free_name(path: Path, taken: Iterable[str]) -> str:
     """The name of the recording, and a number where another recording has that name."""
     name = path.stem if path.suffix in {'.mcap', '.db3', '.bag'} else path.name
-    name = re.sub(r'[^\w.,+=@ -]', '_', shown(name)).strip('. ') or 'recording'
+    name = re.sub(r'[^\w.,+=@ -]', '_', printable(name)).strip('. ') or 'recording'
     name = name.encode()[:_LONGEST_NAME].decode(errors='ignore')
-    number, found = 1, name
-    while found.casefold() in taken:
+    number, free = 1, name
+    while free.casefold() in taken:
         number += 1
-        found = f'{name}-{number}'
-    return found
+        free = f'{name}-{number}'
+    return free
 
 
 def _as_json(entry: Entry) -> dict[str, Any]:
@@ -287,19 +287,19 @@ def _as_json(entry: Entry) -> dict[str, Any]:
     }
 
 
-def _from_json(found: dict[str, Any]) -> Entry:
-    name = Path(found['folder']).name
+def _from_json(content: dict[str, Any]) -> Entry:
+    name = Path(content['folder']).name
     if not name:
         raise ValueError
     return Entry(
-        path=Path(found['bag']),
+        path=Path(content['bag']),
         folder=name,
         outcome=BagOutcome(
-            state=str(found['state']),
-            reason=str(found['reason']),
-            content=str(found['content']),
+            state=str(content['state']),
+            reason=str(content['reason']),
+            content=str(content['content']),
             files=tuple(
-                (str(a), int(b), int(c), int(d), int(e)) for a, b, c, d, e in found['files']
+                (str(a), int(b), int(c), int(d), int(e)) for a, b, c, d, e in content['files']
             ),
         ),
     )

@@ -1,4 +1,4 @@
-"""One recording of a batch: analysed, and written into a folder that says what it is of."""
+"""One recording of a batch: its analysis, results and summary."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ import time
 import traceback
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, cast
 
 import cv2
 import numpy as np
 
 from nanorocks_ros.errors import NanorocksError, RecordingError, UnwritableError
-from nanorocks_ros.outputs.npz_archive import Arrays, write_archive, write_whole
-from nanorocks_ros.outputs.safe_text import shown
+from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.outputs.json_values import json_values
+from nanorocks_ros.outputs.npz_archive import Arrays, write_archive
+from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.recordings.bag.fingerprint import FileState, content_hash, file_states
 from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleSummary, cycles_of
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, analyse
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 
 TROUBLE = 'trouble.txt'
 DONE, PARTIAL, FAILED, UNWRITTEN = 'done', 'partial', 'failed', 'unwritten'
-# How far a recording has come is said so often, [s].
+# Interval of progress notes, [s].
 _NOTE = 1.0
 # Provenance kept of a recording: so many entries, each so long.
 _MOST_ENTRIES, _LONGEST = 100, 500
@@ -65,7 +67,7 @@ class BagTask:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BagOutcome:
-    """What became of it.
+    """The outcome of a task.
 
     Parameters
     ----------
@@ -91,33 +93,75 @@ class BagOutcome:
     folder: str = ''
 
 
+class TraySummary(TypedDict):
+    """One tray in a `BagSummary`; see `results_json` for the keys of a cycle."""
+
+    cycles: list[dict[str, Any]]
+    truth: dict[str, Any] | None
+    by_cycle: dict[str, list[dict[str, Any]]]
+
+
+class BagSummary(TypedDict):
+    """The JSON object `SUMMARY` in the results of a recording.
+
+    Attributes
+    ----------
+    content, film : str
+        Hashes of the recording, and of the film that it was imported from or ''.
+    question : str
+        Hash of the settings.
+    state, reason : str
+        As in `BagOutcome`.
+    start_ns : int, [ns]
+        Stamp of the first frame.
+    trays : dict of str to TraySummary
+        By number.
+    """
+
+    format: int
+    bag: str
+    content: str
+    film: str
+    question: str
+    frames: int
+    frames_lost: int
+    seconds: float
+    complete: bool
+    notices: list[str]
+    state: str
+    reason: str
+    start_ns: int
+    metadata: dict[str, str]
+    trays: dict[str, TraySummary]
+
+
 def analyse_bag(task: BagTask) -> BagOutcome:
     """Analyse a recording and write its results, complete or not at all; it never raises."""
-    # The cores are busy with other recordings.
+    # Other recordings use the other cores.
     cv2.setNumThreads(1)
     try:
         return _analysed(task)
     except UnwritableError as error:
-        return BagOutcome(state=UNWRITTEN, reason=shown(str(error)))
+        return BagOutcome(state=UNWRITTEN, reason=printable(str(error)))
     except NanorocksError as error:
-        return BagOutcome(state=FAILED, reason=shown(str(error)))
+        return BagOutcome(state=FAILED, reason=printable(str(error)))
     except MemoryError:
         return BagOutcome(
-            state=FAILED, reason=f'{shown(task.path)}: takes more memory than is left'
+            state=FAILED, reason=f'{printable(task.path)}: takes more memory than is left'
         )
     except OSError as error:
         return BagOutcome(
-            state=FAILED, reason=f'{shown(task.path)}: cannot be read ({error.strerror})'
+            state=FAILED, reason=f'{printable(task.path)}: cannot be read ({error.strerror})'
         )
     except Exception as error:
-        # A fault of ours, or of a library, over one recording; the others know nothing of it.
+        # A bug shown by one recording must not end the others.
         place = task.folder.with_name(f'{task.folder.name}.{TROUBLE}')
         with suppress(OSError):
             place.write_text(traceback.format_exc(), 'utf-8', 'backslashreplace')
-        what = shown(' '.join(f'{type(error).__name__}: {error}'.split()))
+        fault = printable(' '.join(f'{type(error).__name__}: {error}'.split()))
         return BagOutcome(
             state=FAILED,
-            reason=f'{shown(task.path)}: cannot be analysed ({what}); please report {place}',
+            reason=f'{printable(task.path)}: cannot be analysed ({fault}); please report {place}',
         )
     finally:
         with suppress(OSError):
@@ -143,7 +187,7 @@ def _analysed(task: BagTask) -> BagOutcome:
         raise RecordingError(
             str(task.path), 'changed while it was analysed', 'analyse it again when it is complete'
         )
-    summary = {
+    summary: Any = {
         'format': 1,
         'bag': str(task.path),
         'content': content,
@@ -156,13 +200,13 @@ def _analysed(task: BagTask) -> BagOutcome:
         for number, tray in summary['trays'].items():
             tray['by_cycle'] = _cycles(folder, int(number))
         write_archive(folder / EVIDENCE, _evidence(analysis))
-        write_whole(folder / SUMMARY, json.dumps(summary, allow_nan=False).encode())
+        write_bytes(folder / SUMMARY, json.dumps(summary, allow_nan=False).encode())
 
     write_results(analysis, task.folder, task.path, task.settings, more=more)
     return replace(_outcome(summary, files), frames=analysis.frames)
 
 
-def _outcome(summary: dict[str, Any], files: tuple[FileState, ...]) -> BagOutcome:
+def _outcome(summary: BagSummary, files: tuple[FileState, ...]) -> BagOutcome:
     return BagOutcome(
         state=summary['state'],
         reason=summary['reason'],
@@ -171,13 +215,15 @@ def _outcome(summary: dict[str, Any], files: tuple[FileState, ...]) -> BagOutcom
     )
 
 
-def read_summary(folder: Path) -> dict[str, Any] | None:
-    """What a folder of results says it is of; None where it says nothing."""
+def read_summary(folder: Path) -> BagSummary | None:
+    """The summary in a folder of results; None where there is none that can be read."""
     try:
-        found = json.loads((folder / SUMMARY).read_text('utf-8'))
+        summary = json.loads((folder / SUMMARY).read_text('utf-8'))
     except (OSError, ValueError):
         return None
-    return found if isinstance(found, dict) and found.get('format') == 1 else None
+    if isinstance(summary, dict) and summary.get('format') == 1:
+        return cast('BagSummary', summary)
+    return None
 
 
 def _noting(note: Path) -> Any:
@@ -188,7 +234,7 @@ def _noting(note: Path) -> Any:
         now = time.monotonic()
         if now - last >= _NOTE:
             last = now
-            # Nobody's results depend on it.
+            # Progress is not essential.
             with suppress(OSError):
                 note.write_text(f'{done} {total}', 'ascii')
 
@@ -196,16 +242,15 @@ def _noting(note: Path) -> Any:
 
 
 def _summary(analysis: Analysis) -> dict[str, Any]:
-    found = as_json(analysis, series=False)
     error = analysis.error
     return {
-        **found,
-        'notices': [shown(notice) for notice in analysis.notices],
+        **as_json(analysis, series=False),
+        'notices': [printable(notice) for notice in analysis.notices],
         'state': DONE if error is None else PARTIAL,
-        'reason': '' if error is None else shown(str(error)),
+        'reason': '' if error is None else printable(str(error)),
         'start_ns': min(analysis.stamps_ns),
         'metadata': {
-            shown(key)[:_LONGEST]: shown(value)[:_LONGEST]
+            printable(key)[:_LONGEST]: printable(value)[:_LONGEST]
             for key, value in list(analysis.metadata.items())[:_MOST_ENTRIES]
         },
     }
@@ -215,32 +260,25 @@ def _cycles(folder: Path, tray: int) -> dict[str, list[dict[str, Any]]]:
     """Cycles by each measure of cluster size that was known in the recording."""
     if not (folder / f'tray_{tray}_speed.csv').is_file():
         return {}
-    found = {}
+    by_measure = {}
     for measure in SIZE_MEASURES:
         cycles = cycles_of(folder, tray, measure)
         if measure is SIZE_MEASURES[-1] or _any_size(cycles):
-            found[measure.column] = [_finite(cycle) for cycle in cycles]
-    return found
+            by_measure[measure.column] = [json_values(asdict(cycle)) for cycle in cycles]
+    return by_measure
 
 
 def _any_size(cycles: list[CycleSummary]) -> bool:
     return any(np.isfinite(cycle.cluster_size) for cycle in cycles)
 
 
-def _finite(cycle: CycleSummary) -> dict[str, Any]:
-    return {
-        name: None if isinstance(value, float) and not np.isfinite(value) else value
-        for name, value in asdict(cycle).items()
-    }
-
-
 def _evidence(analysis: Analysis) -> Arrays:
-    found: Arrays = {}
+    arrays: Arrays = {}
     for number, results in analysis.trays.items():
         if results.evidence is not None:
             for name, values in results.evidence.arrays().items():
-                found[f'{number}/cor/{name}'] = values
+                arrays[f'{number}/cor/{name}'] = values
         for k, cycle in enumerate(results.sticking):
             for name in ('times', 'speeds', 'bodies', 'merges'):
-                found[f'{number}/sticking/{k:05d}/{name}'] = getattr(cycle, name)
-    return found
+                arrays[f'{number}/sticking/{k:05d}/{name}'] = getattr(cycle, name)
+    return arrays

@@ -1,4 +1,4 @@
-"""What all cycles of all recordings of a batch say together, tray by tray."""
+"""Means and posteriors over all cycles of all recordings of a batch, per tray."""
 
 from __future__ import annotations
 
@@ -6,13 +6,12 @@ import math
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from nanorocks_ros.errors import FitError, RecordingError
 from nanorocks_ros.experiment.calibration_file import calibrated
-from nanorocks_ros.inference.cycle_likelihoods import Evidence
+from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
 from nanorocks_ros.numerics.sample_mean import mean_of
+from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.outputs.npz_archive import read_archive
 from nanorocks_ros.pipeline.composition import TrayStages, trays_of
 from nanorocks_ros.records import Quality
@@ -82,7 +81,7 @@ class TrayMeans:
 
 
 class CycleRow(NamedTuple):
-    """A cycle of a tray: name of its recording, and what is known of it."""
+    """A cycle of a tray: name of its recording, and its quantities."""
 
     recording: str
     tray: int
@@ -213,9 +212,9 @@ def _added_up(
     results: Sequence[BagResults],
     notices: list[str],
     progress: Callable[[int, int], None] | None,
-) -> tuple[dict[int, Evidence], dict[int, list[StickingCycle]]]:
-    """One recording after the other: never more than one of them in memory."""
-    evidence: dict[int, Evidence] = {}
+) -> tuple[dict[int, CycleLikelihoods], dict[int, list[StickingCycle]]]:
+    """Add up the recordings one by one: only one is in memory."""
+    evidence: dict[int, CycleLikelihoods] = {}
     sticking: dict[int, list[StickingCycle]] = {}
     for done, result in enumerate(results, start=1):
         try:
@@ -223,7 +222,7 @@ def _added_up(
             for number in map(int, result.summary['trays']):
                 own = _below(arrays, f'{number}/cor/')
                 if own:
-                    found = Evidence.from_arrays(own, str(result.folder / EVIDENCE))
+                    found = CycleLikelihoods.from_arrays(own, str(result.folder / EVIDENCE))
                     evidence[number] = evidence[number] + found if number in evidence else found
                 sticking.setdefault(number, []).extend(_sticking(arrays, number))
         except (RecordingError, FitError, ValueError) as error:
@@ -272,7 +271,7 @@ def _cycle(values: Mapping[str, Any]) -> CycleSummary:
 
 
 def means_as_json(one: TrayMeans) -> dict[str, Any]:
-    """What all cycles of a tray say, in SI; None where not known.
+    """Results of all cycles of a tray, in SI; None where not known.
 
     A restitution that is hardly known has an interval, but no value.
     """
@@ -287,30 +286,26 @@ def means_as_json(one: TrayMeans) -> dict[str, Any]:
     values = asdict(mean) if mean is not None else {}
     for name in names:
         unknown = mean is None or (vague and name in ('restitution', 'restitution_error'))
-        found[name] = None if unknown else _known(values[name])
+        found[name] = None if unknown else finite_or_none(float(values[name]))
     found |= {
         'cycles_read': mean.cycles if mean else 0,
-        'tension': _known(mean.tension) if mean else None,
+        'tension': finite_or_none(mean.tension) if mean else None,
         'rebounds': mean.rebounds if mean else 0,
         'collisions': mean.collisions if mean else 0,
     }
     sticking = one.sticking
     found |= {
         'sticking_status': sticking.status.name.lower() if sticking else None,
-        'sticking_speed': _known(sticking.sticking_speed) if sticking else None,
-        'sticking_speed_lower': _known(sticking.lower) if sticking else None,
-        'sticking_speed_upper': _known(sticking.upper) if sticking else None,
+        'sticking_speed': finite_or_none(sticking.sticking_speed) if sticking else None,
+        'sticking_speed_lower': finite_or_none(sticking.lower) if sticking else None,
+        'sticking_speed_upper': finite_or_none(sticking.upper) if sticking else None,
         'merges': sticking.merges if sticking else None,
     }
     for name, value in one.means.items():
         found |= {
-            f'mean_{name}': _known(value.mean),
-            f'mean_{name}_error': _known(value.error),
-            f'{name}_scatter': _known(value.scatter),
+            f'mean_{name}': finite_or_none(value.mean),
+            f'mean_{name}_error': finite_or_none(value.error),
+            f'{name}_scatter': finite_or_none(value.scatter),
             f'{name}_cycles': value.cycles,
         }
     return found
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -1,4 +1,7 @@
-"""The picture of a calibration of the binarised area: its speeds beside those by hand."""
+"""Figure of a calibration of the binarised area: manual speeds over its speeds.
+
+Tested in test_area_calibration.py.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 
 mpl.use('Agg')
 from matplotlib.figure import Figure
@@ -22,18 +25,18 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.calibration.area_fit import AreaFit
 
 _MM = 1e3
-_MEASURED, _FIT, _SAME = '#30506f', '#c23b22', '#8a8a8a'
+_MEASURED, _FIT, _IDENTITY = '#30506f', '#c23b22', '#8a8a8a'
 _SIDE, _DPI = 5.0, 110
 
 
 def area_figure(path: Path, fits: Mapping[int, AreaFit]) -> None:
-    """Draw the pairs of speeds of each tray, and the line through them.
+    """Draw the speed pairs of each tray, and the fitted line.
 
     Parameters
     ----------
     path : Path
     fits : mapping of int to AreaFit
-        By tray.
+        Fits by tray.
 
     Raises
     ------
@@ -44,14 +47,14 @@ def area_figure(path: Path, fits: Mapping[int, AreaFit]) -> None:
     panels = figure.subplots(1, len(fits), squeeze=False)[0]
     for axes, (number, fit) in zip(panels, sorted(fits.items()), strict=True):
         _draw(axes, number, fit)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=_DPI)
 
 
 def _draw(axes: Axes, number: int, fit: AreaFit) -> None:
-    area = _MM * np.array([pair.area_speed for pair in fit.pairs])
+    area_speed = _MM * np.array([pair.area_speed for pair in fit.pairs])
     axes.errorbar(
-        area,
+        area_speed,
         [_MM * pair.manual_speed for pair in fit.pairs],
         xerr=[_MM * pair.area_speed_error for pair in fit.pairs],
         yerr=[_MM * pair.manual_speed_error for pair in fit.pairs],
@@ -61,8 +64,8 @@ def _draw(axes: Axes, number: int, fit: AreaFit) -> None:
         color=_MEASURED,
         label=f'{fit.windows} windows',
     )
-    most = float(area.max()) * 1.1
-    line = np.array([0.0, most])
+    max_speed = float(area_speed.max()) * 1.1
+    line = np.array([0.0, max_speed])
     offset = f' {_MM * fit.offset:+.2f} mm/s' if math.isfinite(fit.offset_error) else ''
     axes.plot(
         line,
@@ -71,8 +74,8 @@ def _draw(axes: Axes, number: int, fit: AreaFit) -> None:
         lw=1.8,
         label=f'{fit.factor:.3g} $\\times$ area{offset}',
     )
-    axes.plot(line, line, color=_SAME, ls='--', lw=1.2, label='no calibration needed')
-    axes.set_xlim(0.0, most)
+    axes.plot(line, line, color=_IDENTITY, ls='--', lw=1.2, label='no calibration needed')
+    axes.set_xlim(0.0, max_speed)
     axes.set_ylim(0.0, 1.3 * _MM * fit.fastest)
     axes.set_title(f'tray {number}', loc='left', fontsize=10)
     axes.set_xlabel('speed by the binarised area [mm/s]')

@@ -1,10 +1,13 @@
-"""A calibration of the binarised area as a parameter file."""
+"""Parameter file of a calibration of the binarised area.
+
+Tested in test_area_calibration.py.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -12,22 +15,22 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.calibration.area_fit import AreaFit
 
-# Settings of the speed that a calibration holds for.
-_READING = 'geometry', 'averaging', 'averaged_frames', 'time_step', 'threshold'
+# Settings of the speed for which a calibration is valid.
+_AREA_SETTINGS = 'geometry', 'averaging', 'averaged_frames', 'time_step', 'threshold'
 
 
 def write_parameters(path: Path, fit: AreaFit, settings: PipelineSettings, remark: str) -> None:
-    """Write a calibration as a ROS parameter file, with the reading that it holds for.
+    """Write a calibration as a ROS parameter file, with the settings for which it is valid.
 
     Parameters
     ----------
     path : Path
-        A file there is replaced.
+        An existing file is replaced.
     fit : AreaFit
     settings : PipelineSettings
-        That were calibrated.
+        Settings that were calibrated.
     remark : str
-        What the calibration is of.
+        Description of the calibration, for a comment in the file.
 
     Raises
     ------
@@ -36,7 +39,7 @@ def write_parameters(path: Path, fit: AreaFit, settings: PipelineSettings, remar
     """
     values = {
         'method': 'binarised_area',
-        **{name: getattr(settings.speed, name) for name in _READING},
+        **{name: getattr(settings.speed, name) for name in _AREA_SETTINGS},
         'area_factor': fit.factor,
         'area_offset': fit.offset,
     }
@@ -48,5 +51,5 @@ def write_parameters(path: Path, fit: AreaFit, settings: PipelineSettings, remar
         '    speed:',
         *(f'      {name}: {value}' for name, value in values.items()),
     ]
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_text('\n'.join(lines) + '\n', encoding='utf-8')

@@ -1,4 +1,4 @@
-"""Factor and offset of the binarised area, from tracks made by hand ([B19] section 3.2)."""
+"""Factor and offset of the binarised area, from manual tracks ([B19] section 3.2)."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Windows that do not overlap: fewer say nothing of the scatter; and for a second unknown.
-_FEWEST, _FEWEST_FOR_OFFSET = 5, 8
-# Fastest over slowest speed below which factor and offset cannot be told apart.
-_LEAST_RANGE = 1.5
-# Standard deviation of a Rayleigh distribution over its mean: how beads scatter about their mean.
+# Least number of windows for a factor, and for a factor and an offset.
+_MIN_WINDOWS, _MIN_WINDOWS_FOR_OFFSET = 5, 8
+# Least ratio of fastest to slowest speed that separates factor and offset.
+_MIN_SPEED_RATIO = 1.5
+# Standard deviation of a Rayleigh distribution over its mean: the scatter of bead speeds.
 _RAYLEIGH_SPREAD = math.sqrt(4.0 / math.pi - 1.0)
-_ROUNDS = 20
-# A factor that is not this many errors above 0 relates nothing to anything.
+_ITERATIONS = 20
+# Least ratio of the factor to its error.
 _SIGNIFICANT = 2.0
-_SMALLEST, _LARGEST, _LARGEST_OFFSET = 1e-3, 1e3, 0.1
+_MIN_FACTOR, _MAX_FACTOR, _MAX_OFFSET = 1e-3, 1e3, 0.1
 _MM = 1e3
-_REMEDY = 'mark more frames, or choose another reading of the binarised area'
+_REMEDY = 'mark more frames, or change the settings of the binarised area'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,9 +40,9 @@ class SpeedPair:
     area_speed, area_speed_error : float, [m/s]
         With a factor of 1 and no offset.
     manual_speed, manual_speed_error : float, [m/s]
-        The error is that of the measurement of the beads that were marked.
+        The error is that of the measured mean of the marked beads.
     beads : int
-        Marked and followed there.
+        Number of beads with a manual speed.
     """
 
     stamp_ns: int
@@ -61,13 +61,13 @@ class AreaFit:
     ----------
     factor, factor_error : float
     offset, offset_error : float, [m/s]
-        0 and NaN where the speeds do not range far enough to tell an offset from a factor.
+        0 and NaN where the range of speeds does not separate offset and factor.
     pairs : tuple of SpeedPair
-        What it rests on.
+        Speeds that were fitted.
     reduced_chi_square : float
-        Errors are larger by its root where that is more than 1.
+        Errors include a factor of its square root where that is above 1.
     scatter : float
-        Standard deviation of calibrated over manual speeds.
+        Standard deviation of the ratio of calibrated to manual speeds.
     """
 
     factor: float
@@ -80,7 +80,7 @@ class AreaFit:
 
     @property
     def windows(self) -> int:
-        """Windows that it rests on."""
+        """Number of fitted windows."""
         return len(self.pairs)
 
     @property
@@ -95,49 +95,51 @@ class AreaFit:
 
 
 def fit_area(pairs: Sequence[SpeedPair], beads: int, where: str) -> AreaFit:
-    """Fit the speeds by the area to those by hand, weighted by the errors of both.
+    """Fit manual speeds by those of the area, weighted with the errors of both.
 
     Parameters
     ----------
     pairs : sequence of SpeedPair
-        Of windows that do not overlap.
+        From windows that do not overlap.
     beads : int
-        In the tray: when fewer were marked, their mean is not that of all.
+        Number of beads in the tray; the mean of fewer marked beads has a sampling error.
     where : str
-        For errors.
+        Name of the tray, for messages.
 
     Raises
     ------
     FitError
         When there are too few windows, or the area does not follow the speed.
     """
-    if len(pairs) < _FEWEST:
+    if len(pairs) < _MIN_WINDOWS:
         raise FitError(
-            where, f'the tracks cover {len(pairs)} windows, {_FEWEST} are needed', _REMEDY
+            where, f'the tracks cover {len(pairs)} windows, {_MIN_WINDOWS} are needed', _REMEDY
         )
     area = np.array([pair.area_speed for pair in pairs])
     manual = np.array([pair.manual_speed for pair in pairs])
-    with_offset = len(pairs) >= _FEWEST_FOR_OFFSET and area.max() >= _LEAST_RANGE * area.min()
+    with_offset = (
+        len(pairs) >= _MIN_WINDOWS_FOR_OFFSET and area.max() >= _MIN_SPEED_RATIO * area.min()
+    )
     design = np.stack((area, np.ones_like(area)), axis=1)[:, : 1 + with_offset]
-    found = np.array([float(manual.sum() / max(area.sum(), 1e-12)), 0.0])[: 1 + with_offset]
-    inverse = np.eye(found.size)
-    for _ in range(_ROUNDS):
-        # From what is fitted, not from each noisy speed: a speed read too low would weigh more.
-        weights = 1.0 / _variances(pairs, design @ found, float(found[0]), beads)
+    parameters = np.array([float(manual.sum() / max(area.sum(), 1e-12)), 0.0])[: 1 + with_offset]
+    inverse = np.eye(parameters.size)
+    for _ in range(_ITERATIONS):
+        # Errors from the fitted speeds: with those of noisy speeds low ones would weigh more.
+        weights = 1.0 / _variances(pairs, design @ parameters, float(parameters[0]), beads)
         inverse = np.linalg.pinv(design.T @ (weights[:, np.newaxis] * design))
-        found = inverse @ (design.T @ (weights * manual))
-    residuals = manual - design @ found
-    chi_square = float(np.sum(weights * residuals**2)) / (len(pairs) - found.size)
+        parameters = inverse @ (design.T @ (weights * manual))
+    residuals = manual - design @ parameters
+    chi_square = float(np.sum(weights * residuals**2)) / (len(pairs) - parameters.size)
     scattered = np.sqrt(np.diag(inverse) * max(chi_square, 1.0))
-    errors = np.hypot(scattered, found * float(np.median(_sample_spread(pairs, beads))))
+    errors = np.hypot(scattered, parameters * float(np.median(_sample_spread(pairs, beads))))
     fit = AreaFit(
-        factor=float(found[0]),
+        factor=float(parameters[0]),
         factor_error=float(errors[0]),
-        offset=float(found[1]) if with_offset else 0.0,
+        offset=float(parameters[1]) if with_offset else 0.0,
         offset_error=float(errors[1]) if with_offset else math.nan,
         pairs=tuple(pairs),
         reduced_chi_square=chi_square,
-        scatter=float(np.std(design @ found / manual)),
+        scatter=float(np.std(design @ parameters / manual)),
     )
     _check(fit, where)
     return fit
@@ -146,7 +148,7 @@ def fit_area(pairs: Sequence[SpeedPair], beads: int, where: str) -> AreaFit:
 def _variances(
     pairs: Sequence[SpeedPair], expected: NDArray[np.float64], factor: float, beads: int
 ) -> NDArray[np.float64]:
-    """Of the manual speed less the calibrated one, [m^2/s^2]."""
+    """Variances of manual minus calibrated speeds, (n_pairs,), [m^2/s^2]."""
     measured = np.array([pair.manual_speed_error for pair in pairs])
     sample = expected * _sample_spread(pairs, beads)
     by_area = factor * np.array([pair.area_speed_error for pair in pairs])
@@ -154,27 +156,27 @@ def _variances(
 
 
 def _sample_spread(pairs: Sequence[SpeedPair], beads: int) -> NDArray[np.float64]:
-    """How far the mean of the beads that were marked may be off that of all, relatively.
+    """Relative sampling error of the mean over the marked beads, (n_pairs,).
 
-    It is usually the same beads that are marked throughout, so more windows do not make it less.
+    It does not decrease with more windows, since usually the same beads are marked in all.
     """
     marked = np.minimum(np.array([pair.beads for pair in pairs]), beads)
     return np.asarray(_RAYLEIGH_SPREAD * np.sqrt((1.0 - marked / beads) / marked))
 
 
 def _check(fit: AreaFit, where: str) -> None:
-    told = f'factor {fit.factor:.3g} +- {fit.factor_error:.2g}'
+    description = f'factor {fit.factor:.3g} +- {fit.factor_error:.2g}'
     if not fit.factor > _SIGNIFICANT * fit.factor_error:
         raise FitError(
             where,
-            f'the binarised area does not follow the speed of the tracks ({told}, '
+            f'the binarised area does not follow the speed of the tracks ({description}, '
             f'{fit.windows} windows, {_MM * fit.slowest:.2f} to {_MM * fit.fastest:.2f} mm/s)',
             _REMEDY,
         )
-    usable = _SMALLEST <= fit.factor <= _LARGEST and abs(fit.offset) <= _LARGEST_OFFSET
+    usable = _MIN_FACTOR <= fit.factor <= _MAX_FACTOR and abs(fit.offset) <= _MAX_OFFSET
     if not usable:
         raise FitError(
             where,
-            f'{told}, offset {_MM * fit.offset:.3g} mm/s cannot be a calibration',
+            f'{description}, offset {_MM * fit.offset:.3g} mm/s cannot be a calibration',
             'see that --first-frame, scale and tray are right',
         )

@@ -1,4 +1,4 @@
-"""Calibration of the camera from a recording of the trays, and pictures that show one."""
+"""Calibration of the camera from a recording of the trays, and images that show it."""
 
 from __future__ import annotations
 
@@ -25,100 +25,100 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import Frame
     from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 
-# Pictures from all over the recording whose median shows the trays without what moves in them.
-_PICTURES = 31
-# Mean slope along the sides of the trays over that of the whole picture: chance gives about 2.
-_LEAST_CONTRAST = 2.5
-_FEWEST_EDGES = 0.6
-LARGEST_RESIDUAL_PX = 0.5
+# Largest number of images in the median that shows the trays without the beads.
+_MAX_IMAGES = 31
+# Least ratio of the mean gradient along the tray sides to that of the image; chance gives 2.
+_MIN_CONTRAST = 2.5
+_MIN_VISIBLE_SHARE = 0.6
+MAX_RESIDUAL_PX = 0.5
 _GREEN, _RED, _WHITE = (60, 220, 60), (60, 60, 240), (255, 255, 255)
 
 
 def calibrate(
     frames: BagFrames, trays: Sequence[Tray], scale: tuple[float, float] | None = None
 ) -> tuple[PlateFit, NDArray[np.uint8]]:
-    """Lens, pose of the plate and regions of the trays from a recording.
+    """Fit lens, pose of the plate and regions of the trays to a recording.
 
     Parameters
     ----------
     frames : BagFrames
     trays : sequence of Tray
-        All that are on the plate, each with its place.
+        All trays on the plate.
     scale : tuple of 2 floats, [px/m], optional
-        Between which the scale lies.
+        Range of the scale.
 
     Returns
     -------
     PlateFit
     ndarray of uint8, (height, width[, 3])
-        The picture that was fitted.
+        The image that was fitted.
 
     Raises
     ------
     RecordingError
-        When no trays are found, or they do not fit where they should be.
+        When no trays are found, or their edges do not fit.
     """
-    picture = still_picture(frames)
+    picture = median_image(frames)
     gray = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
     gray = np.asarray(gray, dtype=np.uint8)
     guess = guess_plate(gray, trays, scale)
     remedy = 'see that the whole plate is in the picture, or give its scale and --trays'
-    if guess is None or guess.contrast < _LEAST_CONTRAST:
+    if guess is None or guess.contrast < _MIN_CONTRAST:
         raise RecordingError(frames.where, 'the trays are not found in the picture', remedy)
     fit = fit_plate(gray.astype(np.float32), trays, guess)
     if fit is None:
         raise RecordingError(
             frames.where, 'too few edges of the trays are seen to calibrate by', remedy
         )
-    seen = len(fit.residuals) / fit.edges.expected
+    visible_share = len(fit.residuals) / fit.edges.expected
     residual = fit.calibration.residual_px
-    if residual > LARGEST_RESIDUAL_PX or seen < _FEWEST_EDGES:
+    if residual > MAX_RESIDUAL_PX or visible_share < _MIN_VISIBLE_SHARE:
         raise RecordingError(
             frames.where,
             f'the trays do not lie where they should: their edges are off by {residual:.2f} px '
-            f'(at most {LARGEST_RESIDUAL_PX} px), {100 * seen:.0f} % of them are seen',
+            f'(at most {MAX_RESIDUAL_PX} px), {100 * visible_share:.0f} % of them are seen',
             remedy,
         )
     return fit, picture
 
 
-def still_picture(frames: BagFrames) -> NDArray[np.uint8]:
-    """Median over time of a recording: the scene without what moves in it.
+def median_image(frames: BagFrames) -> NDArray[np.uint8]:
+    """Median image of a recording: the scene without moving beads.
 
     Raises
     ------
     RecordingError
-        When there is no frame that can be used.
+        When there is no usable frame.
     """
-    pictures = [frame.image for frame in _spread(frames)]
-    if not pictures:
+    images = [frame.image for frame in _evenly_spaced_frames(frames)]
+    if not images:
         raise RecordingError(frames.where, 'holds no frame that can be used', 'pass another')
-    size = pictures[0].shape
-    stack = [picture for picture in pictures if picture.shape == size]
+    size = images[0].shape
+    stack = [image for image in images if image.shape == size]
     median = np.empty(size, dtype=np.uint8)
-    # Some rows at a time: all at once would take gigabytes.
+    # In blocks of rows: all rows at once would take gigabytes.
     for row in range(0, size[0], 64):
         rows = slice(row, row + 64)
-        part = np.stack([one[rows] for one in stack])
-        part.partition(len(stack) // 2, axis=0)
-        median[rows] = part[len(stack) // 2]
+        block = np.stack([image[rows] for image in stack])
+        block.partition(len(stack) // 2, axis=0)
+        median[rows] = block[len(stack) // 2]
     return median
 
 
-def _spread(frames: BagFrames) -> Iterator[Frame]:
-    """Some of the frames, evenly spread over the recording, as bgr or gray."""
+def _evenly_spaced_frames(frames: BagFrames) -> Iterator[Frame]:
+    """Yield frames, bgr or gray, that are evenly spaced over the recording."""
     count = max(1, frames.count)
-    wanted = {int(one) for one in np.linspace(0, count - 1, min(_PICTURES, count))}
+    indices = {int(index) for index in np.linspace(0, count - 1, min(_MAX_IMAGES, count))}
     for number, frame in enumerate(frames.frames()):
-        if number not in wanted or isinstance(frame, FrameError):
+        if number not in indices or isinstance(frame, FrameError):
             continue
         if frame.encoding == 'rgb8':
             raise RecordingError(frames.where, 'holds rgb8 pictures', 'record bgr8 or JPEGs')
         yield frame
 
 
-def rectified_picture(image: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
-    """The whole picture as the calibration straightens it.
+def rectified_image(image: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
+    """The whole image, rectified.
 
     Parameters
     ----------
@@ -135,26 +135,23 @@ def rectified_picture(image: NDArray[np.uint8], view: View) -> NDArray[np.uint8]
     return color
 
 
-def shown(
-    picture: NDArray[np.uint8], calibration: Calibration, trays: Sequence[Tray]
-) -> NDArray[np.uint8]:
-    """The calibration on a picture: straightened, with the regions and a scale drawn in.
+def draw_calibration(picture: NDArray[np.uint8], calibration: Calibration) -> NDArray[np.uint8]:
+    """Draw a calibration: the rectified image with the regions of the trays and a scale.
 
     Parameters
     ----------
     picture : ndarray of uint8, (height, width[, 3])
     calibration : Calibration
-    trays : sequence of Tray
 
     Returns
     -------
     ndarray of uint8, (height, width, 3), bgr
     """
     color = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if picture.ndim == 2 else picture
-    canvas = rectified_picture(np.asarray(color, dtype=np.uint8), calibration.view)
+    canvas = rectified_image(np.asarray(color, dtype=np.uint8), calibration.view)
     for number, region in calibration.regions.items():
         corners = (region.x, region.y), (region.x + region.width, region.y + region.height)
-        # A line is drawn on pixels; the region ends between two of them.
+        # Lines are drawn on pixels; a region ends between two pixels.
         cv2.rectangle(canvas, corners[0], (corners[1][0] - 1, corners[1][1] - 1), _GREEN, 1)
         at = (region.x + 4, region.y - 8)
         cv2.putText(canvas, f'tray {number}', at, 0, 0.6, _GREEN, 1, cv2.LINE_AA)
@@ -163,7 +160,7 @@ def shown(
 
 
 def _draw_scale(canvas: NDArray[np.uint8], scale: float) -> None:
-    """A bar of a centimetre, in the lower left corner."""
+    """Draw a bar of one centimetre in the lower left corner."""
     length = round(0.01 * scale)
     start = (30, canvas.shape[0] - 30)
     cv2.line(canvas, start, (start[0] + length, start[1]), _WHITE, 2)
@@ -172,7 +169,7 @@ def _draw_scale(canvas: NDArray[np.uint8], scale: float) -> None:
 
 
 def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
-    """Write a picture; the name says how.
+    """Write an image; the suffix gives the format.
 
     Raises
     ------
@@ -187,8 +184,8 @@ def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
         raise RecordingError(str(path), 'cannot be written', 'name a .png in a folder that exists')
 
 
-def largest_bend(calibration: Calibration) -> float:
-    """How far the lens moves any corner of a tray, at most, [px]."""
+def max_distortion_px(calibration: Calibration) -> float:
+    """Largest displacement of a tray corner by the lens distortion, [px]."""
     corners = [
         (region.x + a * region.width, region.y + b * region.height)
         for region in calibration.regions.values()

@@ -1,4 +1,4 @@
-"""Tracks that people made by hand, in the formats of the programs they use."""
+"""Files of manual tracks, in the formats of several programs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _REMEDY = (
     'give a CSV file with the columns frame, id, x, y, a TrackMate CSV or XML file, or a text '
     'file of NASA Spotlight'
 )
-# Names of columns, in lower case, of the programs that people use.
+# Names of columns in several programs, in lower case.
 _FRAME = 'frame', 'frame number', 'frame_number', 'frame no', 'slice', 't', 'image'
 _TRACK = 'id', 'track_id', 'track id', 'track', 'particle', 'object', 'target', 'trajectory'
 _COLUMN = 'x', 'position_x', 'x_px', 'x (px)', 'x (pixel)', 'x(px)', 'x [px]', 'xpos', 'column'
@@ -33,16 +33,16 @@ _PIXELS = '', 'pixel', 'pixels', 'px'
 
 @dataclass(frozen=True, slots=True)
 class ManualTracks:
-    """Places of beads in pictures, marked by a person.
+    """Manually marked positions of beads in images.
 
     Parameters
     ----------
     frames : ndarray of int64, (n,)
-        Pictures, as the file counts them.
+        Frame numbers of the file.
     ids : ndarray of int64, (n,)
-        Beads.
+        Bead of each position.
     places : ndarray (n, 2), [px]
-        Column and row, as the file gives them.
+        Column and row.
     """
 
     frames: NDArray[np.int64]
@@ -51,19 +51,19 @@ class ManualTracks:
 
 
 def read_manual_tracks(path: str | Path) -> ManualTracks:
-    """Read tracks that were made by hand; the format is found from the content.
+    """Read manual tracks; the format is detected from the content.
 
     Parameters
     ----------
     path : str or Path
         TrackMate CSV (spots table) or XML (whole model, or exported tracks), plain CSV with
-        columns for frame, bead and place, or the text of NASA Spotlight: numbers in columns,
+        columns for frame, bead and position, or the text of NASA Spotlight: numbers in columns,
         frame first, then column and row of each bead.
 
     Raises
     ------
     RecordingError
-        When the file cannot be read; names the line at fault.
+        When the file cannot be read; names the line with the error.
     """
     try:
         text = Path(path).read_text(encoding='utf-8-sig')
@@ -80,11 +80,11 @@ def read_manual_tracks(path: str | Path) -> ManualTracks:
     table = np.array(rows, dtype=np.float64)
     order = np.lexsort((table[:, 0], table[:, 1]))
     frames, ids = table[order, 0].astype(np.int64), table[order, 1].astype(np.int64)
-    again = np.flatnonzero((np.diff(frames) == 0) & (np.diff(ids) == 0))
-    if again.size:
+    duplicates = np.flatnonzero((np.diff(frames) == 0) & (np.diff(ids) == 0))
+    if duplicates.size:
         raise RecordingError(
             str(path),
-            f'bead {ids[again[0]]} is twice in frame {frames[again[0]]}',
+            f'bead {ids[duplicates[0]]} is twice in frame {frames[duplicates[0]]}',
             'give each bead a number of its own',
         )
     return ManualTracks(frames, ids, table[order, 2:])
@@ -108,23 +108,23 @@ def _cells(line: str) -> list[str]:
     """Cells of a line, between commas, semicolons or tabs, else between blanks."""
     for mark in ',;\t':
         if mark in line:
-            return [one.strip() for one in next(csv.reader([line], delimiter=mark))]
+            return [cell.strip() for cell in next(csv.reader([line], delimiter=mark))]
     return line.split()
 
 
 def _columns(names: Sequence[str]) -> tuple[int, int | None, int, int] | None:
-    """Which columns hold frame, bead, column and row; None when these are no such names."""
-    known = [name.lower() for name in names]
+    """Indices of the columns for frame, bead, column and row; None without such names."""
+    lower_names = [name.lower() for name in names]
 
-    def place(wanted: Sequence[str]) -> int | None:
-        return next((known.index(one) for one in wanted if one in known), None)
+    def index_of(wanted: Sequence[str]) -> int | None:
+        return next((lower_names.index(name) for name in wanted if name in lower_names), None)
 
-    frame, track, column, row = (place(one) for one in (_FRAME, _TRACK, _COLUMN, _ROW))
+    frame, track, column, row = (index_of(name) for name in (_FRAME, _TRACK, _COLUMN, _ROW))
     if frame is None or column is None or row is None:
         return None
-    # TrackMate numbers the spots in ID, and the beads in TRACK_ID.
-    if 'track_id' in known:
-        track = known.index('track_id')
+    # TrackMate has the number of the spot in ID, that of the bead in TRACK_ID.
+    if 'track_id' in lower_names:
+        track = lower_names.index('track_id')
     return frame, track, column, row
 
 
@@ -136,25 +136,25 @@ def _named_rows(
     for number, line in lines:
         cells = _cells(line)
         try:
-            # A spot of TrackMate that belongs to no track has no number.
+            # A spot of TrackMate without a track has no number.
             bead = 0.0 if track is None else float(cells[track] or 'nan')
-            found = float(cells[frame]), bead, float(cells[column]), float(cells[row])
+            values = float(cells[frame]), bead, float(cells[column]), float(cells[row])
         except (ValueError, IndexError) as error:
-            # Below its names TrackMate repeats them for people, and gives units.
+            # TrackMate has further header lines with long names and units.
             if not started:
-                _refuse_units(cells, (column, row), where, number)
+                _check_units(cells, (column, row), where, number)
                 continue
             raise RecordingError(
                 f'{where}:{number}', f'{line[:60]!r} is no row', _REMEDY
             ) from error
         started = True
         if not math.isnan(bead):
-            yield _checked(found, where, number)
+            yield _checked_row(values, where, number)
 
 
-def _refuse_units(cells: Sequence[str], columns: tuple[int, int], where: str, number: int) -> None:
-    for place in columns:
-        unit = re.fullmatch(r'\((.*)\)', cells[place]) if place < len(cells) else None
+def _check_units(cells: Sequence[str], columns: tuple[int, int], where: str, number: int) -> None:
+    for column in columns:
+        unit = re.fullmatch(r'\((.*)\)', cells[column]) if column < len(cells) else None
         if unit and unit.group(1).lower() not in _PIXELS:
             raise RecordingError(
                 f'{where}:{number}',
@@ -184,10 +184,10 @@ def _number_rows(lines: Sequence[tuple[int, str]], where: str) -> Iterable[_Row]
         started = True
         for bead in range(len(values) // 2):
             x, y = values[1 + 2 * bead], values[2 + 2 * bead]
-            yield _checked((values[0], float(bead), x, y), where, number)
+            yield _checked_row((values[0], float(bead), x, y), where, number)
 
 
-def _checked(row: _Row, where: str, number: int) -> _Row:
+def _checked_row(row: _Row, where: str, number: int) -> _Row:
     whole = row[0].is_integer() and row[1].is_integer()
     if not whole or not (math.isfinite(row[2]) and math.isfinite(row[3])):
         raise RecordingError(
@@ -208,20 +208,20 @@ def _xml_rows(text: str, where: str) -> Iterable[_Row]:
         if root.tag == 'TrackMate':
             return list(_model_rows(root, where))
         if root.tag == 'Tracks':
-            _refuse_unit(root.get('spaceUnits', ''), where)
+            _check_unit(root.get('spaceUnits', ''), where)
             return [
-                _checked(
+                _checked_row(
                     (
-                        float(one.attrib['t']),
+                        float(detection.attrib['t']),
                         float(bead),
-                        float(one.attrib['x']),
-                        float(one.attrib['y']),
+                        float(detection.attrib['x']),
+                        float(detection.attrib['y']),
                     ),
                     where,
                     1,
                 )
                 for bead, particle in enumerate(root.iter('particle'))
-                for one in particle.iter('detection')
+                for detection in particle.iter('detection')
             ]
     except (KeyError, ValueError) as error:
         raise RecordingError(
@@ -232,27 +232,27 @@ def _xml_rows(text: str, where: str) -> Iterable[_Row]:
 
 def _model_rows(root: ElementTree.Element, where: str) -> Iterable[_Row]:
     model = root.find('Model')
-    _refuse_unit('' if model is None else model.get('spatialunits', ''), where)
+    _check_unit('' if model is None else model.get('spatialunits', ''), where)
     spots = {
-        one.attrib['ID']: (
-            float(one.attrib['FRAME']),
-            float(one.attrib['POSITION_X']),
-            float(one.attrib['POSITION_Y']),
+        spot.attrib['ID']: (
+            float(spot.attrib['FRAME']),
+            float(spot.attrib['POSITION_X']),
+            float(spot.attrib['POSITION_Y']),
         )
-        for one in root.iter('Spot')
+        for spot in root.iter('Spot')
     }
     for track in root.iter('Track'):
         number = float(track.attrib['TRACK_ID'])
         ends = {edge.attrib[name] for edge in track.iter('Edge') for name in _EDGE}
         for spot in ends:
             frame, x, y = spots[spot]
-            yield _checked((frame, number, x, y), where, 1)
+            yield _checked_row((frame, number, x, y), where, 1)
 
 
 _EDGE = 'SPOT_SOURCE_ID', 'SPOT_TARGET_ID'
 
 
-def _refuse_unit(unit: str, where: str) -> None:
+def _check_unit(unit: str, where: str) -> None:
     if unit.lower() not in _PIXELS:
         raise RecordingError(
             where,

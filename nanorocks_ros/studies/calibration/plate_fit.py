@@ -1,9 +1,9 @@
-"""Lens and pose of the plate from the edges of the trays: least squares, no checkerboard.
+"""Lens and pose of the plate by least squares from the edges of the trays, without a checkerboard.
 
-The sides of the floors are straight and their sizes known, their places nearly: what bends them
-in the picture is the lens, what makes one scale differ from another is the pose of the plate.
-One plane picture tells only one function of the distance from the axis, so the focal length is
-what explains it best with an ideal equidistant lens, and the coefficients k1 and k2 take the rest.
+The sides of the floors are straight, of known size and approximately known position. The lens
+bends them in the image; the pose of the plate varies their scale. One image of a plane determines
+only one function of the distance from the axis: the focal length is that of the equidistant lens
+that fits best, and the coefficients k1 and k2 describe the rest.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.stages.preprocess.tray_edges import Edges
 
-# Places in the vector of unknowns.
-_BEND, _CENTRE, _K, _TURN, _SCALE, _PLACE = (
+# Indices of the vector of unknowns.
+_INVERSE_FOCAL_SQUARED, _CENTRE, _K, _ROTATION, _SCALE, _OFFSET = (
     0,
     slice(1, 3),
     slice(3, 5),
@@ -38,44 +38,44 @@ _BEND, _CENTRE, _K, _TURN, _SCALE, _PLACE = (
     8,
     slice(9, 11),
 )
-# Width of the wall as seen from above: the edge that is seen best may be its outer one.
+# Index of the width of the wall from above: the clearest edge may be the outer one of the wall.
 _WALL = 11
-_COMMON = 12
-_WALL_USUAL, _WALL_ERROR = 0.5e-3, 0.1e-3
-# How well things are known before: place and size of a floor [m], axis of the lens as a share of
-# the width, k1 and k2, and tilt of the plate.
-_TOLERANCE = 0.04e-3
-_CENTRE_SHARE = 0.03
-_K_USUAL = 0.3
-_TILT_USUAL = math.radians(3.0)
-# Of one place on an edge, [px].
+_N_COMMON = 12
+_UNKNOWN_WALL_ERROR, _WALL_ERROR = 0.5e-3, 0.1e-3
+# Prior standard deviations: position and size of a floor [m], axis of the lens relative to the
+# width of the image, k1 and k2, tilt of the plate.
+_FLOOR_ERROR = 0.04e-3
+_CENTRE_ERROR = 0.03
+_K_ERROR = 0.3
+_TILT_ERROR = math.radians(3.0)
+# Standard error of a point on an edge, [px].
 _EDGE_ERROR = 0.15
-_NO_WALL = 0.01e-3
-_LONGEST_FOCAL = 20.0
-# Below this bend, 1 / (f / width)^2, a lens is no fisheye; and the coefficients with which an
-# equidistant one bends nothing, the series of the tangent.
-_STRAIGHT = 0.02
+_NO_WALL_ERROR = 0.01e-3
+_MAX_FOCAL = 20.0
+# Below this value of 1 / (f / width)^2 a lens is not a fisheye; and the coefficients that make an
+# equidistant lens rectilinear, from the series of the tangent.
+_RECTILINEAR = 0.02
 _TANGENT = np.array([1.0 / 3.0, 2.0 / 15.0])
 _OUTWARDS = np.array([-1.0, -1.0, 2.0, 2.0])
-# How far from where they should be edges are looked for: at first in metres, less than half of
-# what lies between two trays, and once the walls are told from the floors in pixels.
+# Search range for edges about their expected position: at first in metres, less than half of the
+# distance between two trays; then, with walls and floors distinguished, in pixels.
 _FIRST_REACHES = (1.9e-3, 1.1e-3)
 _REACHES = (9.0, 8.0, 6.0, 6.0)
 
 
 @dataclass(frozen=True, slots=True)
 class PlateFit:
-    """The calibration, and how well it fits.
+    """A calibration with the residuals of its fit.
 
     Parameters
     ----------
     calibration : Calibration
     edges : Edges
-        That were used.
+        Edges that were fitted.
     residuals : ndarray, (n,), [px]
-        Distance of each from where it should be.
+        Distance of each edge from its fitted position.
     tray_scales : dict of int to float, [px/m]
-        In the picture of the camera, in the middle of each tray.
+        Scale of the camera image in the middle of each tray.
     """
 
     calibration: Calibration
@@ -85,13 +85,13 @@ class PlateFit:
 
 
 class PlateModel:
-    """From the floors of the trays to the picture of the camera.
+    """Projection of the floors of the trays to the camera image.
 
     Parameters
     ----------
     trays : sequence of Tray
     size : tuple of 2 ints, [px]
-        Width and height of the picture.
+        Width and height of the image.
     guess : PlateGuess
     """
 
@@ -100,15 +100,15 @@ class PlateModel:
         self.size = size
         self._order = {tray.number: k for k, tray in enumerate(trays)}
         self._boxes = np.array(list(plate_places(trays).values()))
-        self.values = np.zeros(_COMMON + 4 * len(trays))
+        self.values = np.zeros(_N_COMMON + 4 * len(trays))
         middle = 0.5 * np.array(size)
         self._usual_k = np.zeros(2)
-        # 1 / (f / width) squared: no lens at all is 0, and not infinitely far away.
-        self.values[_BEND] = 0.1
+        # 1 / (f / width)^2: 0 for parallel projection, so that it is not at infinity.
+        self.values[_INVERSE_FOCAL_SQUARED] = 0.1
         self.values[_CENTRE] = middle
         self.values[_SCALE] = guess.pixels_per_metre
         half = 0.04 * guess.pixels_per_metre
-        self.values[_PLACE] = np.array(guess.corner) + half - middle
+        self.values[_OFFSET] = np.array(guess.corner) + half - middle
 
     @property
     def focal(self) -> float:
@@ -116,95 +116,101 @@ class PlateModel:
         return self._focal(self.values)
 
     def _focal(self, values: NDArray[np.float64]) -> float:
-        return self.size[0] / math.sqrt(max(values[_BEND], 1.0 / _LONGEST_FOCAL**2))
+        return self.size[0] / math.sqrt(max(values[_INVERSE_FOCAL_SQUARED], 1.0 / _MAX_FOCAL**2))
 
     def floor(self, number: int, values: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-        """x, y, width, height of a floor from the middle of the plate, as fitted, [m]."""
+        """Fitted x, y, width and height of a floor, from the middle of the plate, [m]."""
         values = self.values if values is None else values
         k = self._order[number]
-        found: NDArray[np.float64] = (
-            self._boxes[k] + values[_COMMON + 4 * k : _COMMON + 4 * k + 4] * _TOLERANCE
+        box: NDArray[np.float64] = (
+            self._boxes[k] + values[_N_COMMON + 4 * k : _N_COMMON + 4 * k + 4] * _FLOOR_ERROR
         )
-        return found
+        return box
 
-    def picture(self, places: NDArray[np.float64], number: int) -> NDArray[np.float64]:
-        """Where places within the edge of a tray, as shares, are in the picture, [px]."""
+    def picture(self, points: NDArray[np.float64], number: int) -> NDArray[np.float64]:
+        """Image positions of points of a tray, given relative to its box, [px]."""
         box = self.floor(number) + self.values[_WALL] * _OUTWARDS
-        return self._project(self.values, box[:2] + places * box[2:])
+        return self._project(self.values, box[:2] + points * box[2:])
 
     def _project(
         self, values: NDArray[np.float64], points: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Points of the plate [m] in the picture [px]."""
         focal = self._focal(values)
-        turn = cv2.Rodrigues(values[_TURN])[0]
-        space = points @ turn[:, :2].T * (values[_SCALE] / focal)
-        flat = (space[..., :2] + values[_PLACE] / focal) / (1.0 + space[..., 2:])
-        radius = np.hypot(flat[..., 0], flat[..., 1])
+        rotation = cv2.Rodrigues(values[_ROTATION])[0]
+        rotated = points @ rotation[:, :2].T * (values[_SCALE] / focal)
+        projected = (rotated[..., :2] + values[_OFFSET] / focal) / (1.0 + rotated[..., 2:])
+        radius = np.hypot(projected[..., 0], projected[..., 1])
         angle = np.arctan(radius)
         square = angle * angle
         k1, k2 = values[_K]
-        bent = angle * (1.0 + square * (k1 + square * k2))
-        ratio = np.divide(bent, radius, where=radius > 1e-12, out=np.ones_like(radius))
-        return np.asarray(flat * (ratio * focal)[..., np.newaxis] + values[_CENTRE])
+        distorted = angle * (1.0 + square * (k1 + square * k2))
+        ratio = np.divide(distorted, radius, where=radius > 1e-12, out=np.ones_like(radius))
+        return np.asarray(projected * (ratio * focal)[..., np.newaxis] + values[_CENTRE])
 
     def residuals(self, values: NDArray[np.float64], edges: Edges) -> NDArray[np.float64]:
-        """Distance of each edge from where it should be, [px]."""
+        """Distance of each edge from its modelled position, [px]."""
         order = np.array([self._order[tray] for tray in edges.trays])
-        boxes = self._boxes + values[_COMMON:].reshape(-1, 4) * _TOLERANCE
+        boxes = self._boxes + values[_N_COMMON:].reshape(-1, 4) * _FLOOR_ERROR
         boxes = boxes + values[_WALL] * _OUTWARDS
-        own = boxes[order]
-        points = self._project(values, own[:, :2] + edges.places * own[:, 2:])
+        tray_boxes = boxes[order]
+        points = self._project(values, tray_boxes[:, :2] + edges.places * tray_boxes[:, 2:])
         return np.asarray(((edges.found - points) * edges.normals).sum(axis=1))
 
     def fit(self, edges: Edges, free_lens: bool) -> None:
-        """Adjust to the edges; the coefficients of the lens too, or its focal length alone."""
-        if free_lens and self.values[_BEND] < _STRAIGHT:
-            # Not a fisheye: a lens that bends nothing, so that it may bend the other way too.
-            self.values[_BEND], self._usual_k = 0.25, _TANGENT
+        """Fit the edges, with the coefficients of the lens or its focal length alone."""
+        if free_lens and self.values[_INVERSE_FOCAL_SQUARED] < _RECTILINEAR:
+            # Not a fisheye: start from a rectilinear lens, which can distort either way.
+            self.values[_INVERSE_FOCAL_SQUARED], self._usual_k = 0.25, _TANGENT
             self.values[_K] = _TANGENT
         free = np.ones(self.values.size, dtype=bool)
-        free[_K if not free_lens else _BEND] = False
+        free[_K if not free_lens else _INVERSE_FOCAL_SQUARED] = False
         start = self.values[free]
         scale = np.ones(self.values.size)
-        scale[_CENTRE] = scale[_PLACE] = 10.0
+        scale[_CENTRE] = scale[_OFFSET] = 10.0
         scale[_SCALE] = 0.01 * self.values[_SCALE]
         scale[_WALL] = 1e-4
-        scale[_TURN], scale[_K], scale[_BEND] = 0.01, 0.05, 0.05
+        scale[_ROTATION], scale[_K], scale[_INVERSE_FOCAL_SQUARED] = 0.01, 0.05, 0.05
         middle = 0.5 * np.array(self.size)
-        # Until the walls are told from the floors the fit has to find out how wide they are.
-        told = math.isfinite(edges.wall_px)
-        wall = edges.wall_px / float(self.values[_SCALE]) if told else 0.0
-        wall_error = _WALL_ERROR if told and wall > 0.0 else _NO_WALL if told else _WALL_USUAL
+        # Until walls and floors are distinguished, the width of the wall is fitted freely.
+        walls_found = math.isfinite(edges.wall_px)
+        wall = edges.wall_px / float(self.values[_SCALE]) if walls_found else 0.0
+        wall_error = (
+            _WALL_ERROR
+            if walls_found and wall > 0.0
+            else _NO_WALL_ERROR
+            if walls_found
+            else _UNKNOWN_WALL_ERROR
+        )
 
-        def every(part: NDArray[np.float64]) -> NDArray[np.float64]:
+        def weighted_residuals(free_values: NDArray[np.float64]) -> NDArray[np.float64]:
             values = self.values.copy()
-            values[free] = part
+            values[free] = free_values
             distances = self.residuals(values, edges) / _EDGE_ERROR
-            # Far-off edges pull with a bounded force (soft l1); what is known before as it is.
+            # The influence of outliers among edges is bounded (soft l1), that of the priors not.
             bounded = np.sign(distances) * np.sqrt(2.0 * (np.sqrt(1.0 + distances**2) - 1.0))
-            known = [
-                (values[_CENTRE] - middle) / (_CENTRE_SHARE * self.size[0]),
-                (values[_K] - self._usual_k) / _K_USUAL,
-                values[_TURN][:2] / _TILT_USUAL,
+            prior_residuals = [
+                (values[_CENTRE] - middle) / (_CENTRE_ERROR * self.size[0]),
+                (values[_K] - self._usual_k) / _K_ERROR,
+                values[_ROTATION][:2] / _TILT_ERROR,
                 (values[_WALL : _WALL + 1] - wall) / wall_error,
-                values[_COMMON:],
+                values[_N_COMMON:],
             ]
-            return np.concatenate([bounded, *known])
+            return np.concatenate([bounded, *prior_residuals])
 
-        found = least_squares(every, start, x_scale=scale[free], max_nfev=60)
-        self.values[free] = found.x
+        solution = least_squares(weighted_residuals, start, x_scale=scale[free], max_nfev=60)
+        self.values[free] = solution.x
 
 
 def fit_plate(
     gray: NDArray[np.float32], trays: Sequence[Tray], guess: PlateGuess
 ) -> PlateFit | None:
-    """Lens, pose and regions from one picture; None when too few edges are seen.
+    """Fit lens, pose and regions to one image; None when too few edges are found.
 
     Parameters
     ----------
     gray : ndarray of float32, (rows, columns)
-        The scene without what moves in it.
+        The scene without moving beads.
     trays : sequence of Tray
     guess : PlateGuess
     """
@@ -231,7 +237,7 @@ def fit_plate(
 
 
 def _local_scale(model: PlateModel, tray: Tray) -> float:
-    """Square root of the area of the floor in the picture over that of the floor."""
+    """Scale of a floor: the square root of its image area over its area, [px/m]."""
     corners = np.array([[0.4, 0.4], [0.6, 0.4], [0.6, 0.6], [0.4, 0.6]])
     x, y = model.picture(corners, tray.number).T
     area = 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
@@ -240,15 +246,15 @@ def _local_scale(model: PlateModel, tray: Tray) -> float:
 
 
 def _calibration(model: PlateModel, residual: float) -> Calibration:
-    """The fit in the words of camera_info: the view from straight above, at the same scale."""
+    """The fit as camera_info: the rectified view is from straight above, at the same scale."""
     values, focal, (width, height) = model.values, model.focal, model.size
     scale = float(values[_SCALE])
-    turn = cv2.Rodrigues(values[_TURN])[0]
-    away = turn.T @ np.array([*(values[_PLACE] / focal), 1.0]) * (focal / scale)
-    new_focal = scale * away[2]
-    middle = 0.5 * np.array([width, height]) - scale * away[:2]
-    cx, cy = (float(one) - 0.5 for one in values[_CENTRE])
-    k1, k2 = (float(one) for one in values[_K])
+    rotation = cv2.Rodrigues(values[_ROTATION])[0]
+    centre_ray = rotation.T @ np.array([*(values[_OFFSET] / focal), 1.0]) * (focal / scale)
+    new_focal = scale * centre_ray[2]
+    middle = 0.5 * np.array([width, height]) - scale * centre_ray[:2]
+    cx, cy = (float(value) - 0.5 for value in values[_CENTRE])
+    k1, k2 = (float(value) for value in values[_K])
     p = (
         new_focal,
         0.0,
@@ -269,15 +275,15 @@ def _calibration(model: PlateModel, residual: float) -> Calibration:
         distortion_model='equidistant',
         d=(k1, k2, 0.0, 0.0),
         k=(focal, 0.0, cx, 0.0, focal, cy, 0.0, 0.0, 1.0),
-        r=tuple(float(one) for one in turn.T.ravel()),
-        p=tuple(float(one) for one in p),
+        r=tuple(float(value) for value in rotation.T.ravel()),
+        p=tuple(float(value) for value in p),
     )
     regions = {}
     for tray in model.trays:
         box = model.floor(tray.number) * scale
         corner = box[:2] + 0.5 * np.array([width, height])
         end = corner + box[2:]
-        x, y = (round(float(one)) for one in corner)
+        x, y = (round(float(value)) for value in corner)
         regions[tray.number] = Region(x, y, round(float(end[0])) - x, round(float(end[1])) - y)
     return Calibration(
         view=view_of(info, 'calibration'),

@@ -1,4 +1,4 @@
-"""How tracks made by hand, or the truth of a simulation, compare with ours."""
+"""Comparison of tracks with manual tracks, or with the truth of a simulation."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.calibration.manual_tracks import ManualTracks
 
 _NS = 1e9
-# Steps of the inversion of a view, each of which gains a factor of three or more, and what
-# is left then, [px].
-_STEPS = 60
-_EXACT_PX = 1e-3
+# Iterations of the inversion of a view, each of which reduces the error by a factor of three or
+# more, and the tolerance after them, [px].
+_ITERATIONS = 60
+_TOLERANCE_PX = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """Beads of one picture that are known from elsewhere.
+class MarkedBeads:
+    """Reference positions of beads in one image.
 
     Parameters
     ----------
@@ -45,27 +45,27 @@ class Place:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackComparison:
-    """Tracks against tracks.
+    """Result of a comparison of tracks with a reference.
 
     Parameters
     ----------
     beads, places : int
-        Of the reference: beads, and places of them in pictures.
+        Number of beads of the reference, and of their positions in images.
     found : float
-        Share of those places where we saw a bead.
+        Fraction of these positions at which the tracks have a bead.
     links, links_correct : int
-        Of two pictures in a row, beads that we followed from one to the other, and that are
-        the same bead in the reference.
+        Number of links of the tracks between consecutive images, and of those that join the
+        same bead of the reference.
     switches : int
-        How often a bead of the reference got another number.
+        How often the track of a bead of the reference changes.
     switches_per_minute : float, [1/min]
-        For each bead; NaN when no time passes.
+        Switches per bead; NaN for a single image.
     rms_distance : float, [m]
-        Between places, of both coordinates together.
+        Root mean square distance between tracks and reference.
     offset : tuple of 2 floats, [m]
-        Mean of ours less theirs.
+        Mean of tracks minus reference.
     speed_ratio : float
-        Our mean speed from picture to picture of the reference, over theirs; NaN when unknown.
+        Mean speed of the tracks over that of the reference; NaN when unknown.
     """
 
     beads: int
@@ -82,7 +82,7 @@ class TrackComparison:
 
 def compare_tracks(
     tracks: Sequence[Tracks],
-    reference: Mapping[int, Place],
+    reference: Mapping[int, MarkedBeads],
     *,
     reach: float,
     species: int | None = None,
@@ -93,100 +93,101 @@ def compare_tracks(
     ----------
     tracks : sequence of Tracks
         Of one tray, in order.
-    reference : mapping of int to Place
-        By the stamp of the picture, [ns].
+    reference : mapping of int to MarkedBeads
+        Beads by the stamp of the image, [ns].
     reach : float, [m]
-        Places further apart are not of the same bead.
+        Largest distance between positions of the same bead.
     species : int or None
-        Of ours, compare this one alone.
+        Compare only tracks of this species.
 
     Raises
     ------
     RecordingError
-        When no picture of the reference is one of ours.
+        When the reference has no image of the tracks.
     """
-    count = _Count()
+    sums = _ComparisonSums()
     stamps = []
     for record in tracks:
-        known = reference.get(record.stamp_ns)
+        marked = reference.get(record.stamp_ns)
         shown = record.seen if species is None else record.seen & (record.species == species)
-        if known is not None:
+        if marked is not None:
             stamps.append(record.stamp_ns)
-            count.add(record.stamp_ns, record.ids[shown], record.positions[shown], known, reach)
+            sums.add(record.ids[shown], record.positions[shown], marked, reach)
     if not stamps:
         raise RecordingError(
             'the reference',
             'none of its pictures is one of the recording',
             'say with --first-frame which number the first frame has',
         )
-    return count.result((stamps[-1] - stamps[0]) / _NS)
+    return sums.result((stamps[-1] - stamps[0]) / _NS)
 
 
-class _Count:
-    """Adds up picture after picture."""
+class _ComparisonSums:
+    """Sums over images."""
 
     def __init__(self) -> None:
         self._beads: set[int] = set()
         self._places = 0
         self._links = self._correct = self._switches = 0
-        self._apart: list[NDArray[np.float64]] = []
-        self._number: dict[int, int] = {}
+        self._differences: list[NDArray[np.float64]] = []
+        self._track_ids: dict[int, int] = {}
         self._last: dict[int, tuple[int, NDArray[np.float64], NDArray[np.float64]]] = {}
-        self._ways = [0.0, 0.0]
+        self._paths = [0.0, 0.0]
 
     def add(
         self,
-        stamp_ns: int,
         ids: NDArray[np.int32],
         positions: NDArray[np.float64],
-        known: Place,
+        marked: MarkedBeads,
         reach: float,
     ) -> None:
-        self._beads.update(known.ids.tolist())
-        self._places += known.ids.size
-        apart = cdist(known.positions, positions)
-        rows, columns = linear_sum_assignment(np.minimum(apart, reach))
-        near = apart[rows, columns] < reach
-        now = {}
-        for i, j in zip(rows[near].tolist(), columns[near].tolist(), strict=True):
-            bead, number = int(known.ids[i]), int(ids[j])
-            here, there = positions[j], known.positions[i]
-            self._apart.append(here - there)
-            now[number] = (bead, here, there)
-            self._switches += self._number.get(bead, number) != number
-            self._number[bead] = number
+        self._beads.update(marked.ids.tolist())
+        self._places += marked.ids.size
+        distances = cdist(marked.positions, positions)
+        rows, columns = linear_sum_assignment(np.minimum(distances, reach))
+        matched = distances[rows, columns] < reach
+        current = {}
+        for i, j in zip(rows[matched].tolist(), columns[matched].tolist(), strict=True):
+            bead, number = int(marked.ids[i]), int(ids[j])
+            position, reference_position = positions[j], marked.positions[i]
+            self._differences.append(position - reference_position)
+            current[number] = (bead, position, reference_position)
+            self._switches += self._track_ids.get(bead, number) != number
+            self._track_ids[bead] = number
             if number in self._last:
-                before, was_here, was_there = self._last[number]
+                last_bead, last_position, last_reference = self._last[number]
                 self._links += 1
-                self._correct += before == bead
-                if before == bead:
-                    self._ways[0] += float(np.hypot(*(here - was_here)))
-                    self._ways[1] += float(np.hypot(*(there - was_there)))
-        self._last = now
+                self._correct += last_bead == bead
+                if last_bead == bead:
+                    self._paths[0] += float(np.hypot(*(position - last_position)))
+                    self._paths[1] += float(np.hypot(*(reference_position - last_reference)))
+        self._last = current
 
     def result(self, seconds: float) -> TrackComparison:
-        apart = np.array(self._apart).reshape(-1, 2)
-        some = apart.shape[0] > 0
+        differences = np.array(self._differences).reshape(-1, 2)
+        any_matched = differences.shape[0] > 0
         minutes = seconds * len(self._beads) / 60.0
-        ours, theirs = self._ways
+        path, reference_path = self._paths
         return TrackComparison(
             beads=len(self._beads),
             places=self._places,
-            found=apart.shape[0] / max(self._places, 1),
+            found=differences.shape[0] / max(self._places, 1),
             links=self._links,
             links_correct=self._correct,
             switches=self._switches,
             switches_per_minute=self._switches / minutes if minutes > 0.0 else np.nan,
-            rms_distance=float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))) if some else np.nan,
-            offset=(float(apart[:, 0].mean()), float(apart[:, 1].mean()))
-            if some
+            rms_distance=float(np.sqrt(np.mean(np.sum(differences**2, axis=1))))
+            if any_matched
+            else np.nan,
+            offset=(float(differences[:, 0].mean()), float(differences[:, 1].mean()))
+            if any_matched
             else (np.nan, np.nan),
-            speed_ratio=ours / theirs if theirs > 0.0 else np.nan,
+            speed_ratio=path / reference_path if reference_path > 0.0 else np.nan,
         )
 
 
-class TrayPicture(Protocol):
-    """What has to be known of a picture of a tray; `Tracks` are of one."""
+class TrayView(Protocol):
+    """Time and displacement of a tray image; `Tracks` have both."""
 
     @property
     def stamp_ns(self) -> int:
@@ -194,60 +195,62 @@ class TrayPicture(Protocol):
 
     @property
     def displacement(self) -> NDArray[np.float64]:
-        """Of the tray in the picture, (2,), [m]; 0 where nobody measured it."""
+        """Displacement of the tray in the image, (2,), [m]; 0 where it is not measured."""
 
 
 def manual_reference(
     manual: ManualTracks,
-    tracks: Sequence[TrayPicture],
+    tracks: Sequence[TrayView],
     numbers: Sequence[int],
     *,
     region: Region,
     pixels_per_metre: float,
     view: View | None = None,
     first_frame: int = 0,
-) -> dict[int, Place]:
-    """Tracks made by hand, in the coordinates of the tray.
+) -> dict[int, MarkedBeads]:
+    """Manual tracks in the coordinates of the tray.
 
     Parameters
     ----------
     manual : ManualTracks
-        Places in the frames as the camera gave them.
-    tracks : sequence of Tracks or other TrayPicture
-        Of the tray, for stamps and the displacement of the tray.
+        Positions in the frames of the camera.
+    tracks : sequence of Tracks or other TrayView
+        Of the tray, for time stamps and displacements.
     numbers : sequence of int
-        Which frame, counted from 0, each of them is of.
+        Frame number of each of them, from 0.
     region : Region
         Of the tray in the rectified frame.
     pixels_per_metre : float, [px/m]
     view : View, optional
-        What is known of the lens.
+        Lens and pose of the camera.
     first_frame : int
-        Number that the file gives to the first frame.
+        Number of the first frame in the file.
 
     Returns
     -------
-    dict of int to Place
-        By stamp; places beyond the tray are left out.
+    dict of int to MarkedBeads
+        Beads by stamp, without positions outside the tray.
     """
-    straight = manual.places if view is None else _straight(view, manual.places)
-    positions = (straight - (region.x, region.y)) / pixels_per_metre
+    rectified = manual.places if view is None else _rectified_points(view, manual.places)
+    positions = (rectified - (region.x, region.y)) / pixels_per_metre
     size = np.array([region.width, region.height]) / pixels_per_metre
-    found = {}
+    reference = {}
     for record, number in zip(tracks, numbers, strict=True):
-        here = manual.frames == number + first_frame
-        places = positions[here] - record.displacement
-        inside = ((places >= 0.0) & (places <= size)).all(axis=1)
+        in_frame = manual.frames == number + first_frame
+        positions_in_tray = positions[in_frame] - record.displacement
+        inside = ((positions_in_tray >= 0.0) & (positions_in_tray <= size)).all(axis=1)
         if inside.any():
-            found[record.stamp_ns] = Place(ids=manual.ids[here][inside], positions=places[inside])
-    return found
+            reference[record.stamp_ns] = MarkedBeads(
+                ids=manual.ids[in_frame][inside], positions=positions_in_tray[inside]
+            )
+    return reference
 
 
-def _straight(view: View, places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where points of the camera's frame are in the rectified frame; NaN where nowhere."""
-    found = np.array(places, dtype=np.float64)
-    for _ in range(_STEPS):
-        found = found + (places - view.source(found))
-    lost = np.abs(view.source(found) - places).max(axis=1) > _EXACT_PX
-    found[lost] = np.nan
-    return found
+def _rectified_points(view: View, distorted: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Positions in the rectified frame of points in the camera frame; NaN where undefined."""
+    rectified = np.array(distorted, dtype=np.float64)
+    for _ in range(_ITERATIONS):
+        rectified = rectified + (distorted - view.source(rectified))
+    failed = np.abs(view.source(rectified) - distorted).max(axis=1) > _TOLERANCE_PX
+    rectified[failed] = np.nan
+    return rectified

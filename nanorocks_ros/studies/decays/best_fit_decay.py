@@ -1,4 +1,4 @@
-"""The simulated decay that agrees best with measured ones, and what it says of restitutions."""
+"""The library decay that fits measured decays best, and its restitutions."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ import numpy as np
 from scipy import optimize
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import (
     DecayLikelihood,
     DecayTables,
     decay_likelihood,
 )
-from nanorocks_ros.inference.posterior import posterior_of, tables_of
+from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
@@ -31,27 +32,27 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.decays.decay_curve import SpeedCurve
 
 _HALF = 0.5 * 0.95
-# ln of the speed at the start over the first one used, at least and at most: a mixture that starts
-# with equal speeds becomes faster at first.
-_LEADS = (-1.0, 4.0)
+# Range of ln(initial speed / first speed used). Below 0: the speed of a mixture that starts with
+# equal speeds rises at first.
+_LOG_SPEED_RATIOS = (-1.0, 4.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LibraryDecay:
-    """A decay of the library of a tray beside measured ones.
+    """Best fitting decay of the library of a tray.
 
     Parameters
     ----------
     times : ndarray (n,), [s]
         Since the shaking event.
     speed : ndarray (n,), [m/s]
-        Mean projected, of the likeliest pair of restitutions; with tray, start and camera as they
-        are likeliest then, within their priors.
+        Mean projected speed for the likeliest restitutions, with the likeliest tray, start and
+        camera within their priors.
     initial_speed : float, [m/s]
-        The same when the gas began to cool.
+        Mean projected speed when the gas began to cool.
     restitution, wall_restitution : tuple of 3 floats
-        Median of what all cycles say with the default priors, lower and upper end of the 95 %
-        interval.
+        Median, lower and upper end of the 95 % interval, from all cycles with the default
+        priors.
     """
 
     times: NDArray[np.float64]
@@ -64,49 +65,51 @@ class LibraryDecay:
 def library_decay(
     tray: Tray, cycles: Sequence[CycleSpeeds], curve: SpeedCurve, start: float = 0.0
 ) -> LibraryDecay:
-    """Hold measured decays against the library of their tray.
+    """Fit measured decays by the library of their tray.
 
     Parameters
     ----------
     tray : Tray
     cycles : sequence of CycleSpeeds
     curve : SpeedCurve
-        Their mean over the times that are to be used.
+        Mean of the cycles over the times that are used.
     start : float, [s]
-        From when on the gas cools, since the shaking event.
+        When the gas begins to cool, since the shaking event.
 
     Raises
     ------
     ConfigurationError
-        When there is no library of such a tray.
+        When there is no library of this tray.
     FitError
         When fewer than 4 speeds of a cycle lie in the cooling window.
     """
-    known = PipelineSettings().prior
+    prior = PipelineSettings().prior
     library = library_of(tray)
-    tables = tables_of(library, tray, known)
-    camera = (math.hypot(known.scale_error, library.misfit), known.speed_bias)
-    # As the stage does: the gas has to forget how it was shaken.
+    tables = tables_of(library, tray, prior)
+    camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
+    # As the restitution stage: the first part still depends on the shaking.
     first = max(float(curve.times[0]), start + PipelineSettings().cooling.delay)
     likelihoods = []
-    for one in cycles:
-        used = (one.times >= first - 1e-9) & (one.times <= curve.times[-1] + 1e-9)
-        used &= one.error > 0.0
-        if used.sum() < 4:
-            raise FitError(f'cycle {one.cycle}', 'is too short', 'choose a longer time')
-        decay = one.times[used] - start, one.speed[used], one.error[used]
+    for cycle in cycles:
+        in_window = (cycle.times >= first - 1e-9) & (cycle.times <= curve.times[-1] + 1e-9)
+        in_window &= cycle.error > 0.0
+        if in_window.sum() < 4:
+            raise FitError(f'cycle {cycle.cycle}', 'is too short', 'choose a longer time')
+        decay = cycle.times[in_window] - start, cycle.speed[in_window], cycle.error[in_window]
         likelihoods.append(decay_likelihood(tables, *decay, camera))
     together = reduce(add, likelihoods)
     integrated = together.integrated()
-    posterior = posterior_of(tables, integrated, (known.wall_low, known.wall_high))
+    posterior = posterior_of(
+        tables, integrated, (prior.min_wall_restitution, prior.max_wall_restitution)
+    )
     ends = np.array([0.5, 0.5 - _HALF, 0.5 + _HALF])
     beads, walls = posterior.quantiles(ends), posterior.wall_quantiles(ends)
-    late = curve.times >= first - 1e-9
-    speed, initial = _matched(
-        tables, together, integrated, curve.times[late] - start, curve.speed[late], camera
+    cooling = curve.times >= first - 1e-9
+    speed, initial = _best_decay(
+        tables, together, integrated, curve.times[cooling] - start, curve.speed[cooling], camera
     )
     return LibraryDecay(
-        times=curve.times[late],
+        times=curve.times[cooling],
         speed=speed,
         initial_speed=initial,
         restitution=(float(beads[0]), float(beads[1]), float(beads[2])),
@@ -114,7 +117,7 @@ def library_decay(
     )
 
 
-def _matched(
+def _best_decay(
     tables: DecayTables,
     likelihood: DecayLikelihood,
     integrated: NDArray[np.float64],
@@ -122,28 +125,28 @@ def _matched(
     speed: NDArray[np.float64],
     camera: tuple[float, float],
 ) -> tuple[NDArray[np.float64], float]:
-    """The likeliest decay with the initial speed that fits best, and that speed."""
-    place = int(np.argmax(integrated))
-    # Tray, start and camera as they are likeliest there, in standard deviations.
-    matrix = np.eye(likelihood.gradient.shape[1]) + likelihood.information[place]
-    off = np.linalg.solve(matrix, likelihood.gradient[place])
-    own, (scale, bias) = off[: -len(camera)], off[-len(camera) :] * np.array(camera)
-    mean = tables.mean[place] + own @ tables.slopes[place]
+    """The likeliest decay and its initial speed."""
+    best_point = int(np.argmax(integrated))
+    # Likeliest nuisance parameters there, in standard deviations.
+    matrix = np.eye(likelihood.gradient.shape[1]) + likelihood.information[best_point]
+    offsets = np.linalg.solve(matrix, likelihood.gradient[best_point])
+    nuisances, (scale, bias) = offsets[: -len(camera)], offsets[-len(camera) :] * np.array(camera)
+    mean = tables.mean[best_point] + nuisances @ tables.slopes[best_point]
     log_distances = np.log(tables.decays.distances)
-    tilt = bias * (np.log(speed) - np.log(speed).mean())
+    bias_term = bias * (np.log(speed) - np.log(speed).mean())
 
     def log_speed(log_initial: float) -> NDArray[np.float64]:
-        # Lengths of the tray are that much longer in the picture than they are taken for.
+        # Lengths in the image are larger by exp(scale) than the calibration says.
         true = log_initial + scale
-        at = (true + np.log(time) - log_distances[0]) / tables.decays.step
-        # Straight on beyond the ends, as where the likelihood is worked out.
-        cell = np.clip(np.floor(at).astype(np.int64), 0, mean.size - 2)
-        found = mean[cell] + (at - cell) * (mean[cell + 1] - mean[cell])
-        return np.asarray(log_initial + found + tilt)
+        position = (true + np.log(time) - log_distances[0]) / tables.decays.step
+        # Extrapolated linearly beyond the ends, as in the likelihood.
+        cell = np.clip(np.floor(position).astype(np.int64), 0, mean.size - 2)
+        log_decay = mean[cell] + (position - cell) * (mean[cell + 1] - mean[cell])
+        return np.asarray(log_initial + log_decay + bias_term)
 
     def misfit(log_initial: float) -> float:
         return float(np.sum((np.log(speed) - log_speed(log_initial)) ** 2))
 
-    bounds = tuple(float(np.log(speed[0])) + lead for lead in _LEADS)
+    bounds = tuple(float(np.log(speed[0])) + lead for lead in _LOG_SPEED_RATIOS)
     best = optimize.minimize_scalar(misfit, bounds=bounds, method='bounded').x
     return np.exp(log_speed(float(best))), math.exp(float(best))

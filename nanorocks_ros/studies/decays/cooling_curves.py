@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.outputs.csv_tables import read_csv
 from nanorocks_ros.studies.decays.decay_curve import SpeedCurve, read_curve
 
 if TYPE_CHECKING:
@@ -24,8 +25,8 @@ MEAN = 'mean_projected_speed'
 _COLUMNS = ('time', 'cycle', 'cycle_start')
 _FORM = 'name the results of `nanorocks analyse`, or their tray_K_speed.csv'
 _TABLE = 'tray_{}_speed.csv'
-# Fewer speeds are no decay.
-_FEWEST = 4
+# Least number of speeds of a decay.
+_MIN_SPEEDS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +39,7 @@ class CycleSpeeds:
     times : ndarray (n,), [s]
         Since the shaking event, rising.
     speed, error : ndarray (n,), [m/s]
-        NaN nowhere; an error of 0 is not known.
+        Never NaN; an error of 0 means that it is not known.
     """
 
     cycle: int
@@ -48,7 +49,7 @@ class CycleSpeeds:
 
 
 def speed_table(path: Path, tray: int | None = None) -> tuple[Path, int | None]:
-    """The table of speeds of a tray, and the number of the tray where the name says it.
+    """Path of the table of speeds of a tray, and the number of the tray if the name has it.
 
     Parameters
     ----------
@@ -60,20 +61,20 @@ def speed_table(path: Path, tray: int | None = None) -> tuple[Path, int | None]:
     Raises
     ------
     RecordingError
-        When there is none, or more than one to choose from.
+        When there is no table, or several and no number to choose one.
     """
     if not path.is_dir():
         parts = path.stem.split('_')
-        named = parts[:1] == ['tray'] and len(parts) > 1 and parts[1].isdigit()
-        return path, tray if tray is not None else int(parts[1]) if named else None
+        has_number = parts[:1] == ['tray'] and len(parts) > 1 and parts[1].isdigit()
+        return path, tray if tray is not None else int(parts[1]) if has_number else None
     numbers = sorted(
-        int(one.stem.split('_')[1])
-        for one in path.glob(_TABLE.format('*'))
-        if one.stem.split('_')[1].isdigit()
+        int(table.stem.split('_')[1])
+        for table in path.glob(_TABLE.format('*'))
+        if table.stem.split('_')[1].isdigit()
     )
     if tray is None and len(numbers) != 1:
-        known = ', '.join(str(one) for one in numbers) or 'none'
-        raise RecordingError(str(path), f'holds speeds of trays: {known}', 'name one with --tray')
+        listed = ', '.join(str(table) for table in numbers) or 'none'
+        raise RecordingError(str(path), f'holds speeds of trays: {listed}', 'name one with --tray')
     number = numbers[0] if tray is None else tray
     if number not in numbers:
         raise RecordingError(str(path), f'holds no speeds of tray {number}', _FORM)
@@ -81,42 +82,42 @@ def speed_table(path: Path, tray: int | None = None) -> tuple[Path, int | None]:
 
 
 def read_cycles(path: Path, speed: str = MEAN) -> tuple[CycleSpeeds, ...]:
-    """The cycles of a table of speeds; what comes before the first shaking event is left out.
+    """Read the cycles of a table of speeds, without those before the first shaking event.
 
     Parameters
     ----------
     path : Path
         CSV table with the columns time, cycle, cycle_start [s] and a speed with its error [m/s].
     speed : str, optional
-        Which speed.
+        Column of the speed.
 
     Raises
     ------
     RecordingError
-        When it cannot be read, or holds no cycle.
+        When the table cannot be read, or holds no cycle.
     """
     rows = _rows(path, (*_COLUMNS, speed, f'{speed}_error'))
-    known = np.isfinite(rows[:, :4]).all(axis=1) & (rows[:, 3] > 0.0)
-    rows = rows[known]
-    # A recording that was played twice holds cycle 1 twice, from different shaking events.
+    usable = np.isfinite(rows[:, :4]).all(axis=1) & (rows[:, 3] > 0.0)
+    rows = rows[usable]
+    # A recording that was played twice holds cycle 1 twice, with different shaking events.
     keys = list(dict.fromkeys(zip(rows[:, 1].tolist(), rows[:, 2].tolist(), strict=True)))
-    found = []
+    cycles = []
     for cycle, start in keys:
-        own = rows[(rows[:, 1] == cycle) & (rows[:, 2] == start)]
-        times = own[:, 0] - start
-        later = np.concatenate(([True], np.diff(times) > 0.0)) & (times >= 0.0)
-        if later.sum() >= _FEWEST:
-            found.append(
+        cycle_rows = rows[(rows[:, 1] == cycle) & (rows[:, 2] == start)]
+        times = cycle_rows[:, 0] - start
+        rising = np.concatenate(([True], np.diff(times) > 0.0)) & (times >= 0.0)
+        if rising.sum() >= _MIN_SPEEDS:
+            cycles.append(
                 CycleSpeeds(
                     cycle=int(cycle),
-                    times=times[later],
-                    speed=own[later, 3],
-                    error=np.nan_to_num(own[later, 4]),
+                    times=times[rising],
+                    speed=cycle_rows[rising, 3],
+                    error=np.nan_to_num(cycle_rows[rising, 4]),
                 )
             )
-    if not found:
+    if not cycles:
         raise RecordingError(str(path), 'holds no decay after a shaking event', _FORM)
-    return tuple(found)
+    return tuple(cycles)
 
 
 def species_cycles(path: Path, tray: Tray) -> tuple[tuple[CycleSpeeds, ...], ...]:
@@ -136,7 +137,9 @@ def species_cycles(path: Path, tray: Tray) -> tuple[tuple[CycleSpeeds, ...], ...
     if len(tray.species) < 2:
         return ()
     try:
-        return tuple(read_cycles(path, f'{one}_species_speed') for one in ('first', 'second'))
+        return tuple(
+            read_cycles(path, f'{ordinal}_species_speed') for ordinal in ('first', 'second')
+        )
     except RecordingError:
         return ()
 
@@ -144,11 +147,9 @@ def species_cycles(path: Path, tray: Tray) -> tuple[tuple[CycleSpeeds, ...], ...
 def _rows(path: Path, columns: tuple[str, ...]) -> NDArray[np.float64]:
     """Columns of a table, (n, n_columns)."""
     try:
-        with path.open(encoding='utf-8', newline='') as stream:
-            header, *lines = [line for line in csv.reader(stream) if line]
-        names = [name.split('[')[0].strip() for name in header]
-        places = [names.index(name) for name in columns]
-        values = [[float(line[k]) for k in places] for line in lines]
+        names, lines = read_csv(path)
+        indices = [names.index(name) for name in columns]
+        values = [[float(line[k]) for k in indices] for line in lines]
     except OSError as error:
         raise RecordingError(
             str(path), f'cannot be read ({error.strerror})', 'name another file'
@@ -161,7 +162,7 @@ def _rows(path: Path, columns: tuple[str, ...]) -> NDArray[np.float64]:
 def cooling_part(
     cycles: Sequence[CycleSpeeds], span: tuple[float, float], start: float
 ) -> tuple[tuple[CycleSpeeds, ...], tuple[float, float]]:
-    """Cycles and span in times since the gas began to cool; speeds before that are left out.
+    """Cycles and span in times since the gas began to cool, without earlier speeds.
 
     Parameters
     ----------
@@ -169,28 +170,28 @@ def cooling_part(
     span : tuple of 2 floats, [s]
         First and last time that is used, since the shaking event.
     start : float, [s]
-        When the gas began to cool, since the shaking event. A span that begins earlier is
-        believed instead.
+        When the gas began to cool, since the shaking event; the start of the span if that is
+        earlier.
     """
     start = min(start, span[0])
-    found = []
-    for one in cycles:
-        late = one.times >= start
-        found.append(
+    cooling = []
+    for cycle in cycles:
+        late = cycle.times >= start
+        cooling.append(
             CycleSpeeds(
-                cycle=one.cycle,
-                times=one.times[late] - start,
-                speed=one.speed[late],
-                error=one.error[late],
+                cycle=cycle.cycle,
+                times=cycle.times[late] - start,
+                speed=cycle.speed[late],
+                error=cycle.error[late],
             )
         )
-    return tuple(found), (span[0] - start, span[1] - start)
+    return tuple(cooling), (span[0] - start, span[1] - start)
 
 
 def mean_cycle(
     cycles: Sequence[CycleSpeeds], first: float = 0.0, last: float = math.inf
 ) -> SpeedCurve:
-    """The mean decay over cycles, at even times that all of them cover.
+    """The mean decay over cycles, at evenly spaced times that all of them cover.
 
     Parameters
     ----------
@@ -202,8 +203,8 @@ def mean_cycle(
     Returns
     -------
     SpeedCurve
-        Its error is that of the measurement alone: the scatter of the gas from one cycle to the
-        next comes on top of it.
+        Its error is that of the measurement alone, without the scatter of the gas from cycle
+        to cycle.
 
     Raises
     ------
@@ -214,7 +215,7 @@ def mean_cycle(
     end = min(last, *(cycle.times[-1] for cycle in cycles), math.inf)
     step = float(np.median(np.concatenate([np.diff(cycle.times) for cycle in cycles])))
     count = int((end - start) / step + 1e-6) + 1 if end >= start else 0
-    if count < _FEWEST:
+    if count < _MIN_SPEEDS:
         raise RecordingError(
             f'{len(cycles)} cycles',
             f'have {count} speeds in common between {first:g} and {last:g} s',
@@ -232,11 +233,12 @@ def mean_cycle(
 
 
 def check_errors(curve: SpeedCurve) -> None:
-    """Refuse speeds whose errors are not known.
+    """Raise for speeds without errors.
 
     Raises
     ------
     RecordingError
+        When an error is not known.
     """
     if not (curve.error > 0.0).all():
         raise RecordingError(
@@ -247,12 +249,12 @@ def check_errors(curve: SpeedCurve) -> None:
 
 
 def read_decay(path: Path) -> SpeedCurve:
-    """One decay from any file: a curve, or the mean over the cycles of a table of speeds.
+    """Read a decay from any file: a curve, or the mean over the cycles of a table of speeds.
 
     Parameters
     ----------
     path : Path
-        What `read_curve` takes, a table that `nanorocks analyse` wrote, or a folder of results
+        A file for `read_curve`, a table that `nanorocks analyse` wrote, or a folder of results
         of a single tray.
 
     Raises
@@ -268,9 +270,8 @@ def read_decay(path: Path) -> SpeedCurve:
 
 def _has_cycles(path: Path) -> bool:
     try:
-        with path.open(encoding='utf-8', newline='') as stream:
-            header = next(csv.reader(stream), [])
+        names, _ = read_csv(path)
     except (OSError, ValueError, csv.Error):
-        # Whoever reads the curve says what is wrong.
+        # `read_curve` raises for what is wrong with the file.
         return False
-    return 'cycle_start' in {name.split('[')[0].strip() for name in header}
+    return 'cycle_start' in names

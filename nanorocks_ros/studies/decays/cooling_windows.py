@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.outputs.csv_tables import read_csv
 from nanorocks_ros.records import CorStatus
 
 if TYPE_CHECKING:
@@ -19,14 +20,14 @@ _FIELDS = 'status', 'window_start', 'window_end', 'cooling_start'
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoolingWindow:
-    """What of a cycle is a gas that cools freely.
+    """The part of a cycle in which the gas cools freely.
 
     Parameters
     ----------
     first, last : float, [s]
         First and last speed used, since the shaking event.
     start : float, [s]
-        From when on the gas is taken to cool, since the shaking event.
+        When the gas begins to cool, since the shaking event.
     """
 
     first: float
@@ -35,25 +36,23 @@ class CoolingWindow:
 
 
 def cooling_window(speeds: Path) -> CoolingWindow | None:
-    """The usual window of the cycles of a tray.
+    """The median cooling window of the cycles of a tray.
 
     Parameters
     ----------
     speeds : Path
-        The table of speeds, ``tray_K_speed.csv``; read is ``tray_K_cor.csv`` beside it.
+        Table of speeds, ``tray_K_speed.csv``; ``tray_K_cor.csv`` beside it holds the window.
 
     Returns
     -------
     CoolingWindow or None
-        Medians over the final estimates of the cycles; None where nothing says so.
+        Medians over the final estimates of the cycles; None without such estimates.
     """
     path = speeds.with_name(speeds.name.replace('_speed.csv', '_cor.csv'))
     if path == speeds or not path.is_file():
         return None
     try:
-        with path.open(encoding='utf-8', newline='') as stream:
-            header, *lines = [line for line in csv.reader(stream) if line]
-        names = [name.split('[')[0].strip() for name in header]
+        names, lines = read_csv(path)
         rows = np.array([[float(line[names.index(field)]) for field in _FIELDS] for line in lines])
     except (OSError, ValueError, IndexError, csv.Error):
         return None
@@ -62,25 +61,25 @@ def cooling_window(speeds: Path) -> CoolingWindow | None:
     final = (rows[:, 0] == float(CorStatus.FINAL)) & np.isfinite(rows).all(axis=1)
     if not final.any():
         return None
-    first, last, start = (float(one) for one in np.median(rows[final, 1:], axis=0))
+    first, last, start = (float(median) for median in np.median(rows[final, 1:], axis=0))
     return CoolingWindow(first=first, last=last, start=start)
 
 
 def span_of(
     first: float | None, last: float | None, usual: tuple[float, float]
 ) -> tuple[float, float]:
-    """First and last time that is used, [s], as asked for with --first and --last or as usual.
+    """First and last time that is used, [s]: those given, else the usual ones.
 
     Raises
     ------
     ConfigurationError
         When they do not rise, or begin before the shaking event.
     """
-    found = usual[0] if first is None else first, usual[1] if last is None else last
-    if not 0.0 <= found[0] < found[1]:
+    span = usual[0] if first is None else first, usual[1] if last is None else last
+    if not 0.0 <= span[0] < span[1]:
         raise ConfigurationError(
             '--first, --last',
-            f'{found[0]:g} to {found[1]:g} s',
+            f'{span[0]:g} to {span[1]:g} s',
             'give two times, rising, none below 0',
         )
-    return found
+    return span

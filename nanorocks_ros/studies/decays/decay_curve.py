@@ -1,4 +1,4 @@
-"""A decay of the mean projected speed, and how far each point of a sweep is from it."""
+"""A decay of the mean projected speed: from a file, or from a point of a sweep."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.outputs.csv_tables import read_csv
 from nanorocks_ros.outputs.npz_archive import read_archive
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 _TIME, _SPEED, _ERROR = 'time', 'mean_projected_speed', 'mean_projected_speed_error'
 _FORM = f'give the columns {_TIME} [s], {_SPEED} [m/s] and, if known, {_ERROR} [m/s]'
-# Values that were written as decimals and meant to be equal.
+# Relative and absolute tolerance of equal decimal values.
 _EQUAL = 1e-9
 
 
@@ -39,10 +40,10 @@ class SpeedCurve:
     error : ndarray (n,), [m/s]
         One standard error; 0 where it is not known.
     point : tuple of float, int, str or bool, or None
-        Where on the grid of a sweep the curve was taken from.
+        Point of the grid of a sweep that the curve is from.
     cycles : int or None
-        How many measured decays it is the mean of; None: it is simulated, or not known, and
-        `error` holds all of its scatter.
+        Number of measured decays that it is the mean of; None for a simulated curve, or when
+        not known: then `error` includes all of its scatter.
     """
 
     times: NDArray[np.float64]
@@ -53,7 +54,7 @@ class SpeedCurve:
 
 
 def read_curve(path: Path) -> SpeedCurve:
-    """A curve from a CSV table, or from an ``.npz`` file such as a sweep of a single point.
+    """Read a curve from a CSV table, or an ``.npz`` file such as a sweep of a single point.
 
     Parameters
     ----------
@@ -77,16 +78,16 @@ def read_curve(path: Path) -> SpeedCurve:
         raise RecordingError(
             str(path), f'{_SPEED} has the shape {speed.shape}', 'name a file of one curve'
         )
-    known = np.isfinite(times) & np.isfinite(speed)
-    times, speed, error = times[known], speed[known], np.nan_to_num(error[known])
+    finite = np.isfinite(times) & np.isfinite(speed)
+    times, speed, error = times[finite], speed[finite], np.nan_to_num(error[finite])
     if len(times) < 2 or (np.diff(times) <= 0.0).any():
         raise RecordingError(str(path), 'its times do not rise', 'name a file of one decay')
     return SpeedCurve(times=times, speed=speed, error=error)
 
 
 def _arrays(path: Path) -> dict[str, NDArray[np.float64]]:
-    found = read_archive(path)
-    numbers = {name: array for name, array in found.items() if array.dtype.kind in 'fiu'}
+    content = read_archive(path)
+    numbers = {name: array for name, array in content.items() if array.dtype.kind in 'fiu'}
     if 'times' in numbers:
         numbers[_TIME] = numbers['times']
     return {name: array.astype(np.float64) for name, array in numbers.items()}
@@ -94,9 +95,7 @@ def _arrays(path: Path) -> dict[str, NDArray[np.float64]]:
 
 def _table(path: Path) -> dict[str, NDArray[np.float64]]:
     try:
-        with path.open(encoding='utf-8', newline='') as stream:
-            header, *lines = [line for line in csv.reader(stream) if line]
-        names = [name.split('[')[0].strip() for name in header]
+        names, lines = read_csv(path)
         wanted = [k for k, name in enumerate(names) if name in (_TIME, _SPEED, _ERROR)]
         values = [[float(line[k]) for k in wanted] for line in lines]
     except OSError as error:
@@ -110,7 +109,7 @@ def _table(path: Path) -> dict[str, NDArray[np.float64]]:
 
 
 def curve_at(sweep: Sweep, values: Sequence[Scalar]) -> SpeedCurve:
-    """The curve at a point of a sweep.
+    """The mean curve at a point of a sweep.
 
     Parameters
     ----------
@@ -122,12 +121,12 @@ def curve_at(sweep: Sweep, values: Sequence[Scalar]) -> SpeedCurve:
     ConfigurationError
         When the grid has no such point.
     """
-    place = place_of({axis.name: axis.values for axis in sweep.axes}, values)
+    index = place_of({axis.name: axis.values for axis in sweep.axes}, values)
     return SpeedCurve(
         times=sweep.times,
-        speed=sweep.mean_projected_speed[place],
-        error=np.nan_to_num(sweep.mean_projected_speed_error[place]),
-        point=tuple(axis.values[k] for axis, k in zip(sweep.axes, place, strict=True)),
+        speed=sweep.mean_projected_speed[index],
+        error=np.nan_to_num(sweep.mean_projected_speed_error[index]),
+        point=tuple(axis.values[k] for axis, k in zip(sweep.axes, index, strict=True)),
     )
 
 
@@ -151,17 +150,17 @@ def place_of(axes: dict[str, tuple[Scalar, ...]], values: Sequence[Scalar]) -> t
             f'{len(values)} values for {len(axes)} axes',
             f'give one each for {", ".join(axes) or "no axis"}',
         )
-    place = []
-    for (name, known), value in zip(axes.items(), values, strict=True):
-        found = [k for k, one in enumerate(known) if _equal(one, value)]
-        if not found:
-            shown = ', '.join(str(one) for one in known)
+    indices = []
+    for (name, axis_values), value in zip(axes.items(), values, strict=True):
+        matches = [k for k, axis_value in enumerate(axis_values) if _equal(axis_value, value)]
+        if not matches:
+            shown = ', '.join(str(axis_value) for axis_value in axis_values)
             raise ConfigurationError('--reference', f'{name} {value}', f'choose one of {shown}')
-        place.append(found[0])
-    return tuple(place)
+        indices.append(matches[0])
+    return tuple(indices)
 
 
-def _equal(one: Scalar, other: Scalar) -> bool:
-    if isinstance(one, int | float) and isinstance(other, int | float):
-        return math.isclose(one, other, rel_tol=_EQUAL, abs_tol=_EQUAL)
-    return one == other
+def _equal(first: Scalar, second: Scalar) -> bool:
+    if isinstance(first, int | float) and isinstance(second, int | float):
+        return math.isclose(first, second, rel_tol=_EQUAL, abs_tol=_EQUAL)
+    return first == second

@@ -1,4 +1,4 @@
-"""The energy of each species of a mixture as it cools, and how they share it."""
+"""The energy of each species of a cooling mixture, and their ratio."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from nanorocks_ros.errors import FitError, RecordingError
 from nanorocks_ros.experiment.colours import COLOURS
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
+from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.physics.haff_law import granular_energy, haff_speed
 from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED
 from nanorocks_ros.studies.decays.cooling_curves import check_errors, mean_cycle
@@ -26,10 +27,10 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.decays.decay_curve import SpeedCurve
 
 _NANOJOULE, _MM = 1e9, 1e3
-_MOST_GRAY = 255.0
-_UNKNOWN = (90.0, 90.0, 90.0)
-# Of a line over points of its own colour.
-_DARKER = 0.7
+_MAX_GRAY = 255.0
+_DEFAULT_COLOUR = (90.0, 90.0, 90.0)
+# Brightness of a line relative to its points.
+_LINE_BRIGHTNESS = 0.7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +44,7 @@ class SpeciesEnergy:
     curve : SpeedCurve
         Their mean.
     fit : HaffFit or None
-        None where the speeds do not fall.
+        None when the speeds do not fall.
     """
 
     species: Species
@@ -58,7 +59,7 @@ def species_energies(
     span: tuple[float, float],
     origin: float = 0.0,
 ) -> tuple[SpeciesEnergy, ...]:
-    """The decay of each species of a mixture, with a fit of Haff's law of its own.
+    """The decay of each species of a mixture, each with a fit of Haff's law.
 
     Parameters
     ----------
@@ -68,43 +69,45 @@ def species_energies(
     span : tuple of 2 floats, [s]
         First and last time since the shaking event that is fitted.
     origin : float, [s], optional
-        From when on the fitted times count, since the shaking event.
+        Origin of the fitted times, since the shaking event.
 
     Returns
     -------
     tuple of SpeciesEnergy
-        Empty where speeds of two species are not known over that time.
+        Empty unless the speeds of two species are known over that time.
     """
     energies = []
-    for species, own in zip(tray.species, cycles, strict=False):
+    for species, species_cycles in zip(tray.species, cycles, strict=False):
         try:
-            curve = mean_cycle(own, *span)
+            curve = mean_cycle(species_cycles, *span)
             check_errors(curve)
         except RecordingError:
             return ()
         try:
-            beads = species.count * len(own)
+            beads = species.count * len(species_cycles)
             fit: HaffFit | None = fit_haff(curve.times - origin, curve.speed, curve.error, beads)
         except FitError:
             fit = None
-        energies.append(SpeciesEnergy(species=species, cycles=tuple(own), curve=curve, fit=fit))
+        energies.append(
+            SpeciesEnergy(species=species, cycles=tuple(species_cycles), curve=curve, fit=fit)
+        )
     return tuple(energies) if len(energies) > 1 else ()
 
 
 def relative_energy(speed: float, mass: float) -> float:
-    """Energy at twice the mean speed, [J], as the paper takes it."""
+    """Energy at twice the mean speed, [J], the relative speed in the paper."""
     return granular_energy(RELATIVE_TO_MEAN_SPEED * speed, mass)
 
 
-def energy_ratio(found: Sequence[SpeciesEnergy]) -> tuple[float, float]:
+def energy_ratio(energies: Sequence[SpeciesEnergy]) -> tuple[float, float]:
     """Energy of a bead of the first species over that of one of the second, and its error.
 
-    From the mean speeds and the masses of beads of the middle diameter; 1 were equipartition.
+    From the mean speeds and the masses of beads of mean diameter; 1 for equipartition.
 
     Parameters
     ----------
-    found : sequence of SpeciesEnergy
-        Two.
+    energies : sequence of SpeciesEnergy
+        Of the two species.
 
     Returns
     -------
@@ -112,25 +115,25 @@ def energy_ratio(found: Sequence[SpeciesEnergy]) -> tuple[float, float]:
         Mean over the time all cycles cover; the error is from the scatter of the cycles, NaN for
         a single one.
     """
-    first, second = (_log_energies(energy) for energy in found[:2])
+    first, second = (_log_energies(energy) for energy in energies[:2])
     ratio = math.exp(float(first.mean() - second.mean()))
     if first.size != second.size or first.size < 2:
         return ratio, math.nan
     return ratio, ratio * float((first - second).std(ddof=1) / math.sqrt(first.size))
 
 
-def _log_energies(one: SpeciesEnergy) -> NDArray[np.float64]:
+def _log_energies(energy: SpeciesEnergy) -> NDArray[np.float64]:
     """Mean over the times of the logarithm of the energy in each cycle, (n_cycles,)."""
-    times = one.curve.times
-    logs = [np.log(np.interp(times, cycle.times, cycle.speed)).mean() for cycle in one.cycles]
-    return math.log(relative_energy(1.0, one.species.bead_mass)) + 2.0 * np.array(logs)
+    times = energy.curve.times
+    logs = [np.log(np.interp(times, cycle.times, cycle.speed)).mean() for cycle in energy.cycles]
+    return math.log(relative_energy(1.0, energy.species.bead_mass)) + 2.0 * np.array(logs)
 
 
-def species_values(found: Sequence[SpeciesEnergy]) -> dict[str, Any]:
-    """What was fitted to each species, in SI, and how they share the energy; JSON has it."""
-    if not found:
+def species_values(energies: Sequence[SpeciesEnergy]) -> dict[str, Any]:
+    """Fits of each species and their energy ratio for JSON, in SI units."""
+    if not energies:
         return {'species': None, 'energy_ratio': None, 'energy_ratio_error': None}
-    ratio, error = energy_ratio(found)
+    ratio, error = energy_ratio(energies)
     return {
         'species': [
             {
@@ -140,19 +143,19 @@ def species_values(found: Sequence[SpeciesEnergy]) -> dict[str, Any]:
                 'haff_time': energy.fit and energy.fit.haff_time,
                 'haff_time_error': energy.fit and energy.fit.haff_time_error,
             }
-            for energy in found
+            for energy in energies
         ],
         'energy_ratio': ratio,
-        'energy_ratio_error': error if math.isfinite(error) else None,
+        'energy_ratio_error': finite_or_none(error),
     }
 
 
-def draw_species(axes: Axes, found: Sequence[SpeciesEnergy], origin: float = 0.0) -> None:
-    """Energies of both species over time, each in its colour with its fit."""
-    for energy, line in zip(found, ('-', '--'), strict=False):
+def draw_species(axes: Axes, energies: Sequence[SpeciesEnergy], origin: float = 0.0) -> None:
+    """Draw the energies of both species over time, each with its fit."""
+    for energy, line in zip(energies, ('-', '--'), strict=False):
         curve, fit, name = energy.curve, energy.fit, energy.species.material
         scale = relative_energy(1.0, energy.species.bead_mass) * _NANOJOULE
-        colour = np.array(COLOURS.get(name, _UNKNOWN))[::-1] / _MOST_GRAY
+        colour = np.array(COLOURS.get(name, _DEFAULT_COLOUR))[::-1] / _MAX_GRAY
         axes.errorbar(
             curve.times,
             scale * curve.speed**2,
@@ -171,11 +174,11 @@ def draw_species(axes: Axes, found: Sequence[SpeciesEnergy], origin: float = 0.0
             scale * haff_speed(curve.times - origin, fit.initial_speed, fit.haff_time) ** 2,
             line,
             lw=2,
-            color=tuple(_DARKER * colour),
+            color=tuple(_LINE_BRIGHTNESS * colour),
             label=f'{name}: {_fit_text(fit)}',
         )
-    ratio, error = energy_ratio(found)
-    names = ' bead over that of one '.join(energy.species.material for energy in found)
+    ratio, error = energy_ratio(energies)
+    names = ' bead over that of one '.join(energy.species.material for energy in energies)
     spread = f' ± {error:.2f}' if math.isfinite(error) else ''
     axes.set_title(f'Energy of one {names} bead: {ratio:.2f}{spread}', fontsize=10)
     axes.set_yscale('log')

@@ -1,4 +1,7 @@
-"""What closed forms say of a sweep: lines of one decay rate across its map."""
+"""Lines of equal decay rate across the map of a sweep, by closed forms.
+
+Tested in test_chi_square_map.py.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +26,10 @@ if TYPE_CHECKING:
 
 _BEADS, _WALLS, _WIDTH = 'restitution', 'wall_restitution', 'restitution_width'
 _STEPS = 101
-# Until then the initial velocities are still remembered.
+# Before this time the decay depends on the initial velocities [s].
 _START = 1.75
-# Errors of speeds that are not known, of the speed.
-_UNKNOWN = 0.01
+# Relative error of speeds whose error is not known.
+_DEFAULT_ERROR = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +40,8 @@ class Contour:
     ----------
     label : str
     restitution, other : ndarray (n,)
-        Restitution between beads, and the value along the other axis; NaN where there is none.
+        Restitution between beads, and the value along the other axis; NaN where the closed form
+        has no solution.
     """
 
     label: str
@@ -48,28 +52,28 @@ class Contour:
 def contours(sweep: Sweep, curve: SpeedCurve) -> tuple[Contour, ...]:
     """Lines along which closed forms give the decay rate of a curve.
 
-    Of the confined theory through the decay rate of the curve, and of the paper's ellipse.
+    One by the confined theory for the decay rate of the curve, one by the ellipse of the paper.
 
     Parameters
     ----------
     sweep : Sweep
         Over the restitution between beads, and that of the walls or the width of the
-        distribution; none are drawn over others.
+        distribution.
     curve : SpeedCurve
 
     Returns
     -------
     tuple of Contour
-        Empty where closed forms have nothing to say: other axes, beads that stick or are rough, a
-        tray too crowded, or a curve that does not fall.
+        Empty where the closed forms do not hold: other axes, beads that stick or are rough, a
+        tray too dense, or a curve that does not fall.
     """
-    asked = json.loads(sweep.question)
-    settings = asked['settings']
+    plan = json.loads(sweep.specification)
+    settings = plan['settings']
     names = {axis.name for axis in sweep.axes}
-    other = next(iter(names - {_BEADS}), '')
+    other_name = next(iter(names - {_BEADS}), '')
     smooth = settings['tangential_restitution'] == settings['wall_tangential_restitution'] == -1.0
-    free = settings['sticking_speed'] == settings['wall_sticking_speed'] == 0.0
-    if names not in ({_BEADS, _WALLS}, {_BEADS, _WIDTH}) or not (smooth and free):
+    no_sticking = settings['sticking_speed'] == settings['wall_sticking_speed'] == 0.0
+    if names not in ({_BEADS, _WALLS}, {_BEADS, _WIDTH}) or not (smooth and no_sticking):
         return ()
     tray = tray_by_number(load_trays(), settings['tray'])
     try:
@@ -77,19 +81,21 @@ def contours(sweep: Sweep, curve: SpeedCurve) -> tuple[Contour, ...]:
         gas = confined_gas(tray)
     except (ConfigurationError, FitError):
         return ()
-    (axis,) = (one for one in sweep.axes if one.name == other)
+    (axis,) = (axis for axis in sweep.axes if axis.name == other_name)
     ends = [float(value) for value in axis.values]
     values = np.linspace(min(ends), max(ends), _STEPS)
-    if other == _WALLS:
+    if other_name == _WALLS:
         fixed = float(settings[_WIDTH])
-        ours = [_restitution(gas, rate, float(value), fixed) for value in values]
+        theory = [_restitution(gas, rate, float(value), fixed) for value in values]
     else:
         fixed = float(settings[_WALLS])
-        ours = [_restitution(gas, rate, fixed, float(value)) for value in values]
-    theirs = _paper(tray, rate, values if other == _WALLS else np.ones_like(values))
+        theory = [_restitution(gas, rate, fixed, float(value)) for value in values]
+    ellipse = _paper(tray, rate, values if other_name == _WALLS else np.ones_like(values))
     return (
-        Contour(label=f'confined theory, {rate:.3g} /m', restitution=np.array(ours), other=values),
-        Contour(label="the paper's ellipse", restitution=theirs, other=values),
+        Contour(
+            label=f'confined theory, {rate:.3g} /m', restitution=np.array(theory), other=values
+        ),
+        Contour(label="the paper's ellipse", restitution=ellipse, other=values),
     )
 
 
@@ -116,7 +122,7 @@ def reference_rate(sweep: Sweep, curve: SpeedCurve, tray: Tray) -> float:
     Parameters
     ----------
     sweep : Sweep
-        Says how many runs a curve is a mean of that does not say so itself.
+        Gives the number of runs of a curve without a number of cycles.
     curve : SpeedCurve
     tray : Tray
 
@@ -127,6 +133,6 @@ def reference_rate(sweep: Sweep, curve: SpeedCurve, tray: Tray) -> float:
     """
     late = (curve.times >= _START) & (curve.speed > 0.0)
     speed, error = curve.speed[late], curve.error[late]
-    error = np.where(error > 0.0, error, _UNKNOWN * speed)
+    error = np.where(error > 0.0, error, _DEFAULT_ERROR * speed)
     beads = tray.count * (curve.cycles or sweep.runs)
     return fit_haff(curve.times[late], speed, error, beads).decay_rate

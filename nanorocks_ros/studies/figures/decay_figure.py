@@ -11,7 +11,7 @@ from scipy import optimize
 from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.inference.decay.confined_decay import confined_restitution
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.physics.error_propagation import Estimate
 from nanorocks_ros.physics.haff_law import haff_speed
 from nanorocks_ros.physics.paper_formulas import paper_restitution
@@ -111,7 +111,7 @@ def decay_figure(
         f'1/(v0 tau) = {fit.decay_rate:.3g} ± {fit.decay_rate * fit.log_decay_rate_error:.2g} /m',
         fontsize=10,
     )
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
     return {
         **found,

@@ -81,24 +81,24 @@ def _draw_energy(
     time = np.array([(speed.stamp_ns - start_ns) / NS for speed in speeds])
     axes.plot(
         time,
-        energy([speed.mean_projected_speed for speed in speeds]),
+        energy([speed.mean_projected_speed.value for speed in speeds]),
         'o',
         ms=3.5,
         color=_MEASURED,
         label='from the frames',
     )
     last = cors[-1]
-    if math.isfinite(last.haff_time):
+    if math.isfinite(last.haff_time.value):
         begin = last.cooling_start if math.isfinite(last.cooling_start) else 0.0
         line = np.linspace(begin, max(time), 300)
-        fitted = haff_speed(line - begin, last.initial_speed, last.haff_time)
+        fitted = haff_speed(line - begin, last.initial_speed.value, last.haff_time.value)
         axes.plot(
             line,
             energy(list(fitted)),
             color=_FIT,
             lw=1.8,
-            label=f"Haff's law, $v_0$ = {last.initial_speed * _MM:.2f} mm/s, "
-            rf'$\tau$ = {last.haff_time:.2f} s',
+            label=f"Haff's law, $v_0$ = {last.initial_speed.value * _MM:.2f} mm/s, "
+            rf'$\tau$ = {last.haff_time.value:.2f} s',
         )
     axes.set_yscale('log')
     axes.set_ylabel(r'energy per bead $\frac{1}{2} m \bar{v}^2$ [nJ]')
@@ -115,8 +115,8 @@ def _draw_convergence(
     time = [(estimate.stamp_ns - start_ns) / NS for estimate in known]
     axes.fill_between(
         time,
-        [estimate.restitution_lower for estimate in known],
-        [estimate.restitution_upper for estimate in known],
+        [estimate.restitution.lower for estimate in known],
+        [estimate.restitution.upper for estimate in known],
         color=_FIT,
         alpha=0.2,
         lw=0,
@@ -124,7 +124,7 @@ def _draw_convergence(
     )
     axes.plot(
         time,
-        [estimate.restitution for estimate in known],
+        [estimate.restitution.value for estimate in known],
         '-o',
         ms=3,
         color=_FIT,
@@ -156,4 +156,4 @@ def _draw_convergence(
 
 def _name(last: CorEstimate, by_paper: bool) -> str:
     what = 'closed form of the paper' if by_paper else 'from simulated decays'
-    return f'{what}: {last.restitution:.3f}'
+    return f'{what}: {last.restitution.value:.3f}'

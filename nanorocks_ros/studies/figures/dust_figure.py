@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.physics.dust_models import (
     ALWAYS_BOUNCING,
     BOUNCING_SLOPE,
@@ -118,7 +118,7 @@ def dust_figure(path: Path, points: Sequence[MeasuredThreshold]) -> dict[str, An
     axes.set_title('Sticking thresholds and published collision models', fontsize=10)
     axes.legend(frameon=False, fontsize=8.5, loc='upper right')
     axes.grid(alpha=0.25)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
     return {'points': [_as_dict(point) for point in points], 'curves': _curves_as_dict()}
 

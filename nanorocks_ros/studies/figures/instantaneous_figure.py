@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
 
 from nanorocks_ros.inference.decay.instantaneous_restitution import instantaneous_cor
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.physics.confined_theory import confined_gas
 from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED
 from nanorocks_ros.studies.decays.cooling_curves import check_errors, mean_cycle
@@ -85,7 +85,7 @@ def instantaneous_figure(
         + (f'mean over {len(cycles)} cycles' if len(cycles) > 1 else 'one cycle'),
         fontsize=10,
     )
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
     return cor
 
@@ -183,10 +183,4 @@ def instantaneous_values(found: InstantaneousCor) -> dict[str, Any]:
         'local_restitution_lower': local.lower,
         'local_restitution_upper': local.upper,
     }
-    return {name: _known(array.tolist()) for name, array in arrays.items()}
-
-
-def _known(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_known(one) for one in value]
-    return value if math.isfinite(value) else None
+    return {name: json_values(array) for name, array in arrays.items()}

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.json_values import finite_or_none, json_values
 
 mpl.use('Agg')
 from matplotlib.figure import Figure
@@ -79,7 +80,7 @@ def long_term_figure(path: Path, campaign: Campaign) -> None:
     cors.set_xlabel('cycle')
     cors.set_xlim(0.5, campaign.places + 0.5)
     cors.xaxis.set_major_locator(MaxNLocator(integer=True))
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
 
 
@@ -121,10 +122,6 @@ def _errors(campaign: Campaign, tray: int, quantity: str) -> NDArray[np.float64]
 
 def campaign_values(campaign: Campaign) -> dict[str, Any]:
     """Everything about a campaign for JSON, SI units, None where not known."""
-
-    def known(value: float) -> float | None:
-        return value if math.isfinite(value) else None
-
     fields = (
         'peak_speed',
         'peak_speed_error',
@@ -151,17 +148,14 @@ def campaign_values(campaign: Campaign) -> dict[str, Any]:
             str(number): {
                 'trends': {
                     name: {
-                        'slope': known(trend.slope),
-                        'slope_error': known(trend.slope_error),
+                        'slope': finite_or_none(trend.slope),
+                        'slope_error': finite_or_none(trend.slope_error),
                         'cycles': trend.samples,
                     }
                     for (tray, name), trend in campaign.trends.items()
                     if tray == number
                 },
-                **{
-                    name: [known(value) for value in campaign.values(number, name).tolist()]
-                    for name in fields
-                },
+                **{name: json_values(campaign.values(number, name)) for name in fields},
             }
             for number in campaign.trays
         },

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.physics.filling_factor import (
     HEXAGONAL_LAYER,
     PAPER_COMPACTION,
@@ -67,7 +67,7 @@ def packing_figure(
     left.set_xlabel('time since the shaking event [s]')
     for axes in (left, right):
         axes.grid(alpha=0.25)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
     return {
         str(number): _values(trays[number], own, found[number]) for number, own in curves.items()

@@ -10,7 +10,7 @@ import matplotlib as mpl
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.settings import SimulationSettings, rows
 from nanorocks_ros.studies.decays.chi_square_map import chi_square
 from nanorocks_ros.studies.decays.sweep_contours import contours
@@ -108,7 +108,7 @@ def chi_square_figure(
     figure.colorbar(mesh, ax=axes, label=r'mean $\chi^2$ over the times', extend='min')
     _draw_contours(axes, sweep, curve)
     _mark(axes, sweep, values, curve)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
 
 
@@ -140,7 +140,7 @@ def _mark(axes: Axes, sweep: Sweep, values: NDArray[np.float64], curve: SpeedCur
 
 def _held(sweep: Sweep) -> str:
     """Tray and walls, where they do not vary."""
-    settings = json.loads(sweep.question)['settings']
+    settings = json.loads(sweep.specification)['settings']
     names = {'tray': 'tray', 'wall_restitution': 'walls'}
     varied = {axis.name for axis in sweep.axes}
     held = [f'{text} {settings[name]:g}' for name, text in names.items() if name not in varied]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 
 mpl.use('Agg')
 from matplotlib.figure import Figure
@@ -59,7 +59,7 @@ def autocorrelation_figure(path: Path, found: BagClusters, pixels_per_metre: flo
             _draw_snapshot(row, shot, pixels_per_metre)
         _draw_sizes(right.subplots(), tray)
         part.suptitle(f'tray {number}, cycle {found.cycle}', x=0.01, ha='left', fontsize=11)
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         figure.savefig(file, dpi=_DPI)
 
 

@@ -22,6 +22,7 @@ from nanorocks_ros.studies.libraries.cluster_films import cluster_sizes
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import NS
 from nanorocks_ros.wire.bead_truth import beads_from_array
+from nanorocks_ros.wire.flat_records import flat_value
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -92,8 +93,8 @@ class CycleClusters:
         return np.array([(estimate.stamp_ns - self.start_ns) / NS for estimate in self.estimates])
 
     def column(self, name: str) -> NDArray[np.float64]:
-        """A field of all estimates, (n,)."""
-        return np.array([float(getattr(estimate, name)) for estimate in self.estimates])
+        """An element of the arrays of all estimates, by name, (n,)."""
+        return np.array([float(flat_value(estimate, name)) for estimate in self.estimates])
 
     def true_sizes(self) -> NDArray[np.float64]:
         """The true weight-averaged size at each estimate, (n,); NaN where not known."""
@@ -265,10 +266,10 @@ def _rows(found: BagClusters) -> Iterator[tuple[object, ...]]:
                 estimate.breadth,
                 estimate.axes_ratio,
                 estimate.direction,
-                estimate.cluster_size,
-                estimate.cluster_size_error,
-                estimate.cluster_size_lower,
-                estimate.cluster_size_upper,
+                estimate.cluster_size.value,
+                estimate.cluster_size.error,
+                estimate.cluster_size.lower,
+                estimate.cluster_size.upper,
                 estimate.size_status.name.lower(),
                 by_paper,
                 true,

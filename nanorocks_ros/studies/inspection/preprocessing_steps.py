@@ -174,7 +174,7 @@ class _Follower:
     """What the stages behind a tray image know of it."""
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
-        self._shakes = CycleFollower(settings.speed.shake_ratio, settings.speed.shortest_cycle)
+        self._shakes = CycleFollower(settings.speed.shake_ratio, settings.speed.min_cycle_duration)
         self._masker = MotionMasker(settings.speed)
         self._tracker = Tracker(settings, tray)
         self.tracks: Tracks | None = None

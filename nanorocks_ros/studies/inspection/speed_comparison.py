@@ -89,7 +89,7 @@ class ComparedSpeeds:
         estimates = [
             speed for speed in self.speeds[method] if cycle is None or speed.cycle == cycle
         ]
-        values = np.array([estimate.mean_projected_speed for estimate in estimates])
+        values = np.array([estimate.mean_projected_speed.value for estimate in estimates])
         with np.errstate(divide='ignore', invalid='ignore'):
             ratios = values / self.true_speeds(estimates)
         return np.asarray(ratios[np.isfinite(ratios)])
@@ -212,8 +212,8 @@ def _rows(found: BagSpeeds) -> Iterator[tuple[object, ...]]:
                     (speed.stamp_ns - found.epoch_ns) / NS,
                     speed.cycle,
                     float('nan') if start is None else (speed.stamp_ns - start) / NS,
-                    speed.mean_projected_speed,
-                    speed.mean_projected_speed_error,
+                    speed.mean_projected_speed.value,
+                    speed.mean_projected_speed.error,
                     speed.window,
                     speed.method.name.lower(),
                     true,

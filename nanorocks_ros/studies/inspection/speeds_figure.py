@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.studies.inspection.speed_comparison import AUTO, METHODS
 from nanorocks_ros.wire.array_layouts import NS
 
@@ -74,7 +74,7 @@ def speeds_figure(path: Path, found: BagSpeeds, cycle: int) -> None:
     for axes in rows[-1]:
         axes.set_xlabel(f'time {since} [s]')
     rows[0, 0].legend(frameon=False, fontsize=8)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=_DPI)
 
 
@@ -104,8 +104,8 @@ def _draw_speeds(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) ->
     for method in METHODS:
         estimates = _of(tray, method, cycle)
         times = [(estimate.stamp_ns - start_ns) / NS for estimate in estimates]
-        speed = _MM * np.array([estimate.mean_projected_speed for estimate in estimates])
-        error = _MM * np.array([estimate.mean_projected_speed_error for estimate in estimates])
+        speed = _MM * np.array([estimate.mean_projected_speed.value for estimate in estimates])
+        error = _MM * np.array([estimate.mean_projected_speed.error for estimate in estimates])
         colour = _COLOURS[method]
         axes.fill_between(times, speed - error, speed + error, color=colour, alpha=0.2, lw=0)
         axes.plot(times, speed, color=colour, lw=1.2, label=method.replace('_', ' '))
@@ -114,7 +114,7 @@ def _draw_speeds(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) ->
     chosen = _of(tray, AUTO, cycle)
     axes.plot(
         [(estimate.stamp_ns - start_ns) / NS for estimate in chosen],
-        [_MM * estimate.mean_projected_speed for estimate in chosen],
+        [_MM * estimate.mean_projected_speed.value for estimate in chosen],
         '.',
         ms=3.5,
         color=_CHOSEN,
@@ -132,7 +132,7 @@ def _draw_ratios(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) ->
         estimates = _of(tray, method, cycle)
         true = tray.true_speeds(estimates)
         times = [(estimate.stamp_ns - start_ns) / NS for estimate in estimates]
-        speeds = np.array([estimate.mean_projected_speed for estimate in estimates])
+        speeds = np.array([estimate.mean_projected_speed.value for estimate in estimates])
         with np.errstate(divide='ignore', invalid='ignore'):
             axes.plot(times, speeds / true, color=_COLOURS[method], lw=1.2)
     axes.set_yscale('log')

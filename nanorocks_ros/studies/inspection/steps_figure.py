@@ -8,7 +8,7 @@ import cv2
 import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.studies.inspection.track_overlay import overlay
 
 mpl.use('Agg')
@@ -66,7 +66,7 @@ def steps_figure(path: Path, steps: FrameSteps, settings: SpeedSettings) -> None
             place.set_title(title, fontsize=9, loc='left')
             place.set_axis_off()
             draw(place)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=_DPI)
 
 

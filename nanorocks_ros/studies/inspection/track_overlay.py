@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -89,7 +89,7 @@ def write_overlay(path: Path, pictures: Sequence[NDArray[np.uint8]]) -> None:
     encoded, content = cv2.imencode('.png', np.vstack(parts)[:-_GAP_PX])
     if not encoded:
         raise RecordingError(str(path), 'the picture cannot be encoded', 'name a .png file')
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_bytes(content.tobytes())
 
 

@@ -1,8 +1,9 @@
-"""Films of clusters that grow, from which cluster sizes are told from autocorrelations.
+"""Simulated films of growing clusters: cluster sizes and widths of the autocorrelation.
 
-Every run has a sticking speed of its own, so that all sizes occur, and a camera, light and dust of
-its own, anything from perfect to half as bad again as in flight: what that does to the width is in
-its scatter.
+Every run has its own sticking speed, so that all sizes occur, and its own effects of camera, light
+and dust, from none to 1.5 times those in flight: the scatter of the widths includes them.
+
+Tested in test_cluster_simulations.py.
 """
 
 from __future__ import annotations
@@ -37,9 +38,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.simulation.plate_scene.plate_film import SceneMoment
 
-# Since the shaking event, [s]: clusters grow ever more slowly.
+# Since the shaking event, [s]; the growth of clusters slows down.
 TIMES = (0.4, 0.8, 1.2, 1.7, 2.3, 3.0, 4.0, 5.5, 7.5, 10.0, 14.0, 19.0, 25.0, 32.0)
-# Of the sticking speed, [m/s]: from hardly any cluster to one.
+# Range of the sticking speed, [m/s]: from hardly any cluster to a single one.
 _SLOWEST, _FASTEST = 1e-4, 2e-2
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 # Effects whose strength is drawn.
@@ -55,7 +56,7 @@ EFFECTS = (
     'ovality',
     'irregularity',
 )
-# One bead in so many may be missing, or too many.
+# Relative range of the number of beads.
 _COUNT_SPREAD = 0.05
 _QUALITY = 85
 _FIRST_SHAKE = 0.1
@@ -64,23 +65,23 @@ _NS = 1e9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterPlan:
-    """What curves of cluster sizes are made of.
+    """Parameters of the simulations for cluster curves.
 
     Parameters
     ----------
     cells : mapping of int to Tray
         All cells of the plate, by number.
     trays : tuple of int
-        Those that curves are made for.
+        Trays with curves.
     runs : int
     seed : int
     level : float
-        Of the autocorrelation.
+        Level of the autocorrelation at which the width is measured.
     strengths : tuple of 2 floats, >= 0
-        Weakest and strongest that effects of camera, light and dust are, relative to flight. The
-        better a camera is known, the narrower, and the smaller the errors.
+        Range of the effects of camera, light and dust, relative to flight. A narrow range, for a
+        camera that is known well, gives small errors.
     moments : int
-        How many of `TIMES` are filmed.
+        Number of `TIMES` that are filmed.
     """
 
     cells: Mapping[int, Tray]
@@ -91,7 +92,7 @@ class ClusterPlan:
     strengths: tuple[float, float] = (0.0, 1.5)
     moments: int = len(TIMES)
 
-    def question(self) -> str:
+    def specification(self) -> str:
         """Everything that the curves depend on, as a JSON object."""
         keys = {str(number): json.loads(curve_key(self.cells[number])) for number in self.trays}
         return json.dumps(
@@ -109,7 +110,7 @@ class ClusterPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterRun:
-    """What is drawn for one run.
+    """Random parameters of one run.
 
     Parameters
     ----------
@@ -126,9 +127,9 @@ class ClusterRun:
 
 
 def drawn_run(plan: ClusterPlan, run: int) -> ClusterRun:
-    """What is drawn for a run; depends on the plan's seed and the run alone."""
+    """Draw the parameters of a run; they depend only on the seed of the plan and the run."""
     generator = np.random.default_rng((plan.seed, run))
-    # Even steps that never repeat fill the range with any number of runs.
+    # Multiples of the golden ratio fill the range evenly for any number of runs.
     part = (0.5 + run * _GOLDEN) % 1.0
     strengths = generator.uniform(*plan.strengths, len(EFFECTS))
     counts = generator.uniform(1.0 - _COUNT_SPREAD, 1.0 + _COUNT_SPREAD, len(plan.cells))
@@ -152,7 +153,7 @@ def cluster_sizes(bodies: NDArray[np.int32]) -> tuple[float, float]:
 
 
 def samples_of_run(plan: ClusterPlan, run: int) -> NDArray[np.float32]:
-    """Film a run, and measure the pictures of its trays as the pipeline does.
+    """Film a run, and measure the images of its trays as the pipeline does.
 
     Parameters
     ----------
@@ -178,13 +179,13 @@ def samples_of_run(plan: ClusterPlan, run: int) -> NDArray[np.float32]:
 def filmed_run(
     plan: ClusterPlan, run: int, drawn: ClusterRun, times: Sequence[float]
 ) -> NDArray[np.float32]:
-    """The same for a run that is given, at given times.
+    """Film a run with given parameters at given times, and measure the images of its trays.
 
     Parameters
     ----------
     plan : ClusterPlan
     run : int, >= 0
-        Of which the gas is.
+        Number that seeds the gas.
     drawn : ClusterRun
     times : sequence of float, [s]
         Since the shaking event, rising.
@@ -192,7 +193,7 @@ def filmed_run(
     Returns
     -------
     ndarray of float32, (n_samples, 8)
-        As `samples_of_run`, and the share of the picture that is covered.
+        As `samples_of_run`, and the covered fraction of the image.
     """
     from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
 
@@ -218,18 +219,18 @@ def filmed_run(
 def _measured(
     moment: SceneMoment, preprocessor: Preprocessor, level: float, scene: SceneSettings
 ) -> list[tuple[int, float, Width]]:
-    """Tray, weight-averaged size and width of the pictures in a frame, after its JPEG."""
+    """Tray, weight-averaged size and width of each tray image of a frame, after JPEG."""
     jpeg = cv2.imencode('.jpg', moment.frame.image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1]
     image = np.asarray(cv2.imdecode(jpeg, cv2.IMREAD_COLOR), dtype=np.uint8)
     frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
     sizes = {beads.tray: cluster_sizes(beads.bodies)[0] for beads in moment.beads}
-    found = []
+    measured = []
     for record in preprocessor.push(frame):
         if isinstance(record, TrayImage):
-            seen = correlated(record.gray, scene.pixels_per_metre)
-            width = seen.width(seen.region(level).area)
-            found.append((record.tray, sizes[record.tray], width))
-    return found
+            correlation = correlated(record.gray, scene.pixels_per_metre)
+            width = correlation.width(correlation.region(level).area)
+            measured.append((record.tray, sizes[record.tray], width))
+    return measured
 
 
 def _settings(
@@ -239,7 +240,7 @@ def _settings(
     strong = {name: getattr(flown, name) * by for name, by in drawn.strengths.items()}
     scene = with_values(flown, {'trays': plan.trays, **strong}, 'cluster films')
     values = {
-        # Another gas for every run, and for every seed.
+        # A different gas for every run and every seed.
         'seed': int(np.random.SeedSequence((plan.seed, run)).generate_state(1)[0] >> 1),
         'sticking_speed': drawn.sticking_speed,
         'first_shake': _FIRST_SHAKE,
@@ -253,5 +254,7 @@ def _settings(
 
 
 def _with_count(tray: Tray, factor: float) -> Tray:
-    species = tuple(replace(one, count=max(1, round(one.count * factor))) for one in tray.species)
+    species = tuple(
+        replace(beads, count=max(1, round(beads.count * factor))) for beads in tray.species
+    )
     return replace(tray, species=species)

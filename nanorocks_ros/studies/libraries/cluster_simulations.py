@@ -1,4 +1,4 @@
-"""Curves from autocorrelations to cluster sizes: films, kept, resumed, and made into one file."""
+"""Cluster curves from simulated films: run in parallel, resumed, written to a file."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.inference.cluster_size.cluster_curve import as_arrays, load_curves
-from nanorocks_ros.jobs.journal import Journal
-from nanorocks_ros.jobs.resumed_tasks import fill_journal
+from nanorocks_ros.jobs.resumed_tasks import fill_journal, resumed_journal
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.outputs.npz_archive import write_archive
 from nanorocks_ros.studies.libraries.cluster_films import ClusterPlan, samples_of_run
@@ -20,10 +19,11 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from nanorocks_ros.inference.cluster_size.size_from_width import ClusterCurve
+    from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.outputs.npz_archive import Arrays
 
 _SAMPLES = 'samples'
-_FEWEST_RUNS = 8
+_MIN_RUNS = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,23 +38,23 @@ def build_curves(
     plan: ClusterPlan,
     output: Path,
     workers: Workers | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     notice: Callable[[str], None] | None = None,
 ) -> Mapping[str, ClusterCurve]:
-    """Film clusters that grow, and write the curves of their trays.
+    """Film growing clusters, and write the cluster curves of their trays.
 
     Parameters
     ----------
     plan : ClusterPlan
     output : Path
-        ``.npz``; finished runs are kept in the folder ``OUTPUT.parts`` until it is written, and
-        the same call goes on from there.
+        ``.npz``; finished runs are kept in the folder ``OUTPUT.parts`` until it is written, so
+        that the same call resumes an interrupted one.
     workers : Workers, optional
         By default processes on all cores.
     progress : callable, optional
-        Called with the runs done and the runs there are.
+        Called with the number of finished runs and the number of runs.
     notice : callable, optional
-        Called with what the user should know, one line each.
+        Called with one line of text for each damaged part.
 
     Returns
     -------
@@ -72,23 +72,19 @@ def build_curves(
     KeyboardInterrupt
         Ctrl-C; its text says what is kept.
     """
-    if plan.runs < _FEWEST_RUNS:
+    if plan.runs < _MIN_RUNS:
         raise ConfigurationError(
-            '--runs', f'{plan.runs}', f'give {_FEWEST_RUNS} or more: each has one sticking speed'
+            '--runs', f'{plan.runs}', f'give {_MIN_RUNS} or more: each has one sticking speed'
         )
     workers = workers or Workers()
     workers.check()
-    folder = output.with_name(f'{output.name}.parts')
-    with Journal(folder, plan.question()) as journal:
+    with resumed_journal(output, plan.specification(), notice) as journal:
         tasks = {str(run): _Run(plan=plan, run=run) for run in range(plan.runs)}
         fill_journal(journal, film_run, tasks, workers, progress)
-        for text in journal.notices:
-            (notice or (lambda text: None))(text)
         samples = [journal.read(str(run))[_SAMPLES] for run in range(plan.runs)]
         trays = {number: plan.cells[number] for number in plan.trays}
-        arrays = as_arrays(trays, plan.level, np.concatenate(samples), plan.question())
+        arrays = as_arrays(trays, plan.level, np.concatenate(samples), plan.specification())
         write_archive(output, arrays)
-        journal.delete()
     load_curves.cache_clear()
     return load_curves(str(output), packaged=False)
 

@@ -1,4 +1,4 @@
-"""Decay libraries: simulated decays at many nodes, kept, resumed, and made into one file."""
+"""Decay libraries from simulations: run in parallel, resumed, written to a file."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.inference.decay.decay_library import NUISANCES, count_step, tray_key
+from nanorocks_ros.inference.decay.decay_library_file import library_arrays
 from nanorocks_ros.inference.decay.library_fit import (
     Decays,
     distances,
@@ -19,8 +20,7 @@ from nanorocks_ros.inference.decay.library_fit import (
     fit_library,
     node_of,
 )
-from nanorocks_ros.jobs.journal import Journal
-from nanorocks_ros.jobs.resumed_tasks import fill_journal
+from nanorocks_ros.jobs.resumed_tasks import fill_journal, resumed_journal
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.outputs.npz_archive import write_archive
 from nanorocks_ros.settings import SimulationSettings, with_values
@@ -33,9 +33,11 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.inference.decay.decay_library import DecayLibrary
+    from nanorocks_ros.jobs.journal import Journal
+    from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.outputs.npz_archive import Arrays
 
-# Any speed would do: the decay is one function of speed times time.
+# Arbitrary: the decay is a function of speed times time alone.
 _MEAN_SPEED = 0.01
 # The mean projected speed of a drawn start is within these factors of the expected one.
 _SLOWER, _FASTER = 0.3, 3.0
@@ -46,15 +48,15 @@ _NODES_IN_TASK = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LibraryPlan:
-    """What a decay library is made of.
+    """Parameters of the simulations for a decay library.
 
     Parameters
     ----------
     tray : Tray
     nodes : int
-        Places in the space of restitutions and nuisances.
+        Number of points in the space of restitutions and nuisance parameters.
     runs : int
-        At each node.
+        Runs at each node.
     seed : int
     """
 
@@ -63,7 +65,7 @@ class LibraryPlan:
     runs: int
     seed: int = 1
 
-    def question(self) -> str:
+    def specification(self) -> str:
         """Everything that the library depends on, as a JSON object."""
         return json.dumps(
             {
@@ -88,7 +90,7 @@ def build_library(
     plan: LibraryPlan,
     output: Path,
     workers: Workers | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     notice: Callable[[str], None] | None = None,
 ) -> DecayLibrary:
     """Simulate the decays of a tray and write its library.
@@ -97,14 +99,14 @@ def build_library(
     ----------
     plan : LibraryPlan
     output : Path
-        ``.npz``; finished nodes are kept in the folder ``OUTPUT.parts`` until it is written, and
-        the same call goes on from there.
+        ``.npz``; finished nodes are kept in the folder ``OUTPUT.parts`` until it is written, so
+        that the same call resumes an interrupted one.
     workers : Workers, optional
         By default processes on all cores.
     progress : callable, optional
-        Called with the parts done and the parts there are, of four nodes each.
+        Called with the number of finished parts, of four nodes each, and the number of parts.
     notice : callable, optional
-        Called with what the user should know, one line each.
+        Called with one line of text for each damaged part.
 
     Returns
     -------
@@ -125,18 +127,14 @@ def build_library(
         raise ConfigurationError(
             '--nodes, --runs',
             f'{plan.nodes}, {plan.runs}',
-            f'give {fewest_nodes()} and 2 or more: with fewer it would be wrong and not know it',
+            f'give {fewest_nodes()} and 2 or more: fewer do not give an error estimate',
         )
     workers = workers or Workers()
     workers.check()
-    folder = output.with_name(f'{output.name}.parts')
-    with Journal(folder, plan.question()) as journal:
+    with resumed_journal(output, plan.specification(), notice) as journal:
         fill_journal(journal, cool_nodes, _tasks(plan), workers, progress)
-        for text in journal.notices:
-            (notice or (lambda text: None))(text)
-        library = fit_library(plan.tray, _decays(plan, journal), plan.question())
-        library.save(lambda arrays: write_archive(output, arrays))
-        journal.delete()
+        library = fit_library(plan.tray, _decays(plan, journal), plan.specification())
+        write_archive(output, library_arrays(library))
     return library
 
 
@@ -187,8 +185,8 @@ def cool_node(plan: LibraryPlan, number: int) -> NDArray[np.float64]:
     start = speed[:, :1]
     return np.array(
         [
-            np.interp(np.log(x), np.log(times * first[0]), np.log(one[1:] / first[0]))
-            for one, first in zip(speed, start, strict=True)
+            np.interp(np.log(x), np.log(times * first[0]), np.log(curve[1:] / first[0]))
+            for curve, first in zip(speed, start, strict=True)
         ]
     )
 
@@ -197,15 +195,15 @@ def _simulated(plan: LibraryPlan, number: int) -> tuple[SimulationSettings, Tray
     """Settings and tray of a node."""
     node = node_of(number)
     tray = plan.tray
-    most = max(range(len(tray.species)), key=lambda k: tray.species[k].count)
-    varied = tray.species[most]
+    index = max(range(len(tray.species)), key=lambda k: tray.species[k].count)
+    most_frequent = tray.species[index]
     size = 1.0 + node['diameter']
     species = list(tray.species)
-    species[most] = replace(
-        varied,
-        diameter_low=size * varied.diameter_low,
-        diameter_high=size * varied.diameter_high,
-        count=max(1, varied.count + round(node['count']) * count_step(tray)),
+    species[index] = replace(
+        most_frequent,
+        diameter_low=size * most_frequent.diameter_low,
+        diameter_high=size * most_frequent.diameter_high,
+        count=max(1, most_frequent.count + round(node['count']) * count_step(tray)),
     )
     length, width, height = tray.dimensions
     wall, ends = node['wall_restitution'], node['floor_lid_restitution']

@@ -1,4 +1,7 @@
-"""Runs of a sweep as tasks, and as parts of its result."""
+"""Runs of a sweep as tasks, and as parts of its result.
+
+Tested in test_sweep_runs.py.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ class RunRange:
 
     @property
     def key(self) -> str:
-        """What the part of these runs is called."""
+        """Key of the part with these runs."""
         return f'{self.first}-{self.last}'
 
     @property
@@ -42,21 +45,21 @@ class RunRange:
 
 def _ranges(keys: Iterable[str]) -> list[tuple[int, int, str]]:
     """First and last run of parts, and their keys, in order."""
-    found = []
+    ranges = []
     for key in keys:
         first, last = key.split('-')
-        found.append((int(first), int(last), key))
-    return sorted(found)
+        ranges.append((int(first), int(last), key))
+    return sorted(ranges)
 
 
 def missing_runs(plan: SweepPlan, keys: Iterable[str]) -> list[RunRange]:
-    """Stretches of runs that no part holds.
+    """Ranges of runs that no part holds.
 
     Parameters
     ----------
     plan : SweepPlan
     keys : iterable of str
-        Of the parts there are.
+        Keys of the existing parts.
     """
     gaps = []
     end = 0
@@ -68,28 +71,28 @@ def missing_runs(plan: SweepPlan, keys: Iterable[str]) -> list[RunRange]:
 
 
 def divided(whole: RunRange, size: int) -> Iterator[RunRange]:
-    """Tasks of at most so many runs."""
+    """Split a range into tasks of at most `size` runs."""
     for first in range(whole.first, whole.last, size):
         yield RunRange(plan=whole.plan, first=first, last=min(first + size, whole.last))
 
 
 def check_points(plan: SweepPlan) -> None:
-    """Refuse settings that do not go together at some point of the grid, before any work.
+    """Raise for settings that are incompatible at a point of the grid, before any work.
 
     Raises
     ------
     SimulationError
-        Naming the first such point.
+        Names the first such point.
     """
     from nanorocks_ros.simulation.initial_state import rules_of
 
     for point in range(plan.points):
-        with _named(plan, point):
+        with _point_named_in_error(plan, point):
             rules_of(*plan.point(point))
 
 
 @contextmanager
-def _named(plan: SweepPlan, point: int) -> Iterator[None]:
+def _point_named_in_error(plan: SweepPlan, point: int) -> Iterator[None]:
     try:
         yield
     except SimulationError as error:
@@ -97,7 +100,7 @@ def _named(plan: SweepPlan, point: int) -> Iterator[None]:
 
 
 def cool(task: RunRange) -> Arrays:
-    """Work out some runs of a sweep.
+    """Simulate some runs of a sweep.
 
     Parameters
     ----------
@@ -112,7 +115,7 @@ def cool(task: RunRange) -> Arrays:
     Raises
     ------
     SimulationError
-        When the gas cannot be prepared or followed; names the point of the grid.
+        When the gas cannot be prepared or simulated; names the point of the grid.
     """
     from nanorocks_ros.simulation.ensemble import cooling_runs
 
@@ -123,7 +126,7 @@ def cool(task: RunRange) -> Arrays:
         start = point * plan.runs
         first, last = max(task.first - start, 0), min(task.last - start, plan.runs)
         numbers = plan.run_numbers(point, first, last)
-        with _named(plan, point):
+        with _point_named_in_error(plan, point):
             pieces.append(cooling_runs(settings, tray, np.array(plan.times), numbers))
     return {
         name: np.concatenate([getattr(piece, name) for piece in pieces])
@@ -132,13 +135,13 @@ def cool(task: RunRange) -> Arrays:
 
 
 def points_in_order(plan: SweepPlan, journal: Journal) -> Iterator[Arrays]:
-    """All runs of one point after the other: no more than that, and a part, is in memory.
+    """Yield the runs of each point; only these and one part are in memory.
 
     Parameters
     ----------
     plan : SweepPlan
     journal : Journal
-        Of a plan that is finished.
+        Of a finished plan.
 
     Yields
     ------
@@ -153,19 +156,19 @@ def points_in_order(plan: SweepPlan, journal: Journal) -> Iterator[Arrays]:
     keys = journal.keys()
     if missing_runs(plan, keys):
         raise RecordingError(str(journal.folder), 'parts have gone', 'give the same command again')
-    held: list[Arrays] = []
+    pieces: list[Arrays] = []
     count = end = 0
     for first, last, key in _ranges(keys):
         part = journal.read(key)
-        # Parts may overlap where one was damaged and made again otherwise divided.
-        held.append({name: array[max(end - first, 0) :] for name, array in part.items()})
+        # Parts overlap where the runs of a damaged one were divided differently.
+        pieces.append({name: array[max(end - first, 0) :] for name, array in part.items()})
         count += max(last - max(first, end), 0)
         end = max(end, last)
         if count < plan.runs:
             continue
-        joined = {name: np.concatenate([one[name] for one in held]) for name in part}
+        joined = {name: np.concatenate([piece[name] for piece in pieces]) for name in part}
         whole = count - count % plan.runs
         for start in range(0, whole, plan.runs):
             yield {name: array[start : start + plan.runs] for name, array in joined.items()}
-        held = [{name: array[whole:] for name, array in joined.items()}]
+        pieces = [{name: array[whole:] for name, array in joined.items()}]
         count -= whole

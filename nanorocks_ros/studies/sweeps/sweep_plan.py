@@ -1,4 +1,4 @@
-"""What a sweep asks: which settings, over which grid, at which times, in how many runs."""
+"""Plan of a sweep: settings, grid, times, number of runs."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import Scalar, Value
 
-MOST_RUNS = 2**31
-MOST_POINTS = 10**6
+MAX_RUNS = 2**31
+MAX_POINTS = 10**6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +44,7 @@ class Axis:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SweepPlan:
-    """A question whose answer does not depend on who works it out.
+    """A plan whose result does not depend on the workers.
 
     Make one with `sweep_plan`, which checks it. Points of the grid are numbered with the last
     axis running fastest.
@@ -52,20 +52,20 @@ class SweepPlan:
     Parameters
     ----------
     settings : SimulationSettings
-        Where no axis says otherwise; the seed is the root of every random number.
+        Settings that no axis varies; the seed determines all random numbers.
     axes : tuple of Axis
-        None: a single point.
+        Empty: a single point.
     times : tuple of float, (n_times,), [s]
         Since the shaking event; rising.
     runs : int
-        At every point.
+        Runs at every point.
     common_random_numbers : bool
-        Whether run k starts alike at every point, which makes differences between points less
-        noisy but correlates their errors. By default every run of every point is independent.
+        Whether run k has the same random numbers at every point: differences between points are
+        less noisy, but their errors are correlated. By default all runs are independent.
     keep_runs : bool
-        Whether the result holds every single run, for covariances, beside the means.
+        Whether the result holds each run, for covariances, beside the means.
     trays : tuple of Tray
-        Those that occur, in order of their number.
+        Trays of the grid, in order of their number.
     """
 
     settings: SimulationSettings
@@ -83,12 +83,12 @@ class SweepPlan:
 
     @property
     def points(self) -> int:
-        """Points of the grid."""
+        """Number of points of the grid."""
         return math.prod(self.shape)
 
     @property
     def total_runs(self) -> int:
-        """Runs over the whole grid."""
+        """Number of runs over the whole grid."""
         return self.points * self.runs
 
     def point(self, number: int) -> tuple[SimulationSettings, Tray]:
@@ -98,35 +98,35 @@ class SweepPlan:
         ----------
         number : int, from 0
         """
-        places = np.unravel_index(number, self.shape)
+        indices = np.unravel_index(number, self.shape)
         values = {
-            axis.name: axis.values[int(place)]
-            for axis, place in zip(self.axes, places, strict=True)
+            axis.name: axis.values[int(index)]
+            for axis, index in zip(self.axes, indices, strict=True)
         }
         settings = with_values(self.settings, values, 'sweep')
-        (tray,) = (one for one in self.trays if one.number == settings.tray)
+        (tray,) = (tray for tray in self.trays if tray.number == settings.tray)
         return settings, tray
 
     def name(self, number: int) -> str:
-        """A point of the grid, for people."""
-        places = np.unravel_index(number, self.shape)
+        """Description of a point of the grid, for messages."""
+        indices = np.unravel_index(number, self.shape)
         return ', '.join(
-            f'{axis.name} {axis.values[int(place)]}'
-            for axis, place in zip(self.axes, places, strict=True)
+            f'{axis.name} {axis.values[int(index)]}'
+            for axis, index in zip(self.axes, indices, strict=True)
         )
 
     def run_numbers(self, point: int, first: int, last: int) -> list[int]:
         """Numbers of the runs first, first + 1, ..., last - 1 of a point.
 
         Run k of point p is number 2^32 p + k of the root seed: numpy's `SeedSequence` takes
-        the two halves as words of their own, so no two runs share a random number, and more
-        runs or points leave those there were as they are.
+        the two halves as separate words, so no two runs share random numbers, and adding
+        runs or points does not change the others.
         """
         offset = 0 if self.common_random_numbers else point << 32
         return [offset + run for run in range(first, last)]
 
-    def question(self) -> str:
-        """Everything that the answer depends on, as a JSON object."""
+    def specification(self) -> str:
+        """Everything that the result depends on, as a JSON object."""
         return json.dumps(
             {
                 'version': __version__,
@@ -149,36 +149,35 @@ def sweep_plan(
     common_random_numbers: bool = False,
     keep_runs: bool = False,
 ) -> SweepPlan:
-    """A plan that can be carried out.
+    """Make a plan, checked.
 
     Parameters
     ----------
     settings : SimulationSettings
     axes : mapping of str to sequences
-        Field of `SimulationSettings` to its values; no two alike. Empty: a single point.
+        Values by field of `SimulationSettings`, each once. Empty: a single point.
     times : array_like (n_times,), [s]
         Since the shaking event; rising.
     runs : int, > 0
-        At every point.
+        Runs at every point.
     common_random_numbers, keep_runs : bool, optional
         See `SweepPlan`.
 
     Raises
     ------
     ConfigurationError
-        Naming what cannot be used: an unknown field, a value outside its range, times that do
-        not rise.
+        For an unknown field, a value outside its range, or times that do not rise.
     """
     settings = with_values(settings, {row.name: row.default for row in rows(settings)}, 'settings')
     checked = tuple(_axis(settings, name, values) for name, values in axes.items())
-    if isinstance(runs, bool) or not isinstance(runs, int) or not 1 <= runs <= MOST_RUNS:
+    if isinstance(runs, bool) or not isinstance(runs, int) or not 1 <= runs <= MAX_RUNS:
         raise ConfigurationError(
-            '--runs', f'{runs!r}', f'give a whole number from 1 to {MOST_RUNS}'
+            '--runs', f'{runs!r}', f'give a whole number from 1 to {MAX_RUNS}'
         )
     points = math.prod(len(axis.values) for axis in checked)
-    if points > MOST_POINTS:
+    if points > MAX_POINTS:
         raise ConfigurationError(
-            'sweep', f'a grid of {points} points', f'give at most {MOST_POINTS}'
+            'sweep', f'a grid of {points} points', f'give at most {MAX_POINTS}'
         )
     numbers = next((axis.values for axis in checked if axis.name == 'tray'), (settings.tray,))
     return SweepPlan(
@@ -193,43 +192,43 @@ def sweep_plan(
 
 
 def _axis(settings: SimulationSettings, name: str, values: Iterable[Any]) -> Axis:
-    known: dict[str, Value] = {}
-    plain = [one.item() if isinstance(one, np.generic) else one for one in values]
+    settings_by_name: dict[str, Value] = {}
+    plain = [value.item() if isinstance(value, np.generic) else value for value in values]
     where = f'axis {name}'
     if not plain:
         raise ConfigurationError(where, 'has no values', 'give one or more')
-    found = []
+    converted = []
     for value in plain:
         changed = with_values(settings, {name: value}, where)
-        known = {row.name: row.default for row in rows(changed)}
-        found.append(known[name])
-    if any(isinstance(value, tuple) for value in found):
+        settings_by_name = {row.name: row.default for row in rows(changed)}
+        converted.append(settings_by_name[name])
+    if any(isinstance(value, tuple) for value in converted):
         raise ConfigurationError(where, 'is a list by itself', 'vary a single number')
-    if len(set(found)) < len(found):
+    if len(set(converted)) < len(converted):
         raise ConfigurationError(where, 'holds a value twice', 'give each value once')
-    return Axis(name=name, values=tuple(found))  # type: ignore[arg-type]  # no tuples among them
+    return Axis(name=name, values=tuple(converted))  # type: ignore[arg-type]  # no tuples among them
 
 
 def _times(times: Sequence[float] | NDArray[np.float64]) -> tuple[float, ...]:
     try:
-        found = tuple(float(time) for time in times)
+        seconds = tuple(float(time) for time in times)
     except (TypeError, ValueError) as error:
         raise ConfigurationError('--times', f'{times!r}', 'give numbers of seconds') from error
-    steps = itertools.pairwise(found)
+    steps = itertools.pairwise(seconds)
     if (
-        not found
-        or not all(math.isfinite(one) and one >= 0.0 for one in found)
+        not seconds
+        or not all(math.isfinite(second) and second >= 0.0 for second in seconds)
         or not all(later > earlier for earlier, later in steps)
     ):
         raise ConfigurationError(
-            '--times', f'{_shown(found)} [s]', 'give one or more, rising, none below 0'
+            '--times', f'{_listed(seconds)} [s]', 'give one or more, rising, none below 0'
         )
-    return found
+    return seconds
 
 
-def _shown(values: Sequence[float]) -> str:
-    more = ', ...' if len(values) > 6 else ''
-    return (', '.join(f'{value:g}' for value in values[:6]) or 'no times') + more
+def _listed(values: Sequence[float]) -> str:
+    ellipsis = ', ...' if len(values) > 6 else ''
+    return (', '.join(f'{value:g}' for value in values[:6]) or 'no times') + ellipsis
 
 
 def _trays(numbers: Iterable[Scalar]) -> tuple[Tray, ...]:

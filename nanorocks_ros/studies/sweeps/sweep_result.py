@@ -1,4 +1,4 @@
-"""The mean decay at every point of a grid, as a record and as a file."""
+"""Result of a sweep: the mean decay at every point of a grid, and its files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 CURVES = ('mean_speed', 'mean_speed_error', 'mean_projected_speed', 'mean_projected_speed_error')
 _RUNS = ('run_mean_speed', 'run_mean_projected_speed')
-_QUESTION, _TIMES, _AXIS = 'question', 'times', 'axis_'
+_SPECIFICATION, _TIMES, _AXIS = 'question', 'times', 'axis_'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,29 +34,29 @@ class Sweep:
     Parameters
     ----------
     axes : tuple of Axis
-        Settings that vary; none for a single point, whose `grid` below is empty.
+        Settings that vary; empty for a single point, whose `grid` below is empty.
     times : ndarray (n_times,), [s]
         Since the shaking event.
     runs : int
-        At every point.
-    question : str
-        A JSON object, everything that the numbers depend on: version, settings with the seed,
+        Runs at every point.
+    specification : str
+        JSON object with everything that the numbers depend on: version, settings with the seed,
         axes, times, runs, trays.
     mean_speed, mean_projected_speed : ndarray (*grid, n_times), [m/s]
         Over beads and runs.
     mean_speed_error, mean_projected_speed_error : ndarray (*grid, n_times), [m/s]
         One standard error, from the scatter of the runs; NaN for a single run. Errors at
-        different times go together, since a run that is slow stays slow.
+        different times are correlated, since a slow run stays slow.
     pair_collisions, wall_collisions : ndarray of int64, (*grid,)
         Sums over the runs.
     run_mean_speed, run_mean_projected_speed : ndarray (*grid, n_runs, n_times) or None, [m/s]
-        Run by run, where that was asked for.
+        Speeds of each run, where the plan keeps them.
     """
 
     axes: tuple[Axis, ...]
     times: NDArray[np.float64]
     runs: int
-    question: str
+    specification: str
     mean_speed: NDArray[np.float64]
     mean_speed_error: NDArray[np.float64]
     mean_projected_speed: NDArray[np.float64]
@@ -76,14 +76,13 @@ class Sweep:
         return tuple(len(axis.values) for axis in self.axes)
 
     def _arrays(self) -> Arrays:
-        every = {name: getattr(self, name) for name in (*CURVES, *COUNTS, *_RUNS)}
-        return {name: array for name, array in every.items() if array is not None}
+        arrays = {name: getattr(self, name) for name in (*CURVES, *COUNTS, *_RUNS)}
+        return {name: array for name, array in arrays.items() if array is not None}
 
     def save(self, path: Path) -> None:
         """Write an ``.npz`` file, complete or not at all.
 
-        Beside the arrays under their own names it holds ``axis_NAME`` for each axis, and
-        ``question``.
+        It holds the arrays by name, ``axis_NAME`` for each axis, and ``question``.
 
         Raises
         ------
@@ -91,12 +90,14 @@ class Sweep:
             When the file cannot be written.
         """
         axes = {f'{_AXIS}{axis.name}': np.array(axis.values) for axis in self.axes}
-        question = np.array(self.question)
-        write_archive(path, {_QUESTION: question, **axes, _TIMES: self.times, **self._arrays()})
+        specification = np.array(self.specification)
+        write_archive(
+            path, {_SPECIFICATION: specification, **axes, _TIMES: self.times, **self._arrays()}
+        )
 
     @classmethod
     def load(cls, path: Path) -> Sweep:
-        """Read what `save` wrote.
+        """Read a file that `save` wrote.
 
         Raises
         ------
@@ -105,16 +106,16 @@ class Sweep:
         """
         arrays = read_archive(path)
         try:
-            question = str(arrays[_QUESTION])
-            asked = json.loads(question)
+            specification = str(arrays[_SPECIFICATION])
+            plan = json.loads(specification)
             axes = tuple(
-                Axis(name=name, values=tuple(values)) for name, values in asked['axes'].items()
+                Axis(name=name, values=tuple(values)) for name, values in plan['axes'].items()
             )
             sweep = cls(
                 axes=axes,
                 times=arrays[_TIMES],
-                runs=asked['runs'],
-                question=question,
+                runs=plan['runs'],
+                specification=specification,
                 **{name: arrays[name] for name in (*CURVES, *COUNTS)},
                 **{name: arrays[name] for name in _RUNS if name in arrays},
             )
@@ -136,10 +137,10 @@ class Sweep:
     def rows(self) -> Iterator[tuple[Any, ...]]:
         """Values of the axes, time and the four curves, point by point and time by time."""
         curves = [getattr(self, name) for name in CURVES]
-        for place in np.ndindex(*self.shape):
-            values = [axis.values[k] for axis, k in zip(self.axes, place, strict=True)]
+        for index in np.ndindex(*self.shape):
+            values = [axis.values[k] for axis, k in zip(self.axes, index, strict=True)]
             for k, time in enumerate(self.times.tolist()):
-                yield (*values, time, *(float(curve[place][k]) for curve in curves))
+                yield (*values, time, *(float(curve[index][k]) for curve in curves))
 
     def write_table(self, path: Path, units: dict[str, str]) -> None:
         """Write the curves as a CSV table, complete or not at all.
@@ -148,7 +149,7 @@ class Sweep:
         ----------
         path : Path
         units : dict of str to str
-            Of the axes, where they have one.
+            Units of the axes that have one.
 
         Raises
         ------

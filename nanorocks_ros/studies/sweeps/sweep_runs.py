@@ -1,4 +1,4 @@
-"""Many runs at every point of a grid of settings: divided, handed out, kept and added up."""
+"""A sweep: many runs at every point of a grid of settings, in parallel and resumable."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import numpy as np
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.journal import Journal, difference
-from nanorocks_ros.jobs.tasks import Workers, as_finished
+from nanorocks_ros.jobs.resumed_tasks import parts_folder
+from nanorocks_ros.jobs.tasks import Workers, as_completed
 from nanorocks_ros.studies.sweeps.sweep_parts import (
     COUNTS,
     SPEEDS,
@@ -31,28 +32,24 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.outputs.npz_archive import Arrays
     from nanorocks_ros.studies.sweeps.sweep_plan import SweepPlan
 
-# A part of more numbers than this is a burden to send.
-_MOST_NUMBERS = 2_000_000
-
-
-def parts_folder(output: Path) -> Path:
-    """Where the finished parts of a sweep lie until it is complete."""
-    return output.with_name(f'{output.name}.parts')
+# A part of more numbers than this is slow to send.
+_MAX_NUMBERS = 2_000_000
 
 
 def sweep(
     plan: SweepPlan,
     output: Path | None = None,
     workers: Workers | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     notice: Callable[[str], None] | None = None,
 ) -> Sweep:
-    """Let the gas cool in many runs at every point of a grid.
+    """Simulate the cooling gas in many runs at every point of a grid.
 
-    The numbers do not depend on the workers: each run has random numbers of its own, and runs
+    The numbers do not depend on the workers: each run has its own random numbers, and runs
     are added up in their order.
 
     Parameters
@@ -60,41 +57,41 @@ def sweep(
     plan : SweepPlan
     output : Path, optional
         File for the result. Finished parts are kept in a folder beside it, ``OUTPUT.parts``,
-        until the sweep is complete; called again, it goes on with what is missing. A file that
-        answers the same plan is read.
+        until the sweep is complete; the same call resumes an interrupted one. An existing
+        result of the same plan is read.
     workers : Workers, optional
         By default processes on all cores.
     progress : callable, optional
-        Called with the runs done and the runs there are, before and after every task.
+        Called with the number of finished runs and the number of runs.
     notice : callable, optional
-        Called with what the user should know, one line each.
+        Called with one line of text for each damaged part.
 
     Raises
     ------
     ConfigurationError
-        For a setting, or a combination of them, that cannot be used.
+        For a setting, or a combination of settings, that cannot be used.
     SimulationError
-        When the gas cannot be prepared or followed at a point; names it.
+        When the gas cannot be prepared or simulated at a point; names it.
     RecordingError
         When the output cannot be written, or it or its parts belong to another plan.
     NanorocksError
-        When workers end again and again, or the cluster cannot be used.
+        When workers die repeatedly, or the cluster cannot be used.
     KeyboardInterrupt
         Ctrl-C; with an output its text says what is kept.
     """
-    found = None if output is None else _answer(plan, output)
-    if found is not None:
-        return found
+    earlier = None if output is None else _existing_result(plan, output)
+    if earlier is not None:
+        return earlier
     workers = workers or Workers()
     check_points(plan)
     workers.check()
     with nullcontext() if output else TemporaryDirectory(prefix='nanorocks_sweep.') as scratch:
         folder = parts_folder(output) if output else Path(str(scratch))
-        with Journal(folder, plan.question()) as journal:
-            work = _Work(plan, journal, progress or (lambda done, total: None))
+        with Journal(folder, plan.specification()) as journal:
+            work = _MissingRuns(plan, journal, progress or (lambda done, total: None))
             try:
                 work.run(workers, notice or (lambda text: None))
-                result = assembled(plan, journal)
+                result = assemble(plan, journal)
                 if output is not None:
                     result.save(output)
             except KeyboardInterrupt:
@@ -109,39 +106,37 @@ def sweep(
     return result
 
 
-def _answer(plan: SweepPlan, output: Path) -> Sweep | None:
-    """What the output holds already, if it answers the plan."""
+def _existing_result(plan: SweepPlan, output: Path) -> Sweep | None:
+    """The result that the output file holds; None when there is no such file."""
     if not output.exists():
         return None
     remedy = 'delete it, or pass another --output'
     try:
-        found = Sweep.load(output)
+        existing = Sweep.load(output)
     except RecordingError as error:
-        raise RecordingError(str(output), 'exists and is no sweep of ours', remedy) from error
-    if found.question != plan.question():
-        text = difference(found.question, plan.question())
+        raise RecordingError(str(output), 'exists and holds no sweep', remedy) from error
+    if existing.specification != plan.specification():
+        text = difference(existing.specification, plan.specification())
         raise RecordingError(str(output), f'holds another sweep ({text})', remedy)
-    if plan.keep_runs and found.run_mean_speed is None:
+    if plan.keep_runs and existing.run_mean_speed is None:
         raise RecordingError(str(output), 'holds no single runs', remedy)
-    return found
+    return existing
 
 
-class _Work:
-    """The runs that are missing in a journal, handed out to workers."""
+class _MissingRuns:
+    """Runs the missing runs of a journal on workers."""
 
-    def __init__(
-        self, plan: SweepPlan, journal: Journal, progress: Callable[[int, int], None]
-    ) -> None:
+    def __init__(self, plan: SweepPlan, journal: Journal, progress: Progress) -> None:
         self.done = 0
         self._plan = plan
         self._journal = journal
         self._progress = progress
 
     def run(self, workers: Workers, notice: Callable[[str], None]) -> None:
-        missing = missing_runs(self._plan, self._journal.good_keys())
+        missing = missing_runs(self._plan, self._journal.intact_keys())
         for text in self._journal.notices:
             notice(text)
-        self.done = self._plan.total_runs - sum(one.size for one in missing)
+        self.done = self._plan.total_runs - sum(piece.size for piece in missing)
         self._progress(self.done, self._plan.total_runs)
         if not missing:
             return
@@ -155,9 +150,9 @@ class _Work:
         if last > first:
             self._keep(last, part)
         missing = missing_runs(self._plan, self._journal.keys())
-        size = _task_size(self._plan, sum(one.size for one in missing), seconds, workers)
-        tasks = {one.key: one for piece in missing for one in divided(piece, size)}
-        with closing(as_finished(cool, tasks, workers)) as results:
+        size = _task_size(self._plan, sum(piece.size for piece in missing), seconds, workers)
+        tasks = {piece.key: piece for piece in missing for piece in divided(piece, size)}
+        with closing(as_completed(cool, tasks, workers)) as results:
             for key, part in results:
                 self._keep(tasks[key].first, part)
 
@@ -173,21 +168,21 @@ def _part(plan: SweepPlan, run: int) -> RunRange:
 
 
 def _task_size(plan: SweepPlan, runs: int, seconds: float, workers: Workers) -> int:
-    size = min(workers.task_seconds / max(seconds, 1e-6), _MOST_NUMBERS / len(plan.times))
+    size = min(workers.task_seconds / max(seconds, 1e-6), _MAX_NUMBERS / len(plan.times))
     if workers.scheduler is None:
-        # Something for everybody.
+        # A task for every process.
         size = min(size, runs / workers.count)
     return max(1, math.ceil(size))
 
 
-def assembled(plan: SweepPlan, journal: Journal) -> Sweep:
-    """The result, from the finished parts.
+def assemble(plan: SweepPlan, journal: Journal) -> Sweep:
+    """Assemble the result from the finished parts.
 
     Parameters
     ----------
     plan : SweepPlan
     journal : Journal
-        Of a plan that is finished.
+        Of a finished plan.
 
     Raises
     ------
@@ -203,26 +198,26 @@ def assembled(plan: SweepPlan, journal: Journal) -> Sweep:
     for name in COUNTS:
         arrays[name] = np.empty(plan.shape, dtype=np.int64)
     for point, runs in enumerate(points_in_order(plan, journal)):
-        place = np.unravel_index(point, plan.shape)
+        index = np.unravel_index(point, plan.shape)
         for name in SPEEDS:
-            arrays[name][place], arrays[f'{name}_error'][place] = _mean(runs[name])
+            arrays[name][index], arrays[f'{name}_error'][index] = _mean(runs[name])
             if plan.keep_runs:
-                arrays[f'run_{name}'][place] = runs[name]
+                arrays[f'run_{name}'][index] = runs[name]
         for name in COUNTS:
-            arrays[name][place] = runs[name].sum()
+            arrays[name][index] = runs[name].sum()
     return Sweep(
         axes=plan.axes,
         times=np.array(plan.times),
         runs=plan.runs,
-        question=plan.question(),
+        specification=plan.specification(),
         **arrays,
     )
 
 
 def _mean(runs: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Mean and its standard error of (n_runs, n_times), added up run by run."""
-    # Not ndarray.sum: the order of its additions depends on the shape of the array and on the
-    # machine, and with it the last digit.
+    # Not ndarray.sum: the order of its additions, and with it the last digit, depends on the
+    # shape of the array and on the machine.
     count = len(runs)
     mean = np.zeros(runs.shape[1])
     for run in runs:

@@ -1,4 +1,7 @@
-"""A simulated run filmed into a bag: compressed camera, epoch, and the truth."""
+"""Film of a simulated tray as a bag: compressed camera images, epoch, truth.
+
+Tested in test_simulated_runs.py.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
 
-# Bags made from the same seed are alike, byte for byte: the clock starts at a fixed instant.
+# Fixed, so that bags of the same seed are equal, byte by byte.
 START_NS = 1_000_000_000_000_000_000
 
 
@@ -55,19 +58,19 @@ def film_into_bag(
     quality : int
         Of the JPEGs, 1 to 100.
     progress : callable
-        Called with the frames done and the frames there will be.
+        Called with the number of written frames and the number of frames.
     tray : Tray, optional
-        By default the one that was flown under the number in the settings.
+        By default the flown tray with the number in the settings.
 
     Returns
     -------
     dict
-        What was filmed: frames, duration, tray, seed.
+        Number of frames, duration, tray, seed.
 
     Raises
     ------
     ConfigurationError
-        For a duration or quality that cannot be used, or an unknown tray.
+        For a duration or quality out of range, or an unknown tray.
     RecordingError
         When the bag cannot be written.
     """
@@ -86,7 +89,7 @@ def film_into_bag(
         'nanorocks_ros': __version__,
         **{row.name: str(row.default) for row in rows(settings)},
     }
-    # Made before the bag, so that a tray that does not fit leaves nothing behind.
+    # Before the bag, so that a tray that does not fit leaves no files.
     moments = film(settings, tray, frames, start_stamp_ns=START_NS)
     with BagWriter(path, table, metadata=provenance) as bag:
         bag.write(topics.EPOCH.absolute(), START_NS, time_message(START_NS))
@@ -105,7 +108,7 @@ def film_into_bag(
 
 
 def check_quality(quality: int) -> None:
-    """Refuse a quality that JPEG does not know.
+    """Raise for a quality that is out of range.
 
     Raises
     ------
@@ -117,7 +120,7 @@ def check_quality(quality: int) -> None:
 
 
 def check_camera(settings: SimulationSettings, tray: Tray) -> None:
-    """Refuse a picture that the tray does not fit into.
+    """Raise for an image that the tray does not fit into.
 
     Raises
     ------

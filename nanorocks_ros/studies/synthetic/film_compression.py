@@ -1,4 +1,7 @@
-"""What compression does to a simulated film: JPEG by quality or by size, or a stream of H.264."""
+"""Compression of a simulated film: JPEG of given quality or size, or an H.264 stream.
+
+Tested in test_film_scene.py.
+"""
 
 from __future__ import annotations
 
@@ -21,12 +24,12 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import CompressionSettings
     from nanorocks_ros.simulation.plate_scene.plate_film import SceneMoment
 
-# Frames of the minute that the rate is given for.
-_FRAMES = 1800.0
+# Frames in the minute that the rate refers to.
+_FRAMES_PER_MINUTE = 1800.0
 _QUALITIES = 1, 100
-# What needs PyAV, and what does without.
+# For the message without PyAV: what needs it, and the alternative.
 _H264 = '--compression-codec h264', 'take jpeg'
-# The size of a frame may be off by this much before the quality is changed.
+# Accumulated relative excess of the size at which the quality changes.
 _TOLERANCE = 0.02
 
 
@@ -37,21 +40,20 @@ def compressed(
     quality: int,
     frame_rate: float,
 ) -> Iterator[tuple[SceneMoment, bytes]]:
-    """Each moment as its compressed picture shows it, and that picture as a JPEG.
+    """Yield each moment as its compressed image shows it, with that image as a JPEG.
 
     Parameters
     ----------
     moments : iterable of SceneMoment
     compression : CompressionSettings
     quality : int, 1 to 100
-        Of the JPEGs: unless they must keep to a size, and of those that hold what the decoder
-        of a stream gave out.
+        Of JPEGs without a given size, and of JPEGs that hold the decoded images of a stream.
     frame_rate : float, [1/s]
 
     Yields
     ------
     SceneMoment
-        With the frame as it was; for H.264 the one that was decoded.
+        For H.264 with the decoded frame.
     bytes
 
     Raises
@@ -60,17 +62,20 @@ def compressed(
         When PyAV, which makes H.264, is not installed.
     """
     if compression.codec == 'h264':
-        yield from _through_h264(moments, compression.rate / _FRAMES, quality, frame_rate)
+        yield from _h264_moments(
+            moments, compression.rate / _FRAMES_PER_MINUTE, quality, frame_rate
+        )
         return
-    keeper = _SizeKeeper(compression.rate / _FRAMES)
+    quality_control = _QualityControl(compression.rate / _FRAMES_PER_MINUTE)
     for moment in moments:
         image = moment.frame.image
         sized = compression.codec == 'jpeg_rate'
-        yield moment, keeper.encode(image) if sized else encode_jpeg(image, quality)
+        jpeg = quality_control.encode(image) if sized else encode_jpeg(image, quality)
+        yield moment, jpeg
 
 
 def check_codec(compression: CompressionSettings) -> None:
-    """Refuse a codec that nothing here knows.
+    """Raise for a codec that is not available.
 
     Raises
     ------
@@ -81,8 +86,8 @@ def check_codec(compression: CompressionSettings) -> None:
         pyav(*_H264)
 
 
-class _SizeKeeper:
-    """Chooses the quality of JPEGs so that their mean size is the wanted.
+class _QualityControl:
+    """Controls the quality of JPEGs so that they have a given mean size.
 
     Parameters
     ----------
@@ -95,9 +100,9 @@ class _SizeKeeper:
         self._excess = 0.0
 
     def encode(self, image: NDArray[np.uint8]) -> bytes:
-        """The next picture as a JPEG."""
+        """Encode the next image as a JPEG."""
         if self._quality is None:
-            self._quality = self._found(image)
+            self._quality = self._largest_quality(image)
         content = encode_jpeg(image, self._quality)
         self._excess += len(content) / self._size - 1.0
         if abs(self._excess) > _TOLERANCE:
@@ -106,8 +111,8 @@ class _SizeKeeper:
             self._quality = min(max(self._quality + step, low), high)
         return content
 
-    def _found(self, image: NDArray[np.uint8]) -> int:
-        """The largest quality that a picture does not exceed the size with."""
+    def _largest_quality(self, image: NDArray[np.uint8]) -> int:
+        """The largest quality at which the JPEG does not exceed the size."""
         low, high = _QUALITIES
         while low < high:
             middle = (low + high + 1) // 2
@@ -118,7 +123,7 @@ class _SizeKeeper:
         return low
 
 
-def _through_h264(
+def _h264_moments(
     moments: Iterable[SceneMoment], size: float, quality: int, frame_rate: float
 ) -> Iterator[tuple[SceneMoment, bytes]]:
     stream = H264Stream(size, frame_rate)
@@ -126,12 +131,12 @@ def _through_h264(
     for moment in moments:
         waiting.append(moment)
         for image in stream.push(moment.frame.image):
-            yield _seen(waiting.popleft(), image, quality)
+            yield _decoded_moment(waiting.popleft(), image, quality)
     for image in stream.finish():
-        yield _seen(waiting.popleft(), image, quality)
+        yield _decoded_moment(waiting.popleft(), image, quality)
 
 
-def _seen(
+def _decoded_moment(
     moment: SceneMoment, image: NDArray[np.uint8], quality: int
 ) -> tuple[SceneMoment, bytes]:
     frame = replace(moment.frame, image=image)
@@ -139,18 +144,18 @@ def _seen(
 
 
 class H264Stream:
-    """An encoder and the decoder behind it.
+    """An H.264 encoder followed by a decoder.
 
     Parameters
     ----------
     size : float, [bytes]
-        Of a frame, in the mean.
+        Mean size of a frame.
     frame_rate : float, [1/s]
 
     Raises
     ------
     ConfigurationError
-        When PyAV is not installed; at the first picture, for sides that are not even.
+        When PyAV is not installed; at the first image, for an odd width or height.
     """
 
     def __init__(self, size: float, frame_rate: float) -> None:
@@ -164,29 +169,29 @@ class H264Stream:
         self._number = 0
 
     def push(self, image: NDArray[np.uint8]) -> Iterator[NDArray[np.uint8]]:
-        """Encode a picture; those that can be decoded now."""
+        """Encode an image; yield the images that can be decoded."""
         if self._encoder is None:
-            self._encoder = self._started(image.shape)
+            self._encoder = self._new_encoder(image.shape)
         frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format='bgr24')
         frame.pts = self._number
         self._number += 1
         for packet in self._encoder.encode(frame):
             self.bytes_written += packet.size
-            yield from self._decoded(packet)
+            yield from self._decode(packet)
 
     def finish(self) -> Iterator[NDArray[np.uint8]]:
-        """The last pictures."""
+        """Yield the remaining images."""
         if self._encoder is not None:
             for packet in self._encoder.encode(None):
                 self.bytes_written += packet.size
-                yield from self._decoded(packet)
-            yield from self._decoded(None)
+                yield from self._decode(packet)
+            yield from self._decode(None)
 
-    def _decoded(self, packet: Any) -> Iterator[NDArray[np.uint8]]:
+    def _decode(self, packet: Any) -> Iterator[NDArray[np.uint8]]:
         for frame in self._decoder.decode(packet):
             yield np.asarray(frame.to_ndarray(format='bgr24'), dtype=np.uint8)
 
-    def _started(self, shape: tuple[int, ...]) -> Any:
+    def _new_encoder(self, shape: tuple[int, ...]) -> Any:
         height, width = shape[:2]
         if height % 2 or width % 2:
             raise ConfigurationError(
@@ -196,8 +201,8 @@ class H264Stream:
         encoder.width, encoder.height, encoder.pix_fmt = width, height, 'yuv420p'
         encoder.framerate, encoder.time_base = self._rate, 1 / self._rate
         encoder.bit_rate = self._bits
-        # One thread: then the stream is the same on every machine. No look-ahead: a camera
-        # cannot look ahead.
+        # One thread, so that the stream is the same on every machine; no look-ahead, as in a
+        # camera.
         encoder.thread_count = 1
         buffer = str(self._bits)
         encoder.options = {

@@ -1,4 +1,4 @@
-"""The whole plate filmed: into a bag with the truth, into a video, into one picture."""
+"""Film of the whole plate: as a bag with the truth, a video, or one image."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 
 from nanorocks_ros import __version__
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.recordings.bag.offered_topics import offered
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import (
@@ -46,7 +46,7 @@ CAMERA_MODEL = 'equidistant'
 
 
 class SceneRecorder:
-    """Films the plate; every film of it begins anew, and is the same.
+    """Films the plate; all films of a recorder are the same.
 
     Parameters
     ----------
@@ -54,12 +54,12 @@ class SceneRecorder:
     scene : SceneSettings
     duration : float, [s], > 0
     trays : mapping of int to Tray, optional
-        All cells of the plate; by default those that were flown.
+        All cells of the plate; by default those of the flight.
 
     Raises
     ------
     ConfigurationError
-        For a duration that cannot be used.
+        For a duration out of range.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class SceneRecorder:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """What is filmed: frames, duration, trays, seed."""
+        """Number of frames, duration, trays, seed."""
         return {
             'frames': self.frames,
             'duration': self.duration,
@@ -85,7 +85,7 @@ class SceneRecorder:
         }
 
     def into_picture(self, path: Path) -> None:
-        """Write the last frame as it is before any compression.
+        """Write the last frame without compression losses.
 
         Raises
         ------
@@ -96,11 +96,10 @@ class SceneRecorder:
         """
         moment = self._film().at(self.frames - 1, START_NS)
         _, content = cv2.imencode('.png', moment.frame.image, [cv2.IMWRITE_PNG_COMPRESSION, 9])
-        with whole_file(path) as part:
-            part.write_bytes(content.tobytes())
+        write_bytes(path, content.tobytes())
 
     def into_video(self, path: Path, progress: Progress) -> None:
-        """Write a video, for people.
+        """Write a video.
 
         Raises
         ------
@@ -116,7 +115,7 @@ class SceneRecorder:
     def into_bag(
         self, path: Path, compression: CompressionSettings, quality: int, progress: Progress
     ) -> None:
-        """Write a bag: the compressed camera, its lens, the epoch, and the truth of every tray.
+        """Write a bag: compressed camera images, lens, epoch, and the truth of every tray.
 
         Raises
         ------
@@ -127,17 +126,17 @@ class SceneRecorder:
         """
         check_quality(quality)
         check_codec(compression)
-        # Made before the bag, so that a scene that cannot be filmed leaves nothing behind.
+        # Before the bag, so that a scene that cannot be filmed leaves no files.
         film = self._film()
         moments = film.moments(self.frames, START_NS)
-        seen = compressed(
+        compressed_moments = compressed(
             moments, compression, quality=quality, frame_rate=self._simulation.frame_rate
         )
         with BagWriter(path, self._table(), metadata=self._provenance(compression)) as bag:
             bag.write(topics.EPOCH.absolute(), START_NS, time_message(START_NS))
             info = lens_message(film.camera.geometry.camera, START_NS)
             bag.write(topics.CAMERA_INFO.absolute(), START_NS, info)
-            for done, (moment, jpeg) in enumerate(seen, start=1):
+            for done, (moment, jpeg) in enumerate(compressed_moments, start=1):
                 _write(bag, moment, jpeg)
                 progress(done, self.frames)
 
@@ -154,7 +153,7 @@ class SceneRecorder:
 
     def _provenance(self, compression: CompressionSettings) -> dict[str, str]:
         simulated = {row.name: str(row.default) for row in rows(self._simulation)}
-        # Of the gas in each tray; the picture is what the scene says.
+        # These settings of a single tray do not apply: the scene has its own.
         for name in ('tray', 'noise', 'pixels_per_metre'):
             simulated.pop(name)
         return {
@@ -166,7 +165,7 @@ class SceneRecorder:
 
 
 def lens_message(camera: Camera, stamp_ns: int) -> object:
-    """What describes the lens: sensor_msgs/CameraInfo."""
+    """The lens as a sensor_msgs/CameraInfo message."""
     return camera_info_message(
         stamp_ns,
         'camera',

@@ -1,4 +1,4 @@
-"""A simulated run filmed from close by into a video that people can play."""
+"""Close-up film of a simulated tray as a video."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros import __version__
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.recordings.film.pyav import pyav
 from nanorocks_ros.simulation.tray_camera.tray_film import film
 from nanorocks_ros.simulation.tray_camera.tray_renderer import RIM
@@ -30,27 +30,27 @@ if TYPE_CHECKING:
 
     Picture = NDArray[np.uint8]
 
-# OpenCV 5 moved it.
+# Moved in OpenCV 5.
 _opencv_log: Any = getattr(cv2.utils, 'logging', cv2)
 _SILENT = 0
 
 VIDEOS = '.mp4', '.avi'
-"""Endings of videos: H.264, which plays everywhere, and Motion JPEG, which needs nothing more."""
+"""Suffixes of videos: H.264, which needs PyAV, and Motion JPEG."""
 
-# The largest picture of a close-up.
+# Largest size of a close-up image.
 _WIDTH_PX, _HEIGHT_PX = 1280, 720
-# What is seen around the floor of the tray, [m].
-_SURROUNDINGS = 1.5 * RIM
+# Margin around the floor of the tray, [m].
+_MARGIN = 1.5 * RIM
 _SCALES = 100.0, 1e6
-# Sensor noise is costly; at 20 one has to look for the loss.
+# Constant rate factor of x264; the loss at 20 is hardly visible.
 _QUALITY = '20'
 _TICKS = 1000
-# What does without PyAV.
-_OTHERWISE = 'name a .avi file'
+# Alternative to a video that needs PyAV, for the message.
+_ALTERNATIVE = 'name a .avi file'
 
 
 def check_video(path: Path) -> None:
-    """Refuse a video that nothing here can write.
+    """Raise for a video in a format that is not available.
 
     Raises
     ------
@@ -58,12 +58,12 @@ def check_video(path: Path) -> None:
         When PyAV, which writes H.264, is not installed.
     """
     if path.suffix == '.mp4':
-        pyav(str(path), _OTHERWISE)
+        pyav(str(path), _ALTERNATIVE)
 
 
 def close_up(settings: SimulationSettings, tray: Tray) -> SimulationSettings:
-    """The settings with the camera so near that the tray fills the picture."""
-    length, width = (side + 2.0 * _SURROUNDINGS for side in tray.dimensions[:2])
+    """The settings with the camera so close that the tray fills the image."""
+    length, width = (side + 2.0 * _MARGIN for side in tray.dimensions[:2])
     scale = min(max(min(_WIDTH_PX / length, _HEIGHT_PX / width), _SCALES[0]), _SCALES[1])
     return replace(
         settings,
@@ -81,7 +81,7 @@ def film_into_video(
     duration: float,
     progress: Progress,
 ) -> dict[str, Any]:
-    """Film a simulated tray into a video, in real time.
+    """Film a simulated tray into a video that plays in real time.
 
     Parameters
     ----------
@@ -91,19 +91,19 @@ def film_into_video(
     tray : Tray
     duration : float, [s], > 0
     progress : callable
-        Called with the frames done and the frames there will be.
+        Called with the number of written frames and the number of frames.
 
     Returns
     -------
     dict
-        What was filmed: frames, duration.
+        Number of frames, duration.
 
     Raises
     ------
     ConfigurationError
-        For a duration that cannot be used, or where PyAV is needed and not installed.
+        For a duration out of range, or when PyAV is needed and not installed.
     SimulationError
-        When the beads do not fit into the tray, or the tray into the picture.
+        When the beads do not fit into the tray, or the tray into the image.
     RecordingError
         When the video cannot be written.
     """
@@ -122,7 +122,7 @@ def images_into_video(
     frames: int,
     progress: Progress,
 ) -> None:
-    """Write pictures of the size and at the rate of the settings into a video.
+    """Write images of the size and at the rate of the settings into a video.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def images_into_video(
         When the video cannot be written.
     """
     kind = _h264 if path.suffix == '.mp4' else _motion_jpeg
-    with whole_file(path) as part, kind(part, settings) as write:
+    with atomic_file(path) as part, kind(part, settings) as write:
         for done, image in enumerate(images, start=1):
             write(image)
             progress(done, frames)
@@ -140,7 +140,7 @@ def images_into_video(
 
 @contextmanager
 def _motion_jpeg(path: Path, settings: SimulationSettings) -> Iterator[Callable[[Picture], None]]:
-    """What OpenCV writes everywhere; of H.264 its wheels hold no encoder."""
+    """Write Motion JPEG with OpenCV, whose wheels have no H.264 encoder."""
     code = cv2.VideoWriter.fourcc(*'MJPG')
     size = settings.width_px, settings.height_px
     count = 0
@@ -156,7 +156,7 @@ def _motion_jpeg(path: Path, settings: SimulationSettings) -> Iterator[Callable[
             yield write
         finally:
             writer.release()
-        # OpenCV tells nobody else when the disk is full.
+        # OpenCV does not report a full disk in another way.
         video = cv2.VideoCapture(str(path))
         written = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
         video.release()
@@ -176,13 +176,13 @@ def _no_warnings() -> Iterator[None]:
 
 @contextmanager
 def _h264(path: Path, settings: SimulationSettings) -> Iterator[Callable[[Picture], None]]:
-    av = pyav(str(path), _OTHERWISE)
-    # The index first, so that players of web pages start at once.
+    av = pyav(str(path), _ALTERNATIVE)
+    # The index comes first, so that players in web pages start at once.
     with av.open(str(path), 'w', options={'movflags': '+faststart'}) as container:
         container.metadata['comment'] = f'nanorocks_ros {__version__}, seed {settings.seed}'
         rate = Fraction(settings.frame_rate).limit_denominator(_TICKS)
         stream = container.add_stream('libx264', rate=rate, options={'crf': _QUALITY})
-        # Players want two colours to four pixels, so sides are even.
+        # The yuv420p format, which players need, has even sides.
         stream.width, stream.height = settings.width_px // 2 * 2, settings.height_px // 2 * 2
         stream.pix_fmt = 'yuv420p'
 

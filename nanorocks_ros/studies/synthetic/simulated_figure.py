@@ -1,4 +1,4 @@
-"""The picture of simulated runs: beads at a few times, and the decay of their speed."""
+"""Figure of simulated runs: beads at a few times, and the decay of their speed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.studies.synthetic.simulated_plan import shown_times
 
 mpl.use('Agg')
@@ -28,22 +28,22 @@ if TYPE_CHECKING:
 _MM = 1e3
 _RUN, _MEAN, _MARK = '#8fa8bf', '#c23b22', '#30506f'
 _COLOURS = 'viridis'
-# Trays that are longer than this, for their width, are shown two by two.
-_LONG = 1.8
-# Speeds are coloured over so many powers of ten.
+# Trays of a larger ratio of length to width are drawn in two columns.
+_LONG_ASPECT = 1.8
+# Powers of ten in the colour scale of speeds.
 _DECADES = 2
-# Size of the figure, and of its lower panel, [in].
-_WIDTH, _BELOW = 10.0, 3.6
+# Width of the figure and height of its lower panel, [in].
+_WIDTH, _DECAY_HEIGHT = 10.0, 3.6
 _FLOOR = '#e9ecef'
 
 
-def simulated_figure(path: Path, found: SimulatedRuns) -> None:
+def simulated_figure(path: Path, simulated: SimulatedRuns) -> None:
     """Draw the beads of the first run from above, coloured by speed, and the decay of all runs.
 
     Parameters
     ----------
     path : Path
-    found : SimulatedRuns
+    simulated : SimulatedRuns
         Of a plan that keeps the first run at `shown_times`, or the trajectory.
 
     Raises
@@ -55,34 +55,36 @@ def simulated_figure(path: Path, found: SimulatedRuns) -> None:
     ----------
     Lower panel after [B19] fig. 11.
     """
-    shown = shown_times(found.plan.samples)
-    length, width, _ = found.plan.tray.dimensions
-    columns = min(len(shown), 2 if length > _LONG * width else len(shown))
-    rows = -(-len(shown) // columns)
-    above = rows * (_WIDTH / columns * width / length + 0.4)
-    figure = Figure(figsize=(_WIDTH, above + _BELOW), layout='constrained')
-    panels: Any = figure.subfigures(2, 1, height_ratios=(above, _BELOW))
+    shown_indices = shown_times(simulated.plan.samples)
+    length, width, _ = simulated.plan.tray.dimensions
+    columns = min(len(shown_indices), 2 if length > _LONG_ASPECT * width else len(shown_indices))
+    rows = -(-len(shown_indices) // columns)
+    trays_height = rows * (_WIDTH / columns * width / length + 0.4)
+    figure = Figure(figsize=(_WIDTH, trays_height + _DECAY_HEIGHT), layout='constrained')
+    panels: Any = figure.subfigures(2, 1, height_ratios=(trays_height, _DECAY_HEIGHT))
     trays = panels[0].subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    _draw_trays(trays, found, shown)
-    _draw_decay(panels[1].subplots(), found, shown)
-    with whole_file(path) as part:
+    _draw_trays(trays, simulated, shown_indices)
+    _draw_decay(panels[1].subplots(), simulated, shown_indices)
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
 
 
-def _draw_trays(trays: NDArray[np.object_], found: SimulatedRuns, shown: tuple[int, ...]) -> None:
-    plan, run = found.plan, found.runs[0]
+def _draw_trays(
+    trays: NDArray[np.object_], simulated: SimulatedRuns, shown: tuple[int, ...]
+) -> None:
+    plan, run = simulated.plan, simulated.runs[0]
     kept = list(plan.bead_times(0))
     speeds = np.linalg.norm(run.velocities, axis=2) * _MM
-    most = float(speeds.max()) or 1.0
-    norm = LogNorm(vmin=most / 10**_DECADES, vmax=most, clip=True)
+    max_speed = float(speeds.max()) or 1.0
+    norm = LogNorm(vmin=max_speed / 10**_DECADES, vmax=max_speed, clip=True)
     for axes, k in zip(trays.ravel(), shown, strict=False):
-        place = kept.index(k)
-        axes.add_collection(_beads(axes, run, place, speeds[place], norm))
+        index = kept.index(k)
+        axes.add_collection(_beads(axes, run, index, speeds[index], norm))
         axes.set_title(f't = {plan.times[k]:.3g} s', fontsize=10)
         axes.set_aspect('equal')
         axes.set_facecolor(_FLOOR)
         axes.set_xlim(0.0, plan.tray.dimensions[0] * _MM)
-        # As the camera sees it: y points down.
+        # As in the camera image: y points down.
         axes.set_ylim(plan.tray.dimensions[1] * _MM, 0.0)
     for axes in trays.ravel()[len(shown) :]:
         axes.set_axis_off()
@@ -94,21 +96,21 @@ def _draw_trays(trays: NDArray[np.object_], found: SimulatedRuns, shown: tuple[i
         ScalarMappable(norm=norm, cmap=_COLOURS), ax=trays, extend='min', pad=0.01
     )
     bar.set_label('speed [mm/s]')
-    _label_in_full(bar.ax)
+    _label_plain_numbers(bar.ax)
 
 
 def _beads(
-    axes: Axes, run: SimulatedRun, place: int, speeds: NDArray[np.float64], norm: LogNorm
+    axes: Axes, run: SimulatedRun, index: int, speeds: NDArray[np.float64], norm: LogNorm
 ) -> EllipseCollection:
-    """The beads at one time, those nearer to the camera on top."""
-    order = np.argsort(run.positions[place, :, 2])
-    across = 2.0 * run.radii[order] * _MM
+    """The beads at one time, with those nearer to the camera on top."""
+    order = np.argsort(run.positions[index, :, 2])
+    diameters = 2.0 * run.radii[order] * _MM
     beads = EllipseCollection(
-        across,
-        across,
+        diameters,
+        diameters,
         np.zeros(order.size),
         units='xy',
-        offsets=run.positions[place, order, :2] * _MM,
+        offsets=run.positions[index, order, :2] * _MM,
         offset_transform=axes.transData,
         cmap=_COLOURS,
         norm=norm,
@@ -119,12 +121,12 @@ def _beads(
     return beads
 
 
-def _draw_decay(axes: Axes, found: SimulatedRuns, shown: tuple[int, ...]) -> None:
-    times, mean = found.plan.times, found.mean('mean_speed') * _MM
-    n = len(found.runs)
+def _draw_decay(axes: Axes, simulated: SimulatedRuns, shown: tuple[int, ...]) -> None:
+    times, mean = simulated.plan.times, simulated.mean('mean_speed') * _MM
+    n = len(simulated.runs)
     if n > 1:
-        curves = [np.column_stack((times, run.mean_speed * _MM)) for run in found.runs]
-        # Thousands of thin lines are a band; as vectors they would be megabytes.
+        curves = [np.column_stack((times, run.mean_speed * _MM)) for run in simulated.runs]
+        # Rasterised: thousands of lines would be megabytes as vectors.
         axes.add_collection(
             LineCollection(
                 curves,
@@ -138,22 +140,22 @@ def _draw_decay(axes: Axes, found: SimulatedRuns, shown: tuple[int, ...]) -> Non
     axes.plot(times, mean, color=_MEAN, lw=2, label='their mean' if n > 1 else None)
     axes.plot(
         times[list(shown)],
-        found.runs[0].mean_speed[list(shown)] * _MM,
+        simulated.runs[0].mean_speed[list(shown)] * _MM,
         'o',
         ms=5,
         color=_MARK,
         clip_on=False,
         label='the run shown above' if n > 1 else 'as shown above',
     )
-    axes.set_xlim(0.0, found.plan.duration)
+    axes.set_xlim(0.0, simulated.plan.duration)
     if mean.min() > 0.0:
         axes.set_yscale('log')
-        _label_in_full(axes)
+        _label_plain_numbers(axes)
     axes.set_xlabel('time since the shaking event [s]')
     axes.set_ylabel('mean speed of the beads [mm/s]')
-    settings = found.plan.settings
+    settings = simulated.plan.settings
     axes.set_title(
-        f'Tray {settings.tray}: {found.plan.tray.count} beads, restitution '
+        f'Tray {settings.tray}: {simulated.plan.tray.count} beads, restitution '
         f'{settings.restitution:g}, walls {settings.wall_restitution:g}, seed {settings.seed}',
         fontsize=10,
     )
@@ -163,8 +165,8 @@ def _draw_decay(axes: Axes, found: SimulatedRuns, shown: tuple[int, ...]) -> Non
     axes.grid(alpha=0.25)
 
 
-def _label_in_full(axes: Axes) -> None:
-    """Numbers along a logarithmic axis as people write them: 0.5, 1, 2."""
+def _label_plain_numbers(axes: Axes) -> None:
+    """Label a logarithmic axis with plain numbers: 0.5, 1, 2."""
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter('{x:g}')
     axes.yaxis.set_minor_formatter(NullFormatter())

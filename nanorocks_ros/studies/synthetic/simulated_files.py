@@ -1,4 +1,7 @@
-"""Everything that can be written about simulated runs: which files, looked at and made."""
+"""Output files of simulated runs: checked before the simulation, written after it.
+
+Tested in test_simulate.py.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.synthetic.simulated_result import SimulatedRuns
 
 PICTURES = '.png', '.pdf', '.svg'
-"""Endings of pictures."""
+"""Suffixes of figures."""
 
 _ENDINGS = {
     '--trajectory': TABLES,
@@ -38,19 +41,19 @@ _ENDINGS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatedFiles:
-    """What is to be written, and how.
+    """Files to write, and how.
 
     Parameters
     ----------
     trajectory, events, picture, video, bag : Path or None
     effects : bool
-        Whether films show what the sensor adds; without, frames are clean.
+        Whether films contain sensor noise.
     near : bool
-        Whether the video is a close-up, whatever the settings say of the camera.
+        Whether the video is a close-up, regardless of the camera settings.
     quality : int
-        Of the JPEGs in the bag, 1 to 100.
+        JPEG quality in the bag, 1 to 100.
     force : bool
-        Whether files that exist may be replaced; a bag never is.
+        Whether existing files may be replaced; a bag never is.
     """
 
     trajectory: Path | None = None
@@ -65,22 +68,22 @@ class SimulatedFiles:
 
     @property
     def named(self) -> dict[str, Path]:
-        """Those that are asked for, by their flag."""
+        """Paths of the files to write, by flag."""
         names = 'trajectory', 'events', 'picture', 'video', 'bag'
-        found = {f'--{name}': getattr(self, name) for name in names}
-        return {flag: path for flag, path in found.items() if path is not None}
+        files = {f'--{name}': getattr(self, name) for name in names}
+        return {flag: path for flag, path in files.items() if path is not None}
 
     def check(self, plan: SimulationPlan) -> None:
-        """Refuse what would fail in the end, before the work.
+        """Raise for files that could not be written, before the simulation.
 
         Raises
         ------
         ConfigurationError
-            For an unknown ending, a quality out of range, or a package that is missing.
+            For an unknown suffix, a quality out of range, or a missing package.
         RecordingError
-            For a file that exists, or cannot be made where it should.
+            For a file that exists, or cannot be created.
         SimulationError
-            For a tray that does not fit into the picture.
+            For a tray that does not fit into the image.
         """
         check_outputs(self.named, _ENDINGS, force=self.force)
         for table in (self.trajectory, self.events):
@@ -93,13 +96,13 @@ class SimulatedFiles:
             check_quality(self.quality)
             check_camera(plan.settings, plan.tray)
 
-    def write(self, found: SimulatedRuns) -> Iterator[Path]:
-        """Write all but the films, one after the other.
+    def write(self, simulated: SimulatedRuns) -> Iterator[Path]:
+        """Write all files except films, one after the other.
 
         Yields
         ------
         Path
-            When it is there.
+            Each file when it is written.
 
         Raises
         ------
@@ -113,15 +116,15 @@ class SimulatedFiles:
         ]
         for path, writer in writers:
             if path is not None:
-                writer(path, found)
+                writer(path, simulated)
                 yield path
 
     def film_bag(self, plan: SimulationPlan, progress: Progress) -> dict[str, Any]:
-        """Film the first run into the bag, and say what was filmed."""
+        """Film the first run into the bag; return frames, duration, tray and seed."""
         assert self.bag is not None
         return film_into_bag(
             self.bag,
-            self._seen(plan.settings),
+            self._film_settings(plan.settings),
             duration=plan.duration,
             quality=self.quality,
             progress=progress,
@@ -129,7 +132,7 @@ class SimulatedFiles:
         )
 
     def film_video(self, plan: SimulationPlan, progress: Progress) -> dict[str, Any]:
-        """Film the first run into the video, and say what was filmed."""
+        """Film the first run into the video; return frames and duration."""
         assert self.video is not None
         settings = self._video_settings(plan)
         return film_into_video(
@@ -137,15 +140,15 @@ class SimulatedFiles:
         )
 
     def _video_settings(self, plan: SimulationPlan) -> SimulationSettings:
-        seen = self._seen(plan.settings)
-        return close_up(seen, plan.tray) if self.near else seen
+        settings = self._film_settings(plan.settings)
+        return close_up(settings, plan.tray) if self.near else settings
 
-    def _seen(self, settings: SimulationSettings) -> SimulationSettings:
+    def _film_settings(self, settings: SimulationSettings) -> SimulationSettings:
         return settings if self.effects else replace(settings, noise=0.0)
 
 
-def _draw(path: Path, found: SimulatedRuns) -> None:
-    # Loads matplotlib, which takes longer than most runs.
+def _draw(path: Path, simulated: SimulatedRuns) -> None:
+    # Imported here: loading matplotlib takes longer than most runs.
     from nanorocks_ros.studies.synthetic.simulated_figure import simulated_figure
 
-    simulated_figure(path, found)
+    simulated_figure(path, simulated)

@@ -1,4 +1,7 @@
-"""What is to be simulated of a tray, and what is kept of it."""
+"""Plan of simulated runs of a tray: settings, times, what is kept.
+
+Tested in test_simulated_runs.py.
+"""
 
 from __future__ import annotations
 
@@ -19,20 +22,20 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import SimulationSettings
 
-MOST_VALUES = 100_000_000
-"""Numbers that may be asked for: 0.8 GB of them, and as much again while they are written."""
-MOST_EVENTS = MOST_VALUES // 6
-LONGEST = 86400.0
+MAX_VALUES = 100_000_000
+"""Largest number of values kept: 0.8 GB, and as much again while they are written."""
+MAX_EVENTS = MAX_VALUES // 6
+MAX_DURATION = 86400.0
 
-# Numbers kept at one time of a run, and of each of its beads: positions, velocities, body; spins.
+# Values kept for each time of a run, and for each bead: positions, velocities, body; spins.
 _CURVES, _BEAD, _SPIN = 3, 7, 3
-# Parts of the duration; most happens early.
+# Fractions of the duration; the speed changes most at the beginning.
 _SHOWN = 0.0, 0.05, 0.25, 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulationPlan:
-    """What is simulated, and what is kept of it.
+    """Parameters of simulated runs.
 
     Parameters
     ----------
@@ -41,7 +44,7 @@ class SimulationPlan:
     duration : float, [s], > 0
         Since the shaking event.
     samples : int, >= 2
-        Times, evenly spaced from 0 to the duration, at which the gas is looked at.
+        Number of times, evenly spaced from 0 to the duration, at which the gas is sampled.
     runs : int, >= 1
     trajectory : bool
         Whether to keep all beads of all runs at all times.
@@ -75,53 +78,53 @@ class SimulationPlan:
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """When the gas is looked at, (samples,), [s]."""
+        """Times at which the gas is sampled, (samples,), [s]."""
         return np.linspace(0.0, self.duration, self.samples)
 
     def bead_times(self, run: int) -> NDArray[np.int64]:
-        """At which of the times the beads of a run are kept."""
+        """Indices of the times at which the beads of a run are kept."""
         if self.trajectory:
             return np.arange(self.samples)
         shown = shown_times(self.samples) if self.picture and run == 0 else ()
         return np.array(shown, dtype=np.int64)
 
     def check_size(self) -> None:
-        """Refuse what memory may not hold.
+        """Raise for more values than memory may hold.
 
         Raises
         ------
         ConfigurationError
-            For more than `MOST_VALUES` numbers.
+            For more than `MAX_VALUES` numbers.
         """
         moments = self.samples * self.runs
         rough = rules_of(self.settings, self.tray).compiled().rough
         bead = self.tray.count * (_BEAD + (_SPIN if rough else 0))
         kept = moments if self.trajectory else self.bead_times(0).size
         values = moments * _CURVES + kept * bead
-        if values > MOST_VALUES:
+        if values > MAX_VALUES:
             raise ConfigurationError(
                 f'{self.samples} times of {self.runs} runs with {self.tray.count} beads',
-                f'{values:.2g} numbers, more than the {MOST_VALUES:.2g} that are kept at once',
+                f'{values:.2g} numbers, more than the {MAX_VALUES:.2g} that are kept at once',
                 'give fewer --times or --runs' + (', or no --trajectory' * self.trajectory),
             )
 
     def check_events(self, events: int) -> None:
-        """Refuse more collisions than memory may hold, where they are kept.
+        """Raise for more kept collisions than memory may hold.
 
         Raises
         ------
         SimulationError
-            For more than `MOST_EVENTS`.
+            For more than `MAX_EVENTS`.
         """
-        if self.events and events > MOST_EVENTS:
+        if self.events and events > MAX_EVENTS:
             raise SimulationError(
                 f'tray {self.tray.number}, {self.runs} runs',
-                f'more than the {MOST_EVENTS:.2g} events that are kept at once',
+                f'more than the {MAX_EVENTS:.2g} events that are kept at once',
                 'give fewer --runs, a shorter --duration, or no --events',
             )
 
     def provenance(self) -> dict[str, Any]:
-        """What makes the runs, and nothing that changes when they are made again."""
+        """Everything that the runs depend on."""
         return {
             'nanorocks_ros': __version__,
             'units': 'SI',
@@ -133,23 +136,23 @@ class SimulationPlan:
 
 
 def shown_times(samples: int) -> tuple[int, ...]:
-    """Which of the times of a run a picture shows the beads at: early ones, and the last."""
+    """Indices of the times at which a figure shows the beads: early ones, and the last."""
     return tuple(sorted({round(part * (samples - 1)) for part in _SHOWN}))
 
 
 def check_duration(duration: float) -> None:
-    """Refuse a duration that cannot be simulated.
+    """Raise for a duration out of range.
 
     Raises
     ------
     ConfigurationError
         Unless it is above 0 and at most a day.
     """
-    if not (math.isfinite(duration) and 0.0 < duration <= LONGEST):
-        raise ConfigurationError('--duration', f'{duration}', f'give up to {LONGEST:g} s')
+    if not (math.isfinite(duration) and 0.0 < duration <= MAX_DURATION):
+        raise ConfigurationError('--duration', f'{duration}', f'give up to {MAX_DURATION:g} s')
 
 
-def default_samples(settings: SimulationSettings, duration: float, most: int = 301) -> int:
-    """A time for every frame of the camera, but no more than so many."""
+def default_samples(settings: SimulationSettings, duration: float, limit: int = 301) -> int:
+    """Number of times: one for each frame of the camera, at most `limit`."""
     check_duration(duration)
-    return max(2, min(most, math.floor(duration * settings.frame_rate) + 1))
+    return max(2, min(limit, math.floor(duration * settings.frame_rate) + 1))

@@ -1,4 +1,7 @@
-"""What several simulated runs of a tray have in common, and what their files say about them."""
+"""Simulated runs of a tray: decays, beads and collisions of each, and their means.
+
+Tested in test_simulated_runs.py.
+"""
 
 from __future__ import annotations
 
@@ -23,21 +26,21 @@ class SimulatedRun:
     Parameters
     ----------
     number : int
-        From 0; runs of one seed differ.
+        Number of the run, from 0.
     mean_speed, mean_projected_speed : ndarray (samples,), [m/s]
     bodies : ndarray of int64, (samples,)
-        Beads that move together count once.
+        Number of bodies; beads that stick together are one.
     counts : EventCounts
     cpu_seconds : float, [s]
     radii, masses : ndarray (n,), [m], [kg]
     positions, velocities : ndarray (n_kept, n, 3), [m], [m/s]
-        At the times at which beads are kept.
+        At the times of `SimulationPlan.bead_times`.
     spins : ndarray (n_kept, n, 3) or None, [rad/s]
         None for smooth beads.
     body : ndarray of int32, (n_kept, n)
-        The smallest number of a bead in the body of each bead.
+        Body of each bead: the smallest bead number in it.
     events : structured ndarray (n_events,)
-        As `engine.course.EVENT`; empty unless they are kept.
+        As `engine.run_record.EVENT`; empty unless the plan keeps events.
     """
 
     number: int
@@ -69,28 +72,28 @@ class SimulatedRuns:
     runs: tuple[SimulatedRun, ...]
 
     def mean(self, name: str) -> NDArray[np.float64]:
-        """A curve averaged over the runs, (samples,)."""
-        found: NDArray[np.float64] = self._curves(name).mean(axis=0)
-        return found
+        """Mean of a curve over the runs, (samples,)."""
+        mean: NDArray[np.float64] = self._curves(name).mean(axis=0)
+        return mean
 
     def error(self, name: str) -> NDArray[np.float64] | None:
-        """Its standard error; None for a single run."""
+        """Standard error of the mean of a curve; None for a single run."""
         if len(self.runs) == 1:
             return None
         curves = self._curves(name)
-        found: NDArray[np.float64] = curves.std(axis=0, ddof=1) / math.sqrt(len(curves))
-        return found
+        error: NDArray[np.float64] = curves.std(axis=0, ddof=1) / math.sqrt(len(curves))
+        return error
 
     def _curves(self, name: str) -> NDArray[np.float64]:
         return np.array([getattr(run, name) for run in self.runs], dtype=np.float64)
 
     def count(self, name: str) -> int:
-        """Events of a kind in all runs."""
+        """Number of events of a kind in all runs."""
         return sum(getattr(run.counts, name) for run in self.runs)
 
     @property
     def events(self) -> int:
-        """Collisions of two beads and with walls, merges and beads that stuck to a wall."""
+        """Number of collisions with beads and walls, merges, and beads that stuck to a wall."""
         return sum(self.count(name) for name in ('pair', 'wall', 'merge', 'fix'))
 
     @property
@@ -100,13 +103,13 @@ class SimulatedRuns:
 
     @property
     def filling_factor(self) -> float:
-        """Part of the tray that the beads fill; their sizes are drawn in each run."""
+        """Filling factor of the tray; the sizes of beads are drawn in each run."""
         cubes = math.fsum(math.fsum((run.radii**3).tolist()) for run in self.runs)
         return 4.0 / 3.0 * math.pi * cubes / len(self.runs) / self.plan.tray.volume
 
     @property
     def half_time(self) -> float | None:
-        """When the mean speed has fallen to half, [s]; None when that is later than the end."""
+        """Time at which the mean speed has halved, [s]; None after the end of the runs."""
         speed, times = self.mean('mean_speed'), self.plan.times
         half = 0.5 * speed[0]
         below = np.flatnonzero(speed <= half)
@@ -117,5 +120,5 @@ class SimulatedRuns:
         return float(times[k - 1] + part * (times[k] - times[k - 1]))
 
     def provenance(self) -> str:
-        """What made these runs, as JSON: version, settings, seed, tray; units are SI."""
+        """Everything that the runs depend on, as JSON; units are SI."""
         return json.dumps(self.plan.provenance(), sort_keys=True)

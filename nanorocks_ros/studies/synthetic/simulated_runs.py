@@ -1,4 +1,4 @@
-"""One shaking event of a tray, simulated several times: decay, beads and collisions."""
+"""Simulation of one shaking event of a tray in several runs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.experiment.trays import Species, Tray
-from nanorocks_ros.jobs.tasks import Workers, as_finished
+from nanorocks_ros.jobs.tasks import Workers, as_completed
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.engine.gas import MOST_FOR_SCAN, EventCounts, HardSphereGas
 from nanorocks_ros.simulation.initial_state import resting_beads, rules_of
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.simulation.engine.run_record import Course
 
-# Work that takes less is done before other processes are up [s].
-_WORTH_PROCESSES = 3.0
-# A first run of more beads takes long enough to be missed by the other cores.
-_MOST_FOR_TRIAL = 2000
-# Tasks for each process: enough that none of them waits long for the last one.
-_TASKS_EACH = 8
+# Less work than this is done sooner in this process than with others [s].
+_MIN_SECONDS_FOR_PROCESSES = 3.0
+# With more beads the first run is not done here alone, since it occupies one core for long.
+_MAX_BEADS_FOR_TRIAL = 2000
+# Enough tasks for each process that none waits long for the last one.
+_TASKS_PER_PROCESS = 8
 
 
 def simulate(
@@ -38,43 +38,43 @@ def simulate(
     workers: Workers,
     progress: Callable[[float], None] | None = None,
 ) -> SimulatedRuns:
-    """Let the tray cool after a shaking event, run by run.
+    """Simulate the cooling of a tray after a shaking event.
 
-    The numbers do not depend on the workers: each run has random numbers of its own. Where that
-    is quicker all runs are made in this process.
+    The numbers do not depend on the workers: each run has its own random numbers. Short
+    simulations run in this process.
 
     Parameters
     ----------
     plan : SimulationPlan
     workers : Workers
     progress : callable, optional
-        Called with the part of the work that is done, 0 to 1.
+        Called with the finished fraction of the work, 0 to 1.
 
     Raises
     ------
     ConfigurationError
-        For more numbers than memory may hold.
+        For more values than memory may hold.
     SimulationError
-        When the beads do not fit, a run has events without end, or more than `MOST_EVENTS`
-        events were to be kept.
+        When the beads do not fit, a run has events without end, or keeps more than `MAX_EVENTS`
+        events.
     NanorocksError
-        When workers end again and again.
+        When workers die repeatedly.
     """
     plan.check_size()
     report = progress or (lambda done: None)
-    # Here first: where it is not on disk yet, each process would compile it.
+    # Before other processes start: without compiled code on disk each would compile it.
     load_compiled_code()
     report(0.0)
     runs: list[SimulatedRun] = []
-    if plan.runs == 1 or plan.tray.count <= _MOST_FOR_TRIAL:
+    if plan.runs == 1 or plan.tray.count <= _MAX_BEADS_FOR_TRIAL:
         start = time.perf_counter()
-        runs.append(_followed(plan, 0, lambda part: report(part / plan.runs)))
+        runs.append(_simulated_run(plan, 0, lambda part: report(part / plan.runs)))
         plan.check_events(len(runs[0].events) * plan.runs)
-        if (time.perf_counter() - start) * (plan.runs - 1) < _WORTH_PROCESSES:
+        if (time.perf_counter() - start) * (plan.runs - 1) < _MIN_SECONDS_FOR_PROCESSES:
             workers = replace(workers, processes=1)
-    with closing(as_finished(_work, _tasks(plan, len(runs), workers), workers)) as results:
-        for _, some in results:
-            runs.extend(some)
+    with closing(as_completed(_run_task, _tasks(plan, len(runs), workers), workers)) as results:
+        for _, finished_runs in results:
+            runs.extend(finished_runs)
             report(len(runs) / plan.runs)
             plan.check_events(sum(len(run.events) for run in runs))
     report(1.0)
@@ -89,8 +89,8 @@ class _Task:
 
 
 def _tasks(plan: SimulationPlan, done: int, workers: Workers) -> dict[str, _Task]:
-    """The runs that are left, in tasks."""
-    size = math.ceil((plan.runs - done) / (workers.count * _TASKS_EACH))
+    """Tasks with the remaining runs."""
+    size = math.ceil((plan.runs - done) / (workers.count * _TASKS_PER_PROCESS))
     if workers.count == 1:
         size = 1
     return {
@@ -99,33 +99,33 @@ def _tasks(plan: SimulationPlan, done: int, workers: Workers) -> dict[str, _Task
     }
 
 
-def _work(task: _Task) -> tuple[SimulatedRun, ...]:
+def _run_task(task: _Task) -> tuple[SimulatedRun, ...]:
     load_compiled_code()
-    return tuple(_followed(task.plan, run) for run in range(task.first, task.last))
+    return tuple(_simulated_run(task.plan, run) for run in range(task.first, task.last))
 
 
-def _followed(
+def _simulated_run(
     plan: SimulationPlan, run: int, progress: Callable[[float], None] | None = None
 ) -> SimulatedRun:
-    """One run, from the shaking event on."""
+    """Simulate one run from the shaking event on."""
     start = time.thread_time()
     rules = rules_of(plan.settings, plan.tray, run)
     resting = resting_beads(plan.settings, plan.tray, run)
     gas = HardSphereGas(after_shaking(plan.settings, rules, resting, run, 0), rules)
 
-    def look(now: float) -> None:
+    def report_time(now: float) -> None:
         if plan.events:
-            plan.check_events(_total(gas.counts))
+            plan.check_events(_event_count(gas.counts))
         if progress is not None:
             progress(now / plan.duration)
 
     times = plan.times
     kept = times[plan.bead_times(run)]
-    course = gas.follow(plan.duration, kept, times, log=plan.events, progress=look)
-    return _as_run(gas, course, run, time.thread_time() - start)
+    course = gas.follow(plan.duration, kept, times, log=plan.events, progress=report_time)
+    return _run_record(gas, course, run, time.thread_time() - start)
 
 
-def _as_run(gas: HardSphereGas, course: Course, run: int, seconds: float) -> SimulatedRun:
+def _run_record(gas: HardSphereGas, course: Course, run: int, seconds: float) -> SimulatedRun:
     n_times, n = course.positions.shape[:2]
     alone = np.broadcast_to(np.arange(n, dtype=np.int32), (n_times, n))
     return SimulatedRun(
@@ -145,13 +145,13 @@ def _as_run(gas: HardSphereGas, course: Course, run: int, seconds: float) -> Sim
     )
 
 
-def _total(counts: EventCounts) -> int:
+def _event_count(counts: EventCounts) -> int:
     return counts.pair + counts.wall + counts.merge + counts.fix
 
 
 @cache
 def load_compiled_code() -> None:
-    """Load the compiled code, which takes a second in each process and is no part of the work."""
+    """Load the compiled code, which takes a second in each process."""
     settings = SimulationSettings()
     for count in (2, MOST_FOR_SCAN + 1):
         species = Species(
@@ -159,4 +159,4 @@ def load_compiled_code() -> None:
         )
         tray = Tray(number=1, dimensions=(0.02, 0.02, 0.02), species=(species,), chalk=False)
         plan = SimulationPlan(settings=settings, tray=tray, duration=0.1, samples=2, events=True)
-        _followed(plan, 0)
+        _simulated_run(plan, 0)

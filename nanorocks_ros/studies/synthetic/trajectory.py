@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.outputs.parquet import Column, write_parquet
 from nanorocks_ros.simulation.initial_state import stock
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.synthetic.simulated_result import SimulatedRun, SimulatedRuns
 
 TABLES = '.npz', '.parquet'
-"""Endings of the files below."""
+"""Suffixes of these files."""
 
 _AXES = 'xyz'
 _EVENT_COLUMNS = (
@@ -32,11 +32,11 @@ _EVENT_COLUMNS = (
     Column(name='normal_speed', kind='f8', unit='m/s'),
     Column(name='impulse', kind='f8', unit='kg m/s'),
 )
-# The engine's name for the type.
+# Fields of the engine that have other names than their columns.
 _FIELDS = {'type': 'kind'}
 
 
-def write_trajectory(path: Path, found: SimulatedRuns) -> None:
+def write_trajectory(path: Path, simulated: SimulatedRuns) -> None:
     """Write the beads of every run at every time.
 
     Parameters
@@ -45,10 +45,10 @@ def write_trajectory(path: Path, found: SimulatedRuns) -> None:
         ``.npz``: arrays `times` (samples,), `runs`, `box` (3,), and for each bead `ids`,
         `species`, `materials`, `radii`, `masses`, `positions` and `velocities`
         (samples, n, 3), `spins` of rough beads, `body` (samples, n), the smallest number of
-        a bead that moves with this one. With several runs, all that differs from run to run
-        has them as first axis. ``.parquet``: a row for each bead at each time of each run.
+        a bead that moves with this one. With several runs, arrays that differ between runs
+        have them as first axis. ``.parquet``: a row for each bead at each time of each run.
         Either holds `provenance`, as JSON; units are SI.
-    found : SimulatedRuns
+    simulated : SimulatedRuns
         Of a plan that keeps the trajectory.
 
     Raises
@@ -59,13 +59,13 @@ def write_trajectory(path: Path, found: SimulatedRuns) -> None:
         When the file cannot be written.
     """
     if path.suffix == '.parquet':
-        pieces = (_bead_rows(found, run) for run in found.runs)
-        write_parquet(path, _bead_columns(found), pieces, found.provenance())
+        pieces = (_bead_rows(simulated, run) for run in simulated.runs)
+        write_parquet(path, _bead_columns(simulated), pieces, simulated.provenance())
     else:
-        _write_arrays(path, _bead_arrays(found))
+        _write_arrays(path, _bead_arrays(simulated))
 
 
-def write_events(path: Path, found: SimulatedRuns) -> None:
+def write_events(path: Path, simulated: SimulatedRuns) -> None:
     """Write every collision of every run, in the order of runs and times.
 
     Parameters
@@ -74,7 +74,7 @@ def write_events(path: Path, found: SimulatedRuns) -> None:
         ``.npz`` or ``.parquet``, with the columns `run`, `time`, `type` (pair, wall, merge,
         fix), `bead`, `partner` (a bead, or the wall: 0 to 5 for low and high x, y, z),
         `normal_speed` and `impulse`; units are SI.
-    found : SimulatedRuns
+    simulated : SimulatedRuns
         Of a plan that keeps events.
 
     Raises
@@ -84,9 +84,9 @@ def write_events(path: Path, found: SimulatedRuns) -> None:
     RecordingError
         When the file cannot be written.
     """
-    pieces = (_event_rows(run) for run in found.runs)
+    pieces = (_event_rows(run) for run in simulated.runs)
     if path.suffix == '.parquet':
-        write_parquet(path, _EVENT_COLUMNS, pieces, found.provenance())
+        write_parquet(path, _EVENT_COLUMNS, pieces, simulated.provenance())
         return
     rows = list(pieces)
 
@@ -94,7 +94,7 @@ def write_events(path: Path, found: SimulatedRuns) -> None:
         return lambda: np.concatenate([row[name] for row in rows])
 
     arrays = {column.name: joined(column.name) for column in _EVENT_COLUMNS}
-    _write_arrays(path, {**arrays, 'provenance': lambda: np.array(found.provenance())})
+    _write_arrays(path, {**arrays, 'provenance': lambda: np.array(simulated.provenance())})
 
 
 def _event_rows(run: SimulatedRun) -> dict[str, NDArray[Any]]:
@@ -105,43 +105,43 @@ def _event_rows(run: SimulatedRun) -> dict[str, NDArray[Any]]:
     return {'run': np.full(len(run.events), run.number, dtype=np.int32), **columns}
 
 
-def _bead_arrays(found: SimulatedRuns) -> dict[str, Callable[[], Any]]:
-    """How to make each array: one at a time is in memory twice."""
-    drawn = stock(found.plan.tray)
+def _bead_arrays(simulated: SimulatedRuns) -> dict[str, Callable[[], Any]]:
+    """Functions that make the arrays, so that only one array at a time is in memory twice."""
+    drawn = stock(simulated.plan.tray)
 
     def joined(name: str) -> Callable[[], Any]:
-        if len(found.runs) == 1:
-            return lambda: getattr(found.runs[0], name)
-        return lambda: np.stack([getattr(run, name) for run in found.runs])
+        if len(simulated.runs) == 1:
+            return lambda: getattr(simulated.runs[0], name)
+        return lambda: np.stack([getattr(run, name) for run in simulated.runs])
 
     names = ['radii', 'masses', 'positions', 'velocities', 'body']
-    if found.runs[0].spins is not None:
+    if simulated.runs[0].spins is not None:
         names.append('spins')
     return {
-        'times': lambda: found.plan.times,
-        'runs': lambda: np.array([run.number for run in found.runs], dtype=np.int32),
-        'box': lambda: np.array(found.plan.tray.dimensions),
+        'times': lambda: simulated.plan.times,
+        'runs': lambda: np.array([run.number for run in simulated.runs], dtype=np.int32),
+        'box': lambda: np.array(simulated.plan.tray.dimensions),
         'ids': lambda: np.arange(drawn.species.size, dtype=np.int32),
         'species': lambda: drawn.species,
         'materials': lambda: np.array(drawn.materials),
         **{name: joined(name) for name in names},
-        'provenance': lambda: np.array(found.provenance()),
+        'provenance': lambda: np.array(simulated.provenance()),
     }
 
 
 def _write_arrays(path: Path, arrays: dict[str, Callable[[], Any]]) -> None:
     """Write an ``.npz`` file that ``numpy.load`` reads, the same bytes for the same arrays."""
-    with whole_file(path) as part, zipfile.ZipFile(part, 'w') as archive:
+    with atomic_file(path) as part, zipfile.ZipFile(part, 'w') as archive:
         for name, make in arrays.items():
-            # A member made this way carries no date.
+            # A `ZipInfo` made from the name alone has no date.
             member = zipfile.ZipInfo(f'{name}.npy')
             with archive.open(member, 'w', force_zip64=True) as stream:
                 np.lib.format.write_array(stream, np.asarray(make()), allow_pickle=False)
 
 
-def _bead_columns(found: SimulatedRuns) -> tuple[Column, ...]:
+def _bead_columns(simulated: SimulatedRuns) -> tuple[Column, ...]:
     vectors = [('', 'm'), ('v', 'm/s')]
-    if found.runs[0].spins is not None:
+    if simulated.runs[0].spins is not None:
         vectors.append(('w', 'rad/s'))
     return (
         Column(name='run', kind='i4'),
@@ -160,10 +160,10 @@ def _bead_columns(found: SimulatedRuns) -> tuple[Column, ...]:
     )
 
 
-def _bead_rows(found: SimulatedRuns, run: SimulatedRun) -> dict[str, NDArray[Any]]:
-    """A row for each bead at each time, times first."""
-    drawn = stock(found.plan.tray)
-    times = found.plan.times
+def _bead_rows(simulated: SimulatedRuns, run: SimulatedRun) -> dict[str, NDArray[Any]]:
+    """A row for each bead at each time, in the order of times."""
+    drawn = stock(simulated.plan.tray)
+    times = simulated.plan.times
     n_times, n = run.body.shape
 
     def of_beads(values: NDArray[Any]) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""What is generated: the pages on the wire, on parameters and viewers, and the viewers' layouts.
+"""Pages of the documentation that are generated: topics and array layouts, parameters.
 
 ``python -m nanorocks_ros.tools.docs_pages.wire_pages`` writes them; a test fails when they are
 stale.
@@ -11,39 +11,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import settings as st
-from nanorocks_ros.records import (
-    BodyEstimate,
-    ClusterEstimate,
-    CorEstimate,
-    GroundTruth,
-    Merge,
-    PairCollision,
-    Rebound,
-    SpeedEstimate,
-    TrayState,
-)
-from nanorocks_ros.tools.viewer_layouts.foxglove import foxglove
-from nanorocks_ros.tools.viewer_layouts.plotjuggler import plotjuggler
-from nanorocks_ros.tools.viewer_layouts.rviz import rviz
-from nanorocks_ros.tools.viewer_layouts.viewers_page import viewers_page
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import layout
 from nanorocks_ros.wire.bead_truth import beads_layout
+from nanorocks_ros.wire.products import PRODUCTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-_RECORDS = (
-    SpeedEstimate,
-    ClusterEstimate,
-    CorEstimate,
-    Rebound,
-    PairCollision,
-    BodyEstimate,
-    Merge,
-    GroundTruth,
-    TrayState,
-)
 _NOTE = '<!-- Made by `make docs` from the code; change that instead. -->\n\n'
 _GROUPS = (
     (
@@ -122,34 +97,34 @@ def topics_page() -> str:
         '`time` counts from. Read from `msg_defs/nanorocks_msgs/msg/`, which also builds as an '
         'interface package.\n'
     )
-    for record in _RECORDS:
-        one = layout(record)
-        text += f'\n## {one.name}\n\n{one.doc}\n\n'
+    for product in PRODUCTS:
+        array = layout(product.record)
+        text += f'\n## {array.name}\n\n{array.doc}\n\n'
         text += _table(
             ('element', 'field', 'unit', 'meaning'),
             (
                 (str(index), f'`{field.name}`', field.unit, field.doc)
-                for index, field in enumerate(one.fields)
+                for index, field in enumerate(array.fields)
             ),
         )
-        if one.constants:
-            named = ', '.join(f'`{name}` = {value}' for name, value in one.constants.items())
+        if array.constants:
+            named = ', '.join(f'`{name}` = {value}' for name, value in array.constants.items())
             text += f'\nConstants: {named}.\n'
     return text + _beads_section()
 
 
 def _beads_section() -> str:
     """The array whose length is that of the list of beads."""
-    one = beads_layout()
-    head, row = len(one.head), len(one.bead)
-    text = f'\n## BeadsTruth\n\n{one.doc}\n\n'
+    array = beads_layout()
+    head, row = len(array.head), len(array.bead)
+    text = f'\n## BeadsTruth\n\n{array.doc}\n\n'
     text += (
         f'{head} elements (`layout.dim[0]`), then {row} for each bead (`dim[1]`: how many beads, '
         '`dim[2]`: the names); a bead keeps its row, which is its identity.\n\n'
     )
     fields = [
-        *((str(index), field) for index, field in enumerate(one.head)),
-        *((f'{head + index} + {row} i', field) for index, field in enumerate(one.bead)),
+        *((str(index), field) for index, field in enumerate(array.head)),
+        *((f'{head + index} + {row} i', field) for index, field in enumerate(array.bead)),
     ]
     return text + _table(
         ('element', 'field', 'unit', 'meaning'),
@@ -175,7 +150,7 @@ def parameters_page() -> str:
 
 def _default(value: st.Value) -> str:
     if isinstance(value, tuple):
-        return ', '.join(f'{one:g}' for one in value) or 'empty'
+        return ', '.join(f'{number:g}' for number in value) or 'empty'
     if isinstance(value, bool):
         return str(value).lower()
     return f'{value:g}' if isinstance(value, float) else str(value) or 'empty'
@@ -192,10 +167,6 @@ def _range(row: st.SettingRow) -> str:
 FILES = {
     'docs/reference/topics.md': topics_page,
     'docs/reference/parameters.md': parameters_page,
-    'docs/use/viewers.md': lambda: _NOTE + viewers_page(),
-    'foxglove/nanorocks.json': foxglove,
-    'rviz/nanorocks.rviz': rviz,
-    'plotjuggler/nanorocks.xml': plotjuggler,
 }
 
 

@@ -45,7 +45,7 @@ def test_a_sweep_prints_curves_and_writes_them(tmp_path, capsys):
         np.testing.assert_array_equal(printed[name], getattr(sweep, name))
     total = int(sweep.pair_collisions.sum() + sweep.wall_collisions.sum())
     assert printed['events'] == total > 0
-    assert json.loads(sweep.question)['settings']['mean_speed'] == 0.01
+    assert json.loads(sweep.specification)['settings']['mean_speed'] == 0.01
     with table.open(newline='') as stream:
         lines = list(csv.DictReader(stream))
     assert len(lines) == 3 * 2 * 3
@@ -131,7 +131,7 @@ def test_files_that_cannot_be_used_are_told(tmp_path, capsys):
     output = tmp_path / 'a.npz'
     output.write_text('mine')
     assert main(['sweep', *SMALL, '-o', str(output)]) == 1
-    assert 'a.npz: exists and is no sweep of ours; delete it' in capsys.readouterr().err
+    assert 'a.npz: exists and holds no sweep; delete it' in capsys.readouterr().err
     missing = ['--figure', 'a.png', '--reference', str(tmp_path / 'no.csv')]
     assert main(['sweep', *SMALL, *GRID, '-o', str(tmp_path / 'b.npz'), *missing]) == 1
     assert 'no.csv: cannot be read (No such file or directory)' in capsys.readouterr().err

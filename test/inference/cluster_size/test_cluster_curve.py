@@ -1,4 +1,4 @@
-"""From widths to cluster sizes, within the range of the calibration and not beyond."""
+"""Cluster sizes from widths, within the range of the calibration."""
 
 from __future__ import annotations
 
@@ -67,13 +67,13 @@ def test_where_the_breadth_no_longer_grows_the_range_ends():
     assert estimate.upper == pytest.approx(100.0, rel=0.03)
 
 
-def test_what_may_as_well_be_all_beads_is_not_bounded_below_that():
+def test_a_reading_on_the_flat_part_has_an_interval_up_to_the_largest_size():
     estimate = CURVE.size_of(seen(2.5 * 20.0**0.2 * math.exp(-0.02)))
     assert estimate.status is SizeStatus.MEASURED
     assert estimate.upper == pytest.approx(100.0, rel=0.03)
 
 
-def test_single_beads_have_size_one_however_narrow_their_picture_happens_to_be():
+def test_single_beads_have_size_one_below_the_curve():
     estimate = CURVE.size_of(seen(2.5 * math.exp(-0.05)))
     assert (estimate.status, estimate.size, estimate.lower) == (SizeStatus.MEASURED, 1.0, 1.0)
 
@@ -89,13 +89,13 @@ def test_single_beads_have_size_one_however_narrow_their_picture_happens_to_be()
         Width(math.nan, math.nan, 40.0),
     ],
 )
-def test_what_no_picture_of_beads_showed_has_no_size(width):
+def test_widths_outside_the_simulated_range_have_no_size(width):
     estimate = CURVE.size_of(width)
     assert estimate.status is SizeStatus.NOTHING
     assert math.isnan(estimate.size)
 
 
-def test_where_beads_are_missing_there_is_no_size():
+def test_an_image_with_missing_beads_has_no_size():
     curve = fit_curve('a tray', 0.5, made_up(0.2, 0.03), discs=0.25)
     full, partial = (seen(3.0)._replace(cover=cover) for cover in (0.22, 0.15))
     assert curve.size_of(full).status is SizeStatus.MEASURED
@@ -104,7 +104,7 @@ def test_where_beads_are_missing_there_is_no_size():
     assert curve.size_of(seen(3.0)).status is SizeStatus.MEASURED
 
 
-def test_the_discs_of_the_flown_beads_cover_what_their_number_says():
+def test_the_disc_area_of_the_flight_trays_follows_from_their_beads():
     # 15 beads of 2 mm on 15 mm x 15 mm.
     assert curve_of(load_trays()[1]).discs == pytest.approx(15 * math.pi / 225.0)
 
@@ -121,7 +121,7 @@ def test_without_single_beads_there_is_no_curve():
     assert curve.size_of(seen(3.0)).status is SizeStatus.INSENSITIVE
 
 
-def test_all_flown_trays_have_one_and_it_is_of_use_where_beads_are_seen_apart():
+def test_all_flight_trays_have_a_curve_which_is_used_where_beads_are_resolved():
     curves = {number: curve_of(tray) for number, tray in load_trays().items()}
     assert sorted(curves) == list(range(1, 9))
     for number in (1, 3, 5, 7):
@@ -136,7 +136,7 @@ def with_fewer_beads():
     return replace(tray, species=(replace(tray.species[0], count=7), tray.species[1]))
 
 
-def test_another_tray_has_none_and_the_command_that_makes_it_is_named():
+def test_another_tray_has_no_curve_and_the_error_names_the_command():
     tray = with_fewer_beads()
     with pytest.raises(
         ConfigurationError, match=r'nanorocks cluster-curve --tray 3 -o curve\.npz'
@@ -155,7 +155,7 @@ def test_a_file_serves_the_trays_it_was_made_for(tmp_path):
 
 
 @pytest.mark.parametrize('content', [b'', b'no archive', b'PK\x03\x04 cut short'])
-def test_a_damaged_file_is_one_clear_line(tmp_path, content):
+def test_a_damaged_file_is_an_error_of_one_line(tmp_path, content):
     path = tmp_path / f'{len(content)}.npz'
     path.write_bytes(content)
     with pytest.raises(ConfigurationError, match='is damaged, or no calibration') as caught:

@@ -1,4 +1,4 @@
-"""Restitutions from contacts that are drawn as the likelihoods say they come about."""
+"""Restitutions from contacts drawn from the likelihoods."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ def _walls(rebounds):
 
 def test_rebounds_give_the_restitution_of_the_wall_without_bias():
     rng = np.random.default_rng(1)
-    found = [_walls(drawn_rebounds(rng, 30, 0.85)) for _ in range(60)]
-    values = np.array([one.restitution for one in found])
+    estimates = [_walls(drawn_rebounds(rng, 30, 0.85)) for _ in range(60)]
+    values = np.array([estimate.restitution for estimate in estimates])
     assert values.mean() == pytest.approx(0.85, abs=3.5 * values.std() / 60**0.5)
     # Stated errors are not believed altogether.
-    stated = np.mean([one.restitution_error for one in found])
+    stated = np.mean([estimate.restitution_error for estimate in estimates])
     assert 1.0 < stated / values.std() < 1.8
 
 
-def test_rebounds_that_were_something_else_hardly_count():
+def test_outliers_among_rebounds_have_little_effect():
     rng = np.random.default_rng(2)
     rebounds = list(drawn_rebounds(rng, 40, 0.9, 0.02))
     clean = _walls(rebounds)
@@ -45,7 +45,7 @@ def test_rebounds_that_were_something_else_hardly_count():
     )
 
 
-def test_a_wall_whose_own_motion_is_uncertain_says_less():
+def test_an_uncertain_wall_velocity_enlarges_the_error():
     still = _walls([drawn_rebound(3e-3, 2.7e-3, 3e-5)])
     moving = _walls([drawn_rebound(3e-3, 2.7e-3, 3e-5, wall_error=1e-4)])
     assert moving.restitution == pytest.approx(still.restitution, abs=0.01)
@@ -56,8 +56,8 @@ def test_two_cycles_add_up():
     rng = np.random.default_rng(3)
     cycles = [list(drawn_rebounds(rng, 20, 0.9)) for _ in range(2)]
     logs = [rebound_log_likelihood(cycle, WALLS) for cycle in cycles]
-    both = contact_estimate(WALLS, sum(logs))
-    assert both.restitution_error < min(_walls(cycle).restitution_error for cycle in cycles)
+    combined = contact_estimate(WALLS, sum(logs))
+    assert combined.restitution_error < min(_walls(cycle).restitution_error for cycle in cycles)
 
 
 def _pairs(collisions, **values):
@@ -66,34 +66,34 @@ def _pairs(collisions, **values):
 
 @pytest.mark.parametrize('restitution', [0.6, 0.9])
 @pytest.mark.parametrize('ratio', [0.3, 1.0])
-def test_collisions_give_the_restitution_whatever_the_vertical_speeds(restitution, ratio):
-    found = _pairs(drawn_collisions(4, 250, restitution, ratio=ratio))
-    assert found.restitution_error < 0.02
-    assert found.restitution == pytest.approx(restitution, abs=3.0 * found.restitution_error)
+def test_collisions_give_the_restitution_at_any_ratio_of_vertical_speeds(restitution, ratio):
+    estimate = _pairs(drawn_collisions(4, 250, restitution, ratio=ratio))
+    assert estimate.restitution_error < 0.02
+    assert estimate.restitution == pytest.approx(restitution, abs=3.0 * estimate.restitution_error)
 
 
-def test_collisions_cover_the_truth_as_often_as_they_say():
-    found = [_pairs(drawn_collisions(seed, 30, 0.8, ratio=0.6)) for seed in range(50)]
-    covered = np.mean([one.lower <= 0.8 <= one.upper for one in found])
+def test_intervals_from_collisions_have_the_stated_coverage():
+    estimates = [_pairs(drawn_collisions(seed, 30, 0.8, ratio=0.6)) for seed in range(50)]
+    covered = np.mean([estimate.lower <= 0.8 <= estimate.upper for estimate in estimates])
     assert 0.55 < covered < 0.9
 
 
-def test_many_collisions_are_as_likely_as_their_parts_together():
+def test_log_likelihoods_of_parts_add_up():
     collisions = drawn_collisions(8, 150, 0.8)
     values = {'vertical_ratios': (0.5,)}
     parts = [
-        pair_log_likelihood(one, PAIRS, **values) for one in (collisions[:70], collisions[70:])
+        pair_log_likelihood(part, PAIRS, **values) for part in (collisions[:70], collisions[70:])
     ]
     assert pair_log_likelihood(collisions, PAIRS, **values) == pytest.approx(sum(parts))
 
 
-def test_vertical_speeds_that_are_known_tell_more():
+def test_known_vertical_speeds_reduce_the_error():
     collisions = drawn_collisions(5, 80, 0.8, ratio=0.6)
     known = _pairs(collisions, vertical_ratios=(0.6,))
     assert known.restitution_error <= _pairs(collisions).restitution_error * 1.05
 
 
-def test_radii_that_were_measured_too_large_do_no_harm():
+def test_radii_measured_too_large_do_not_bias_the_restitution():
     collisions = drawn_collisions(6, 150, 0.8, radius_error=0.04)
     believed = _pairs(collisions, radius_errors=(0.0,))
     doubted = _pairs(collisions)
@@ -101,7 +101,7 @@ def test_radii_that_were_measured_too_large_do_no_harm():
     assert abs(doubted.restitution - 0.8) < 0.5 * abs(believed.restitution - 0.8)
 
 
-def test_collisions_that_merged_are_missing_and_that_is_known():
+def test_missing_collisions_below_the_sticking_speed_do_not_bias_the_restitution():
     collisions = drawn_collisions(7, 250, 0.8, ratio=1.0, sticking_speed=0.8e-3)
     ignored = _pairs(collisions)
     known = _pairs(collisions, sticking_speed=0.8e-3)
@@ -110,9 +110,9 @@ def test_collisions_that_merged_are_missing_and_that_is_known():
 
 
 @pytest.mark.parametrize('likelihood', [rebound_log_likelihood, pair_log_likelihood])
-def test_nothing_seen_prefers_nothing(likelihood):
+def test_no_contacts_give_a_constant_likelihood_and_no_estimate(likelihood):
     assert likelihood([], WALLS).tolist() == [0.0] * WALLS.size
-    with pytest.raises(FitError, match='prefers no value'):
+    with pytest.raises(FitError, match='a constant or infinite log likelihood'):
         contact_estimate(WALLS, likelihood([], WALLS))
 
 
@@ -124,7 +124,7 @@ def test_a_grid_that_leaves_0_to_1_is_refused(likelihood, grid):
 
 
 @pytest.mark.parametrize('share', [0.0, 1.0, math.nan])
-def test_a_share_of_outliers_that_cannot_be_is_refused(share):
+def test_a_fraction_of_outliers_outside_0_to_1_is_refused(share):
     with pytest.raises(FitError, match='outliers'):
         rebound_log_likelihood([], WALLS, outliers=share)
 

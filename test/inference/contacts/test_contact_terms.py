@@ -1,4 +1,4 @@
-"""What contacts say, added up."""
+"""Log-likelihood tables of contacts add up."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ def contacts():
 
 def sum_of(first, *others):
     total = ContactTerms.of(first)
-    for one in others:
-        total += ContactTerms.of(one)
+    for batch in others:
+        total += ContactTerms.of(batch)
     return total
 
 
-def test_a_sum_says_what_all_contacts_together_say():
+def test_tables_of_parts_add_up_to_the_table_of_all_contacts():
     every = contacts()
     whole = ContactTerms.of(every)
     parts = sum_of(every[:15], every[15:60], every[60:])
@@ -37,33 +37,36 @@ def test_a_sum_says_what_all_contacts_together_say():
     np.testing.assert_allclose(parts.beads, whole.beads, rtol=1e-9)
 
 
-def test_its_nodes_are_close_enough_to_give_what_a_fine_grid_gives():
+def test_the_nodes_give_the_same_estimate_as_a_fine_grid():
     every = contacts()
     terms = ContactTerms.of(every)
-    pairs = [one for one in every if isinstance(one, PairCollision)]
-    walls = [one for one in every if isinstance(one, Rebound)]
+    pairs = [contact for contact in every if isinstance(contact, PairCollision)]
+    walls = [contact for contact in every if isinstance(contact, Rebound)]
     for term, exact in (
-        (terms.of_beads(), pair_log_likelihood(pairs, FINE)),
-        (terms.of_walls(), rebound_log_likelihood(walls, FINE)),
+        (terms.bead_likelihood(), pair_log_likelihood(pairs, FINE)),
+        (terms.wall_likelihood(), rebound_log_likelihood(walls, FINE)),
     ):
         grid = FINE[term.restitution[0] <= FINE]
-        found, expected = contact_estimate(grid, term.at(grid)), contact_estimate(FINE, exact)
+        estimate, expected = contact_estimate(grid, term.at(grid)), contact_estimate(FINE, exact)
         near = 0.02 * expected.restitution_error
-        assert found.restitution == pytest.approx(expected.restitution, abs=near)
-        assert found.restitution_error == pytest.approx(expected.restitution_error, rel=0.02)
+        assert estimate.restitution == pytest.approx(expected.restitution, abs=near)
+        assert estimate.restitution_error == pytest.approx(expected.restitution_error, rel=0.02)
 
 
-def test_without_contacts_nothing_is_said():
+def test_without_contacts_there_is_no_likelihood():
     terms = ContactTerms.of(())
-    assert terms.of_beads() is None
-    assert terms.of_walls() is None
+    assert terms.bead_likelihood() is None
+    assert terms.wall_likelihood() is None
 
 
-def test_what_all_contacts_may_be_off_by_adds_to_the_error_in_squares():
+def test_a_common_systematic_error_adds_in_quadrature():
     terms = ContactTerms.of(contacts())
-    for term, bias, low in ((terms.of_beads, 0.02, 0.5), (terms.of_walls, 0.01, 0.8)):
+    for term, bias, low in (
+        (terms.bead_likelihood, 0.02, 0.5),
+        (terms.wall_likelihood, 0.01, 0.8),
+    ):
         grid = np.linspace(low, 1.0, 1001)
         sure, unsure = (contact_estimate(grid, term(value).at(grid)) for value in (0.0, bias))
-        both = np.hypot(sure.restitution_error, bias)
-        assert unsure.restitution_error == pytest.approx(both, rel=0.1)
+        expected_error = np.hypot(sure.restitution_error, bias)
+        assert unsure.restitution_error == pytest.approx(expected_error, rel=0.1)
         assert unsure.restitution == pytest.approx(sure.restitution, abs=0.3 * bias)

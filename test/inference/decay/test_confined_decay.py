@@ -1,4 +1,4 @@
-"""The confined theory on the way to its steady state."""
+"""The confined theory before its steady state."""
 
 from __future__ import annotations
 
@@ -31,14 +31,15 @@ def gas(number):
 
 
 def test_a_late_window_sees_the_steady_decay():
-    found = windowed_decay_rate(gas(1), 0.9, 0.95, initial_speed=0.0055, window=(60.0, 120.0))
-    assert found == pytest.approx(gas(1).decay_rate(0.9, 0.95), rel=0.003)
+    result = windowed_decay_rate(gas(1), 0.9, 0.95, initial_speed=0.0055, window=(60.0, 120.0))
+    assert result == pytest.approx(gas(1).decay_rate(0.9, 0.95), rel=0.003)
 
 
-def test_energy_along_the_height_at_first_feeds_the_others():
+def test_initial_vertical_energy_is_transferred_to_the_horizontal_motion():
     # What is kept along z is not lost to the beads, and comes back to the motion that is seen.
     rates = [
-        windowed_decay_rate(gas(1), 0.89, 0.99, **START, vertical=one) for one in (0.04, 1.0, 4.0)
+        windowed_decay_rate(gas(1), 0.89, 0.99, **START, vertical=vertical)
+        for vertical in (0.04, 1.0, 4.0)
     ]
     assert rates[0] > rates[1] > rates[2]
 
@@ -46,11 +47,11 @@ def test_energy_along_the_height_at_first_feeds_the_others():
 @pytest.mark.parametrize(('number', 'restitution', 'walls'), [(1, 0.8, 1.0), (3, 0.7, 0.97)])
 def test_the_restitution_undoes_the_decay_of_a_window(number, restitution, walls):
     rate = windowed_decay_rate(gas(number), restitution, walls, **START)
-    found = windowed_restitution(gas(number), rate, walls, **START)
-    assert found == pytest.approx(restitution, abs=1e-3)
+    result = windowed_restitution(gas(number), rate, walls, **START)
+    assert result == pytest.approx(restitution, abs=1e-3)
 
 
-def test_with_elastic_walls_the_way_to_the_steady_state_matters():
+def test_with_elastic_walls_the_approach_to_the_steady_state_matters():
     # Simulated, the steady state alone reads 0.77 for 0.80.
     settings = SimulationSettings(
         tray=1, restitution=0.8, wall_restitution=1.0, speeds='maxwellian'
@@ -64,12 +65,12 @@ def test_with_elastic_walls_the_way_to_the_steady_state_matters():
         np.log(speed[1:]),
         p0=(speed[0], 30.0),
     )
-    found = windowed_restitution(gas(1), rate, 1.0, initial_speed=speed[0], window=window)
-    assert found == pytest.approx(0.8, abs=0.015)
+    result = windowed_restitution(gas(1), rate, 1.0, initial_speed=speed[0], window=window)
+    assert result == pytest.approx(0.8, abs=0.015)
     assert gas(1).restitution(rate, 1.0) < 0.78
 
 
-def test_a_crowded_gas_that_cannot_stay_even_gives_no_number():
+def test_a_crowded_gas_that_does_not_stay_homogeneous_is_an_error():
     # Simulated tray 8 at 0.8 decays with 349 /m, from which an even gas would read 0.90.
     with pytest.raises(FitError, match='forms clusters'):
         confined_restitution(TRAYS[8], 349.0, 0.95)
@@ -83,6 +84,6 @@ def test_a_decay_that_no_restitution_makes_is_an_error():
 
 
 @pytest.mark.parametrize('window', [(5.0, 2.0), (-1.0, 2.0), (0.0, math.inf)])
-def test_a_window_that_is_none_is_named(window):
+def test_a_wrong_window_is_named(window):
     with pytest.raises(ConfigurationError, match='window'):
         windowed_decay_rate(gas(1), 0.9, 0.9, initial_speed=0.005, window=window)

@@ -1,4 +1,4 @@
-"""Decay libraries: what they hold is what the gas does, and a wrong file is told."""
+"""Decay libraries agree with simulation, and a wrong file is refused."""
 
 from __future__ import annotations
 
@@ -10,7 +10,12 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.decay.decay_library import NUISANCES, library_of, load_library
+from nanorocks_ros.inference.decay.decay_library import NUISANCES
+from nanorocks_ros.inference.decay.decay_library_file import (
+    library_arrays,
+    library_of,
+    load_library,
+)
 from nanorocks_ros.inference.decay.library_fit import node_of
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
@@ -30,7 +35,7 @@ def at_node(library, number):
 
 
 @pytest.mark.parametrize('tray', TRAYS.values(), ids=lambda tray: f'tray{tray.number}')
-def test_every_tray_has_a_library_and_a_node_made_anew_lies_on_it(tray):
+def test_every_tray_has_a_library_that_agrees_with_a_new_simulation_of_a_node(tray):
     library = library_of(tray)
     made = json.loads(library.made_by)
     plan = LibraryPlan(tray=tray, nodes=made['nodes'], runs=made['runs'], seed=made['seed'])
@@ -51,10 +56,10 @@ def test_the_mean_decay_of_a_gas_that_was_not_in_it_is_that_of_the_library():
     speed = cooling_runs(settings, tray, np.concatenate(([0.0], x / 0.0055)), range(runs))
     projected = speed.mean_projected_speed
     along = np.log(speed.times[1:] * projected[:, :1])
-    found = np.mean(
+    measured = np.mean(
         [
-            np.interp(np.log(x), one, np.log(values[1:] / values[0]))
-            for one, values in zip(along, projected, strict=True)
+            np.interp(np.log(x), log_distance, np.log(values[1:] / values[0]))
+            for log_distance, values in zip(along, projected, strict=True)
         ],
         axis=0,
     )
@@ -66,7 +71,7 @@ def test_the_mean_decay_of_a_gas_that_was_not_in_it_is_that_of_the_library():
         )[0],
     )
     # Their ends are cut where a run was slow.
-    assert np.abs(found - expected)[3:-6].max() < 0.03
+    assert np.abs(measured - expected)[3:-6].max() < 0.03
 
 
 def test_more_is_lost_with_less_restitution():
@@ -77,12 +82,12 @@ def test_more_is_lost_with_less_restitution():
     assert (np.diff(walls) > 0.0).all()
 
 
-def test_a_covariance_is_one():
+def test_covariances_are_symmetric_and_positive():
     library = library_of(TRAYS[1])
     for row in library.covariance:
-        for one in row:
-            np.testing.assert_allclose(one, one.T, atol=1e-7)
-            assert np.linalg.eigvalsh(one).min() > -1e-6
+        for covariance in row:
+            np.testing.assert_allclose(covariance, covariance.T, atol=1e-7)
+            assert np.linalg.eigvalsh(covariance).min() > -1e-6
 
 
 def test_a_library_of_another_tray_is_refused_and_the_command_named(tmp_path):
@@ -91,7 +96,7 @@ def test_a_library_of_another_tray_is_refused_and_the_command_named(tmp_path):
         library_of(tray)
 
 
-def test_a_file_that_is_none_is_told_and_how_it_is_made(tmp_path):
+def test_a_wrong_file_is_refused_and_the_command_named(tmp_path):
     path = tmp_path / 'mine.npz'
     with pytest.raises(ConfigurationError, match=r'no such decay library.*nanorocks library'):
         load_library(str(path), packaged=False)
@@ -103,10 +108,10 @@ def test_a_file_that_is_none_is_told_and_how_it_is_made(tmp_path):
         load_library(str(path), packaged=False)
 
 
-def test_a_byte_that_changed_is_seen(tmp_path):
+def test_a_changed_byte_is_detected(tmp_path):
     path = tmp_path / 'mine.npz'
     library = library_of(TRAYS[1])
-    library.save(lambda arrays: np.savez(path, **arrays))
+    np.savez(path, **library_arrays(library))
     again = load_library(str(path), packaged=False)
     np.testing.assert_array_equal(again.coefficients, library.coefficients)
     content = bytearray(path.read_bytes())

@@ -1,4 +1,4 @@
-"""Likelihoods of decays, against the same worked out by hand, matrix by matrix."""
+"""Likelihoods of decays against the same with dense matrices."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.decay.decay_library import library_of
+from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood, decay_likelihood
-from nanorocks_ros.inference.posterior import tables_of
+from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.settings import PriorSettings
 
 TRAY = load_trays()[1]
@@ -26,7 +26,7 @@ def tables():
 def test_nuisances_are_integrated_over_as_by_a_determinant_and_an_inverse():
     rng = np.random.default_rng(1)
     half = rng.normal(size=(30, 8, 5)) * np.geomspace(0.1, 30.0, 30)[:, np.newaxis, np.newaxis]
-    one = DecayLikelihood(
+    likelihood = DecayLikelihood(
         log_likelihood=rng.normal(size=30),
         gradient=rng.normal(0.0, 3.0, (30, 8)),
         information=half @ half.swapaxes(1, 2),
@@ -35,19 +35,19 @@ def test_nuisances_are_integrated_over_as_by_a_determinant_and_an_inverse():
     )
     expected = []
     for log, gradient, information in zip(
-        one.log_likelihood, one.gradient, one.information, strict=True
+        likelihood.log_likelihood, likelihood.gradient, likelihood.information, strict=True
     ):
         matrix = np.eye(8) + information
         shift = np.linalg.inv(matrix) @ gradient
         share = min(1.0, 4.0 / np.abs(shift).max())
         gain = (share - 0.5 * share**2) * gradient @ shift
         expected.append(log + gain - 0.5 * math.log(np.linalg.det(matrix)))
-    np.testing.assert_allclose(one.integrated(), expected, rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(likelihood.integrated(), expected, rtol=1e-11, atol=1e-11)
 
 
 def test_the_best_amplitude_leaves_residuals_that_no_other_makes_smaller(tables):
-    one = decay_likelihood(tables, TIMES, SPEEDS, 0.02 * SPEEDS, (0.01, 0.01))
-    place = int(np.argmax(one.log_likelihood))
+    likelihood = decay_likelihood(tables, TIMES, SPEEDS, 0.02 * SPEEDS, (0.01, 0.01))
+    place = int(np.argmax(likelihood.log_likelihood))
     library = tables.decays
     bins = np.floor(np.log(TIMES / TIMES[0]) / library.step + 1e-9).astype(int)
     log_time, log_speed = (
@@ -71,5 +71,5 @@ def test_the_best_amplitude_leaves_residuals_that_no_other_makes_smaller(tables)
         covariance = table[first : first + len(residual), first : first + len(residual)]
         matrix = covariance + np.diag(variance)
         costs.append(residual @ np.linalg.solve(matrix, residual))
-    assert one.deviation[place] == pytest.approx(min(costs), rel=0.1)
-    assert one.samples == len(log_time)
+    assert likelihood.deviation[place] == pytest.approx(min(costs), rel=0.1)
+    assert likelihood.samples == len(log_time)

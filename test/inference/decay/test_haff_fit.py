@@ -1,4 +1,4 @@
-"""Haff's law from speeds: the parameters, and whether the interval means what it says."""
+"""Fit of Haff's law: the parameters, and the coverage of the interval."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ def test_an_exact_decay_gives_back_its_parameters(v0, tau):
 
 def test_the_result_does_not_depend_on_the_unit_of_speed():
     speed = fluctuating_decay(np.random.default_rng(3), 0.01, 0.02)
-    one = fit_haff(TIME, speed, 0.02 * speed, BEADS)
-    other = fit_haff(TIME, 1e3 * speed, 20.0 * speed, BEADS)
-    assert other.haff_time == pytest.approx(one.haff_time, rel=1e-4)
-    assert other.initial_speed == pytest.approx(1e3 * one.initial_speed, rel=1e-4)
+    fit = fit_haff(TIME, speed, 0.02 * speed, BEADS)
+    scaled = fit_haff(TIME, 1e3 * speed, 20.0 * speed, BEADS)
+    assert scaled.haff_time == pytest.approx(fit.haff_time, rel=1e-4)
+    assert scaled.initial_speed == pytest.approx(1e3 * fit.initial_speed, rel=1e-4)
 
 
 def coverage(fits, rate):
@@ -90,7 +90,7 @@ def test_the_interval_of_one_simulated_cycle_covers_the_decay_of_the_ensemble(re
     assert np.median([fit.log_decay_rate_error for fit in fits]) < 2.0 * scatter
 
 
-def test_residuals_taken_for_independent_would_be_far_too_sure():
+def test_independent_residuals_would_give_a_far_too_small_error():
     rng = np.random.default_rng(7)
     honest, naive = [], []
     for _ in range(20):
@@ -113,9 +113,7 @@ def test_residuals_taken_for_independent_would_be_far_too_sure():
     ],
     ids=['errors far too small', 'a decay that stops'],
 )
-def test_decays_that_the_noise_does_not_explain_are_fitted_no_worse_than_they_can_be(
-    decay, haff_time
-):
+def test_decays_unlike_haffs_law_reach_the_lowest_cost(decay, haff_time):
     time = np.arange(1.75, 20.0, 0.2)
     rng = np.random.default_rng(5)
     speed = 0.01 * decay(time) * np.exp(0.05 * rng.normal(size=time.size))

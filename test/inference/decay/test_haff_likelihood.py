@@ -45,7 +45,7 @@ def by_definition(parameters):
 
 
 @pytest.mark.parametrize('parameters', PARAMETERS)
-def test_the_likelihood_is_the_one_by_definition(parameters):
+def test_the_likelihood_equals_its_definition(parameters):
     cost, log_v0, information = DECAY.generalised(parameters)
     expected = by_definition(parameters)
     assert cost == pytest.approx(expected[0], rel=1e-9)

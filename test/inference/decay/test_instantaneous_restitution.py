@@ -1,4 +1,4 @@
-"""Restitution against speed, and what noise makes of it."""
+"""Restitution against speed, and its bands of noise."""
 
 from __future__ import annotations
 
@@ -57,23 +57,23 @@ def test_the_slope_is_right_about_a_fit_that_is_a_little_off():
 
 def test_without_noise_all_windows_give_the_restitution_of_the_decay():
     rate = gas().decay_rate(0.89, WALLS)
-    found = cor(haff_speed(TIMES, 0.0055, 1.0 / (0.0055 * rate)), 1e-6, cycles=10_000)
-    assert found.whole == pytest.approx(0.89, abs=0.002)
-    assert found.local.restitution == pytest.approx(np.full(8, 0.89), abs=0.003)
-    assert (found.local.lower < 0.89).all()
-    assert (found.local.upper > 0.89).all()
+    result = cor(haff_speed(TIMES, 0.0055, 1.0 / (0.0055 * rate)), 1e-6, cycles=10_000)
+    assert result.whole == pytest.approx(0.89, abs=0.002)
+    assert result.local.restitution == pytest.approx(np.full(8, 0.89), abs=0.003)
+    assert (result.local.lower < 0.89).all()
+    assert (result.local.upper > 0.89).all()
 
 
 def test_the_papers_estimate_of_a_simulated_gas_without_rotation_spreads_as_noise_does():
     # No bead rotates, one restitution holds at all speeds, and yet it spreads as in [B19] fig. 13.
     inside = spread = 0.0
     for seed in range(4):
-        found = cor(simulated(18, 1e-4, seed), 1e-4, cycles=18)
-        low, _, _, high = found.noise_and_gas
-        inside += np.mean((found.paper > low) & (found.paper < high)) / 4.0
-        fast, slow = found.paper[:40], found.paper[-40:]
+        result = cor(simulated(18, 1e-4, seed), 1e-4, cycles=18)
+        low, _, _, high = result.noise_and_gas
+        inside += np.mean((result.paper > low) & (result.paper < high)) / 4.0
+        fast, slow = result.paper[:40], result.paper[-40:]
         spread += slow.std() / fast.std() / 4.0
-        assert np.nanmax(found.paper) > 1.0
+        assert np.nanmax(result.paper) > 1.0
     assert inside == pytest.approx(0.95, abs=0.03)
     assert spread > 3.0
 
@@ -81,19 +81,19 @@ def test_the_papers_estimate_of_a_simulated_gas_without_rotation_spreads_as_nois
 def test_errors_of_the_local_slopes_are_their_scatter():
     deviations = []
     for seed in range(16):
-        found = cor(simulated(18, 1e-4, seed), 1e-4, cycles=18).local
+        result = cor(simulated(18, 1e-4, seed), 1e-4, cycles=18).local
         truth = gas().decay_rate(0.89, WALLS)
-        deviations.append((found.decay_rate - truth) / found.decay_rate_error)
+        deviations.append((result.decay_rate - truth) / result.decay_rate_error)
     assert np.std(deviations) == pytest.approx(1.0, abs=0.2)
     assert np.mean(deviations) == pytest.approx(0.0, abs=0.35)
 
 
 def test_the_band_widens_as_beads_become_slow_and_holds_the_narrower_one():
-    found = cor(simulated(6, 1e-4, 1), 1e-4, cycles=6)
-    width = found.noise[3] - found.noise[0]
+    result = cor(simulated(6, 1e-4, 1), 1e-4, cycles=6)
+    width = result.noise[3] - result.noise[0]
     assert width[-20:].mean() > 4.0 * width[:20].mean()
-    assert (found.noise_and_gas[3] >= found.noise[3] - 0.05).all()
-    assert (np.diff(found.noise, axis=0) > 0.0).all()
+    assert (result.noise_and_gas[3] >= result.noise[3] - 0.05).all()
+    assert (np.diff(result.noise, axis=0) > 0.0).all()
 
 
 def test_the_same_seed_draws_the_same_band():
@@ -103,9 +103,9 @@ def test_the_same_seed_draws_the_same_band():
 
 def test_a_window_faster_than_any_restitution_has_no_value_but_a_range():
     rate = 6.0 * gas().decay_rate(0.5, WALLS)
-    found = cor(haff_speed(TIMES, 0.006, 1.0 / (0.006 * rate)), 1e-6).local
-    assert np.isnan(found.restitution).all()
-    assert (found.lower == 0.0).all()
+    result = cor(haff_speed(TIMES, 0.006, 1.0 / (0.006 * rate)), 1e-6).local
+    assert np.isnan(result.restitution).all()
+    assert (result.lower == 0.0).all()
 
 
 def test_speeds_that_rise_are_an_error():
@@ -125,8 +125,8 @@ def test_a_tray_of_other_beads_gives_another_restitution():
     speed = haff_speed(TIMES, 0.0055, 7.0)
     fewer = replace(TRAY, species=(replace(TRAY.species[0], count=12),))
     errors = np.full(TIMES.size, 1e-5)
-    found = instantaneous_cor(
+    result = instantaneous_cor(
         (TIMES, speed, errors), fewer, confined_gas(fewer), wall_restitution=WALLS
     )
     # Fewer collisions must each take more for the same decay.
-    assert found.whole < cor(speed, 1e-5).whole
+    assert result.whole < cor(speed, 1e-5).whole

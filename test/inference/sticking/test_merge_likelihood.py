@@ -1,4 +1,4 @@
-"""What a cycle says of sticking speeds: by the integral itself, and while the cycle grows."""
+"""Likelihood of merges against the integral itself, and for a growing cycle."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def cycle(until, *times):
     return sticking_cycle(BEADS, merges(*times), STAMPS[used], SPEEDS[used], 0)
 
 
-def test_terms_are_the_integral_of_the_rates_and_the_logarithms_of_those_of_the_merges():
-    one = cycle(50.0, 20.0, 31.5)
-    terms = MergeRates(CONTACTS, BEADS).terms(one)
-    slower = CONTACTS.slower_between(terms.speeds[:, np.newaxis] / one.speeds)
-    rates = slower * one.speeds * 0.5 * one.bodies**2 / BEADS
-    np.testing.assert_allclose(terms.expected, trapezoid(rates, one.times), rtol=1e-12)
-    speeds = np.interp(one.merges, one.times, one.speeds)
-    slower = CONTACTS.slower_between(terms.speeds[:, np.newaxis] / speeds)
+def test_the_likelihood_has_the_integral_of_the_rates_and_their_logarithms_at_the_merges():
+    decay = cycle(50.0, 20.0, 31.5)
+    terms = MergeRates(CONTACTS, BEADS).terms(decay)
+    slower = CONTACTS.interpolated_rate_below(terms.speeds[:, np.newaxis] / decay.speeds)
+    rates = slower * decay.speeds * 0.5 * decay.bodies**2 / BEADS
+    np.testing.assert_allclose(terms.expected, trapezoid(rates, decay.times), rtol=1e-12)
+    speeds = np.interp(decay.merges, decay.times, decay.speeds)
+    slower = CONTACTS.interpolated_rate_below(terms.speeds[:, np.newaxis] / speeds)
     np.testing.assert_allclose(terms.logs, np.log(slower * speeds).sum(axis=1), rtol=1e-12)
     assert terms.merges == 2
 
@@ -58,19 +58,19 @@ def test_terms_are_the_integral_of_the_rates_and_the_logarithms_of_those_of_the_
         [(30.0,), (31.0, 5.0), (8.0,), (32.0, 5.0, 31.0)],
     ],
 )
-def test_a_cycle_that_has_grown_says_what_it_says_at_once(steps):
+def test_a_growing_cycle_has_the_likelihood_of_the_whole_cycle(steps):
     growing = MergeRates(CONTACTS, BEADS)
     for until, *times in steps:
-        found, afresh = (
+        terms, afresh = (
             rates.terms(cycle(until, *times)) for rates in (growing, MergeRates(CONTACTS, BEADS))
         )
-        np.testing.assert_allclose(found.expected, afresh.expected, rtol=1e-13)
-        np.testing.assert_array_equal(found.logs, afresh.logs)
+        np.testing.assert_allclose(terms.expected, afresh.expected, rtol=1e-13)
+        np.testing.assert_array_equal(terms.logs, afresh.logs)
 
 
-def test_cycles_add_up_and_one_of_a_single_body_says_nothing():
+def test_cycles_add_up_and_a_single_body_does_not_contribute():
     rates = MergeRates(CONTACTS, BEADS)
-    one, other = rates.terms(cycle(30.0, 20.0)), rates.terms(cycle(50.0))
+    first, second = rates.terms(cycle(30.0, 20.0)), rates.terms(cycle(50.0))
     stuck = StickingCycle(
         times=np.array([0.0, 1.0]),
         speeds=np.ones(2),
@@ -79,6 +79,6 @@ def test_cycles_add_up_and_one_of_a_single_body_says_nothing():
     )
     alone = rates.terms(stuck)
     assert not alone.exposed
-    both = one + other + alone
-    assert (both.merges, both.exposed) == (1, True)
-    np.testing.assert_array_equal(both.expected, one.expected + other.expected)
+    total = first + second + alone
+    assert (total.merges, total.exposed) == (1, True)
+    np.testing.assert_array_equal(total.expected, first.expected + second.expected)

@@ -1,4 +1,4 @@
-"""Sticking speeds from merges that are drawn as the likelihood says they come about."""
+"""Sticking speeds from merges drawn from the likelihood."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ START = 5_000_000_000
 def _cycle(rng, sticking_speed, measure='normal'):
     bodies, merges = np.empty(TIMES.size), []
     left = BEADS
-    rates = CONTACTS.slower(sticking_speed / SPEEDS, measure) * SPEEDS * 0.5 / BEADS
+    rates = CONTACTS.rate_below(sticking_speed / SPEEDS, measure) * SPEEDS * 0.5 / BEADS
     step = TIMES[1]
     for k, rate in enumerate(rates):
         bodies[k] = left
@@ -35,7 +35,7 @@ def _cycle(rng, sticking_speed, measure='normal'):
 
 
 @pytest.mark.parametrize('measure', ['normal', 'total'])
-def test_the_interval_holds_the_truth_as_often_as_it_says(measure):
+def test_the_interval_has_the_stated_coverage(measure):
     rng = np.random.default_rng(1)
     estimates = [
         sticking_estimate(
@@ -55,15 +55,15 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(measure):
     )
 
 
-def test_many_cycles_tell_more_than_one_but_not_more_than_the_theory():
+def test_many_cycles_narrow_the_interval_down_to_the_error_of_the_theory():
     rng = np.random.default_rng(2)
     cycles = [_cycle(rng, 3e-3) for _ in range(16)]
-    one, many, sure = (
+    single, many, sure = (
         sticking_estimate(part, CONTACTS, BEADS, rate_error=error)
         for part, error in ((cycles[:1], 0.1), (cycles, 0.1), (cycles, 1e-6))
     )
-    assert many.merges > 10 * one.merges
-    assert one.upper - one.lower > 2.0 * (many.upper - many.lower)
+    assert many.merges > 10 * single.merges
+    assert single.upper - single.lower > 2.0 * (many.upper - many.lower)
     assert many.upper - many.lower > 1.2 * (sure.upper - sure.lower)
     assert many.lower < 3e-3 < many.upper
 
@@ -72,15 +72,15 @@ def test_without_a_merge_there_is_an_upper_limit_that_falls_with_more_cycles():
     cycle = StickingCycle(
         times=TIMES, speeds=SPEEDS, bodies=np.full(TIMES.size, 15.0), merges=np.empty(0)
     )
-    one, many = (sticking_estimate([cycle] * n, CONTACTS, BEADS) for n in (1, 9))
-    assert one.status is many.status is StickingStatus.NO_MERGE
-    assert math.isnan(one.sticking_speed)
-    assert one.lower == many.lower == 0.0
+    single, many = (sticking_estimate([cycle] * n, CONTACTS, BEADS) for n in (1, 9))
+    assert single.status is many.status is StickingStatus.NO_MERGE
+    assert math.isnan(single.sticking_speed)
+    assert single.lower == many.lower == 0.0
     # So few contacts are so slow: their number goes with the square of the speed.
-    assert many.upper == pytest.approx(one.upper / 3.0, rel=0.1)
+    assert many.upper == pytest.approx(single.upper / 3.0, rel=0.1)
 
 
-def test_everything_stuck_at_the_start_says_nothing():
+def test_beads_that_all_stick_at_the_start_give_no_speed():
     cycle = StickingCycle(
         times=TIMES, speeds=SPEEDS, bodies=np.ones(TIMES.size), merges=np.empty(0)
     )
@@ -90,7 +90,7 @@ def test_everything_stuck_at_the_start_says_nothing():
     assert math.isnan(estimate.sticking_speed)
 
 
-def test_where_all_that_meet_stick_there_is_a_lower_limit_only():
+def test_if_all_colliding_bodies_stick_there_is_only_a_lower_limit():
     estimate = sticking_estimate(
         [_cycle(np.random.default_rng(3), 1.0)], CONTACTS, BEADS, highest=0.05
     )
@@ -111,7 +111,7 @@ def _merge(seconds, joins=True):
     )
 
 
-def test_a_cycle_is_made_of_merges_that_join_bodies_while_speeds_are_known():
+def test_a_cycle_has_the_merges_up_to_the_last_known_speed():
     stamps = START + np.arange(1, 11) * 1_000_000_000
     merges = [_merge(2.5), _merge(2.6, joins=False), _merge(4.0), _merge(11.0)]
     cycle = sticking_cycle(BEADS, merges, stamps, np.linspace(5e-3, 1e-3, 10), START)

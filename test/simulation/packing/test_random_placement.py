@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for, uniform
-from nanorocks_ros.numerics.stable_sort import rising
+from nanorocks_ros.numerics.stable_sort import stable_argsort
 from nanorocks_ros.simulation.packing.random_placement import MOST_TRIES, place, placed_at_random
 
 WALLS = (False, False, False)
@@ -328,4 +328,4 @@ def test_compiled_code_places_none_where_one_cannot_be(radius):
 @settings(deadline=None)
 def test_rising_order_keeps_equals_as_they_are(values):
     array = np.array(values, dtype=np.float64) / 3.0
-    np.testing.assert_array_equal(rising(array), np.argsort(array, kind='stable'))
+    np.testing.assert_array_equal(stable_argsort(array), np.argsort(array, kind='stable'))

@@ -1,4 +1,4 @@
-"""Bodies counted in tracks made from simulated gases, whose bodies are known."""
+"""Bodies counted in tracks of simulated gases, against the bodies of the simulation."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ RATE, NS = 30.0, 1e9
 ERROR = 8e-6
 
 
-def _tracks(stamp_ns, places, velocities, seen=None, ids=None):
-    n = len(places)
+def _tracks(stamp_ns, positions, velocities, seen=None, ids=None):
+    n = len(positions)
     return Tracks(
         stamp_ns=stamp_ns,
         tray=1,
         ids=np.arange(n, dtype=np.int32) if ids is None else ids,
         species=np.zeros(n, dtype=np.int32),
         displacement=np.zeros(2),
-        positions=places,
+        positions=positions,
         position_errors=np.full(n, ERROR),
         velocities=velocities,
         velocity_errors=np.full(n, 1e-5),
@@ -38,26 +38,26 @@ def _tracks(stamp_ns, places, velocities, seen=None, ids=None):
 
 
 def _gas(sticking_speed, seconds, seed=1, **values):
-    """Tracks of a tray and, for each, the body of each bead."""
+    """Tracks of each frame, with the body of each bead."""
     settings = SimulationSettings(
         sticking_speed=sticking_speed, seed=seed, first_shake=0.0, mean_speed=0.01, **values
     )
     gas, rng = ShakenTray(settings, TRAY), np.random.default_rng(seed)
     for moment in gas.moments(round(seconds * RATE)):
-        places = moment.positions[:, :2] + rng.normal(0.0, ERROR, (15, 2))
+        positions = moment.positions[:, :2] + rng.normal(0.0, ERROR, (15, 2))
         yield (
-            _tracks(moment.truth.stamp_ns, places, moment.velocities[:, :2]),
+            _tracks(moment.truth.stamp_ns, positions, moment.velocities[:, :2]),
             gas.bodies.copy(),
         )
 
 
-def _counted(pictures, cycle=1, settings=None):
+def _estimates_and_merges(frames, cycle=1, settings=None):
     counter = BodyCounter(settings or PipelineSettings(), TRAY)
-    found = [one for tracks in pictures for one in counter.push(tracks, cycle)]
-    found += counter.flush()
+    records = [record for tracks in frames for record in counter.push(tracks, cycle)]
+    records += counter.flush()
     return (
-        [one for one in found if isinstance(one, BodyEstimate)],
-        [one for one in found if isinstance(one, Merge)],
+        [record for record in records if isinstance(record, BodyEstimate)],
+        [record for record in records if isinstance(record, Merge)],
     )
 
 
@@ -66,8 +66,8 @@ def sticky():
     return list(_gas(5e-3, 12.0))
 
 
-def test_bodies_and_sizes_of_a_gas_that_sticks_are_those_that_it_has(sticky):
-    counts, _ = _counted([tracks for tracks, _ in sticky])
+def test_bodies_and_sizes_of_a_sticky_gas_agree_with_the_simulation(sticky):
+    counts, _ = _estimates_and_merges([tracks for tracks, _ in sticky])
     truth = {tracks.stamp_ns: np.unique(b, return_counts=True)[1] for tracks, b in sticky}
     wrong = np.array([count.bodies - truth[count.stamp_ns].size for count in counts])
     sizes = np.array([(truth[count.stamp_ns] ** 2).sum() / 15 for count in counts])
@@ -80,8 +80,8 @@ def test_bodies_and_sizes_of_a_gas_that_sticks_are_those_that_it_has(sticky):
     assert last.sizes.sum() == last.bodies
 
 
-def test_the_first_merge_is_dated_back_to_when_it_happened(sticky):
-    counts, merges = _counted([tracks for tracks, _ in sticky])
+def test_the_first_merge_has_the_time_of_the_simulated_one(sticky):
+    counts, merges = _estimates_and_merges([tracks for tracks, _ in sticky])
     first = next(tracks.stamp_ns for tracks, b in sticky if np.unique(b).size < 15)
     assert min(merge.stamp_ns for merge in merges) == pytest.approx(first, abs=0.1 * NS)
     assert all(merge.known_ns >= merge.stamp_ns + 0.3 * NS for merge in merges)
@@ -90,32 +90,32 @@ def test_the_first_merge_is_dated_back_to_when_it_happened(sticky):
 
 
 def test_a_gas_without_sticking_has_no_merge_and_fifteen_bodies():
-    pictures = [tracks for tracks, _ in _gas(0.0, 20.0, restitution=0.7)]
-    counts, merges = _counted(pictures)
+    frames = [tracks for tracks, _ in _gas(0.0, 20.0, restitution=0.7)]
+    counts, merges = _estimates_and_merges(frames)
     assert not merges
     assert {count.bodies for count in counts} == {15.0}
     assert not any(count.merged for count in counts)
 
 
-def test_beads_at_rest_beside_each_other_are_not_taken_for_a_body():
+def test_adjacent_beads_at_rest_are_no_body():
     rng = np.random.default_rng(2)
     columns, rows = np.meshgrid(np.arange(5), np.arange(3))
-    places = 2.0e-3 * np.column_stack([columns.ravel(), rows.ravel()]) + 2e-3
+    positions = 2.0e-3 * np.column_stack([columns.ravel(), rows.ravel()]) + 2e-3
     still = np.zeros((15, 2))
-    pictures = [
-        _tracks(int(k * NS / RATE), places + rng.normal(0.0, ERROR, (15, 2)), still)
+    frames = [
+        _tracks(int(k * NS / RATE), positions + rng.normal(0.0, ERROR, (15, 2)), still)
         for k in range(300)
     ]
-    counts, merges = _counted(pictures)
+    counts, merges = _estimates_and_merges(frames)
     assert not merges
     assert counts[-1].weighted_size == 1.0
 
 
-def test_a_bead_of_a_body_that_is_lost_stays_in_it_and_comes_back_under_its_number(sticky):
-    _, merges = _counted([tracks for tracks, _ in sticky])
+def test_an_occluded_bead_stays_in_its_body_and_keeps_its_number(sticky):
+    _, merges = _estimates_and_merges([tracks for tracks, _ in sticky])
     lost = int(merges[0].tracks[1])
     from_ns, to_ns = merges[0].known_ns + 1 * NS, merges[0].known_ns + 4 * NS
-    pictures = []
+    frames = []
     for tracks, _ in sticky:
         if tracks.stamp_ns > from_ns:
             kept = tracks.ids != lost
@@ -126,40 +126,44 @@ def test_a_bead_of_a_body_that_is_lost_stays_in_it_and_comes_back_under_its_numb
             tracks = _tracks(
                 tracks.stamp_ns, tracks.positions[order], tracks.velocities[order], ids=ids[order]
             )
-        pictures.append(tracks)
-    counts, _ = _counted(pictures)
-    whole, _ = _counted([tracks for tracks, _ in sticky])
-    differs = [a.bodies != b.bodies for a, b in zip(counts, whole, strict=True)]
+        frames.append(tracks)
+    counts, _ = _estimates_and_merges(frames)
+    whole, _ = _estimates_and_merges([tracks for tracks, _ in sticky])
+    differs = [
+        estimate.bodies != complete.bodies
+        for estimate, complete in zip(counts, whole, strict=True)
+    ]
     assert np.mean(differs) < 0.1
     assert min(count.followed for count in counts) == 15
 
 
-def test_beads_that_are_never_seen_widen_the_error_and_numbers_are_those_of_all(sticky):
-    pictures = [
-        _tracks(one.stamp_ns, one.positions[:12], one.velocities[:12]) for one, _ in sticky[:60]
+def test_unseen_beads_widen_the_error_and_count_as_single_ones(sticky):
+    frames = [
+        _tracks(tracks.stamp_ns, tracks.positions[:12], tracks.velocities[:12])
+        for tracks, _ in sticky[:60]
     ]
-    first = _counted(pictures)[0][0]
+    first = _estimates_and_merges(frames)[0][0]
     assert (first.beads, first.followed, first.bodies) == (15, 12, 15.0)
     assert first.bodies_error > 0.5
 
 
-def test_a_body_that_comes_apart_is_two_again(sticky):
-    counts, merges = _counted([tracks for tracks, _ in sticky])
+def test_a_body_that_breaks_is_two_bodies(sticky):
+    counts, merges = _estimates_and_merges([tracks for tracks, _ in sticky])
     pair = next(merge.tracks for merge in merges if merge.joins)
     alone = next(count for count in counts if count.clusters == 1.0).stamp_ns + 2 * NS
-    pictures = []
+    frames = []
     for tracks, _ in sticky:
-        places = tracks.positions.copy()
+        positions = tracks.positions.copy()
         if tracks.stamp_ns > alone:
-            places[pair[1]] += 5e-3 * (tracks.stamp_ns - alone) / NS * np.array([1.0, 0.3])
-        pictures.append(replace(tracks, positions=places))
-    parted, _ = _counted(pictures)
+            positions[pair[1]] += 5e-3 * (tracks.stamp_ns - alone) / NS * np.array([1.0, 0.3])
+        frames.append(replace(tracks, positions=positions))
+    parted, _ = _estimates_and_merges(frames)
     # Two seconds later it is 10 mm away, though all others went on as they were.
     at = next(k for k, count in enumerate(counts) if count.stamp_ns > alone + 2 * NS)
     assert parted[at].bodies > counts[at].bodies
 
 
-def test_a_shaking_event_sets_all_beads_apart(sticky):
+def test_a_shaking_event_separates_all_beads(sticky):
     counter = BodyCounter(PipelineSettings(), TRAY)
     for tracks, _ in sticky:
         counter.push(tracks, 1)
@@ -167,41 +171,78 @@ def test_a_shaking_event_sets_all_beads_apart(sticky):
         replace(tracks, stamp_ns=tracks.stamp_ns + sticky[-1][0].stamp_ns + 33_000_000)
         for tracks, _ in _gas(0.0, 3.0, seed=3)
     ]
-    found = [one for tracks in later for one in counter.push(tracks, 2)]
-    new = [one for one in found if isinstance(one, BodyEstimate) and one.cycle == 2]
-    assert new
-    assert {(estimate.bodies, estimate.merged) for estimate in new} == {(15.0, False)}
+    records = [record for tracks in later for record in counter.push(tracks, 2)]
+    estimates = [
+        record for record in records if isinstance(record, BodyEstimate) and record.cycle == 2
+    ]
+    assert estimates
+    assert {(estimate.bodies, estimate.merged) for estimate in estimates} == {(15.0, False)}
 
 
-def test_a_stamp_that_goes_back_starts_afresh(sticky):
+def test_a_stamp_that_goes_back_resets_the_counter(sticky):
     counter = BodyCounter(PipelineSettings(), TRAY)
     runs = [
-        [one for tracks, _ in sticky[:120] for one in counter.push(tracks, 1)] for _ in range(2)
+        [record for tracks, _ in sticky[:120] for record in counter.push(tracks, 1)]
+        for _ in range(2)
     ]
-    assert [one.stamp_ns for one in runs[0]] == [one.stamp_ns for one in runs[1]]
+    assert [record.stamp_ns for record in runs[0]] == [record.stamp_ns for record in runs[1]]
 
 
-def test_what_sticks_from_the_start_is_one_body_from_the_start():
+def test_flush_gives_the_estimates_of_the_last_instants(sticky):
+    counts, merges = _estimates_and_merges([tracks for tracks, _ in sticky])
+    last = [merge for merge in merges if merge.joins][-1]
+    counter = BodyCounter(PipelineSettings(), TRAY)
+    pushed = [
+        record
+        for tracks, _ in sticky
+        if tracks.stamp_ns <= last.known_ns
+        for record in counter.push(tracks, 1)
+    ]
+    before = [record for record in pushed if isinstance(record, BodyEstimate)]
+    # The merge itself is not held back; the estimates of the bodies it makes are.
+    merged = [record for record in pushed if isinstance(record, Merge)]
+    assert merged[-1].known_ns == last.known_ns
+    held_back = counter.flush()
+    assert held_back[0].stamp_ns > before[-1].stamp_ns
+    assert held_back[-1].stamp_ns > last.known_ns - 0.2 * NS
+    assert held_back[-1].bodies == counts[-1].bodies
+    assert counter.flush() == ()
+
+
+def test_reset_forgets_bodies_and_estimates(sticky):
+    counter = BodyCounter(PipelineSettings(), TRAY)
+    runs = []
+    for _ in range(2):
+        records = [record for tracks, _ in sticky for record in counter.push(tracks, 1)]
+        runs.append([record.stamp_ns for record in records])
+        counter.reset()
+        assert counter.flush() == ()
+    assert runs[0] == runs[1]
+
+
+def test_beads_that_stick_from_the_start_are_one_body_from_the_start():
     rng = np.random.default_rng(4)
     velocity = np.array([3e-3, 1e-3])
     columns, rows = np.meshgrid(np.arange(5), np.arange(3))
-    places = 1.99e-3 * np.column_stack([columns.ravel(), rows.ravel()]) + 2e-3
-    pictures = [
+    positions = 1.99e-3 * np.column_stack([columns.ravel(), rows.ravel()]) + 2e-3
+    frames = [
         _tracks(
             int(k * NS / RATE),
-            places + velocity * k / RATE + rng.normal(0.0, ERROR, (15, 2)),
+            positions + velocity * k / RATE + rng.normal(0.0, ERROR, (15, 2)),
             np.tile(velocity, (15, 1)),
         )
         for k in range(150)
     ]
-    counts, merges = _counted(pictures)
+    counts, merges = _estimates_and_merges(frames)
     assert counts[-1].bodies == 1.0
     assert counts[-1].first_merge_ns == merges[0].stamp_ns == 0
 
 
-def test_a_tray_in_which_nothing_is_seen_says_that_nothing_is_known():
+def test_an_empty_tray_has_unknown_estimates():
     nothing = np.empty((0, 2))
-    counts, merges = _counted([_tracks(int(k * NS / RATE), nothing, nothing) for k in range(60)])
+    counts, merges = _estimates_and_merges(
+        [_tracks(int(k * NS / RATE), nothing, nothing) for k in range(60)]
+    )
     assert not merges
     assert counts
     assert all(np.isnan(count.bodies) and np.isnan(count.bodies_error) for count in counts)
@@ -210,27 +251,29 @@ def test_a_tray_in_which_nothing_is_seen_says_that_nothing_is_known():
 def test_one_bead_is_one_body():
     tray = replace(TRAY, species=(replace(TRAY.species[0], count=1),))
     counter = BodyCounter(PipelineSettings(), tray)
-    places = np.array([[5e-3, 5e-3]])
-    found = [
-        one
+    positions = np.array([[5e-3, 5e-3]])
+    estimates = [
+        estimate
         for k in range(60)
-        for one in counter.push(_tracks(int(k * NS / RATE), places, np.zeros((1, 2))), 1)
+        for estimate in counter.push(_tracks(int(k * NS / RATE), positions, np.zeros((1, 2))), 1)
     ]
-    assert {(one.bodies, one.bodies_error) for one in found} == {(1.0, 0.0)}
+    assert {(estimate.bodies, estimate.bodies_error) for estimate in estimates} == {(1.0, 0.0)}
 
 
-def test_fewer_false_alarms_are_paid_for_with_a_later_answer(sticky):
+def test_fewer_false_alarms_delay_the_first_merge(sticky):
     known = []
     for rate in (1e-4, 0.01, 0.3):
-        settings = PipelineSettings(bodies=BodySettings(false_alarms=rate))
-        _, merges = _counted([tracks for tracks, _ in sticky[:200]], settings=settings)
+        settings = PipelineSettings(bodies=BodySettings(false_alarm_rate=rate))
+        _, merges = _estimates_and_merges(
+            [tracks for tracks, _ in sticky[:200]], settings=settings
+        )
         known.append(merges[0].known_ns)
     assert known[0] > known[1] > known[2]
 
 
-def _doubled(pictures, bead, start, shift):
-    """One bead that is found a second time, beside itself, from some picture on."""
-    for k, (tracks, _) in enumerate(pictures):
+def _doubled(frames, bead, start, shift):
+    """Tracks in which one bead is detected twice from a frame on, `shift` apart."""
+    for k, (tracks, _) in enumerate(frames):
         if k < start:
             yield tracks
             continue
@@ -241,42 +284,42 @@ def _doubled(pictures, bead, start, shift):
                 'radius_errors', 'seen',
             )
         }  # fmt: skip
-        places = np.vstack([tracks.positions, tracks.positions[bead] + (shift, 0.0)])
+        positions = np.vstack([tracks.positions, tracks.positions[bead] + (shift, 0.0)])
         ids = np.append(tracks.ids, 99).astype(np.int32)
-        yield replace(tracks, ids=ids, positions=places, **columns)
+        yield replace(tracks, ids=ids, positions=positions, **columns)
 
 
-def test_a_bead_that_is_found_twice_is_no_body():
+def test_a_double_detection_is_no_body():
     free = list(_gas(0.0, 8.0))
     for shift in (0.5e-3, 1.0e-3, 1.5e-3):
-        _, merges = _counted(_doubled(free, 4, 60, shift))
+        _, merges = _estimates_and_merges(_doubled(free, 4, 60, shift))
         assert not merges
 
 
-def test_where_tracks_break_all_the_time_nothing_is_said(sticky):
-    pictures = [tracks for tracks, _ in sticky]
+def test_no_estimate_is_made_while_tracks_break_often(sticky):
+    frames = [tracks for tracks, _ in sticky]
     # Every track gets a new number every second.
     broken = [
         replace(tracks, ids=(tracks.ids + 100 * ((k + 2 * tracks.ids) // 30)).astype(np.int32))
-        for k, tracks in enumerate(pictures)
+        for k, tracks in enumerate(frames)
     ]
-    counts, merges = _counted(pictures)
+    counts, merges = _estimates_and_merges(frames)
     assert counts
     assert merges
-    counts, merges = _counted(broken)
+    counts, merges = _estimates_and_merges(broken)
     assert not merges
     assert not [count for count in counts if count.stamp_ns > NS]
 
 
-def test_a_bead_that_comes_back_over_its_cluster_is_in_it_once_others_stick(sticky):
-    pictures = [tracks for tracks, _ in sticky]
+def test_a_bead_that_reappears_at_its_cluster_is_part_of_it(sticky):
+    frames = [tracks for tracks, _ in sticky]
     truth = np.unique(sticky[-1][1], return_counts=True)[1]
-    counts, _ = _counted(pictures)
+    counts, _ = _estimates_and_merges(frames)
     assert counts[-1].bodies == truth.size
     # From 6 s on every bead has another number, as if all had been hidden for a moment.
     renamed = [
         replace(tracks, ids=(tracks.ids + 100 * (k > 180)).astype(np.int32))
-        for k, tracks in enumerate(pictures)
+        for k, tracks in enumerate(frames)
     ]
-    counts, _ = _counted(renamed)
+    counts, _ = _estimates_and_merges(renamed)
     assert counts[-1].bodies == pytest.approx(truth.size, abs=1.0)

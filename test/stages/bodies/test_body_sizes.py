@@ -1,3 +1,5 @@
+"""Bodies from bonds, and the size statistics of an estimate."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -6,30 +8,30 @@ import pytest
 from nanorocks_ros.stages.bodies.body_sizes import bodies_of, size_fields
 
 
-def test_beads_that_stick_to_a_third_are_one_body_even_when_it_is_not_listed():
+def test_beads_bonded_to_an_unlisted_bead_are_one_body():
     assert bodies_of([1, 2, 3, 4], [(2, 9), (3, 9)]) == {1: 1, 2: 2, 3: 2, 4: 4}
 
 
 def test_sizes_are_means_over_bodies_and_over_beads():
-    found = size_fields(np.array([1, 1, 1, 2, 3, 7]), 15, [])
-    assert found['bodies'] == 6.0
-    assert found['mean_size'] == pytest.approx(2.5)
-    assert found['weighted_size'] == pytest.approx((3 + 4 + 9 + 49) / 15)
-    assert found['clustered_share'] == pytest.approx(12 / 15)
-    assert found['clusters'] == 3.0
-    assert found['sizes'].tolist() == [3.0, 1.0, 1.0, 0.0, 1.0]
-    assert found['bodies_error'] == 0.0
+    fields = size_fields(np.array([1, 1, 1, 2, 3, 7]), 15, [])
+    assert fields['bodies'] == 6.0
+    assert fields['mean_size'] == pytest.approx(2.5)
+    assert fields['weighted_size'] == pytest.approx((3 + 4 + 9 + 49) / 15)
+    assert fields['clustered_share'] == pytest.approx(12 / 15)
+    assert fields['clusters'] == 3.0
+    assert fields['sizes'].tolist() == [3.0, 1.0, 1.0, 0.0, 1.0]
+    assert fields['bodies_error'] == 0.0
 
 
-def test_a_merge_that_is_half_probable_makes_its_errors():
-    found = size_fields(np.array([1, 1, 3]), 5, [(1, 3, 0.5)])
+def test_a_merge_of_probability_one_half_sets_the_errors():
+    fields = size_fields(np.array([1, 1, 3]), 5, [(1, 3, 0.5)])
     # The mean shift and the scatter of one merge or none, in squares.
-    assert found['bodies_error'] == pytest.approx(np.sqrt(0.5**2 + 0.25))
-    assert found['weighted_size_error'] == pytest.approx(np.sqrt(0.5) * 2 * 3 / 5)
-    assert found['clustered_share_error'] == pytest.approx(np.sqrt(0.5) / 5)
+    assert fields['bodies_error'] == pytest.approx(np.sqrt(0.5**2 + 0.25))
+    assert fields['weighted_size_error'] == pytest.approx(np.sqrt(0.5) * 2 * 3 / 5)
+    assert fields['clustered_share_error'] == pytest.approx(np.sqrt(0.5) / 5)
 
 
-def test_beads_counted_twice_do_not_make_bodies_larger_than_there_are_beads():
-    found = size_fields(np.array([12]), 10, [])
-    assert found['weighted_size'] == pytest.approx(10.0)
-    assert found['bodies_error'] > 0.0
+def test_double_detections_do_not_make_bodies_larger_than_the_tray_has_beads():
+    fields = size_fields(np.array([12]), 10, [])
+    assert fields['weighted_size'] == pytest.approx(10.0)
+    assert fields['bodies_error'] > 0.0

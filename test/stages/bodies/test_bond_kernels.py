@@ -1,21 +1,21 @@
-"""Pairs of beads that are bodies: which come apart, and which only seem to."""
+"""Bonds between beads: which break, and which tracks only jump."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from nanorocks_ros.stages.bodies.bond_kernels import Beads
-from nanorocks_ros.stages.bodies.bonds import Bond, Pairs
+from nanorocks_ros.stages.bodies.bonds import Bond, BondFinder
+from nanorocks_ros.stages.bodies.touching_pairs import SeenBeads
 
 RADIUS, ERROR, STEP = 5e-4, 1e-5, 1.0 / 30.0
 
 
-def _beads(places):
-    n = len(places)
-    return Beads(
+def _beads(positions):
+    n = len(positions)
+    return SeenBeads(
         ids=np.arange(n, dtype=np.int64),
-        places=np.array(places),
+        positions=np.array(positions),
         errors=np.full(n, ERROR),
         radii=np.full(n, RADIUS),
         radius_errors=np.zeros(n),
@@ -24,39 +24,37 @@ def _beads(places):
     )
 
 
-def _pushed(pairs, motion, start, pictures):
-    """Bonds and what broke of beads that are at `motion(k)` in picture k."""
+def _pushed(finder, motion, start, frames):
+    """New and broken bonds of beads that are at `motion(k)` in frame k."""
     bonds, broken = [], []
-    for k in range(start, start + pictures):
-        new, gone = pairs.push(k * STEP, _beads(motion(k)), 1.0)
-        bonds += [one.ids for one in new]
-        broken += gone
+    for k in range(start, start + frames):
+        bonds_now, broken_now = finder.push(k * STEP, _beads(motion(k)), 1.0)
+        bonds += [bond.ids for bond in bonds_now]
+        broken += broken_now
     return bonds, broken
 
 
 @pytest.fixture
-def pairs():
-    # Whatever stays is a body.
-    return Pairs(lambda way, _: np.zeros_like(way))
+def finder():
+    # Every pair that keeps its separation is a bond.
+    return BondFinder(lambda path, _: np.zeros_like(path))
 
 
 @pytest.mark.parametrize(('speed', 'breaks'), [(0.0, False), (3e-3, True)])
-def test_a_track_that_jumps_within_its_cluster_stays_and_one_that_flies_off_does_not(
-    pairs, speed, breaks
-):
+def test_a_jump_within_a_cluster_keeps_a_bond_and_a_drift_breaks_it(finder, speed, breaks):
     def motion(k):
         jumped = 6e-4 if k >= 20 else 0.0
         return [(0.0, 0.0), (1e-3 + jumped + speed * STEP * max(k - 20, 0), 0.0)]
 
-    bonds, broken = _pushed(pairs, motion, 0, 60)
+    bonds, broken = _pushed(finder, motion, 0, 60)
     assert bonds[0] == (0, 1)
     assert broken == ([(0, 1)] if breaks else [])
 
 
-def test_a_pair_that_is_taken_in_is_followed_until_it_comes_apart(pairs):
+def test_an_added_bond_is_tracked_until_it_breaks(finder):
     far = [(0.0, 0.0), (1.8e-3, 0.0)]
-    pairs.push(0.0, _beads(far), 1.0)
-    pairs.adopt(0.0, _beads(far), [Bond((0, 1), 0.0, (1.8e-3, 0.0), 4e-5)])
-    assert _pushed(pairs, lambda _: far, 1, 30) == ([], [])
-    _, broken = _pushed(pairs, lambda k: [(0.0, 0.0), (1.8e-3 + 1e-4 * (k - 30), 0.0)], 31, 60)
+    finder.push(0.0, _beads(far), 1.0)
+    finder.add_bonds(0.0, _beads(far), [Bond((0, 1), 0.0, (1.8e-3, 0.0), 4e-5)])
+    assert _pushed(finder, lambda _: far, 1, 30) == ([], [])
+    _, broken = _pushed(finder, lambda k: [(0.0, 0.0), (1.8e-3 + 1e-4 * (k - 30), 0.0)], 31, 60)
     assert broken == [(0, 1)]

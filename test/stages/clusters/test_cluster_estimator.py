@@ -62,13 +62,13 @@ def test_estimates_come_two_seconds_later_with_what_tracks_say_of_the_instant():
             if isinstance(item, ClusterEstimate):
                 seen += 1
                 assert record.stamp_ns - item.stamp_ns >= 2 * NS
-                assert item.bodies == true[item.stamp_ns]
+                assert item.bodies.value == true[item.stamp_ns]
                 assert math.isnan(item.onset) == (item.stamp_ns < first * NS)
     assert seen > 40
     (*_, last) = stage.flush()
     assert last.onset == pytest.approx(first)
     assert last.sticking_status is StickingStatus.MEASURED
-    assert last.sticking_speed_lower < last.sticking_speed < last.sticking_speed_upper
+    assert last.sticking_speed.lower < last.sticking_speed.value < last.sticking_speed.upper
 
 
 def test_they_do_not_depend_on_the_order_in_which_records_come_in():
@@ -82,7 +82,7 @@ def test_without_tracks_the_autocorrelation_speaks_alone():
     results = estimates(images(5.0))
     assert len(results) > 20
     for record in results:
-        assert math.isnan(record.bodies)
+        assert math.isnan(record.bodies.value)
         assert math.isnan(record.onset)
         assert record.sticking_status is StickingStatus.UNKNOWN
         assert record.level_area > 0.0
@@ -95,11 +95,11 @@ def test_sizes_by_both_are_weighted_by_their_errors():
         for image in images(5.0)
     ]
     for estimate in estimates(as_they_come([*images(5.0), *by_tracks], {})):
-        known = math.isfinite(estimate.cluster_size)
-        weights = np.array([4.0, 1.0 / estimate.cluster_size_error**2 if known else 0.0])
-        sizes = np.array([3.0, estimate.cluster_size if known else 0.0])
-        assert estimate.combined_size == pytest.approx(weights @ sizes / weights.sum())
-        assert estimate.combined_size_error == pytest.approx(weights.sum() ** -0.5)
+        known = math.isfinite(estimate.cluster_size.value)
+        weights = np.array([4.0, 1.0 / estimate.cluster_size.error**2 if known else 0.0])
+        sizes = np.array([3.0, estimate.cluster_size.value if known else 0.0])
+        assert estimate.combined_size.value == pytest.approx(weights @ sizes / weights.sum())
+        assert estimate.combined_size.error == pytest.approx(weights.sum() ** -0.5)
 
 
 def test_the_image_is_sent_at_once_while_somebody_looks():
@@ -125,7 +125,7 @@ def test_time_that_goes_back_gives_out_what_was_held():
 
 def test_where_the_scale_is_wrong_nothing_is_said_of_clusters_and_sticking():
     records = as_they_come([*cooling(until=12.0), *images(12.0)], {})
-    assert math.isfinite(estimates(records)[-1].sticking_speed)
+    assert math.isfinite(estimates(records)[-1].sticking_speed.value)
     wrong = [
         replace(record, quality=Quality.WRONG_SCALE)
         if isinstance(record, TrayImage | SpeedEstimate)
@@ -135,12 +135,12 @@ def test_where_the_scale_is_wrong_nothing_is_said_of_clusters_and_sticking():
     results = estimates(wrong)
     assert len(results) > 40
     for item in results:
-        assert math.isnan(item.cluster_size)
-        assert math.isnan(item.combined_size)
-        assert math.isnan(item.bodies)
+        assert math.isnan(item.cluster_size.value)
+        assert math.isnan(item.combined_size.value)
+        assert math.isnan(item.bodies.value)
         assert math.isnan(item.onset)
         assert item.sticking_status is StickingStatus.UNKNOWN
-        assert math.isnan(item.sticking_speed)
+        assert math.isnan(item.sticking_speed.value)
 
 
 def test_a_cycle_with_a_wrong_scale_tells_no_sticking_speed_even_once_it_is_right_again():

@@ -81,7 +81,7 @@ def test_a_flat_image_says_that_there_is_nothing(gray):
     (estimate,) = pushed(ClusterAutocorrelator(PipelineSettings(), load_trays()[1]), gray)
     assert estimate.size_status is SizeStatus.NOTHING
     assert estimate.level_area == 0.0
-    assert math.isnan(estimate.cluster_size)
+    assert math.isnan(estimate.cluster_size.value)
     assert math.isnan(estimate.breadth)
 
 
@@ -96,7 +96,7 @@ def test_of_a_few_beads_of_fifteen_the_size_is_unknown_rather_than_wrong(count):
     gray = bead_image(count)
     (estimate,) = pushed(ClusterAutocorrelator(PipelineSettings(), load_trays()[1]), gray)
     assert estimate.size_status is SizeStatus.NOTHING
-    assert math.isnan(estimate.cluster_size)
+    assert math.isnan(estimate.cluster_size.value)
     assert estimate.axes_ratio == pytest.approx(1.0, abs=0.05)
 
 
@@ -117,9 +117,9 @@ def test_beads_pushed_together_are_a_larger_cluster_than_the_same_beads_apart():
     for gray in (apart, together):
         (estimate,) = pushed(ClusterAutocorrelator(PipelineSettings(), load_trays()[1]), gray)
         sizes.append(
-            estimate.cluster_size
-            if math.isfinite(estimate.cluster_size)
-            else estimate.cluster_size_lower
+            estimate.cluster_size.value
+            if math.isfinite(estimate.cluster_size.value)
+            else estimate.cluster_size.lower
         )
     assert sizes[0] < 1.5
     assert sizes[1] > 3.0
@@ -134,7 +134,7 @@ def test_a_tray_without_calibration_says_once_which_command_makes_it():
     stage = ClusterAutocorrelator(PipelineSettings(), strange_tray())
     estimate, notice = pushed(stage, bead_image(7))
     assert estimate.size_status is SizeStatus.UNCALIBRATED
-    assert math.isnan(estimate.cluster_size)
+    assert math.isnan(estimate.cluster_size.value)
     assert estimate.level_area > 0.0
     assert 'nanorocks cluster-curve --tray 1 -o curve.npz' in notice.text
     (again,) = pushed(stage, bead_image(7), NS)

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from hexagonal_discs import hexagonal_patch
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.physics.filling_factor import HEXAGONAL_LAYER, hexagonal_patch
+from nanorocks_ros.physics.filling_factor import HEXAGONAL_LAYER
 from nanorocks_ros.stages.clusters.packing_density import bodies_of_pairs, packing_of_clusters
 
 R, HEIGHT = 0.001, 0.003

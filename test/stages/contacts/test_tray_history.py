@@ -1,4 +1,4 @@
-"""How a tray moves, from its displacements in the pictures."""
+"""Velocity of a tray from its displacements in the frames."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from bead_paths import PIXEL, RATE, tracks_of
 
-from nanorocks_ros.stages.contacts.tray_history import Surroundings
+from nanorocks_ros.stages.contacts.tray_history import TrayHistory
 
 TIMES = np.arange(120) / RATE
 
 
-def _pushed(displacements):
-    around = Surroundings(144)
+def _history_of(displacements):
+    history = TrayHistory(144)
     beads = np.full((TIMES.size, 1, 2), 5e-3)
     for time, tracks in zip(TIMES, tracks_of(beads, displacements=displacements), strict=True):
-        around.push(time, tracks)
-    return around
+        history.push(time, tracks)
+    return history
 
 
 def _jitter(seed):
@@ -27,33 +27,33 @@ def _jitter(seed):
 
 def test_the_velocity_of_a_swinging_tray_is_known_within_its_error():
     omega = 2.0 * math.pi * 1.5
-    swing = 1e-4 * np.exp(-0.16 * TIMES) * np.sin(omega * TIMES)
-    around = _pushed(np.outer(swing, (0.8, 0.6)) + _jitter(1))
+    oscillation = 1e-4 * np.exp(-0.16 * TIMES) * np.sin(omega * TIMES)
+    history = _history_of(np.outer(oscillation, (0.8, 0.6)) + _jitter(1))
     for time in np.linspace(1.7, 2.3, 13):
         slope = omega * np.cos(omega * time) - 0.16 * np.sin(omega * time)
         true = 1e-4 * math.exp(-0.16 * time) * slope * np.array((0.8, 0.6))
-        velocity, error = around.motion(time)
+        velocity, error = history.velocity(time)
         assert np.abs(velocity - true).max() < 2.0 * error
         assert error < 0.15 * 1e-4 * omega
 
 
-def test_a_tray_at_rest_moves_no_faster_than_the_jitter_lets_it_seem():
-    speeds = [_pushed(_jitter(seed)).motion(2.0) for seed in range(20)]
+def test_the_velocity_of_a_tray_at_rest_is_within_the_noise():
+    speeds = [_history_of(_jitter(seed)).velocity(2.0) for seed in range(20)]
     scatter = np.std([velocity for velocity, _ in speeds])
     errors = [error for _, error in speeds]
     assert scatter < np.mean(errors)
     assert np.mean(errors) < 0.05 * PIXEL * RATE
 
 
-def test_a_tray_that_nobody_registered_is_at_rest():
-    velocity, error = _pushed(np.zeros((TIMES.size, 2))).motion(2.0)
+def test_a_tray_without_registration_is_at_rest():
+    velocity, error = _history_of(np.zeros((TIMES.size, 2))).velocity(2.0)
     assert velocity == pytest.approx([0.0, 0.0])
     assert error == 0.0
 
 
-def test_a_jerk_is_followed_too():
+def test_a_jerk_is_fitted_by_a_cubic():
     jerk = np.where(TIMES > 2.0, 3e-3 * (TIMES - 2.0), 0.0)
     jerk = jerk + np.where(TIMES > 2.6, 9e-3 * (TIMES - 2.6), 0.0)
-    velocity, error = _pushed(np.outer(jerk, (1.0, 0.0)) + _jitter(1)).motion(2.3)
+    velocity, error = _history_of(np.outer(jerk, (1.0, 0.0)) + _jitter(1)).velocity(2.3)
     assert velocity[0] == pytest.approx(3e-3, abs=4.0 * error)
     assert error < 1e-3

@@ -215,7 +215,7 @@ def test_the_scale_of_a_film_from_close_by_is_found(noise):
     (text,) = [message for message in texts if 'looks wrong' in message]
     assert float(text.split(' px/m')[0].split()[-1]) == pytest.approx(38700.0, rel=0.01)
     assert images[-1].quality & Quality.WRONG_SCALE
-    values = {'preprocess.check_map': False}
+    values = {'preprocess.check_tray_positions': False}
     chosen = with_values(PipelineSettings(), values, 'test')
     images, texts = pushed(Preprocessor(chosen, trays_of(chosen), 'cam', None), shots)
     assert not [message for message in texts if 'looks wrong' in message]

@@ -15,6 +15,7 @@ from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
 from nanorocks_ros.records import (
     CorRelation,
     CorStatus,
+    Measured,
     Merge,
     Quality,
     Rebound,
@@ -39,8 +40,7 @@ def speed(time, value, cycle=1, start=0.0):
         tray=1,
         cycle=cycle,
         cycle_start_ns=round(start * NS) if cycle else None,
-        mean_projected_speed=value,
-        mean_projected_speed_error=0.02 * abs(value) + 1e-6,
+        mean_projected_speed=Measured(value, 0.02 * abs(value) + 1e-6),
         window=0.1,
         method=SpeedMethod.STRUCTURE_FUNCTION,
     )
@@ -94,18 +94,18 @@ def test_a_decay_is_read_by_the_closed_form_of_the_paper_when_that_is_asked_for(
     expected = paper_restitution_of_decay(1 / (6e-3 * 5.0), TRAY.diameter, TRAY.number_density)
     assert final.status is CorStatus.FINAL
     assert final.relation is CorRelation.PAPER
-    assert final.restitution_lower < expected < final.restitution_upper
-    assert final.paper_restitution == final.restitution
-    assert final.initial_speed == pytest.approx(6e-3, rel=0.02)
-    assert final.haff_time == pytest.approx(5.0, rel=0.04)
+    assert final.restitution.lower < expected < final.restitution.upper
+    assert final.paper_restitution == final.restitution.value
+    assert final.initial_speed.value == pytest.approx(6e-3, rel=0.02)
+    assert final.haff_time.value == pytest.approx(5.0, rel=0.04)
 
 
 def test_both_restitutions_of_a_simulated_gas_lie_in_their_intervals():
     *_, final = all_estimates(fitter(), simulated_cycle())
     assert final.status is CorStatus.FINAL
     assert final.relation is CorRelation.LIBRARY
-    assert final.restitution_lower < 0.89 < final.restitution_upper
-    assert final.wall_restitution_lower < 0.97 < final.wall_restitution_upper
+    assert final.restitution.lower < 0.89 < final.restitution.upper
+    assert final.wall_restitution.lower < 0.97 < final.wall_restitution.upper
     assert final.correlation < -0.5
     assert final.paper_restitution > 0.95
     assert 0.3 < final.reduced_chi_square < 2.5
@@ -121,7 +121,7 @@ def test_the_window_begins_when_the_tray_has_come_to_rest():
     ]
     *_, final = all_estimates(fitter(), speeds)
     by_hand = next(
-        record for record in speeds if record.tray_speed < 0.05 * record.mean_projected_speed
+        record for record in speeds if record.tray_speed < 0.05 * record.mean_projected_speed.value
     )
     assert final.window_start == pytest.approx(by_hand.stamp_ns / NS)
     assert final.window_start > 8.0
@@ -136,8 +136,8 @@ def test_next_to_elastic_beads_have_a_restitution_though_no_haff_time():
     speeds = [speed(t, 6e-3 * (1.0 - 1e-4 * t)) for t in np.arange(0.1, 25.0, 0.1)]
     *_, final = all_estimates(fitter(), speeds)
     assert final.status is CorStatus.FINAL
-    assert final.restitution_lower > 0.9
-    assert final.haff_time > 1000.0
+    assert final.restitution.lower > 0.9
+    assert final.haff_time.value > 1000.0
 
 
 def test_a_window_from_the_shake_to_the_next_day_is_no_trouble():
@@ -147,7 +147,7 @@ def test_a_window_from_the_shake_to_the_next_day_is_no_trouble():
     all_estimates(stage, speeds)
     (final,) = stage.flush()
     assert final.status is CorStatus.FINAL
-    assert 0.0 < final.restitution_lower < final.restitution < final.restitution_upper <= 1.0
+    assert 0.0 < final.restitution.lower < final.restitution.value < final.restitution.upper <= 1.0
 
 
 def test_a_tray_that_swings_to_the_end_gives_no_estimate():
@@ -160,18 +160,22 @@ def test_a_tray_that_swings_to_the_end_gives_no_estimate():
 
 
 def test_walls_that_are_known_leave_the_beads_to_be_found():
-    known = {'prior.wall_low': 0.97, 'prior.wall_high': 0.97, 'prior.floor_lid_spread': 0.0}
+    known = {
+        'prior.min_wall_restitution': 0.97,
+        'prior.max_wall_restitution': 0.97,
+        'prior.floor_lid_spread': 0.0,
+    }
     *_, final = all_estimates(fitter(**known), simulated_cycle())
     *_, free = all_estimates(fitter(), simulated_cycle())
-    assert final.wall_restitution == pytest.approx(0.97)
-    assert abs(final.restitution - 0.89) < 0.06
-    width = final.restitution_upper - final.restitution_lower
-    assert width < 0.7 * (free.restitution_upper - free.restitution_lower)
+    assert final.wall_restitution.value == pytest.approx(0.97)
+    assert abs(final.restitution.value - 0.89) < 0.06
+    width = final.restitution.upper - final.restitution.lower
+    assert width < 0.7 * (free.restitution.upper - free.restitution.lower)
 
 
 def test_the_interval_tightens_as_the_gas_cools():
     estimates = all_estimates(fitter(), simulated_cycle())
-    widths = [record.restitution_upper - record.restitution_lower for record in estimates]
+    widths = [record.restitution.upper - record.restitution.lower for record in estimates]
     assert len(estimates) > 20
     assert [record.status for record in estimates].count(CorStatus.FINAL) == 1
     assert widths[-1] < 0.7 * widths[0]
@@ -179,14 +183,19 @@ def test_the_interval_tightens_as_the_gas_cools():
 
 def test_a_decay_that_tells_too_little_says_so():
     vague = [
-        replace(record, mean_projected_speed_error=0.5 * record.mean_projected_speed)
+        replace(
+            record,
+            mean_projected_speed=Measured(
+                record.mean_projected_speed.value, 0.5 * record.mean_projected_speed.value
+            ),
+        )
         for record in simulated_cycle()
     ]
     first, *_ = all_estimates(fitter(), vague)
     assert first.status is CorStatus.UNDETERMINED
-    assert (first.restitution_lower, first.restitution_upper) == (0.0, 1.0)
-    assert math.isnan(first.restitution)
-    assert first.initial_speed > 0.0
+    assert (first.restitution.lower, first.restitution.upper) == (0.0, 1.0)
+    assert math.isnan(first.restitution.value)
+    assert first.initial_speed.value > 0.0
 
 
 def test_what_was_wrong_with_the_pictures_goes_with_the_estimate():
@@ -202,7 +211,7 @@ def test_of_trays_that_are_not_where_the_settings_say_nothing_is_told():
     estimates = all_estimates(stage, wrong)
     assert {record.status for record in estimates} == {CorStatus.UNDETERMINED}
     assert all(
-        (record.restitution_lower, record.restitution_upper) == (0.0, 1.0) for record in estimates
+        (record.restitution.lower, record.restitution.upper) == (0.0, 1.0) for record in estimates
     )
     assert estimates[-1].quality is Quality.WRONG_SCALE
     assert stage.evidence is None
@@ -236,13 +245,13 @@ def test_the_mean_of_the_paper_is_over_the_final_estimates():
             for estimate in all_estimates(stage, speeds)
             if estimate.status is CorStatus.FINAL
         ]
-    values = [record.restitution for record in finals]
-    assert finals[-1].mean_restitution == pytest.approx(np.mean(values))
-    assert finals[-1].mean_restitution_error == pytest.approx(np.std(values, ddof=1) / 3**0.5)
+    values = [record.restitution.value for record in finals]
+    assert finals[-1].mean_restitution.value == pytest.approx(np.mean(values))
+    assert finals[-1].mean_restitution.error == pytest.approx(np.std(values, ddof=1) / 3**0.5)
 
 
 def test_many_cycles_together_say_more():
-    stage = fitter(**{'prior.wall_low': 0.97, 'prior.wall_high': 0.97})
+    stage = fitter(**{'prior.min_wall_restitution': 0.97, 'prior.max_wall_restitution': 0.97})
     finals = []
     for cycle in range(1, 7):
         speeds = simulated_cycle(cycle, start=60.0 * (cycle - 1))
@@ -251,9 +260,9 @@ def test_many_cycles_together_say_more():
             for estimate in all_estimates(stage, speeds)
             if estimate.status is CorStatus.FINAL
         ]
-    assert finals[-1].mean_restitution_error < 0.8 * finals[0].mean_restitution_error
-    off = finals[-1].mean_restitution - 0.89
-    assert abs(off) < 3.0 * finals[-1].mean_restitution_error
+    assert finals[-1].mean_restitution.error < 0.8 * finals[0].mean_restitution.error
+    off = finals[-1].mean_restitution.value - 0.89
+    assert abs(off) < 3.0 * finals[-1].mean_restitution.error
 
 
 def test_another_tray_than_that_of_the_library_is_refused_at_once():
@@ -271,8 +280,8 @@ def test_speeds_that_rise_are_no_decay_and_the_interval_says_so():
     speeds = [speed(t, 1e-3 * (1 + t)) for t in np.arange(0.1, 25.0, 0.1)]
     *_, final = all_estimates(fitter(), speeds)
     assert final.status is CorStatus.NO_DECAY
-    assert (final.restitution_lower, final.restitution_upper) == (0.0, 1.0)
-    assert math.isnan(final.restitution)
+    assert (final.restitution.lower, final.restitution.upper) == (0.0, 1.0)
+    assert math.isnan(final.restitution.value)
 
 
 def test_too_few_speeds_give_no_estimate():
@@ -286,7 +295,7 @@ def test_unknown_speeds_are_left_out():
     broken = [*speeds[:50], speed(5.05, math.nan), speed(5.06, 0.0), *speeds[50:]]
     *_, clean = all_estimates(fitter(), speeds)
     *_, other = all_estimates(fitter(), broken)
-    assert other.restitution == clean.restitution
+    assert other.restitution.value == clean.restitution.value
 
 
 def test_time_that_goes_back_starts_all_afresh():
@@ -299,17 +308,20 @@ def test_time_that_goes_back_starts_all_afresh():
 def test_the_asked_probability_widens_the_interval():
     *_, narrow = all_estimates(fitter(**{'cooling.probability': 0.68}), cooling_cycle())
     *_, wide = all_estimates(fitter(**{'cooling.probability': 0.95}), cooling_cycle())
-    assert narrow.restitution == pytest.approx(wide.restitution)
-    assert narrow.restitution_lower > wide.restitution_lower
+    assert narrow.restitution.value == pytest.approx(wide.restitution.value)
+    assert narrow.restitution.lower > wide.restitution.lower
 
 
 def test_walls_the_wrong_way_round_are_refused_at_once():
-    with pytest.raises(ConfigurationError, match=r'prior.wall_low, prior.wall_high: 0.95 to 0.9'):
-        fitter(**{'prior.wall_low': 0.95, 'prior.wall_high': 0.9})
+    with pytest.raises(
+        ConfigurationError,
+        match=r'prior.min_wall_restitution, prior.max_wall_restitution: 0.95 to 0.9',
+    ):
+        fitter(**{'prior.min_wall_restitution': 0.95, 'prior.max_wall_restitution': 0.9})
 
 
 def half_width(estimate):
-    return 0.5 * (estimate.restitution_upper - estimate.restitution_lower)
+    return 0.5 * (estimate.restitution.upper - estimate.restitution.lower)
 
 
 def test_rebounds_fix_the_walls_and_through_the_valley_the_beads():
@@ -318,9 +330,9 @@ def test_rebounds_fix_the_walls_and_through_the_valley_the_beads():
     *_, without = all_estimates(fitter(), speeds)
     *_, final = all_estimates(fitter(), by_stamp([*speeds, *seen]))
     assert (without.rebounds, final.rebounds) == (0, 80)
-    assert final.wall_restitution_lower < 0.97 < final.wall_restitution_upper
-    assert final.wall_restitution_upper - final.wall_restitution_lower < 0.03
-    assert final.restitution_lower < 0.89 < final.restitution_upper
+    assert final.wall_restitution.lower < 0.97 < final.wall_restitution.upper
+    assert final.wall_restitution.upper - final.wall_restitution.lower < 0.03
+    assert final.restitution.lower < 0.89 < final.restitution.upper
     assert half_width(final) < 0.7 * half_width(without)
     assert final.tension < 2.5
     assert not final.quality & Quality.INCONSISTENT
@@ -399,10 +411,10 @@ def test_contacts_of_all_cycles_count_in_the_mean():
         finals += [record for record in estimates if record.status is CorStatus.FINAL]
     assert [estimate.rebounds for estimate in finals] == [30] * 4
     first, last = finals[0], finals[-1]
-    assert last.mean_wall_restitution == pytest.approx(
-        0.97, abs=3.0 * last.mean_wall_restitution_error
+    assert last.mean_wall_restitution.value == pytest.approx(
+        0.97, abs=3.0 * last.mean_wall_restitution.error
     )
-    ratio = first.mean_wall_restitution_error / last.mean_wall_restitution_error
+    ratio = first.mean_wall_restitution.error / last.mean_wall_restitution.error
     assert ratio == pytest.approx(2.0, abs=0.6)
 
 
@@ -439,8 +451,8 @@ def test_a_gas_whose_beads_stick_at_once_tells_nothing():
     for time in (0.5, 2.0):
         (only,) = all_estimates(fitter(), as_known([*simulated_cycle(), merge(time, known=0.4)]))
         assert only.status is CorStatus.UNDETERMINED
-        assert (only.restitution_lower, only.restitution_upper) == (0.0, 1.0)
-        assert math.isnan(only.restitution)
+        assert (only.restitution.lower, only.restitution.upper) == (0.0, 1.0)
+        assert math.isnan(only.restitution.value)
         assert only.cycle == 1
 
 
@@ -466,9 +478,9 @@ def test_speeds_of_grains_by_their_pictures_alone_say_nothing():
         *_, estimates[method] = [*all_estimates(stage, speeds), *stage.flush()]
     grains, beads = estimates.values()
     assert grains.status is CorStatus.UNDETERMINED
-    assert (grains.restitution_lower, grains.restitution_upper) == (0.0, 1.0)
-    assert math.isnan(grains.restitution)
-    assert math.isnan(grains.mean_restitution)
-    assert math.isfinite(grains.haff_time)
+    assert (grains.restitution.lower, grains.restitution.upper) == (0.0, 1.0)
+    assert math.isnan(grains.restitution.value)
+    assert math.isnan(grains.mean_restitution.value)
+    assert math.isfinite(grains.haff_time.value)
     assert beads.status is CorStatus.FINAL
-    assert beads.restitution_lower < 0.89 < beads.restitution_upper
+    assert beads.restitution.lower < 0.89 < beads.restitution.upper

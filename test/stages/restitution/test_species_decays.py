@@ -10,7 +10,13 @@ import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.physics.haff_law import haff_speed
-from nanorocks_ros.records import CorStatus, SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import (
+    UNKNOWN_MEASURED,
+    CorStatus,
+    Measured,
+    SpeedEstimate,
+    SpeedMethod,
+)
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
 from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
@@ -21,12 +27,6 @@ TRAY = load_trays()[5]
 TIMES = np.arange(0.2, 22.0, 0.2)
 # Initial speed and Haff time of each species.
 LAWS = ((9e-3, 2.5), (4e-3, 2.6))
-NAMES = [
-    f'{name}_species_{value}{error}'
-    for name in ('first', 'second')
-    for value in ('initial_speed', 'haff_time')
-    for error in ('', '_error')
-]
 
 
 def estimate(time, first, second, noise=0.02):
@@ -35,11 +35,10 @@ def estimate(time, first, second, noise=0.02):
         tray=TRAY.number,
         cycle=1,
         cycle_start_ns=0,
-        mean_projected_speed=0.5 * (first + second),
-        mean_projected_speed_error=noise * 0.5 * (first + second),
+        mean_projected_speed=Measured(0.5 * (first + second), noise * 0.5 * (first + second)),
         window=0.1,
         method=SpeedMethod.TRACKING,
-        **SpeedEstimate.by_species(((first, noise * first), (second, noise * second))),
+        species_speeds=(Measured(first, noise * first), Measured(second, noise * second)),
     )
 
 
@@ -63,38 +62,41 @@ def final_of(speeds, tray=TRAY, **values):
 
 def test_each_species_gets_its_own_law_in_the_final_estimate():
     final, _ = final_of(lawful())
-    for name, (speed, time) in zip(('first', 'second'), LAWS, strict=True):
-        for value, truth in (('initial_speed', speed), ('haff_time', time)):
-            measured = getattr(final, f'{name}_species_{value}')
-            error = getattr(final, f'{name}_species_{value}_error')
-            assert 0.0 < error < 0.2 * truth
-            assert abs(measured - truth) < 3.0 * error
+    decays = zip(final.species_initial_speeds, final.species_haff_times, strict=True)
+    for fitted, law in zip(decays, LAWS, strict=True):
+        for measured, truth in zip(fitted, law, strict=True):
+            assert 0.0 < measured.error < 0.2 * truth
+            assert abs(measured.value - truth) < 3.0 * measured.error
 
 
 def test_live_estimates_do_not_take_the_time_for_it():
     _, live = final_of(lawful())
     assert live
-    assert all(math.isnan(getattr(record, name)) for record in live for name in NAMES)
+    assert {record.species_initial_speeds for record in live} == {()}
+    assert {record.species_haff_times for record in live} == {()}
 
 
 def test_a_species_that_is_not_known_leaves_the_other_alone():
     speeds = lawful()
-    blind = [replace(speed, second_species_speed=math.nan) for speed in speeds]
+    blind = [replace(speed, species_speeds=speed.species_speeds[:1]) for speed in speeds]
     whole, part = final_of(speeds)[0], final_of(blind)[0]
-    assert part.first_species_haff_time == whole.first_species_haff_time
-    assert math.isnan(part.second_species_haff_time)
-    assert math.isnan(part.second_species_initial_speed_error)
+    assert part.species_haff_times[0] == whole.species_haff_times[0]
+    assert part.species_haff_times[1] == UNKNOWN_MEASURED
+    assert part.species_initial_speeds[1] == UNKNOWN_MEASURED
     assert part.restitution == whole.restitution
 
 
 def test_a_few_speeds_of_a_species_are_no_decay():
     speeds = lawful()
     few = [
-        replace(speed, first_species_speed=math.nan) if k > 13 else speed
+        replace(speed, species_speeds=(UNKNOWN_MEASURED, speed.species_speeds[1]))
+        if k > 13
+        else speed
         for k, speed in enumerate(speeds)
     ]
-    assert math.isnan(final_of(few)[0].first_species_haff_time)
-    assert final_of(few, **{'cooling.fewest_samples': 4})[0].first_species_haff_time > 0.0
+    assert final_of(few)[0].species_haff_times[0] == UNKNOWN_MEASURED
+    final, _ = final_of(few, **{'cooling.min_samples': 4})
+    assert final.species_haff_times[0].value > 0.0
 
 
 def test_a_species_that_speeds_up_has_no_law():
@@ -102,12 +104,14 @@ def test_a_species_that_speeds_up_has_no_law():
     rising = [
         estimate(instant, 1e-3 * (1.0 + 0.1 * instant), 4e-3 / (1.0 + instant)) for instant in time
     ]
-    fields = species_decays(TRAY, time, rising, 8)
-    assert sorted(fields) == sorted(name for name in NAMES if name.startswith('second'))
+    initial_speeds, haff_times = species_decays(TRAY, time, rising, 8)
+    assert (initial_speeds[0], haff_times[0]) == (UNKNOWN_MEASURED, UNKNOWN_MEASURED)
+    assert initial_speeds[1].known
+    assert haff_times[1].known
 
 
 def test_a_tray_of_one_species_has_none():
-    assert species_decays(load_trays()[1], TIMES, lawful(), 8) == {}
+    assert species_decays(load_trays()[1], TIMES, lawful(), 8) == ((), ())
 
 
 @pytest.mark.parametrize('number', [3, 5])
@@ -129,11 +133,8 @@ def test_species_of_a_simulated_mixture_share_the_haff_time_but_not_the_speed(nu
     rows = [
         estimate(*speed, noise=0.01) for speed in zip(times[late], *speeds[:, late], strict=True)
     ]
-    fields = species_decays(tray, times[late], rows, 8)
-    ratio = fields['first_species_haff_time'] / fields['second_species_haff_time']
+    initial_speeds, haff_times = species_decays(tray, times[late], rows, 8)
+    ratio = haff_times[0].value / haff_times[1].value
     assert abs(math.log(ratio)) < 0.2
     light = 0 if number == 5 else 1
-    fast, slow = (
-        fields[f'{("first", "second")[k]}_species_initial_speed'] for k in (light, 1 - light)
-    )
-    assert fast > 1.5 * slow
+    assert initial_speeds[light].value > 1.5 * initial_speeds[1 - light].value

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.records import Quality, SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import Measured, Quality, SpeedEstimate, SpeedMethod
 from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.stages.speed.speed_selector import SpeedSelector
 from nanorocks_ros.stages.speed.track_reliability import TrackReliability
@@ -22,8 +22,7 @@ def speed(time, method, value=1e-3, error=1e-5):
         tray=1,
         cycle=1,
         cycle_start_ns=0,
-        mean_projected_speed=value,
-        mean_projected_speed_error=error,
+        mean_projected_speed=Measured(value, error),
         window=0.1,
         method=method,
     )

@@ -7,7 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from nanorocks_ros.records import SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.records import (
+    Measured,
+    SpeedEstimate,
+    SpeedMethod,
+    TrayImage,
+)
 from nanorocks_ros.stages.speed.tray_oscillation import TrayOscillation
 
 NS = 1_000_000_000
@@ -26,8 +31,7 @@ def estimate(time):
         tray=1,
         cycle=1,
         cycle_start_ns=0,
-        mean_projected_speed=1e-3,
-        mean_projected_speed_error=1e-4,
+        mean_projected_speed=Measured(1e-3, 1e-4),
         window=0.1,
         method=SpeedMethod.TRACKING,
     )

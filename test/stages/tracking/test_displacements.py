@@ -1,4 +1,4 @@
-"""Distances between three pictures against the same made bead by bead."""
+"""Displacements between three frames against a calculation bead by bead."""
 
 from __future__ import annotations
 
@@ -8,11 +8,16 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.records import Tracks
-from nanorocks_ros.stages.tracking.displacements import ALL, distances_of, jitter_of, joined
+from nanorocks_ros.stages.tracking.displacements import (
+    ALL_SPECIES,
+    displacements_between,
+    join_tracks,
+    position_noise,
+)
 
 
-def _picture(rng, number):
-    """Some of thirty beads in any places, some hidden, one placed badly."""
+def _frame(rng, number):
+    """Some of 30 beads at random positions; some are hidden, one has a large position error."""
     ids = np.sort(rng.choice(30, rng.integers(18, 26), replace=False)).astype(np.int32)
     n = ids.size
     errors = rng.uniform(1e-6, 2e-6, n)
@@ -35,8 +40,8 @@ def _picture(rng, number):
 
 
 def _usable(tracks, species):
-    """Place past the camera and variance of each bead that is used, by its number."""
-    own = tracks.seen & ((tracks.species == species) | (species == ALL))
+    """Position in the camera frame and variance of each usable bead, by its number."""
+    own = tracks.seen & ((tracks.species == species) | (species == ALL_SPECIES))
     own &= tracks.position_errors <= 5.0 * np.median(tracks.position_errors[own])
     return {
         int(number): (tracks.positions[k] + tracks.displacement, tracks.position_errors[k] ** 2)
@@ -45,17 +50,17 @@ def _usable(tracks, species):
     }
 
 
-@pytest.mark.parametrize('species', [ALL, 0, 1])
-def test_distances_are_those_of_the_beads_seen_in_all_three_pictures(species):
+@pytest.mark.parametrize('species', [ALL_SPECIES, 0, 1])
+def test_displacements_are_of_the_beads_visible_in_all_three_frames(species):
     rng = np.random.default_rng(8)
     for _ in range(20):
-        tracks = [_picture(rng, number) for number in range(3)]
-        earlier, middle, later = (_usable(one, species) for one in tracks)
+        tracks = [_frame(rng, number) for number in range(3)]
+        earlier, middle, later = (_usable(record, species) for record in tracks)
         common = sorted(earlier.keys() & middle.keys() & later.keys())
-        found, square, variance, place_variance = distances_of(
-            joined(tracks), (2, 1, 0), species, 3e-12
+        distances, square, variance, position_variance = displacements_between(
+            join_tracks(tracks), (2, 1, 0), species, 3e-12
         )
-        assert found.shape == (3, len(common))
+        assert distances.shape == (3, len(common))
         if not common:
             assert np.isnan(square)
             continue
@@ -65,17 +70,19 @@ def test_distances_are_those_of_the_beads_seen_in_all_three_pictures(species):
                 for a, b in ((later, middle), (middle, earlier), (later, earlier))
             ]
         )
-        variances = [np.mean([one[k][1] for one in (earlier, middle, later)]) for k in common]
-        np.testing.assert_allclose(found, expected, rtol=1e-12)
+        variances = [
+            np.mean([record[k][1] for record in (earlier, middle, later)]) for k in common
+        ]
+        np.testing.assert_allclose(distances, expected, rtol=1e-12)
         assert square == pytest.approx(np.mean(expected[:2] ** 2))
         assert variance == pytest.approx(np.mean(np.minimum(variances, 3e-12)))
-        assert place_variance == pytest.approx(np.median(variances))
+        assert position_variance == pytest.approx(np.median(variances))
 
 
-def test_without_three_pictures_evenly_apart_nothing_is_known_of_the_jitter():
+def test_the_noise_is_unknown_without_three_frames_at_equal_intervals():
     rng = np.random.default_rng(9)
-    tracks = [_picture(rng, number) for number in (0, 1, 5)]
-    assert jitter_of(joined(tracks), ALL) == np.inf
-    assert jitter_of(joined(tracks[:2]), ALL) == np.inf
-    even = [replace(one, stamp_ns=33_000_000 * k) for k, one in enumerate(tracks)]
-    assert jitter_of(joined(even), ALL) < np.inf
+    tracks = [_frame(rng, number) for number in (0, 1, 5)]
+    assert position_noise(join_tracks(tracks), ALL_SPECIES) == np.inf
+    assert position_noise(join_tracks(tracks[:2]), ALL_SPECIES) == np.inf
+    even = [replace(record, stamp_ns=33_000_000 * k) for k, record in enumerate(tracks)]
+    assert position_noise(join_tracks(even), ALL_SPECIES) < np.inf

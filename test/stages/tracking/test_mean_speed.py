@@ -1,4 +1,4 @@
-"""Mean speed from tracks: of made-up tracks, whose speeds are known, and of a film."""
+"""Mean speed from synthetic tracks of known speed, and from a film."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PIXEL = 1.0 / SCALE
 
 
 def _tracks(velocities, jitter, frames, seed=1, species=None):
-    """Beads in free flight, with places that jitter."""
+    """Beads in free flight, with noise on their positions."""
     rng = np.random.default_rng(seed)
     n = len(velocities)
     start = rng.uniform(0.0, 0.01, (n, 2))
@@ -41,26 +41,29 @@ def _tracks(velocities, jitter, frames, seed=1, species=None):
 
 
 @pytest.mark.parametrize('speed', [0.1e-3, 0.5e-3, 2e-3, 15e-3])
-def test_the_speed_of_a_maxwellian_gas_is_right_whatever_the_jitter(speed):
+def test_the_speed_of_a_maxwellian_gas_does_not_depend_on_the_noise(speed):
     rng = np.random.default_rng(5)
     velocities = rng.normal(0.0, speed * np.sqrt(2.0 / np.pi), (400, 2))
     true = np.hypot(*velocities.T).mean()
     for jitter in (0.02 * PIXEL, 0.3 * PIXEL):
-        found = mean_speed(list(_tracks(velocities, jitter, 90)), least_distance=1.5 * PIXEL)
-        assert found.mean_projected_speed == pytest.approx(true, rel=0.03)
+        estimate = mean_speed(list(_tracks(velocities, jitter, 90)), least_distance=1.5 * PIXEL)
+        assert estimate.mean_projected_speed == pytest.approx(true, rel=0.03)
 
 
 def test_resting_beads_do_not_move():
-    found = [
+    estimates = [
         mean_speed(
             list(_tracks(np.zeros((40, 2)), 0.1 * PIXEL, 60, seed)), least_distance=1.5 * PIXEL
         )
         for seed in range(10)
     ]
-    speeds = [one.mean_projected_speed for one in found]
-    # Jitter from picture to picture alone would look like 5 px/s.
+    speeds = [estimate.mean_projected_speed for estimate in estimates]
+    # The noise between frames alone would look like 5 px/s.
     assert np.mean(speeds) < 0.1 * PIXEL
-    assert all(one.mean_projected_speed <= 4.0 * one.mean_projected_speed_error for one in found)
+    assert all(
+        estimate.mean_projected_speed <= 4.0 * estimate.mean_projected_speed_error
+        for estimate in estimates
+    )
 
 
 def test_each_species_has_a_speed_of_its_own():
@@ -69,23 +72,23 @@ def test_each_species_has_a_speed_of_its_own():
     species = np.repeat([0, 1], 10).astype(np.int32)
     tracks = list(_tracks(velocities, 0.05 * PIXEL, 30, species=species))
     for index, speed in ((0, 2e-3), (1, 6e-3)):
-        found = mean_speed(tracks, least_distance=1.5 * PIXEL, species=index)
-        assert found.mean_projected_speed == pytest.approx(speed, rel=0.03)
-        assert found.beads == 10
-    both = mean_speed(tracks, least_distance=1.5 * PIXEL)
-    assert both.mean_projected_speed == pytest.approx(4e-3, rel=0.03)
+        estimate = mean_speed(tracks, least_distance=1.5 * PIXEL, species=index)
+        assert estimate.mean_projected_speed == pytest.approx(speed, rel=0.03)
+        assert estimate.beads == 10
+    overall = mean_speed(tracks, least_distance=1.5 * PIXEL)
+    assert overall.mean_projected_speed == pytest.approx(4e-3, rel=0.03)
 
 
 def test_a_speed_of_half_of_the_beads_is_not_reliable():
     tracks = list(_tracks(np.full((20, 2), 1e-3), 1e-6, 20))
     assert mean_speed(tracks, least_distance=PIXEL).reliable
     seen = np.arange(20) < 10
-    half = [replace(one, seen=seen) for one in tracks]
-    found = mean_speed(half, least_distance=PIXEL)
-    assert (found.beads, found.share, found.reliable) == (10, 0.5, False)
+    half = [replace(record, seen=seen) for record in tracks]
+    estimate = mean_speed(half, least_distance=PIXEL)
+    assert (estimate.beads, estimate.share, estimate.reliable) == (10, 0.5, False)
 
 
-def test_nothing_is_said_of_two_beads_or_two_pictures():
+def test_two_beads_or_two_frames_have_no_mean_speed():
     tracks = list(_tracks(np.full((5, 2), 1e-3), 1e-6, 20))
     assert mean_speed(tracks[:2], least_distance=PIXEL) is None
     assert mean_speed([], least_distance=PIXEL) is None
@@ -103,9 +106,9 @@ def test_the_mean_speed_of_a_filmed_gas_is_right_within_five_percent(speed):
         if k > 7:
             tracks += tracker.push(image)
             true.append(np.hypot(*truth.velocities[:, :2].T).mean())
-            found = mean_speed(tracks, least_distance=1.5 * PIXEL)
-            if found is not None and len(tracks) > 30:
-                frames = round(found.window * RATE)
-                ratios.append(found.mean_projected_speed / np.mean(true[-frames - 1 :]))
+            estimate = mean_speed(tracks, least_distance=1.5 * PIXEL)
+            if estimate is not None and len(tracks) > 30:
+                frames = round(estimate.window * RATE)
+                ratios.append(estimate.mean_projected_speed / np.mean(true[-frames - 1 :]))
     assert len(ratios) > 40
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.05)

@@ -1,4 +1,4 @@
-"""Tracks against the truth of the simulation."""
+"""Tracks of simulated films against the simulated positions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tracking_films import SCALE, paired, pipeline_settings, tray_film
+from tracking_films import SCALE, match_positions, pipeline_settings, tray_film
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import View
@@ -35,15 +35,15 @@ def tray_3():
 
 
 def _beads_of(tracks, truth, index):
-    """True bead of each track of a species that is seen."""
+    """Simulated bead and row of each visible track of a species."""
     own = np.flatnonzero(truth.species == index)
     ours = np.flatnonzero(tracks.seen & (tracks.species == index))
     reach = 0.6 * float(truth.radii[own].min())
-    rows, columns = paired(truth.positions[own, :2], tracks.positions[ours], reach)
+    rows, columns = match_positions(truth.positions[own, :2], tracks.positions[ours], reach)
     return own[rows], ours[columns]
 
 
-def test_red_beads_keep_their_numbers_from_rest_through_the_shaking_to_the_end(tray_3):
+def test_red_beads_keep_their_numbers_through_the_shaking(tray_3):
     number_of = {}
     for tracks, truth in tray_3:
         beads, rows = _beads_of(tracks, truth, 0)
@@ -52,7 +52,7 @@ def test_red_beads_keep_their_numbers_from_rest_through_the_shaking_to_the_end(t
             assert number_of.setdefault(bead, number) == number
 
 
-def test_blue_beads_are_seen_and_linked_but_for_those_that_are_hidden(tray_3):
+def test_visible_blue_beads_are_detected_and_linked(tray_3):
     right = possible = 0
     before = {}
     for tracks, truth in tray_3[20:]:
@@ -65,7 +65,7 @@ def test_blue_beads_are_seen_and_linked_but_for_those_that_are_hidden(tray_3):
     assert right / possible > 0.99
 
 
-def test_hidden_beads_are_predicted_and_say_so(tray_3):
+def test_hidden_beads_are_predicted_with_larger_errors(tray_3):
     records = [tracks for tracks, _ in tray_3[20:]]
     counts = [np.count_nonzero(record.species == 1) for record in records]
     assert np.mean(counts) == pytest.approx(40.0, abs=0.8)
@@ -76,32 +76,32 @@ def test_hidden_beads_are_predicted_and_say_so(tray_3):
     assert records[-1].expected.tolist() == [15, 40]
 
 
-def test_errors_of_places_and_velocities_are_not_understated(tray_3):
-    places, velocities = [], []
+def test_errors_of_positions_and_velocities_are_not_understated(tray_3):
+    positions, velocities = [], []
     for tracks, truth in tray_3[20:]:
         for index in (0, 1):
             beads, rows = _beads_of(tracks, truth, index)
-            apart = tracks.positions[rows] - truth.positions[beads, :2]
-            places.append(apart / tracks.position_errors[rows, None])
+            difference = tracks.positions[rows] - truth.positions[beads, :2]
+            positions.append(difference / tracks.position_errors[rows, None])
             known = np.isfinite(tracks.velocity_errors[rows])
-            apart = tracks.velocities[rows] - truth.velocities[beads, :2]
-            velocities.append((apart / tracks.velocity_errors[rows, None])[known])
-    for pulls in (np.concatenate(places), np.concatenate(velocities)):
+            difference = tracks.velocities[rows] - truth.velocities[beads, :2]
+            velocities.append((difference / tracks.velocity_errors[rows, None])[known])
+    for pulls in (np.concatenate(positions), np.concatenate(velocities)):
         assert np.median(np.abs(pulls)) / 0.6745 < 1.3
-        # Collisions between two pictures, and beads half hidden.
+        # Collisions between two frames, and beads half hidden.
         assert np.mean(np.abs(pulls) > 3.0) < 0.15
 
 
-def test_a_track_knows_the_size_of_its_bead_better_than_one_picture():
-    apart = []
+def test_the_radius_of_a_track_is_known_to_a_fifth_of_a_pixel():
+    differences = []
     tracks, truth = _follow(5, 60)[-1]
     for index in (0, 1):
         beads, rows = _beads_of(tracks, truth, index)
-        apart.append(tracks.radii[rows] - truth.radii[beads])
-    assert np.median(np.abs(np.concatenate(apart))) * SCALE < 0.2
+        differences.append(tracks.radii[rows] - truth.radii[beads])
+    assert np.median(np.abs(np.concatenate(differences))) * SCALE < 0.2
 
 
-def test_pictures_that_are_missing_from_the_middle_cost_no_identity():
+def test_missing_frames_change_no_track_number():
     tracker = Tracker(pipeline_settings(1), load_trays()[1])
     number_of = {}
     for k, (image, truth) in enumerate(tray_film(1, 90)):
@@ -114,45 +114,57 @@ def test_pictures_that_are_missing_from_the_middle_cost_no_identity():
     assert len(number_of) == 15
 
 
-def test_a_tray_that_swings_leaves_velocities_past_the_camera_alone():
+def test_a_swinging_tray_does_not_change_velocities_in_the_camera_frame():
     still, swinging = (Tracker(pipeline_settings(1), load_trays()[1]) for _ in range(2))
     for k, (image, _) in enumerate(tray_film(1, 40)):
-        there = round(4.0 * np.sin(0.4 * k)), round(3.0 * np.cos(0.3 * k))
-        moved = np.ascontiguousarray(np.roll(image.color, (-there[1], -there[0]), axis=(0, 1)))
+        offset = round(4.0 * np.sin(0.4 * k)), round(3.0 * np.cos(0.3 * k))
+        moved = np.ascontiguousarray(np.roll(image.color, (-offset[1], -offset[0]), axis=(0, 1)))
         shown = replace(
             image,
             color=moved,
-            displacement=(there[0] / SCALE, there[1] / SCALE),
+            displacement=(offset[0] / SCALE, offset[1] / SCALE),
             displacement_error=0.0,
         )
-        one, other = still.push(image)[0], swinging.push(shown)[0]
+        at_rest, swung = still.push(image)[0], swinging.push(shown)[0]
     inside = [
         number
-        for number, place in zip(one.ids.tolist(), one.positions * SCALE, strict=True)
-        if (place > 25.0).all() and (place < 162.0).all()
+        for number, position in zip(at_rest.ids.tolist(), at_rest.positions * SCALE, strict=True)
+        if (position > 25.0).all() and (position < 162.0).all()
     ]
     assert len(inside) > 4
     for number in inside:
-        here = np.flatnonzero(one.ids == number)[0]
+        row = np.flatnonzero(at_rest.ids == number)[0]
         nearest = np.argmin(
-            np.hypot(*(other.positions + other.displacement - one.positions[here]).T)
+            np.hypot(*(swung.positions + swung.displacement - at_rest.positions[row]).T)
         )
-        apart = other.velocities[nearest] - one.velocities[here]
+        difference = swung.velocities[nearest] - at_rest.velocities[row]
         assert (
-            np.hypot(*apart)
-            < 4.0 * np.hypot(one.velocity_errors[here], other.velocity_errors[nearest]) + 2e-5
+            np.hypot(*difference)
+            < 4.0 * np.hypot(at_rest.velocity_errors[row], swung.velocity_errors[nearest]) + 2e-5
         )
 
 
-def test_the_same_pictures_give_the_same_tracks_and_a_stamp_that_goes_back_starts_afresh():
+def test_a_stamp_that_goes_back_resets_and_the_same_images_give_the_same_tracks():
     images = [image for image, _ in tray_film(3, 12)]
     tracker = Tracker(pipeline_settings(3), load_trays()[3])
     first = [tracker.push(image)[0] for image in images]
     again = [tracker.push(image)[0] for image in images]
-    for one, other in zip(first, again, strict=True):
-        np.testing.assert_array_equal(one.ids, other.ids)
-        np.testing.assert_array_equal(one.positions, other.positions)
-        np.testing.assert_array_equal(one.velocities, other.velocities)
+    for tracks, repeated in zip(first, again, strict=True):
+        np.testing.assert_array_equal(tracks.ids, repeated.ids)
+        np.testing.assert_array_equal(tracks.positions, repeated.positions)
+        np.testing.assert_array_equal(tracks.velocities, repeated.velocities)
+
+
+def test_a_tracker_that_is_reset_gives_the_same_tracks_again():
+    images = [image for image, _ in tray_film(3, 8)]
+    tracker = Tracker(pipeline_settings(3), load_trays()[3])
+    first = [tracker.push(image)[0] for image in images]
+    assert tracker.flush() == ()
+    tracker.reset()
+    again = [tracker.push(image)[0] for image in images]
+    for tracks, repeated in zip(first, again, strict=True):
+        np.testing.assert_array_equal(tracks.ids, repeated.ids)
+        np.testing.assert_array_equal(tracks.positions, repeated.positions)
 
 
 def test_a_gray_camera_gives_no_tracks():
@@ -170,7 +182,7 @@ def test_a_tray_that_lacks_beads_is_flagged(tray_3):
     assert tracks.expected.tolist() == [20]
 
 
-def test_more_beads_than_there_should_be_are_seen_all_the_same():
+def test_more_beads_than_expected_are_detected():
     image, _ = next(tray_film(1, 1))
     species = replace(load_trays()[1].species[0], count=13)
     tracks = Tracker(pipeline_settings(1), replace(load_trays()[1], species=(species,))).push(
@@ -179,7 +191,7 @@ def test_more_beads_than_there_should_be_are_seen_all_the_same():
     assert tracks[0].seen.sum() == 15
 
 
-def test_lens_chalk_shadows_glare_and_swing_leave_most_beads_to_be_tracked():
+def test_most_beads_are_tracked_despite_lens_chalk_shadows_glare_and_swing():
     scene = with_values(SceneSettings(trays=(2, 3)), {'swing_knocks': False}, 'test')
     film = SceneFilm(SimulationSettings(first_shake=0.1), scene)
     names = {'trays': [2, 3], 'preprocess.layout': 'plate', 'preprocess.pixels_per_metre': SCALE}

@@ -10,7 +10,12 @@ import pytest
 from campaigns import PEAK, SIZE, write_recording
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
-from nanorocks_ros.records import Quality, SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import (
+    Measured,
+    Quality,
+    SpeedEstimate,
+    SpeedMethod,
+)
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, cycles_of
 from nanorocks_ros.studies.analysis.long_term import in_period, read_campaign, write_campaign
@@ -137,8 +142,7 @@ def test_speeds_measured_at_a_wrong_scale_are_no_peaks(tmp_path):
             tray=1,
             cycle=cycle,
             cycle_start_ns=cycle * 60_000_000_000,
-            mean_projected_speed=PEAK,
-            mean_projected_speed_error=1e-4,
+            mean_projected_speed=Measured(PEAK, 1e-4),
             window=0.1,
             method=SpeedMethod.TRACKING,
             quality=quality,
@@ -148,7 +152,7 @@ def test_speeds_measured_at_a_wrong_scale_are_no_peaks(tmp_path):
         *(speed(61.0 + k, 1, Quality.WRONG_SCALE | Quality.UNCERTAIN) for k in range(3)),
         *(speed(121.0 + k, 2, Quality.UNCERTAIN) for k in range(3)),
     ]
-    analysis = Analysis(epoch_ns=0, trays={1: TrayResults(speeds=speeds)})
+    analysis = Analysis(epoch_ns=0, trays={1: TrayResults(speeds)})
     write_results(analysis, tmp_path / 'results', Path('bag'), PipelineSettings())
     first, second = cycles_of(tmp_path / 'results', 1, SIZE_MEASURES[-1])
     assert math.isnan(first.peak_speed)

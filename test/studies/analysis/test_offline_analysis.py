@@ -82,7 +82,7 @@ def test_the_speeds_from_the_frames_are_those_of_the_truth(analysis):
     stamps = np.array([one.stamp_ns for one in results.truth])
     true = np.array([one.mean_projected_speed for one in results.truth])
     ratios = [
-        speed.mean_projected_speed / np.interp(speed.stamp_ns, stamps, true)
+        speed.mean_projected_speed.value / np.interp(speed.stamp_ns, stamps, true)
         for speed in results.speeds
         if speed.cycle == 1
     ]
@@ -113,8 +113,10 @@ def test_results_are_written_as_tables_and_as_a_bag(analysis, tmp_path):
         )
         for message in bag.messages([topics.COR.absolute(1)])
     ]
-    expected = [cor.restitution for cor in analysis.trays[1].cors]
-    assert [cor.restitution for cor in cors] == pytest.approx(expected, rel=1e-6, nan_ok=True)
+    expected = [cor.restitution.value for cor in analysis.trays[1].cors]
+    assert [cor.restitution.value for cor in cors] == pytest.approx(
+        expected, rel=1e-6, nan_ok=True
+    )
     assert bag.metadata['source'] == SAMPLE.name
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,16 +14,18 @@ from nanorocks_ros.records import (
     CorEstimate,
     CorRelation,
     CorStatus,
+    Measured,
     Merge,
     SpeedEstimate,
     SpeedMethod,
 )
 from nanorocks_ros.settings import PipelineSettings
-from nanorocks_ros.studies.analysis.offline_analysis import _LISTS, Analysis, TrayResults
+from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
 from nanorocks_ros.studies.analysis.results_folder import FORMATS, write_results
 from nanorocks_ros.studies.analysis.results_json import as_json, last_of_each_cycle
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array, layout
+from nanorocks_ros.wire.products import MEASURED
 
 NS = 1_000_000_000
 SPEED = SpeedEstimate(
@@ -31,8 +33,7 @@ SPEED = SpeedEstimate(
     tray=5,
     cycle=1,
     cycle_start_ns=NS,
-    mean_projected_speed=1e-3,
-    mean_projected_speed_error=1e-5,
+    mean_projected_speed=Measured(1e-3, 1e-5),
     window=0.1,
     method=SpeedMethod.TRACKING,
 )
@@ -42,15 +43,13 @@ COR = CorEstimate(
     cycle=1,
     status=CorStatus.FINAL,
     relation=CorRelation.LIBRARY,
-    first_species_initial_speed=9e-3,
-    first_species_initial_speed_error=2e-4,
-    first_species_haff_time=2.5,
-    first_species_haff_time_error=0.125,
+    species_initial_speeds=(Measured(9e-3, 2e-4),),
+    species_haff_times=(Measured(2.5, 0.125),),
 )
 
 
 def analysis():
-    return Analysis(epoch_ns=0, trays={5: TrayResults(speeds=[SPEED], cors=[COR])})
+    return Analysis(epoch_ns=0, trays={5: TrayResults([SPEED, COR])})
 
 
 def test_the_decay_of_each_species_is_among_the_numbers_of_a_cycle():
@@ -93,20 +92,18 @@ def test_tables_in_parquet_hold_the_numbers_of_the_csv(tmp_path):
 
 def test_every_kind_of_result_goes_into_the_bag_and_into_the_tables(tmp_path):
     found = analysis()
-    for kind, name in _LISTS.items():
-        if not getattr(found.trays[5], name):
-            values = np.ones(len(layout(kind).fields))
-            record = from_array(kind, values, tray=5, epoch_ns=0, where='test')
-            getattr(found.trays[5], name).append(record)
-    # What cycles say together is kept beside the tables.
-    beside = {'truth', 'evidence', 'sticking'}
-    assert set(_LISTS.values()) == {field.name for field in fields(TrayResults)} - beside
+    for product in MEASURED:
+        if not found.trays[5].of(product.record):
+            values = np.ones(len(layout(product.record).fields))
+            found.trays[5].add(
+                from_array(product.record, values, tray=5, epoch_ns=0, where='test')
+            )
     write_results(found, tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
     bag = open_bag(tmp_path / 'results' / 'results_bag')
     assert bag.complete
     tables = {path.stem.removeprefix('tray_5_') for path in (tmp_path / 'results').glob('*.csv')}
     assert {one.rpartition('/')[2] for one in bag.topics} == {*tables, 'epoch'}
-    assert len(tables) == len(_LISTS)
+    assert len(tables) == len(MEASURED)
 
 
 def test_records_that_came_in_another_order_stand_by_their_stamps_in_the_bag(tmp_path):
@@ -122,7 +119,7 @@ def test_records_that_came_in_another_order_stand_by_their_stamps_in_the_bag(tmp
         )
         for number, stamp in enumerate(came)
     ]
-    found = Analysis(epoch_ns=0, trays={5: TrayResults(merges=merges)})
+    found = Analysis(epoch_ns=0, trays={5: TrayResults(merges)})
     write_results(found, tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
     bag = open_bag(tmp_path / 'results' / 'results_bag')
     topic = topics.MERGE.absolute(5)
@@ -141,7 +138,7 @@ def test_tables_in_parquet_are_put_together_of_pieces(tmp_path):
     from pyarrow import parquet
 
     speeds = [replace(SPEED, stamp_ns=number * NS) for number in range(2500)]
-    found = Analysis(epoch_ns=0, trays={5: TrayResults(speeds=speeds)})
+    found = Analysis(epoch_ns=0, trays={5: TrayResults(speeds)})
     write_results(found, tmp_path / 'out', tmp_path / 'bag', PipelineSettings(), 'parquet')
     table = parquet.read_table(tmp_path / 'out' / 'tray_5_speed.parquet')
     assert table['time'].to_pylist() == list(range(2500))

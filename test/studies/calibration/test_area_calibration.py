@@ -31,15 +31,19 @@ def bag(tmp_path_factory):
 @pytest.fixture(scope='module')
 def marks(bag, tmp_path_factory):
     """What somebody would mark: most of the beads, in every third frame, a little off."""
-    found = track_bag(bag, PipelineSettings())
+    tracked = track_bag(bag, PipelineSettings())
     rng = np.random.default_rng(5)
-    region = found.regions[1]
+    region = tracked.regions[1]
     lines = ['frame,id,x,y']
-    for number, one in zip(found.numbers[1], found.tracks[1], strict=True):
+    for number, tracks in zip(tracked.numbers[1], tracked.tracks[1], strict=True):
         if number % EVERY == 0 and number > 6:
-            places = (one.positions + one.displacement) * found.pixels_per_metre
-            places += np.array([region.x, region.y]) + rng.normal(0.0, JITTER_PX, places.shape)
-            for bead, (x, y) in list(zip(one.ids.tolist(), places.tolist(), strict=True))[:MARKED]:
+            positions_px = (tracks.positions + tracks.displacement) * tracked.pixels_per_metre
+            positions_px += np.array([region.x, region.y]) + rng.normal(
+                0.0, JITTER_PX, positions_px.shape
+            )
+            for bead, (x, y) in list(zip(tracks.ids.tolist(), positions_px.tolist(), strict=True))[
+                :MARKED
+            ]:
                 lines.append(f'{number + 1},{bead},{x:.2f},{y:.2f}')
     path = tmp_path_factory.mktemp('marks') / 'hand.csv'
     path.write_text('\n'.join(lines), encoding='utf-8')
@@ -62,8 +66,8 @@ def test_calibrated_speeds_are_nearer_to_the_truth(bag, marks, tmp_path, capsys)
 
     def ratios(*flags):
         assert main(['speeds', str(bag), '--json', *flags]) == 0
-        found = json.loads(capsys.readouterr().out)['trays']['1']['methods']['binarised_area']
-        return found['ratio_to_truth'], found['ratio_to_truth_scatter']
+        methods = json.loads(capsys.readouterr().out)['trays']['1']['methods']['binarised_area']
+        return methods['ratio_to_truth'], methods['ratio_to_truth_scatter']
 
     raw, calibrated = ratios(*READING), ratios('--parameters', str(file))
     assert abs(calibrated[0] - 1.0) < 0.1
@@ -73,25 +77,25 @@ def test_calibrated_speeds_are_nearer_to_the_truth(bag, marks, tmp_path, capsys)
 def test_a_calibration_that_is_set_already_is_no_part_of_the_next(bag, marks, tmp_path, capsys):
     assert main(call(bag, marks, '-o', str(tmp_path / 'area.yaml'), '--json')) == 0
     once = capsys.readouterr().out
-    again = call(bag, marks, '--parameters', str(tmp_path / 'area.yaml'), '--json')
-    assert main(again) == 0
+    second = call(bag, marks, '--parameters', str(tmp_path / 'area.yaml'), '--json')
+    assert main(second) == 0
     assert json.loads(capsys.readouterr().out) == json.loads(once)
 
 
 def test_people_are_told_the_flags_and_what_they_rest_on(bag, marks, capsys):
     assert main(call(bag, marks)) == 0
-    said = capsys.readouterr().out
+    stdout = capsys.readouterr().out
     for text in ('windows, by hand', '--speed-area-factor', '--speed-area-offset', 'chi square'):
-        assert text in said
+        assert text in stdout
 
 
 def test_tracks_that_cover_too_little_are_refused_in_a_line(bag, marks, tmp_path, capsys):
     few = marks.read_text().splitlines()[: 1 + 5 * MARKED]
     (tmp_path / 'few.csv').write_text('\n'.join(few), encoding='utf-8')
     assert main(call(bag, tmp_path / 'few.csv')) == 1
-    said = capsys.readouterr().err
-    assert 'the tracks cover' in said.splitlines()[-1]
-    assert 'mark more frames' in said.splitlines()[-1]
+    stderr = capsys.readouterr().err
+    assert 'the tracks cover' in stderr.splitlines()[-1]
+    assert 'mark more frames' in stderr.splitlines()[-1]
 
 
 def test_tracks_elsewhere_are_refused(bag, tmp_path, capsys):

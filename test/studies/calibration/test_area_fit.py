@@ -18,10 +18,10 @@ N = 15
 def pairs(count=30, low=1e-3, high=8e-3, noise=0.1, seed=1, factor=FACTOR, offset=OFFSET):
     """Speeds by hand on a line over those by the area, with errors as they are stated."""
     rng = np.random.default_rng(seed)
-    found = []
+    speed_pairs = []
     for k, area in enumerate(np.linspace(low, high, count)):
         true = factor * area + offset
-        found.append(
+        speed_pairs.append(
             SpeedPair(
                 stamp_ns=k,
                 area_speed=float(area),
@@ -31,7 +31,7 @@ def pairs(count=30, low=1e-3, high=8e-3, noise=0.1, seed=1, factor=FACTOR, offse
                 beads=N,
             )
         )
-    return found
+    return speed_pairs
 
 
 def test_a_line_is_found_within_its_errors():
@@ -70,15 +70,17 @@ def test_beads_that_were_not_marked_leave_an_error_that_more_windows_do_not_take
     spread = np.std([rng.permutation(rng.rayleigh(1.0, N))[:4].mean() for _ in range(4000)])
     spread /= np.sqrt(np.pi / 2.0)
     # That is beside the mean of all 15, which scatters itself.
-    own = np.std([rng.rayleigh(1.0, N).mean() for _ in range(4000)]) / np.sqrt(np.pi / 2.0)
-    expected = FACTOR * np.sqrt(spread**2 - own**2)
+    sampling_error = np.std([rng.rayleigh(1.0, N).mean() for _ in range(4000)]) / np.sqrt(
+        np.pi / 2.0
+    )
+    expected = FACTOR * np.sqrt(spread**2 - sampling_error**2)
     few = [replace(pair, beads=4) for pair in pairs(count=2000, noise=0.05)]
     assert fit_area(few, N, 'test').factor_error == pytest.approx(expected, rel=0.1)
 
 
 def test_scatter_beyond_the_stated_errors_makes_the_error_larger():
     stated = pairs(noise=0.05)
-    sure = [replace(one, manual_speed_error=0.2 * one.manual_speed_error) for one in stated]
+    sure = [replace(pair, manual_speed_error=0.2 * pair.manual_speed_error) for pair in stated]
     fit = fit_area(sure, N, 'test')
     assert fit.reduced_chi_square > 10.0
     # A fifth of it, did it rest on what the speeds say of themselves.

@@ -52,19 +52,19 @@ def made(filmed, tmp_path_factory):
 def places_in(calibration):
     """Points all over the trays, in the rectified picture of the calibration."""
     shares = np.linspace(0.0, 1.0, 7)
-    found = []
+    places = []
     for x, y, width, height in calibration.regions.values():
         a, b = np.meshgrid(x + width * shares, y + height * shares)
-        found.append(np.stack([a.ravel(), b.ravel()], axis=-1))
-    return np.concatenate(found)
+        places.append(np.stack([a.ravel(), b.ravel()], axis=-1))
+    return np.concatenate(places)
 
 
 def aligned(points, target):
     """Points moved, turned and scaled to lie on the target as well as they can."""
     x, y = points.T
-    one, zero = np.ones_like(x), np.zeros_like(x)
+    ones, zeros = np.ones_like(x), np.zeros_like(x)
     rows = np.stack(
-        [np.stack([x, -y, one, zero], -1), np.stack([y, x, zero, one], -1)], axis=1
+        [np.stack([x, -y, ones, zeros], -1), np.stack([y, x, zeros, ones], -1)], axis=1
     ).reshape(-1, 4)
     return (rows @ np.linalg.lstsq(rows, target.ravel(), rcond=None)[0]).reshape(-1, 2)
 
@@ -105,10 +105,10 @@ def test_an_existing_calibration_can_be_shown(filmed, made, tmp_path, capsys):
     picture = tmp_path / 'shown.png'
     arguments = ['calibrate', str(filmed), '--show', str(file), '--picture', str(picture)]
     assert main([*arguments, '--json']) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found['pixels_per_metre'] == calibration.pixels_per_metre
-    assert found['trays']['3'] == list(calibration.regions[3])
-    assert found['largest_bend_px'] > 30.0
+    values = json.loads(capsys.readouterr().out)
+    assert values['pixels_per_metre'] == calibration.pixels_per_metre
+    assert values['trays']['3'] == list(calibration.regions[3])
+    assert values['largest_bend_px'] > 30.0
     assert np.array_equal(cv2.imread(str(picture)), cv2.imread(str(before)))
 
 

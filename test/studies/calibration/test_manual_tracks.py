@@ -46,42 +46,42 @@ Frame   X1      Y1      X2      Y2
 """
 
 
-def _places(tmp_path, text, name='tracks.txt'):
+def _first_bead(tmp_path, text, name='tracks.txt'):
     path = tmp_path / name
     path.write_text(text, encoding='utf-8')
     tracks = read_manual_tracks(path)
     first = np.unique(tracks.ids)[0]
-    one = tracks.ids == first
-    return tracks, tracks.frames[one].tolist(), tracks.places[one].tolist()
+    of_first = tracks.ids == first
+    return tracks, tracks.frames[of_first].tolist(), tracks.places[of_first].tolist()
 
 
 @pytest.mark.parametrize('text', [PLAIN, TRACKMATE, MODEL, EXPORTED, SPOTLIGHT])
 def test_every_format_gives_the_same_bead(tmp_path, text):
-    found, frames, places = _places(tmp_path, text)
+    tracks, frames, positions = _first_bead(tmp_path, text)
     assert frames == [0, 1]
-    assert places == [[10.5, 20.5], [11.5, 21.0]]
-    assert np.unique(found.ids).size == 2
+    assert positions == [[10.5, 20.5], [11.5, 21.0]]
+    assert np.unique(tracks.ids).size == 2
 
 
 def test_a_table_between_tabs_or_semicolons_or_with_a_byte_order_mark_is_read(tmp_path):
     for mark in '\t;':
-        _, frames, _ = _places(tmp_path, '\ufeff' + PLAIN.replace(',', mark))
+        _, frames, _ = _first_bead(tmp_path, '\ufeff' + PLAIN.replace(',', mark))
         assert frames == [0, 1]
 
 
 def test_a_table_without_a_column_of_beads_is_of_one_bead(tmp_path):
-    found, _, _ = _places(tmp_path, 'frame x y\n3 1 2\n4 2 3\n')
-    assert found.ids.tolist() == [0, 0]
-    assert found.frames.tolist() == [3, 4]
+    tracks, _, _ = _first_bead(tmp_path, 'frame x y\n3 1 2\n4 2 3\n')
+    assert tracks.ids.tolist() == [0, 0]
+    assert tracks.frames.tolist() == [3, 4]
 
 
 def test_our_own_table_is_no_table_of_pixels_but_numbers_are(tmp_path):
-    found, _, _ = _places(tmp_path, '# made by hand\n0 1.5 2.5\n1 1.75 2.5\n')
-    assert found.places.tolist() == [[1.5, 2.5], [1.75, 2.5]]
+    tracks, _, _ = _first_bead(tmp_path, '# made by hand\n0 1.5 2.5\n1 1.75 2.5\n')
+    assert tracks.places.tolist() == [[1.5, 2.5], [1.75, 2.5]]
 
 
 @pytest.mark.parametrize(
-    ('text', 'what'),
+    ('text', 'message'),
     [
         ('', 'holds no track'),
         ('frame,id,x,y\n', 'holds no track'),
@@ -98,10 +98,10 @@ def test_our_own_table_is_no_table_of_pixels_but_numbers_are(tmp_path):
         (TRACKMATE.replace('(pixel)', '(mm)'), 'places are in mm'),
     ],
 )
-def test_what_cannot_be_used_is_named_with_its_line(tmp_path, text, what):
+def test_what_cannot_be_used_is_named_with_its_line(tmp_path, text, message):
     path = tmp_path / 'bad.txt'
     path.write_text(text, encoding='utf-8')
-    with pytest.raises(RecordingError, match=what) as caught:
+    with pytest.raises(RecordingError, match=message) as caught:
         read_manual_tracks(path)
     assert '\n' not in str(caught.value)
 

@@ -12,7 +12,7 @@ from nanorocks_ros.experiment.view import View
 from nanorocks_ros.records import Tracks
 from nanorocks_ros.studies.calibration.manual_tracks import ManualTracks
 from nanorocks_ros.studies.calibration.track_comparison import (
-    Place,
+    MarkedBeads,
     compare_tracks,
     manual_reference,
 )
@@ -44,8 +44,8 @@ def _tracks(frames, ids=(0, 1, 2), shift=(0.0, 0.0), displacement=(0.0, 0.0)):
 
 def _reference(tracks):
     return {
-        one.stamp_ns: Place(ids=one.ids.astype(np.int64), positions=one.positions)
-        for one in tracks
+        record.stamp_ns: MarkedBeads(ids=record.ids.astype(np.int64), positions=record.positions)
+        for record in tracks
     }
 
 
@@ -94,8 +94,8 @@ def test_marks_in_a_bent_picture_that_moves_come_to_the_place_in_the_tray():
     moved = (2e-4, -1e-4)
     tracks = list(_tracks(4, displacement=moved))
     marks, frames, ids = [], [], []
-    for k, one in enumerate(tracks):
-        straight = (one.positions + moved) * scale + (region.x, region.y)
+    for k, record in enumerate(tracks):
+        straight = (record.positions + moved) * scale + (region.x, region.y)
         marks.append(camera.distorted(straight))
         frames.append(np.full(3, k + 1))
         ids.append(np.arange(3))

@@ -10,7 +10,11 @@ from decays import TIMES, simulated_table
 
 from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.records import SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import (
+    Measured,
+    SpeedEstimate,
+    SpeedMethod,
+)
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 from nanorocks_ros.studies.decays.best_fit_decay import library_decay
@@ -41,17 +45,16 @@ def test_it_goes_through_the_speeds_and_its_intervals_hold_the_truth(cycles):
 
 
 def test_it_says_of_a_cycle_what_the_stage_says(cycles):
-    one = cycles[0]
+    cycle = cycles[0]
     stage = RestitutionEstimator(PipelineSettings(), TRAY)
-    for time, speed in zip(one.times, one.speed, strict=True):
+    for time, speed in zip(cycle.times, cycle.speed, strict=True):
         stage.push(
             SpeedEstimate(
                 stamp_ns=round(time * NS),
                 tray=1,
                 cycle=1,
                 cycle_start_ns=0,
-                mean_projected_speed=float(speed),
-                mean_projected_speed_error=1e-4,
+                mean_projected_speed=Measured(float(speed), 1e-4),
                 window=0.3,
                 method=SpeedMethod.TRACKING,
             )
@@ -59,9 +62,9 @@ def test_it_says_of_a_cycle_what_the_stage_says(cycles):
         if time > 19.95:
             break
     (final,) = stage.flush()
-    decay = library_decay(TRAY, [one], mean_cycle([one], 1.75, 20.0))
-    assert decay.restitution[0] == pytest.approx(final.restitution, abs=2e-3)
-    assert decay.wall_restitution[0] == pytest.approx(final.wall_restitution, abs=2e-3)
+    decay = library_decay(TRAY, [cycle], mean_cycle([cycle], 1.75, 20.0))
+    assert decay.restitution[0] == pytest.approx(final.restitution.value, abs=2e-3)
+    assert decay.wall_restitution[0] == pytest.approx(final.wall_restitution.value, abs=2e-3)
 
 
 def test_a_gas_that_began_to_cool_later_is_the_same_gas(cycles):

@@ -37,18 +37,18 @@ def grid():
 
 
 def test_with_their_covariance_other_runs_of_a_point_deviate_by_one(grid):
-    found = [
+    values = [
         chi_square(grid, curve_of(made({}, 60, seed=seed), cycles=60))[2, 1]
         for seed in range(20, 40)
     ]
     # Chi square over its degrees of freedom: 11 times, 20 draws.
-    assert np.mean(found) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / 11.0 / 20.0))
+    assert np.mean(values) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / 11.0 / 20.0))
 
 
-def curve_of(one, cycles):
+def curve_of(grid, cycles):
     return SpeedCurve(
         times=TIMES,
-        speed=one.mean_projected_speed,
+        speed=grid.mean_projected_speed,
         error=np.zeros(TIMES.size),
         cycles=cycles,
     )
@@ -64,23 +64,23 @@ def test_without_runs_deviations_count_as_independent(grid):
 
 
 def test_few_cycles_scatter_more_than_their_speeds_err(grid):
-    one = SpeedCurve(
+    curve = SpeedCurve(
         times=TIMES, speed=1.2 * grid.mean_projected_speed[0, 0], error=np.full(11, 1e-6)
     )
     bare = replace(grid, run_mean_projected_speed=None, run_mean_speed=None)
     for kind in (grid, bare):
-        alone, many = (chi_square(kind, replace(one, cycles=n))[0, 0] for n in (1, 10_000))
+        alone, many = (chi_square(kind, replace(curve, cycles=n))[0, 0] for n in (1, 10_000))
         assert many / alone == pytest.approx(61.0, rel=0.05)
 
 
 def test_too_few_runs_give_no_correlation(grid):
     few = made({'restitution': (0.8, 0.9)}, runs=3)
-    every = np.ones(TIMES.size, dtype=bool)
-    assert run_correlation(few, every) is None
-    found = run_correlation(grid, every)
-    assert np.diag(found) == pytest.approx(1.0)
+    all_times = np.ones(TIMES.size, dtype=bool)
+    assert run_correlation(few, all_times) is None
+    correlation = run_correlation(grid, all_times)
+    assert np.diag(correlation) == pytest.approx(1.0)
     # A run that is slow stays slow, but not for ever.
-    assert found[5, 6] > 0.5 > found[1, 10] > 0.0
+    assert correlation[5, 6] > 0.5 > correlation[1, 10] > 0.0
 
 
 def test_a_gas_that_starts_faster_is_found_where_its_restitution_is(grid):
@@ -109,21 +109,21 @@ def test_speeds_are_not_scaled_where_beads_stick(grid):
 
 
 def test_the_line_of_the_confined_theory_passes_through_the_reference(grid):
-    ours, theirs = contours(grid, curve_at(grid, (0.8, 0.95)))
-    assert np.interp(0.95, ours.other, ours.restitution) == pytest.approx(0.8, abs=0.02)
+    theory, ellipse = contours(grid, curve_at(grid, (0.8, 0.95)))
+    assert np.interp(0.95, theory.other, theory.restitution) == pytest.approx(0.8, abs=0.02)
     # A higher restitution of the walls calls for a lower one of the beads.
-    known = np.isfinite(ours.restitution)
-    assert (np.diff(ours.restitution[known]) < 0.0).all()
+    solved = np.isfinite(theory.restitution)
+    assert (np.diff(theory.restitution[solved]) < 0.0).all()
     # The paper's hardly depends on the walls, and is far off.
-    assert np.nanmin(theirs.restitution) > 0.9
+    assert np.nanmin(ellipse.restitution) > 0.9
 
 
 def test_the_line_over_widths_bends_as_their_mean_square():
     axes = {'restitution': (0.7, 0.8), 'restitution_width': (0.0, 0.4)}
-    found = made(axes, runs=40, wall_restitution=1.0)
-    ours, _ = contours(found, curve_at(found, (0.8, 0.0)))
-    assert ours.restitution[0] > ours.restitution[-1]
-    squares = ours.restitution**2 + ours.other**2 / 12.0
+    grid = made(axes, runs=40, wall_restitution=1.0)
+    theory, _ = contours(grid, curve_at(grid, (0.8, 0.0)))
+    assert theory.restitution[0] > theory.restitution[-1]
+    squares = theory.restitution**2 + theory.other**2 / 12.0
     assert squares == pytest.approx(squares[0], rel=0.01)
 
 
@@ -137,9 +137,9 @@ def test_the_line_over_widths_bends_as_their_mean_square():
     ],
 )
 def test_there_are_no_lines_where_closed_forms_say_nothing(axes, settings):
-    found = made(axes, runs=3, **settings)
+    grid = made(axes, runs=3, **settings)
     first = tuple(values[0] for values in axes.values())
-    assert contours(found, curve_at(found, first)) == ()
+    assert contours(grid, curve_at(grid, first)) == ()
 
 
 def test_a_curve_that_does_not_fall_has_no_lines(grid):

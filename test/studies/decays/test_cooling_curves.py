@@ -11,7 +11,11 @@ from decays import simulated_table, write_rows
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.csv_tables import write_csv
-from nanorocks_ros.records import SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import (
+    Measured,
+    SpeedEstimate,
+    SpeedMethod,
+)
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
 from nanorocks_ros.studies.analysis.results_folder import write_results
@@ -34,22 +38,22 @@ def cycle(number, start, factor=1.0, error=1e-4):
 
 def test_each_shaking_event_opens_a_cycle(tmp_path):
     path = write_rows(tmp_path / 'tray_1_speed.csv', cycle(1, 3.0) + cycle(2, 63.0, 2.0))
-    one, other = read_cycles(path)
-    assert (one.cycle, other.cycle) == (1, 2)
-    assert one.times == pytest.approx([age for age, _ in LAW])
-    assert other.speed == pytest.approx(2.0 * one.speed)
+    first, second = read_cycles(path)
+    assert (first.cycle, second.cycle) == (1, 2)
+    assert first.times == pytest.approx([age for age, _ in LAW])
+    assert second.speed == pytest.approx(2.0 * first.speed)
 
 
 def test_a_recording_played_twice_holds_its_cycles_twice(tmp_path):
     path = write_rows(tmp_path / 'a.csv', cycle(1, 3.0) + cycle(1, 103.0))
-    assert [one.cycle for one in read_cycles(path)] == [1, 1]
+    assert [cycle.cycle for cycle in read_cycles(path)] == [1, 1]
 
 
 def test_what_is_before_the_first_shake_or_not_known_is_left_out(tmp_path):
     before = [(0.1 * k, 0, math.nan, 0.001, 1e-4, 0.3) for k in range(5)]
     unknown = [(3.05, 1, 3.0, math.nan, math.nan, 0.3)]
-    (found,) = read_cycles(write_rows(tmp_path / 'a.csv', before + unknown + cycle(1, 3.0)))
-    assert found.times.size == len(LAW)
+    (speeds,) = read_cycles(write_rows(tmp_path / 'a.csv', before + unknown + cycle(1, 3.0)))
+    assert speeds.times.size == len(LAW)
 
 
 def test_the_mean_over_cycles_has_the_error_of_a_mean(tmp_path):
@@ -93,9 +97,9 @@ def test_a_decay_is_read_from_a_table_of_cycles_or_of_one_curve(tmp_path):
     cycles = write_rows(tmp_path / 'tray_1_speed.csv', cycle(1, 3.0) + cycle(2, 63.0))
     names = ('time', 'mean_projected_speed')
     write_csv(tmp_path / 'curve.csv', names, ('s', 'm/s'), LAW)
-    one, other = read_decay(cycles), read_decay(tmp_path / 'curve.csv')
-    assert (one.cycles, other.cycles) == (2, None)
-    assert read_decay(tmp_path / 'tray_1_speed.csv').speed == pytest.approx(other.speed)
+    from_cycles, from_curve = read_decay(cycles), read_decay(tmp_path / 'curve.csv')
+    assert (from_cycles.cycles, from_curve.cycles) == (2, None)
+    assert read_decay(tmp_path / 'tray_1_speed.csv').speed == pytest.approx(from_curve.speed)
 
 
 def test_what_the_analysis_writes_can_be_read(tmp_path):
@@ -106,15 +110,14 @@ def test_what_the_analysis_writes_can_be_read(tmp_path):
             tray=1,
             cycle=k,
             cycle_start_ns=epoch_ns + 60 * k * NS if k else None,
-            mean_projected_speed=speed,
-            mean_projected_speed_error=1e-4,
+            mean_projected_speed=Measured(speed, 1e-4),
             window=0.3,
             method=SpeedMethod.TRACKING,
         )
         for k in range(3)
         for age, speed in LAW
     ]
-    analysis = Analysis(epoch_ns=epoch_ns, trays={1: TrayResults(speeds=speeds)})
+    analysis = Analysis(epoch_ns=epoch_ns, trays={1: TrayResults(speeds)})
     write_results(analysis, tmp_path / 'results', Path('bag'), PipelineSettings())
     curve = read_decay(tmp_path / 'results')
     assert curve.cycles == 2
@@ -150,14 +153,14 @@ def test_simulated_tables_hold_as_many_cycles_as_asked(tmp_path):
 
 def test_times_can_count_from_when_the_gas_began_to_cool(tmp_path):
     cycles = read_cycles(simulated_table(tmp_path / 'a.csv', 2))
-    found, span = cooling_part(cycles, (4.0, 20.0), 3.0)
+    cooling, span = cooling_part(cycles, (4.0, 20.0), 3.0)
     assert span == (1.0, 17.0)
-    for one, later in zip(cycles, found, strict=True):
+    for cycle, later in zip(cycles, cooling, strict=True):
         assert later.times[0] == pytest.approx(0.0, abs=1e-9)
-        assert later.speed[0] == one.speed[29]
-        assert len(later.times) == len(later.speed) == len(later.error) == len(one.times) - 29
+        assert later.speed[0] == cycle.speed[29]
+        assert len(later.times) == len(later.speed) == len(later.error) == len(cycle.times) - 29
     # Who asks for earlier times gets them.
-    found, span = cooling_part(cycles, (1.0, 20.0), 3.0)
+    cooling, span = cooling_part(cycles, (1.0, 20.0), 3.0)
     assert span == (0.0, 19.0)
-    assert found[0].times[0] == pytest.approx(0.0, abs=1e-9)
-    assert len(found[0].times) == len(cycles[0].times) - 9
+    assert cooling[0].times[0] == pytest.approx(0.0, abs=1e-9)
+    assert len(cooling[0].times) == len(cycles[0].times) - 9

@@ -40,25 +40,25 @@ def table(path, columns, fields=FIELDS):
 
 
 def test_a_point_agrees_with_itself(grid):
-    found = chi_square(grid, curve_at(grid, (0.75, 0.92)))
-    assert found[1, 1] == 0.0
-    assert found.shape == (3, 3)
-    assert (np.delete(found.ravel(), 4) > 0.0).all()
+    chi_squares = chi_square(grid, curve_at(grid, (0.75, 0.92)))
+    assert chi_squares[1, 1] == 0.0
+    assert chi_squares.shape == (3, 3)
+    assert (np.delete(chi_squares.ravel(), 4) > 0.0).all()
 
 
 def test_the_true_point_is_found_among_others(grid, point, tmp_path):
     sweep(point, tmp_path / 'point.npz', HERE)
-    found = chi_square(grid, read_curve(tmp_path / 'point.npz'))
+    chi_squares = chi_square(grid, read_curve(tmp_path / 'point.npz'))
     # Of the order of 1 where both are the same gas; hundreds far away.
-    assert found[1, 1] < 3.0
-    assert found[0, 0] > 30.0
-    assert found[2, 2] > 30.0
+    assert chi_squares[1, 1] < 3.0
+    assert chi_squares[0, 0] > 30.0
+    assert chi_squares[2, 2] > 30.0
 
 
 def test_chi_square_is_the_mean_squared_deviation_over_both_errors(grid):
     curve = SpeedCurve(times=TIMES, speed=np.full(11, 0.002), error=np.full(11, 1e-4))
-    mean, own = grid.mean_projected_speed[2, 0], grid.mean_projected_speed_error[2, 0]
-    expected = np.mean((mean - 0.002) ** 2 / (own**2 + 1e-8))
+    mean, sweep_error = grid.mean_projected_speed[2, 0], grid.mean_projected_speed_error[2, 0]
+    expected = np.mean((mean - 0.002) ** 2 / (sweep_error**2 + 1e-8))
     assert chi_square(grid, curve)[2, 0] == pytest.approx(expected, rel=1e-12)
 
 
@@ -66,23 +66,23 @@ def test_only_times_that_the_curve_covers_are_compared(grid):
     times = np.array([1.5, 8.0])
     curve = SpeedCurve(times=times, speed=np.full(2, 0.002), error=np.zeros(2))
     part = (slice(None), slice(None), slice(2, 9))
-    mean, own = grid.mean_projected_speed[part], grid.mean_projected_speed_error[part]
-    expected = np.mean((mean - 0.002) ** 2 / own**2, axis=-1)
+    mean, sweep_error = grid.mean_projected_speed[part], grid.mean_projected_speed_error[part]
+    expected = np.mean((mean - 0.002) ** 2 / sweep_error**2, axis=-1)
     np.testing.assert_allclose(chi_square(grid, curve), expected, rtol=1e-12)
 
 
 def test_a_table_gives_the_same_as_the_point(grid, tmp_path):
-    own = curve_at(grid, (0.9, 0.85))
-    read = read_curve(table(tmp_path / 'a.csv', (own.times, own.speed, own.error)))
-    np.testing.assert_array_equal(chi_square(grid, read), chi_square(grid, own))
+    curve = curve_at(grid, (0.9, 0.85))
+    read = read_curve(table(tmp_path / 'a.csv', (curve.times, curve.speed, curve.error)))
+    np.testing.assert_array_equal(chi_square(grid, read), chi_square(grid, curve))
 
 
 def test_an_error_that_is_not_known_counts_as_none(grid, tmp_path):
-    own = curve_at(grid, (0.9, 0.85))
-    read = read_curve(table(tmp_path / 'a.csv', (own.times, own.speed), FIELDS[:2]))
+    curve = curve_at(grid, (0.9, 0.85))
+    read = read_curve(table(tmp_path / 'a.csv', (curve.times, curve.speed), FIELDS[:2]))
     assert not read.error.any()
     unknown = np.full(11, np.nan)
-    read = read_curve(table(tmp_path / 'b.csv', (own.times, own.speed, unknown)))
+    read = read_curve(table(tmp_path / 'b.csv', (curve.times, curve.speed, unknown)))
     assert not read.error.any()
 
 
@@ -139,11 +139,11 @@ def test_the_map_is_dark_blue_where_curves_agree_and_red_where_they_do_not(grid,
     picture = cv2.imread(str(path))
     assert min(picture.shape[:2]) > 500
     # The ends of the scale: the reference itself, and the point that is farthest away.
-    colours = {tuple(one) for one in picture.reshape(-1, 3)[::7].tolist()}
+    colours = {tuple(pixel) for pixel in picture.reshape(-1, 3)[::7].tolist()}
     assert {(59, 18, 48), (3, 4, 122)} <= colours
 
 
 def test_a_sweep_that_is_no_map_is_not_drawn(tmp_path):
-    found = sweep(sweep_plan(SimulationSettings(), {}, TIMES, 2), workers=HERE)
+    result = sweep(sweep_plan(SimulationSettings(), {}, TIMES, 2), workers=HERE)
     with pytest.raises(ConfigurationError, match='a single point; vary two numbers'):
-        chi_square_figure(tmp_path / 'map.png', found, curve_at(found, ()))
+        chi_square_figure(tmp_path / 'map.png', result, curve_at(result, ()))

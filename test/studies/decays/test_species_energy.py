@@ -30,7 +30,7 @@ def cycle(number, scale, rise=False):
 
 def mixture(*factors):
     """Cycles with energies of glass so many times those of copper."""
-    light, heavy = (one.bead_mass for one in TRAY.species)
+    light, heavy = (species.bead_mass for species in TRAY.species)
     glass = [cycle(k, math.sqrt(factor * heavy / light)) for k, factor in enumerate(factors)]
     copper = [cycle(k, 1.0) for k in range(len(factors))]
     return species_energies(TRAY, (glass, copper), SPAN)
@@ -62,7 +62,9 @@ def test_a_species_that_does_not_slow_down_has_no_fit_but_an_energy():
 
 def test_times_may_count_from_when_the_gas_began_to_cool():
     glass = [cycle(1, 1.0)]
-    early, late = (species_energies(TRAY, (glass, glass), SPAN, one)[0].fit for one in (0.0, 1.5))
+    early, late = (
+        species_energies(TRAY, (glass, glass), SPAN, origin)[0].fit for origin in (0.0, 1.5)
+    )
     assert late.initial_speed == pytest.approx(float(haff_speed(1.5, 0.01, 2.0)), rel=1e-3)
     assert late.decay_rate == pytest.approx(early.decay_rate, rel=1e-3)
 
@@ -72,9 +74,9 @@ def test_tables_without_two_species_have_none(tmp_path):
     # Of an earlier release, and of a single species.
     assert species_cycles(table, TRAY) == ()
     assert species_cycles(table, load_trays()[1]) == ()
-    both = species_cycles(simulated_mixture(tmp_path / 'tray_5_speed.csv', 5, 2), TRAY)
-    assert [len(one) for one in both] == [2, 2]
-    assert species_energies(TRAY, both, (90.0, 99.0)) == ()
+    by_species = species_cycles(simulated_mixture(tmp_path / 'tray_5_speed.csv', 5, 2), TRAY)
+    assert [len(cycles) for cycles in by_species] == [2, 2]
+    assert species_energies(TRAY, by_species, (90.0, 99.0)) == ()
     assert species_values(()) == {
         'species': None,
         'energy_ratio': None,

@@ -15,7 +15,12 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.recordings.bag.offered_topics import offered
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
-from nanorocks_ros.records import GroundTruth, SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import (
+    GroundTruth,
+    Measured,
+    SpeedEstimate,
+    SpeedMethod,
+)
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.studies.inspection import speed_comparison as study
@@ -51,8 +56,7 @@ def estimate(seconds, speed, window, cycle=1, method=SpeedMethod.TRACKING):
         tray=1,
         cycle=cycle,
         cycle_start_ns=0,
-        mean_projected_speed=speed,
-        mean_projected_speed_error=0.0,
+        mean_projected_speed=Measured(speed, 0.0),
         window=window,
         method=method,
     )

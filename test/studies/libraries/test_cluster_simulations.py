@@ -44,13 +44,13 @@ def test_a_point_of_the_packaged_calibration_is_what_its_film_shows_again():
         strengths=tuple(made_by['strengths']),
         moments=2,
     )
-    again = samples_of_run(plan, 5)
+    repeated = samples_of_run(plan, 5)
     for number in plan.trays:
         kept = curve_of(TRAYS[number]).samples
         kept = kept[kept[:, 0] == 5.0][:2]
         # Codecs and lenses may round otherwise elsewhere; beads may not.
-        np.testing.assert_allclose(again[again[:, 0] == number, 1:4], kept[:, :3], rtol=1e-6)
-        np.testing.assert_allclose(again[again[:, 0] == number, 4:], kept[:, 3:], rtol=0.02)
+        np.testing.assert_allclose(repeated[repeated[:, 0] == number, 1:4], kept[:, :3], rtol=1e-6)
+        np.testing.assert_allclose(repeated[repeated[:, 0] == number, 4:], kept[:, 3:], rtol=0.02)
 
 
 def test_weight_and_number_averages_of_known_bodies():
@@ -109,6 +109,6 @@ def test_too_few_runs_are_refused_before_any_work(tmp_path):
 )
 def test_a_wrong_call_is_one_line(flags, text, tmp_path, capsys):
     assert main(['cluster-curve', *flags, '-o', str(tmp_path / 'c.npz')]) == 2
-    said = capsys.readouterr().err
-    assert text in said
-    assert said.count('\n') == 1
+    stderr = capsys.readouterr().err
+    assert text in stderr
+    assert stderr.count('\n') == 1

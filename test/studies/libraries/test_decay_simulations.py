@@ -9,7 +9,8 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.decay.decay_library import load_library, tray_key
+from nanorocks_ros.inference.decay.decay_library import tray_key
+from nanorocks_ros.inference.decay.decay_library_file import load_library
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.studies.libraries.decay_simulations import LibraryPlan, build_library
 
@@ -28,24 +29,24 @@ class Enough(KeyboardInterrupt):
 def test_an_interrupted_build_goes_on_and_ends_in_the_same_library(tmp_path):
     whole, path = tmp_path / 'whole.npz', tmp_path / 'mine.npz'
     build_library(PLAN, whole, HERE)
-    seen = []
+    reported = []
 
     def stop(done, total):
-        seen.append(done)
+        reported.append(done)
         if done == 10:
             raise Enough
 
     with pytest.raises(KeyboardInterrupt, match=r'10 of \d+ parts are kept in .*mine.npz.parts'):
         build_library(PLAN, path, HERE, stop)
     assert not path.exists()
-    resumed = []
-    build_library(PLAN, path, HERE, lambda done, total: resumed.append((done, total)))
-    assert resumed[0] == (10, 64)
-    assert resumed[-1] == (64, 64)
-    one, other = (load_library(str(name), packaged=False) for name in (whole, path))
-    np.testing.assert_array_equal(one.coefficients, other.coefficients)
-    np.testing.assert_array_equal(one.covariance, other.covariance)
-    assert one.tray == tray_key(PLAN.tray)
+    counts = []
+    build_library(PLAN, path, HERE, lambda done, total: counts.append((done, total)))
+    assert counts[0] == (10, 64)
+    assert counts[-1] == (64, 64)
+    uninterrupted, resumed = (load_library(str(name), packaged=False) for name in (whole, path))
+    np.testing.assert_array_equal(uninterrupted.coefficients, resumed.coefficients)
+    np.testing.assert_array_equal(uninterrupted.covariance, resumed.covariance)
+    assert uninterrupted.tray == tray_key(PLAN.tray)
     assert not path.with_name('mine.npz.parts').exists()
 
 

@@ -12,14 +12,14 @@ import pytest
 from nanorocks_ros.errors import ConfigurationError, RecordingError, SimulationError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.jobs.journal import Journal
+from nanorocks_ros.jobs.resumed_tasks import parts_folder
 from nanorocks_ros.jobs.tasks import Workers
-from nanorocks_ros.outputs.npz_archive import read_archive, write_archive
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
 from nanorocks_ros.studies.sweeps.sweep_parts import COUNTS, RunRange, cool
 from nanorocks_ros.studies.sweeps.sweep_plan import sweep_plan
 from nanorocks_ros.studies.sweeps.sweep_result import CURVES, Sweep
-from nanorocks_ros.studies.sweeps.sweep_runs import parts_folder, sweep
+from nanorocks_ros.studies.sweeps.sweep_runs import sweep
 
 SETTINGS = SimulationSettings(seed=7)
 AXES = {'restitution': (0.7, 0.8, 0.9), 'wall_restitution': (0.9, 0.99)}
@@ -36,11 +36,11 @@ def straight():
     return sweep(PLAN, workers=HERE)
 
 
-def assert_same(one, other):
+def assert_same(actual, expected):
     for name in (*CURVES, *COUNTS, 'times'):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), strict=True)
-    assert one.axes == other.axes
-    assert one.question == other.question
+        np.testing.assert_array_equal(getattr(actual, name), getattr(expected, name), strict=True)
+    assert actual.axes == expected.axes
+    assert actual.specification == expected.specification
 
 
 def interrupted(output, *, after, plan=PLAN):
@@ -73,22 +73,22 @@ def test_a_sweep_is_the_mean_over_the_runs_of_every_point(straight):
 
 
 def test_a_point_is_a_sweep_without_axes():
-    found = sweep(sweep_plan(SETTINGS, {}, TIMES, 1), workers=HERE)
+    result = sweep(sweep_plan(SETTINGS, {}, TIMES, 1), workers=HERE)
     runs = cooling_runs(SETTINGS, load_trays()[1], TIMES, [0])
-    np.testing.assert_array_equal(found.mean_speed, runs.mean_speed[0])
-    assert np.isnan(found.mean_speed_error).all()
-    assert found.run_mean_speed is None
-    assert found.pair_collisions.shape == ()
+    np.testing.assert_array_equal(result.mean_speed, runs.mean_speed[0])
+    assert np.isnan(result.mean_speed_error).all()
+    assert result.run_mean_speed is None
+    assert result.pair_collisions.shape == ()
 
 
 @pytest.mark.parametrize('workers', [PIECES, Workers(processes=2, task_seconds=0.005)])
 def test_neither_workers_nor_tasks_change_a_digit(straight, workers):
-    told = []
-    found = sweep(PLAN, None, workers, lambda *numbers: told.append(numbers))
-    assert_same(found, straight)
-    assert told[0] == (0, 120)
-    assert told[-1] == (120, 120)
-    assert told == sorted(told)
+    reported = []
+    result = sweep(PLAN, None, workers, lambda *numbers: reported.append(numbers))
+    assert_same(result, straight)
+    assert reported[0] == (0, 120)
+    assert reported[-1] == (120, 120)
+    assert reported == sorted(reported)
 
 
 def test_a_killed_worker_of_a_cluster_changes_no_digit(cluster):
@@ -101,52 +101,54 @@ def test_a_killed_worker_of_a_cluster_changes_no_digit(cluster):
             cluster.workers[0].kill()
             killed.append(done)
 
-    found = sweep(plan, None, Workers(scheduler=cluster.address, task_seconds=0.02), progress=kill)
+    result = sweep(
+        plan, None, Workers(scheduler=cluster.address, task_seconds=0.02), progress=kill
+    )
     assert killed[0] < 600
     assert cluster.workers[0].wait() != 0
     for processes in (1, 2):
-        assert_same(found, sweep(plan, workers=Workers(processes=processes)))
+        assert_same(result, sweep(plan, workers=Workers(processes=processes)))
 
 
 def test_points_are_independent_unless_common_random_numbers_are_asked_for():
     # An axis that changes nothing of the gas.
     axes = {'noise': (1.0, 2.0)}
-    found = sweep(sweep_plan(SETTINGS, axes, TIMES, 2), workers=HERE)
-    assert (found.mean_speed[0] != found.mean_speed[1]).all()
+    result = sweep(sweep_plan(SETTINGS, axes, TIMES, 2), workers=HERE)
+    assert (result.mean_speed[0] != result.mean_speed[1]).all()
     plan = sweep_plan(SETTINGS, axes, TIMES, 2, common_random_numbers=True)
     common = sweep(plan, workers=HERE)
     np.testing.assert_array_equal(common.mean_speed[0], common.mean_speed[1])
-    np.testing.assert_array_equal(common.mean_speed[0], found.mean_speed[0])
+    np.testing.assert_array_equal(common.mean_speed[0], result.mean_speed[0])
 
 
 def test_more_runs_leave_those_there_were_as_they_are(straight):
-    more = sweep(sweep_plan(SETTINGS, AXES, TIMES, 25, keep_runs=True), workers=HERE)
-    np.testing.assert_array_equal(more.run_mean_speed[:, :, :20], straight.run_mean_speed)
+    larger = sweep(sweep_plan(SETTINGS, AXES, TIMES, 25, keep_runs=True), workers=HERE)
+    np.testing.assert_array_equal(larger.run_mean_speed[:, :, :20], straight.run_mean_speed)
 
 
 def test_trays_and_names_can_be_axes(tmp_path):
     plan = sweep_plan(SETTINGS, {'tray': (3, 1), 'speeds': ('uniform', 'maxwellian')}, TIMES, 2)
-    assert [one.number for one in plan.trays] == [1, 3]
+    assert [tray.number for tray in plan.trays] == [1, 3]
     settings, tray = plan.point(1)
     assert (settings.tray, settings.speeds, tray) == (3, 'maxwellian', load_trays()[3])
     assert plan.name(2) == 'tray 1, speeds uniform'
     output = tmp_path / 'a.npz'
-    found = sweep(replace(plan, axes=plan.axes[1:]), output, HERE)
-    assert (found.mean_speed[0] != found.mean_speed[1]).all()
+    result = sweep(replace(plan, axes=plan.axes[1:]), output, HERE)
+    assert (result.mean_speed[0] != result.mean_speed[1]).all()
     assert Sweep.load(output).axes == plan.axes[1:]
 
 
 def test_what_is_saved_is_read_back(tmp_path, straight):
     path = tmp_path / 'a.npz'
-    found = sweep(PLAN, path, HERE)
-    again = Sweep.load(path)
-    assert_same(again, found)
-    assert_same(again, straight)
-    np.testing.assert_array_equal(again.run_mean_speed, straight.run_mean_speed)
+    result = sweep(PLAN, path, HERE)
+    loaded = Sweep.load(path)
+    assert_same(loaded, result)
+    assert_same(loaded, straight)
+    np.testing.assert_array_equal(loaded.run_mean_speed, straight.run_mean_speed)
     assert not parts_folder(path).exists()
-    asked = json.loads(again.question)
-    assert asked['settings']['seed'] == 7
-    assert asked['axes'] == {name: list(values) for name, values in AXES.items()}
+    specification = json.loads(loaded.specification)
+    assert specification['settings']['seed'] == 7
+    assert specification['axes'] == {name: list(values) for name, values in AXES.items()}
     with np.load(path) as plain:
         assert plain['axis_restitution'].tolist() == [0.7, 0.8, 0.9]
 
@@ -156,11 +158,11 @@ def test_an_interrupted_sweep_goes_on_and_ends_the_same(tmp_path, straight, afte
     output = tmp_path / 'a.npz'
     text = interrupted(output, after=after)
     assert f'of 120 runs are kept in {parts_folder(output)}; the same command goes on' in text
-    told = []
+    reported = []
     # Otherwise divided than before.
-    found = sweep(PLAN, output, HERE, lambda done, total: told.append(done))
-    assert told[0] >= after
-    assert_same(found, straight)
+    result = sweep(PLAN, output, HERE, lambda done, total: reported.append(done))
+    assert reported[0] >= after
+    assert_same(result, straight)
     assert_same(Sweep.load(output), straight)
     assert [path.name for path in tmp_path.iterdir()] == ['a.npz']
 
@@ -168,9 +170,9 @@ def test_an_interrupted_sweep_goes_on_and_ends_the_same(tmp_path, straight, afte
 def test_a_finished_sweep_is_not_done_again(tmp_path, straight):
     output = tmp_path / 'a.npz'
     sweep(PLAN, output, HERE)
-    told = []
-    assert_same(sweep(PLAN, output, HERE, lambda *numbers: told.append(numbers)), straight)
-    assert told == []
+    reported = []
+    assert_same(sweep(PLAN, output, HERE, lambda *numbers: reported.append(numbers)), straight)
+    assert reported == []
 
 
 def test_the_file_of_another_sweep_is_not_overwritten(tmp_path):
@@ -182,7 +184,7 @@ def test_the_file_of_another_sweep_is_not_overwritten(tmp_path):
     with pytest.raises(RecordingError, match=r'a.npz: holds another sweep \(runs: 2, not 20\);'):
         sweep(PLAN, output, HERE)
     output.write_text('mine')
-    with pytest.raises(RecordingError, match='exists and is no sweep of ours; delete it, or'):
+    with pytest.raises(RecordingError, match='exists and holds no sweep; delete it, or'):
         sweep(PLAN, output, HERE)
     assert output.read_text() == 'mine'
 
@@ -214,14 +216,14 @@ def test_parts_of_another_version_are_refused(tmp_path, monkeypatch):
 
 
 def test_a_part_from_elsewhere_is_refused(tmp_path):
-    here, there = tmp_path / 'here.npz', tmp_path / 'there.npz'
-    interrupted(here, after=10)
-    interrupted(there, after=10, plan=replace(PLAN, runs=30))
-    parts_folder(here).joinpath('0-1.npz').write_bytes(
-        parts_folder(there).joinpath('0-1.npz').read_bytes()
+    output, other_output = tmp_path / 'here.npz', tmp_path / 'there.npz'
+    interrupted(output, after=10)
+    interrupted(other_output, after=10, plan=replace(PLAN, runs=30))
+    parts_folder(output).joinpath('0-1.npz').write_bytes(
+        parts_folder(other_output).joinpath('0-1.npz').read_bytes()
     )
     with pytest.raises(RecordingError, match=r'0-1.npz: is a part of another job; delete it'):
-        sweep(PLAN, here, HERE)
+        sweep(PLAN, output, HERE)
 
 
 def test_a_part_under_another_name_is_refused(tmp_path):
@@ -240,19 +242,19 @@ def test_a_damaged_part_is_told_and_made_again(tmp_path, straight):
     cut.write_bytes(cut.read_bytes()[:-40])
     content = bytearray(spoilt.read_bytes())
     # More than the header of an array, of which some bytes mean nothing.
-    for place in range(len(content) // 2, len(content) // 2 + 200):
-        content[place] ^= 1
+    for offset in range(len(content) // 2, len(content) // 2 + 200):
+        content[offset] ^= 1
     spoilt.write_bytes(content)
     notices = []
-    found = sweep(PLAN, output, PIECES, notice=notices.append)
+    result = sweep(PLAN, output, PIECES, notice=notices.append)
     assert notices == [f'{path}: is damaged; it is made again' for path in (cut, spoilt)]
-    assert_same(found, straight)
+    assert_same(result, straight)
 
 
 def test_a_folder_in_use_is_refused(tmp_path):
     output = tmp_path / 'a.npz'
     folder = parts_folder(output)
-    with Journal(folder, PLAN.question()) as journal:
+    with Journal(folder, PLAN.specification()) as journal:
         journal.write('0-1', cool(RunRange(plan=PLAN, first=0, last=1)))
         with pytest.raises(RecordingError, match=r'a.npz.parts: is in use by another process'):
             sweep(PLAN, output, HERE)
@@ -261,10 +263,10 @@ def test_a_folder_in_use_is_refused(tmp_path):
 
 def test_an_output_that_cannot_be_written_is_refused_before_the_work(tmp_path):
     (tmp_path / 'file').write_text('')
-    told = []
+    reported = []
     with pytest.raises(RecordingError, match='cannot be written'):
-        sweep(PLAN, tmp_path / 'file' / 'a.npz', HERE, lambda *numbers: told.append(numbers))
-    assert told == []
+        sweep(PLAN, tmp_path / 'file' / 'a.npz', HERE, lambda *numbers: reported.append(numbers))
+    assert reported == []
 
 
 def test_settings_that_do_not_go_together_name_the_point_and_leave_nothing_behind(tmp_path):
@@ -279,91 +281,3 @@ def test_a_cluster_that_is_not_there_leaves_nothing_behind(tmp_path):
     with pytest.raises(ConfigurationError, match='no address'):
         sweep(PLAN, tmp_path / 'a.npz', Workers(scheduler='nowhere'))
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ('axes', 'message'),
-    [
-        ({'restitutoin': (0.5,)}, "no setting 'restitutoin'"),
-        ({'restitution': (0.5, math.nan)}, 'nan is not finite'),
-        ({'restitution': (0.5, 1.5)}, r'1.5 is outside \[0, 1\]'),
-        ({'restitution': (0.5, 0.5)}, 'holds a value twice; give each value once'),
-        ({'restitution': ()}, 'has no values; give one or more'),
-        ({'restitution': ('a',)}, "'a' is not a number"),
-        ({'tray': (1.5,)}, '1.5 is not a whole number'),
-        ({'tray': (9,)}, r'9 is outside \[1, 8\]'),
-        ({'restitution': np.linspace(0, 1, 2000), 'noise': np.linspace(0, 1, 2000)}, 'at most'),
-    ],
-)
-def test_axes_that_cannot_be_are_refused(axes, message):
-    with pytest.raises(ConfigurationError, match=message):
-        sweep_plan(SETTINGS, axes, TIMES, 2)
-
-
-@pytest.mark.parametrize('times', [(), (1.0, 1.0), (2.0, 1.0), (-1.0,), (math.nan,), ('a',)])
-def test_times_that_cannot_be_are_refused(times):
-    with pytest.raises(ConfigurationError, match=r'--times: .*give'):
-        sweep_plan(SETTINGS, {}, times, 2)
-
-
-@pytest.mark.parametrize('runs', [0, -1, 1.5, True, 2**40])
-def test_numbers_of_runs_that_cannot_be_are_refused(runs):
-    with pytest.raises(ConfigurationError, match=r'--runs: .*give a whole number'):
-        sweep_plan(SETTINGS, {}, TIMES, runs)
-
-
-def test_settings_that_cannot_be_are_refused():
-    with pytest.raises(ConfigurationError, match=r'noise: -1.0 is outside'):
-        sweep_plan(replace(SETTINGS, noise=-1.0), {}, TIMES, 2)
-
-
-def test_no_two_runs_share_a_number():
-    numbers = [number for point in range(6) for number in PLAN.run_numbers(point, 0, 20)]
-    assert len(set(numbers)) == 120
-
-
-@pytest.mark.parametrize('bits', [0xFF, 0x01, 0x08])
-def test_a_damaged_byte_is_found_wherever_it_is(tmp_path, bits):
-    path = tmp_path / 'a.npz'
-    write_archive(path, {'a': np.arange(3.0), 'b': np.array('text')})
-    content = path.read_bytes()
-    refused = 0
-    for k in range(len(content)):
-        path.write_bytes(content[:k] + bytes([content[k] ^ bits]) + content[k + 1 :])
-        try:
-            found = read_archive(path)
-        except RecordingError as error:
-            assert 'is damaged' in error.what  # noqa: PT017
-            refused += 1
-            continue
-        # A byte that holds nothing, such as the date, or one of a name.
-        if set(found) == {'a', 'b'}:
-            assert found['a'].tolist() == [0.0, 1.0, 2.0]
-            assert str(found['b']) == 'text'
-    assert refused > len(content) // 2
-
-
-@pytest.mark.parametrize('cut', [0, 1, 100, -1])
-def test_a_file_cut_short_is_refused(tmp_path, cut):
-    path = tmp_path / 'a.npz'
-    sweep(replace(PLAN, runs=1, axes=()), path, HERE)
-    path.write_bytes(path.read_bytes()[:cut])
-    with pytest.raises(RecordingError, match=r'a.npz: is damaged, or no .npz file'):
-        Sweep.load(path)
-
-
-def test_files_that_hold_no_sweep_are_refused(tmp_path):
-    path = tmp_path / 'a.npz'
-    with pytest.raises(RecordingError, match=r'cannot be read \(No such file or directory\)'):
-        Sweep.load(path)
-    write_archive(path, {'a': np.zeros(3)})
-    with pytest.raises(RecordingError, match='holds no sweep'):
-        Sweep.load(path)
-    np.save(tmp_path / 'single', np.zeros(3))
-    with pytest.raises(RecordingError, match='is damaged, or no'):
-        Sweep.load(tmp_path / 'single.npy')
-    sweep(replace(PLAN, runs=1, axes=()), tmp_path / 'b.npz', HERE)
-    arrays = read_archive(tmp_path / 'b.npz')
-    write_archive(path, {**arrays, 'mean_speed': np.zeros((2, 2))})
-    with pytest.raises(RecordingError, match='holds no sweep'):
-        Sweep.load(path)

@@ -43,21 +43,21 @@ def bag(tmp_path_factory):
     path = tmp_path_factory.mktemp('scene') / 'bag'
     recorder = SceneRecorder(SIMULATION, SCENE, FRAMES / SIMULATION.frame_rate)
     recorder.into_bag(path, CompressionSettings(), 90, nothing)
-    found = {}
+    messages = {}
     with AnyReader([path]) as reader:
         for connection, stamp_ns, raw in reader.messages():
             message = reader.deserialize(raw, connection.msgtype)
-            found.setdefault(connection.topic, []).append((stamp_ns, message))
-        found['qos'] = {
-            one.topic: one.ext.offered_qos_profiles[0].durability.name
-            for one in reader.connections
+            messages.setdefault(connection.topic, []).append((stamp_ns, message))
+        messages['qos'] = {
+            connection.topic: connection.ext.offered_qos_profiles[0].durability.name
+            for connection in reader.connections
         }
-    return found
+    return messages
 
 
 def test_the_bag_holds_the_camera_its_lens_the_epoch_and_the_truth_of_each_tray(bag):
     counts = {name: len(messages) for name, messages in bag.items() if name != 'qos'}
-    trays = {f'/nanorocks/tray_{k}/{what}': FRAMES for k in (1, 4) for what in ('truth', 'beads')}
+    trays = {f'/nanorocks/tray_{k}/{name}': FRAMES for k in (1, 4) for name in ('truth', 'beads')}
     assert counts == {
         '/nanorocks/camera/image_raw/compressed': FRAMES,
         '/nanorocks/camera/camera_info': 1,
@@ -87,9 +87,11 @@ def test_the_truth_in_the_bag_is_that_of_the_film(bag):
             assert back.mean_projected_speed == pytest.approx(truth.mean_projected_speed)
             stamp_ns, message = bag[f'/nanorocks/tray_{truth.tray}/beads'][k]
             assert message.layout.dim[1].size == len(beads.radii)
-            found = beads_from_array(message.data, tray=truth.tray, epoch_ns=START_NS, where='bag')
-            np.testing.assert_allclose(found.positions, beads.positions, atol=1e-8)
-            np.testing.assert_allclose(found.displacement, beads.displacement, atol=1e-10)
+            recorded = beads_from_array(
+                message.data, tray=truth.tray, epoch_ns=START_NS, where='bag'
+            )
+            np.testing.assert_allclose(recorded.positions, beads.positions, atol=1e-8)
+            np.testing.assert_allclose(recorded.displacement, beads.displacement, atol=1e-10)
 
 
 def test_the_pictures_in_the_bag_are_those_of_the_film(bag):

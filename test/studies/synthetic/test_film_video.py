@@ -33,8 +33,8 @@ def filmed(path, settings=SETTINGS, duration=0.6):
     rate = video.get(cv2.CAP_PROP_FPS)
     frames = []
     while True:
-        there, frame = video.read()
-        if not there:
+        read, frame = video.read()
+        if not read:
             return made, rate, frames
         frames.append(frame)
 
@@ -93,9 +93,9 @@ def test_without_pyav_it_says_what_to_do(tmp_path, monkeypatch):
 @pytest.mark.parametrize('number', range(1, 9))
 def test_a_close_up_is_full_of_tray(number):
     tray = load_trays()[number]
-    near = close_up(SimulationSettings(), tray)
-    region = TrayCamera(near, tray, np.array([1e-3]), ('glass',)).region
-    assert max(region.width / near.width_px, region.height / near.height_px) > 0.8
-    assert near.width_px % 2 == near.height_px % 2 == 0
-    assert near.width_px <= 1280
-    assert near.height_px <= 720
+    settings = close_up(SimulationSettings(), tray)
+    region = TrayCamera(settings, tray, np.array([1e-3]), ('glass',)).region
+    assert max(region.width / settings.width_px, region.height / settings.height_px) > 0.8
+    assert settings.width_px % 2 == settings.height_px % 2 == 0
+    assert settings.width_px <= 1280
+    assert settings.height_px <= 720

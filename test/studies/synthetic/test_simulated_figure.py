@@ -35,7 +35,7 @@ def drawn(path, tray=1, samples=51, runs=3, **settings):
 def test_beads_and_decay_are_drawn(tmp_path, tray):
     picture = drawn(tmp_path / 'tray.png', tray)
     assert min(picture.shape[:2]) > 600
-    colours = {tuple(one) for one in picture.reshape(-1, 3).tolist()}
+    colours = {tuple(pixel) for pixel in picture.reshape(-1, 3).tolist()}
     assert {MEAN, MARK} <= colours
     # Beads in the colours of their speeds fill a good part of the trays.
     upper = picture[: picture.shape[0] // 2]

@@ -36,31 +36,31 @@ def plan_of(tray=1, duration=2.0, samples=11, runs=1, kept=(), **settings):
 @pytest.mark.parametrize('tray', [1, 6])
 def test_runs_are_bit_for_bit_those_of_the_ensemble(tray):
     plan = plan_of(tray, duration=1.0, runs=3, sticking_speed=0.001)
-    found = simulate(plan, HERE)
+    simulated = simulate(plan, HERE)
     expected = cooling_runs(plan.settings, plan.tray, plan.times, range(3))
     for name in ('mean_speed', 'mean_projected_speed', 'bodies'):
-        curves = np.array([getattr(run, name) for run in found.runs])
+        curves = np.array([getattr(run, name) for run in simulated.runs])
         np.testing.assert_array_equal(curves, getattr(expected, name))
-    assert found.count('pair') == expected.pair_collisions.sum()
-    assert found.events > found.count('pair') + expected.wall_collisions.sum()
+    assert simulated.count('pair') == expected.pair_collisions.sum()
+    assert simulated.events > simulated.count('pair') + expected.wall_collisions.sum()
 
 
 def test_beads_move_as_the_curves_say():
-    found = simulate(plan_of(3, runs=2, kept=['trajectory']), HERE)
-    for run in found.runs:
+    simulated = simulate(plan_of(3, runs=2, kept=['trajectory']), HERE)
+    for run in simulated.runs:
         speeds = np.linalg.norm(run.velocities, axis=2)
         np.testing.assert_allclose(speeds.mean(axis=1), run.mean_speed, rtol=1e-12)
         assert (run.positions >= run.radii[:, np.newaxis] * (1.0 - 1e-9)).all()
-    assert not np.array_equal(found.runs[0].positions, found.runs[1].positions)
+    assert not np.array_equal(simulated.runs[0].positions, simulated.runs[1].positions)
 
 
 def test_a_picture_needs_the_beads_of_one_run_only():
-    found = simulate(plan_of(samples=101, runs=2, kept=['picture']), HERE)
+    simulated = simulate(plan_of(samples=101, runs=2, kept=['picture']), HERE)
     whole = simulate(plan_of(samples=101, kept=['trajectory']), HERE)
     shown = list(simulated_plan.shown_times(101))
     assert shown == [0, 5, 25, 100]
-    np.testing.assert_array_equal(found.runs[0].positions, whole.runs[0].positions[shown])
-    assert found.runs[1].positions.size == 0
+    np.testing.assert_array_equal(simulated.runs[0].positions, whole.runs[0].positions[shown])
+    assert simulated.runs[1].positions.size == 0
 
 
 def test_what_is_kept_changes_no_number():
@@ -71,7 +71,7 @@ def test_what_is_kept_changes_no_number():
 
 
 def test_files_do_not_depend_on_the_workers(tmp_path, monkeypatch):
-    monkeypatch.setattr(simulated_runs, '_WORTH_PROCESSES', 0.0)
+    monkeypatch.setattr(simulated_runs, '_MIN_SECONDS_FOR_PROCESSES', 0.0)
     plan = plan_of(duration=0.5, runs=5, kept=['trajectory'])
     contents = []
     for processes in (1, 2):
@@ -88,7 +88,7 @@ def test_the_film_shows_the_first_run(tmp_path):
         tmp_path / 'bag', plan.settings, duration=1.0, quality=50, progress=lambda *_: None
     )
     truth = BagFrames(tmp_path / 'bag').truth(START_NS)[1]
-    speeds = [one.mean_speed for one in truth]
+    speeds = [record.mean_speed for record in truth]
     expected = simulate(plan, HERE).mean('mean_speed')[: len(speeds)]
     np.testing.assert_allclose(speeds, expected, rtol=1e-6)
 
@@ -103,17 +103,17 @@ def test_the_speed_has_halved_when_it_has():
 
 def test_one_run_has_no_error_and_several_have():
     assert simulate(plan_of(), HERE).error('mean_speed') is None
-    found = simulate(plan_of(runs=4), HERE)
-    curves = np.array([run.mean_speed for run in found.runs])
+    simulated = simulate(plan_of(runs=4), HERE)
+    curves = np.array([run.mean_speed for run in simulated.runs])
     expected = curves.std(axis=0, ddof=1) / 2.0
-    np.testing.assert_allclose(found.error('mean_speed'), expected, rtol=1e-12)
+    np.testing.assert_allclose(simulated.error('mean_speed'), expected, rtol=1e-12)
 
 
 def test_progress_rises_to_one():
-    seen = []
-    simulate(plan_of(duration=0.2, runs=3), HERE, seen.append)
-    assert seen == sorted(seen)
-    assert seen[-1] == 1.0
+    reported = []
+    simulate(plan_of(duration=0.2, runs=3), HERE, reported.append)
+    assert reported == sorted(reported)
+    assert reported[-1] == 1.0
 
 
 def test_more_numbers_than_memory_may_hold_are_refused():
@@ -123,7 +123,7 @@ def test_more_numbers_than_memory_may_hold_are_refused():
 
 
 def test_more_events_than_memory_may_hold_are_refused(monkeypatch):
-    monkeypatch.setattr(simulated_plan, 'MOST_EVENTS', 20)
+    monkeypatch.setattr(simulated_plan, 'MAX_EVENTS', 20)
     with pytest.raises(SimulationError, match=r'more than the 20 events.*shorter --duration'):
         simulate(plan_of(kept=['events']), HERE)
     simulate(plan_of(), HERE)

@@ -43,14 +43,14 @@ def read(path):
 
 
 def test_arrays_hold_every_bead(tmp_path):
-    found = runs_of()
-    write_trajectory(tmp_path / 'run.npz', found)
+    simulated = runs_of()
+    write_trajectory(tmp_path / 'run.npz', simulated)
     arrays = read(tmp_path / 'run.npz')
     assert arrays['positions'].shape == arrays['velocities'].shape == (6, 55, 3)
     assert arrays['body'].shape == (6, 55)
     assert 'spins' not in arrays
-    np.testing.assert_array_equal(arrays['times'], found.plan.times)
-    np.testing.assert_array_equal(arrays['positions'], found.runs[0].positions)
+    np.testing.assert_array_equal(arrays['times'], simulated.plan.times)
+    np.testing.assert_array_equal(arrays['positions'], simulated.runs[0].positions)
     np.testing.assert_array_equal(arrays['body'], np.tile(arrays['ids'], (6, 1)))
     assert list(arrays['materials'][[14, 15]]) == ['acrylic', 'glass']
     assert list(arrays['species'][[14, 15]]) == [0, 1]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.numerics.stable_sort import rising
+from nanorocks_ros.numerics.stable_sort import stable_argsort
 from nanorocks_ros.simulation.plate_scene.drawing.bead_appearance import (
     Appearance,
     appearance_of,
@@ -147,7 +147,10 @@ class BeadPainter:
         """The lowest first, tray by tray: so what is drawn on stays in the cache."""
         ends = np.cumsum([0, *self._counts.values()])
         return np.concatenate(
-            [first + rising(heights[first:last]) for first, last in itertools.pairwise(ends)]
+            [
+                first + stable_argsort(heights[first:last])
+                for first, last in itertools.pairwise(ends)
+            ]
         )
 
     def _rows(

@@ -1,4 +1,4 @@
-"""The empty floor of a tray, learnt while beads lie and move on it."""
+"""Background model: the empty floor of a tray, estimated while beads lie and move on it."""
 
 from __future__ import annotations
 
@@ -12,158 +12,173 @@ from nanorocks_ros.numerics.compiled import compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Rows of which one is renewed at each picture; the rest wait their turn.
-_ROWS_IN_TURN = 8
-# Share of a new value taken over: with the turn, a light that changes is followed in a second.
-_SHARE = 0.2
-# Where a gray bead may lie, darker values are believed slowly.
-_SLOW_SHARE = 0.004
-# Of its level, what differs more from the floor says nothing of the light as a whole.
-_LIKE_FLOOR = 0.15
-# Chroma above which a pixel is surely a bead, at the first picture.
-_COLOURED = 0.12
-# Of the local level of the floor: darker pixels of the first picture are gray beads.
-_DARK = 0.8
+# One row in eight is updated in each frame.
+_ROW_SETS = 8
+# Weight of a new value: together with the row sets, the time constant is 1 s.
+_WEIGHT = 0.2
+# Weight of darker values where gray beads may lie.
+_SLOW_WEIGHT = 0.004
+# Largest relative deviation of a pixel that counts in the change of the light.
+_MAX_LIGHT_CHANGE = 0.15
+# Chroma above which a pixel is a bead.
+_MAX_CHROMA = 0.12
+# Brightness over that of the background, below which a pixel of the first frame is a gray bead.
+_DARK_SHARE = 0.8
 _LEVEL_QUANTILE = 0.85
 
 
-def first_floor(
-    color: NDArray[np.uint8], gray_known: bool, reach: int
+def initial_background(
+    color: NDArray[np.uint8], has_gray: bool, diameter: int
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Guess the empty floor from one picture with beads on it.
+    """Estimate the background from one image with beads.
 
     Parameters
     ----------
     color : ndarray of uint8, (rows, columns, 3), bgr
-    gray_known : bool
-        Whether beads may be gray.
-    reach : int, [px]
+    has_gray : bool
+        Whether the tray has a gray species.
+    diameter : int, [px]
         Diameter of the largest beads.
 
     Returns
     -------
-    floor : ndarray of float32, (rows, columns, 3), [gray levels]
-        The picture where no bead lies, else what lies around.
-    free : ndarray of bool, (rows, columns)
-        Where no bead seems to lie.
+    background : ndarray of float32, (rows, columns, 3), [gray levels]
+        The image where no bead lies, elsewhere the mean of the surroundings.
+    is_background : ndarray of bool, (rows, columns)
+        Pixels without a bead.
     """
-    picture = color.astype(np.float32)
-    blue, red = picture[:, :, 0], picture[:, :, 2]
-    # The median pixel is floor, or gray grains: either tells the white of the light.
+    image = color.astype(np.float32)
+    blue, red = image[:, :, 0], image[:, :, 2]
+    # The median pixel is floor or gray grain: both give the white balance.
     white = float(np.median((red - blue) / np.maximum(red + blue, 1.0)))
-    free = np.abs(red - blue - white * (red + blue)) <= _COLOURED * (red + blue)
-    if gray_known:
-        low = picture.min(axis=2)
-        free &= low >= _DARK * _local_level(low, free, 2 * reach)
-    shape = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7))
-    free = cv2.erode(free.astype(np.uint8), shape, borderValue=1).astype(bool)
-    if not free.any():
-        free[:] = True
-    floor = picture.copy()
-    around = _mean_around(picture, free, reach)
-    floor[~free] = around[~free]
-    return floor, free
+    is_background = np.abs(red - blue - white * (red + blue)) <= _MAX_CHROMA * (red + blue)
+    if has_gray:
+        darkest = image.min(axis=2)
+        is_background &= darkest >= _DARK_SHARE * _local_brightness(
+            darkest, is_background, 2 * diameter
+        )
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7))
+    is_background = cv2.erode(is_background.astype(np.uint8), kernel, borderValue=1).astype(bool)
+    if not is_background.any():
+        is_background[:] = True
+    background = image.copy()
+    means = _local_mean(image, is_background, diameter)
+    background[~is_background] = means[~is_background]
+    return background, is_background
 
 
-def _local_level(
-    low: NDArray[np.float32], free: NDArray[np.bool_], side: int
+def _local_brightness(
+    darkest: NDArray[np.float32], is_background: NDArray[np.bool_], side: int
 ) -> NDArray[np.float32]:
-    """How bright the floor is: a high quantile over squares, smoothly between them."""
-    rows = max(1, round(low.shape[0] / side))
-    columns = max(1, round(low.shape[1] / side))
+    """Brightness of the background: a high quantile over blocks, interpolated between them."""
+    rows = max(1, round(darkest.shape[0] / side))
+    columns = max(1, round(darkest.shape[1] / side))
     levels = np.zeros((rows, columns), dtype=np.float32)
-    overall = float(np.quantile(low[free], _LEVEL_QUANTILE)) if free.any() else 0.0
-    for i, (some_rows, some_free) in enumerate(
-        zip(np.array_split(low, rows), np.array_split(free, rows), strict=True)
+    overall = (
+        float(np.quantile(darkest[is_background], _LEVEL_QUANTILE)) if is_background.any() else 0.0
+    )
+    for i, (row_block, background_block) in enumerate(
+        zip(np.array_split(darkest, rows), np.array_split(is_background, rows), strict=True)
     ):
-        pairs = zip(
-            np.array_split(some_rows, columns, axis=1),
-            np.array_split(some_free, columns, axis=1),
+        blocks = zip(
+            np.array_split(row_block, columns, axis=1),
+            np.array_split(background_block, columns, axis=1),
             strict=True,
         )
-        for j, (values, usable) in enumerate(pairs):
-            enough = np.count_nonzero(usable) > 0.05 * usable.size
-            here = float(np.quantile(values[usable], _LEVEL_QUANTILE)) if enough else overall
-            # A square full of beads shows no floor.
-            levels[i, j] = max(here, 0.75 * overall)
+        for j, (values, is_usable) in enumerate(blocks):
+            has_background = np.count_nonzero(is_usable) > 0.05 * is_usable.size
+            level = (
+                float(np.quantile(values[is_usable], _LEVEL_QUANTILE))
+                if has_background
+                else overall
+            )
+            # A block full of beads shows no background.
+            levels[i, j] = max(level, 0.75 * overall)
     return np.asarray(
-        cv2.resize(levels, low.shape[::-1], interpolation=cv2.INTER_LINEAR), dtype=np.float32
+        cv2.resize(levels, darkest.shape[::-1], interpolation=cv2.INTER_LINEAR), dtype=np.float32
     )
 
 
-def _mean_around(
-    picture: NDArray[np.float32], free: NDArray[np.bool_], reach: int
+def _local_mean(
+    image: NDArray[np.float32], is_background: NDArray[np.bool_], diameter: int
 ) -> NDArray[np.float32]:
-    """Mean of the free pixels around each, from as near as there are any."""
-    found = np.zeros_like(picture)
-    missing = np.ones(free.shape, dtype=bool)
-    side = 2 * reach + 1
+    """Mean of the background pixels around each pixel, from the smallest window that has some."""
+    means = np.zeros_like(image)
+    missing = np.ones(is_background.shape, dtype=bool)
+    side = 2 * diameter + 1
     while missing.any():
-        weights = cv2.blur(free.astype(np.float32), (side, side), borderType=cv2.BORDER_REFLECT)
-        sums = cv2.blur(picture * free[:, :, None], (side, side), borderType=cv2.BORDER_REFLECT)
+        weights = cv2.blur(
+            is_background.astype(np.float32), (side, side), borderType=cv2.BORDER_REFLECT
+        )
+        sums = cv2.blur(
+            image * is_background[:, :, None], (side, side), borderType=cv2.BORDER_REFLECT
+        )
         known = missing & (weights > 0.02)
-        found[known] = (sums / np.maximum(weights, 1e-6)[:, :, None])[known]
+        means[known] = (sums / np.maximum(weights, 1e-6)[:, :, None])[known]
         missing &= ~known
-        if side > 2 * max(free.shape):
-            found[missing] = picture[free].mean(axis=0)
+        if side > 2 * max(is_background.shape):
+            means[missing] = image[is_background].mean(axis=0)
             break
         side = 2 * side + 1
-    return found
+    return means
 
 
 @compiled
-def renew_floor(
+def update_background(
     color: NDArray[np.uint8],
     covered: NDArray[np.uint8],
-    gray_known: bool,
-    turn: int,
-    floor: NDArray[np.float32],
+    has_gray: bool,
+    frame: int,
+    background: NDArray[np.float32],
     levels: NDArray[np.uint8],
-    sure: NDArray[np.bool_],
+    confirmed: NDArray[np.bool_],
 ) -> float:
-    """Follow the floor where no bead lies, in one of several sets of rows.
+    """Update the background where no bead lies, in one of several sets of rows.
 
     Parameters
     ----------
     color : ndarray of uint8, (rows, columns, 3)
     covered : ndarray of uint8, (rows, columns)
-        Not 0 in pixels of beads.
-    gray_known : bool
-        Darker values may be gray beads that were not found, and are believed slowly.
-    turn : int, >= 0
-        Number of the picture.
-    floor : ndarray of float32, (rows, columns, 3), [gray levels]
+        Nonzero in pixels of beads.
+    has_gray : bool
+        Whether darker values may be undetected gray beads; they get a small weight.
+    frame : int, >= 0
+        Number of the frame.
+    background : ndarray of float32, (rows, columns, 3), [gray levels]
         Changed.
     levels : ndarray of uint8, (rows, columns, 3)
-        Changed: the same, rounded.
-    sure : ndarray of bool, (rows, columns)
-        Changed: where the floor itself has been seen; elsewhere it is a guess.
+        Changed: `background`, rounded.
+    confirmed : ndarray of bool, (rows, columns)
+        Changed: where the background has been visible; elsewhere it is an estimate.
 
     Returns
     -------
     float
-        How bright these rows were, relative to the floor as it was known.
+        Brightness of these rows over that of the background before.
     """
-    shown, known = 1.0, 1.0
-    for i in range(turn % _ROWS_IN_TURN, color.shape[0], _ROWS_IN_TURN):
+    brightness, expected = 1.0, 1.0
+    for i in range(frame % _ROW_SETS, color.shape[0], _ROW_SETS):
         for j in range(color.shape[1]):
             if covered[i, j]:
                 continue
             blue, red = np.int32(color[i, j, 0]), np.int32(color[i, j, 2])
-            warm = (red - blue) - (floor[i, j, 2] - floor[i, j, 0])
-            if abs(warm) > _COLOURED * (red + blue):
+            redness = (red - blue) - (background[i, j, 2] - background[i, j, 0])
+            if abs(redness) > _MAX_CHROMA * (red + blue):
                 continue
-            green, floor_g = np.float64(color[i, j, 1]), np.float64(floor[i, j, 1])
-            if sure[i, j] and abs(green - floor_g) < _LIKE_FLOOR * floor_g:
-                shown += green
-                known += floor_g
+            green, background_green = np.float64(color[i, j, 1]), np.float64(background[i, j, 1])
+            if (
+                confirmed[i, j]
+                and abs(green - background_green) < _MAX_LIGHT_CHANGE * background_green
+            ):
+                brightness += green
+                expected += background_green
             for k in range(3):
-                step = color[i, j, k] - floor[i, j, k]
-                share = _SHARE if sure[i, j] else 1.0
-                if gray_known and step < -0.08 * floor[i, j, k]:
-                    share = _SLOW_SHARE
-                floor[i, j, k] += share * step
-                # A light that became brighter may have taken the floor beyond white.
-                levels[i, j, k] = np.uint8(min(floor[i, j, k] + 0.5, 255.0))
-            sure[i, j] = True
-    return shown / known
+                step = color[i, j, k] - background[i, j, k]
+                weight = _WEIGHT if confirmed[i, j] else 1.0
+                if has_gray and step < -0.08 * background[i, j, k]:
+                    weight = _SLOW_WEIGHT
+                background[i, j, k] += weight * step
+                # A brighter light may have scaled the background above 255.
+                levels[i, j, k] = np.uint8(min(background[i, j, k] + 0.5, 255.0))
+            confirmed[i, j] = True
+    return brightness / expected

@@ -1,4 +1,4 @@
-"""Beads in one picture of a tray: species, place and size of each, with errors."""
+"""Detection of the beads in one image of a tray: species, position and radius, with errors."""
 
 from __future__ import annotations
 
@@ -9,18 +9,21 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.experiment.colours import hue_of
-from nanorocks_ros.stages.tracking.detection.background_model import first_floor, renew_floor
-from nanorocks_ros.stages.tracking.detection.circle_fit import refit
-from nanorocks_ros.stages.tracking.detection.disc_scores import Search
-from nanorocks_ros.stages.tracking.detection.greedy_disc_cover import cover
+from nanorocks_ros.stages.tracking.detection.background_model import (
+    initial_background,
+    update_background,
+)
+from nanorocks_ros.stages.tracking.detection.circle_fit import refit_circles
+from nanorocks_ros.stages.tracking.detection.disc_scores import DiscSearch
+from nanorocks_ros.stages.tracking.detection.greedy_disc_cover import cover_with_discs
 from nanorocks_ros.stages.tracking.detection.pixel_classes import (
     BLUE,
     GRAY,
     RED,
-    Picture,
-    lift_dark_hues,
-    look_at_dusty_pixels,
-    look_at_pixels,
+    PixelMaps,
+    brighten_dark_hues,
+    classify_chalky_pixels,
+    classify_pixels,
 )
 
 if TYPE_CHECKING:
@@ -32,49 +35,49 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import TrackingSettings
 
 _HUE_SIGN = {RED: 1.0, BLUE: -1.0, GRAY: 0.0}
-# Sizes tried differ by this factor at most.
-_SIZE_STEP = 1.2
-# Squares in which places are tried, per radius of the smallest bead.
+# Largest ratio of successive trial radii.
+_RADIUS_FACTOR = 1.2
+# Squares of the candidate grid per radius of the smallest bead.
 _SQUARES_PER_RADIUS = 2.4
-# Smallest radius with which squares of two pixels lose nothing, [px].
-_COARSE_FROM_PX = 3.0
-# What a size that all beads of a species share may still be off in the picture, [px].
-_SIZE_SPREAD_PX = 0.3
-# More beads than the tray should hold are looked for, so that a wrong number shows.
-_SURPLUS = 1.2
-# A pixel of floor under a disc outweighs so many of the species; not where chalk may hide them.
-_FLOOR_WEIGHT = 2
-# Gray grains are many: fewer sizes are tried.
-_GRAY_SIZE_STEP = 1.45
-# Least share of its disc that a bead under chalk must show where sizes differ by a factor.
-_LEAST_SLIVER, _MANY_SIZES = 0.45, 1.5
-# Of the light, a change that is followed at once.
-_LIGHT_CHANGE = 0.012
-# Patches of chalk are smoothed over so many pixels.
-_DUSTY_BLUR_PX = 5
+# Smallest radius for a candidate grid of two pixels, [px].
+_COARSE_RADIUS_PX = 3.0
+# Smallest prior spread of a radius, for species of one size, [px].
+_RADIUS_SPREAD_PX = 0.3
+# More beads than expected are searched, so that a wrong number is noticed.
+_MAX_COUNT_FACTOR = 1.2
+# Weight of a background pixel under a disc, over one of the species; 1 under chalk.
+_BACKGROUND_WEIGHT = 2
+# The same for gray grains: they are many, and fewer radii are tried.
+_GRAY_RADIUS_FACTOR = 1.45
+# Smallest visible share of a bead under chalk, if radii differ by more than the factor.
+_MIN_CHALKY_SHARE, _WIDE_SIZE_RANGE = 0.45, 1.5
+# Smallest relative change of the light that is applied to the whole background.
+_MIN_LIGHT_CHANGE = 0.012
+# Width of the filter that smooths patches of chalk, [px].
+_CHALKY_BLUR_PX = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Detections:
-    """Beads of one species in one picture.
+    """Beads of one species in one frame.
 
     Parameters
     ----------
-    places : ndarray (n, 2), [px]
+    positions : ndarray (n, 2), [px]
         Column and row; the centre of the first pixel is at (0.5, 0.5).
-    place_errors : ndarray (n,), [px]
-        Of a coordinate.
+    position_errors : ndarray (n,), [px]
+        Error of a coordinate.
     radii, radius_errors : ndarray (n,), [px]
-    outline_seen, area_seen : ndarray (n,)
-        Shares of the outline and of the disc that are not hidden.
+    visible_outline, visible_share : ndarray (n,)
+        Visible shares of the outline and of the disc.
     """
 
-    places: NDArray[np.float64]
-    place_errors: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    position_errors: NDArray[np.float64]
     radii: NDArray[np.float64]
     radius_errors: NDArray[np.float64]
-    outline_seen: NDArray[np.float64]
-    area_seen: NDArray[np.float64]
+    visible_outline: NDArray[np.float64]
+    visible_share: NDArray[np.float64]
 
 
 class BeadDetector:
@@ -89,157 +92,168 @@ class BeadDetector:
 
     def __init__(self, settings: TrackingSettings, tray: Tray, pixels_per_metre: float) -> None:
         self._settings = settings
-        self._gray_known = any(_kind(one) == GRAY for one in tray.species)
-        self._dusty = tray.chalk and not self._gray_known
-        self._searches = [self._search(tray, one, pixels_per_metre) for one in tray.species]
-        largest = max(one.diameter_high for one in tray.species)
-        self._reach = max(3, round(largest * pixels_per_metre))
-        self._turn = 0
-        self._ground: _Ground | None = None
+        self._has_gray = any(_class_of(species) == GRAY for species in tray.species)
+        self._chalky = tray.chalk and not self._has_gray
+        self._searches = [
+            self._search_parameters(tray, species, pixels_per_metre) for species in tray.species
+        ]
+        largest = max(species.diameter_high for species in tray.species)
+        self._largest_diameter = max(3, round(largest * pixels_per_metre))
+        self._frame = 0
+        self._background: _Background | None = None
 
     @property
     def crowded(self) -> bool:
-        """Whether there are too many grains to look for."""
-        return any(search.most == 0 for search in self._searches)
+        """Whether a species has too many grains for detection."""
+        return any(search.max_beads == 0 for search in self._searches)
 
     @property
     def darkness(self) -> NDArray[np.uint8] | None:
-        """Of the last picture, where discs are looked for: 0 floor, 255 black; None before it."""
-        return None if self._ground is None else self._ground.picture.darkness.copy()
+        """Darkness map of the last image: 0 background, 255 black; None before the first image."""
+        return None if self._background is None else self._background.maps.darkness.copy()
 
     def detect(
         self, color: NDArray[np.uint8], hints: Sequence[NDArray[np.float64]] = ()
     ) -> tuple[Detections, ...]:
-        """The beads of each species, in the order of the species of the tray.
+        """Detect the beads of each species, in the order of the species of the tray.
 
         Parameters
         ----------
         color : ndarray of uint8, (rows, columns, 3), bgr
         hints : sequence of ndarrays (k, 4), [px]
-            For each species where beads should be: column, row, radius and its error.
+            For each species the predicted beads: column, row, radius and its error.
         """
         color = np.ascontiguousarray(color)
-        if self._ground is None or self._ground.floor.shape != color.shape:
-            self._ground = self._first_ground(color)
-        picture = self._look(color, self._ground)
-        found = self._find(picture, hints or [np.empty((0, 4))] * len(self._searches))
-        every = np.concatenate([discs for discs, _ in found])
+        if self._background is None or self._background.mean.shape != color.shape:
+            self._background = self._initial_background(color)
+        maps = self._classify(color, self._background)
+        discs_and_fits = self._find_discs(maps, hints or [np.empty((0, 4))] * len(self._searches))
+        discs_of_all = np.concatenate([discs for discs, _ in discs_and_fits])
         detections = []
         first = 0
-        for search, (discs, fits) in zip(self._searches, found, strict=True):
-            last = first + len(discs)
-            refit(picture, search.hue_sign, every, first, len(discs), search.expected, fits)
-            detections.append(_detections(every[first:last], fits))
-            first = last
-        self._renew(color, picture, self._ground)
-        self._turn += 1
+        for search, (discs, fits) in zip(self._searches, discs_and_fits, strict=True):
+            end = first + len(discs)
+            refit_circles(
+                maps, search.hue_sign, discs_of_all, first, len(discs), search.expected, fits
+            )
+            detections.append(_detections(discs_of_all[first:end], fits))
+            first = end
+        self._update_background(color, maps, self._background)
+        self._frame += 1
         return tuple(detections)
 
-    def _first_ground(self, color: NDArray[np.uint8]) -> _Ground:
-        floor, sure = first_floor(color, self._gray_known, self._reach)
+    def _initial_background(self, color: NDArray[np.uint8]) -> _Background:
+        mean, confirmed = initial_background(color, self._has_gray, self._largest_diameter)
         shape = color.shape[:2]
-        picture = Picture(
+        maps = PixelMaps(
             np.empty(shape, dtype=np.uint8),
             np.empty(shape, dtype=np.int16),
             np.empty(shape, dtype=np.uint8),
             np.zeros(shape, dtype=np.uint8),
         )
-        return _Ground(floor, _rounded(floor), sure, picture)
+        return _Background(mean, _rounded(mean), confirmed, maps)
 
-    def _look(self, color: NDArray[np.uint8], ground: _Ground) -> Picture:
-        picture = ground.picture
-        look_at_pixels(color, ground.levels, self._gray_known, picture)
-        if self._dusty:
-            lift_dark_hues(color, picture.hue)
-            smooth = cv2.blur(picture.hue, (_DUSTY_BLUR_PX, _DUSTY_BLUR_PX))
-            picture = picture._replace(hue=np.asarray(smooth, dtype=np.int16))
-            look_at_dusty_pixels(ground.levels, picture)
-        picture.covered[:] = 0
-        return picture
+    def _classify(self, color: NDArray[np.uint8], background: _Background) -> PixelMaps:
+        maps = background.maps
+        classify_pixels(color, background.levels, self._has_gray, maps)
+        if self._chalky:
+            brighten_dark_hues(color, maps.hue)
+            smoothed = cv2.blur(maps.hue, (_CHALKY_BLUR_PX, _CHALKY_BLUR_PX))
+            maps = maps._replace(hue=np.asarray(smoothed, dtype=np.int16))
+            classify_chalky_pixels(background.levels, maps)
+        maps.covered[:] = 0
+        return maps
 
-    def _find(
-        self, picture: Picture, hints: Sequence[NDArray[np.float64]]
+    def _find_discs(
+        self, maps: PixelMaps, hints: Sequence[NDArray[np.float64]]
     ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        """Discs and fits of each species."""
-        found = [
-            (np.zeros((search.most, 3)), np.zeros((search.most, 4))) for search in self._searches
+        """Find the discs of each species, with their fits."""
+        discs_and_fits = [
+            (np.zeros((search.max_beads, 3)), np.zeros((search.max_beads, 4)))
+            for search in self._searches
         ]
-        # Gray ones last: the outline of a coloured bead looks gray.
-        for k in sorted(range(len(found)), key=lambda k: self._searches[k].kind == GRAY):
-            discs, fits = found[k]
-            count = cover(picture, self._searches[k], hints[k], discs, fits)
-            found[k] = discs[:count], fits[:count]
-        return found
+        # Gray beads last: the outline of a coloured bead looks gray.
+        for k in sorted(range(len(discs_and_fits)), key=lambda k: self._searches[k].kind == GRAY):
+            discs, fits = discs_and_fits[k]
+            count = cover_with_discs(maps, self._searches[k], hints[k], discs, fits)
+            discs_and_fits[k] = discs[:count], fits[:count]
+        return discs_and_fits
 
-    def _renew(self, color: NDArray[np.uint8], picture: Picture, ground: _Ground) -> None:
-        gain = renew_floor(
+    def _update_background(
+        self, color: NDArray[np.uint8], maps: PixelMaps, background: _Background
+    ) -> None:
+        gain = update_background(
             color,
-            picture.covered,
-            self._gray_known,
-            self._turn,
-            ground.floor,
-            ground.levels,
-            ground.sure,
+            maps.covered,
+            self._has_gray,
+            self._frame,
+            background.mean,
+            background.levels,
+            background.confirmed,
         )
-        if abs(gain - 1.0) > _LIGHT_CHANGE and not (self._gray_known or self._dusty):
-            # The rows in turn are too slow for a light that changes everywhere. Grains and
-            # chalk that pass for floor would lead this astray.
-            ground.floor[:] *= np.float32(gain)
-            ground.levels[:] = _rounded(ground.floor)
+        if abs(gain - 1.0) > _MIN_LIGHT_CHANGE and not (self._has_gray or self._chalky):
+            # The row sets are too slow for a change of the light. Grains and chalk that look
+            # like background would bias the gain.
+            background.mean[:] *= np.float32(gain)
+            background.levels[:] = _rounded(background.mean)
 
-    def _search(self, tray: Tray, species: Species, pixels_per_metre: float) -> Search:
+    def _search_parameters(
+        self, tray: Tray, species: Species, pixels_per_metre: float
+    ) -> DiscSearch:
         low = 0.5 * species.diameter_low * pixels_per_metre
         high = 0.5 * species.diameter_high * pixels_per_metre
-        kind = _kind(species)
-        factor = _GRAY_SIZE_STEP if kind == GRAY else _SIZE_STEP
-        sizes = max(1, int(np.ceil(np.log(high / low) / np.log(factor))))
-        grains = 0.25 * np.pi * species.diameter**2 * species.count
-        area = tray.dimensions[0] * tray.dimensions[1]
-        crowded = kind == GRAY and grains > self._settings.most_crowded * area
-        # Under chalk, what is left of a large bead may pass for a small one.
-        least = _LEAST_SLIVER if self._dusty and high > _MANY_SIZES * low else 0.0
-        spread = max((high - low) / np.sqrt(12.0), _SIZE_SPREAD_PX)
-        return Search(
-            kind=kind,
-            hue_sign=_HUE_SIGN[kind],
-            radii=np.geomspace(low, high, 2 * sizes + 1)[1::2].copy(),
+        pixel_class = _class_of(species)
+        factor = _GRAY_RADIUS_FACTOR if pixel_class == GRAY else _RADIUS_FACTOR
+        n_sizes = max(1, int(np.ceil(np.log(high / low) / np.log(factor))))
+        disc_area = 0.25 * np.pi * species.diameter**2 * species.count
+        tray_area = tray.dimensions[0] * tray.dimensions[1]
+        crowded = (
+            pixel_class == GRAY and disc_area > self._settings.max_covered_fraction * tray_area
+        )
+        # Under chalk, the visible part of a large bead may look like a small bead.
+        min_share = _MIN_CHALKY_SHARE if self._chalky and high > _WIDE_SIZE_RANGE * low else 0.0
+        spread = max((high - low) / np.sqrt(12.0), _RADIUS_SPREAD_PX)
+        return DiscSearch(
+            kind=pixel_class,
+            hue_sign=_HUE_SIGN[pixel_class],
+            radii=np.geomspace(low, high, 2 * n_sizes + 1)[1::2].copy(),
             expected=np.array([0.5 * (low + high), spread]),
-            step=max(2 if low >= _COARSE_FROM_PX else 1, int(low / _SQUARES_PER_RADIUS)),
-            most=0 if crowded else int(_SURPLUS * species.count) + 2,
-            floor_weight=1 if self._dusty else _FLOOR_WEIGHT,
-            least_share=max(self._settings.least_area_seen, least),
+            step=max(2 if low >= _COARSE_RADIUS_PX else 1, int(low / _SQUARES_PER_RADIUS)),
+            max_beads=0 if crowded else int(_MAX_COUNT_FACTOR * species.count) + 2,
+            background_weight=1 if self._chalky else _BACKGROUND_WEIGHT,
+            min_share=max(self._settings.min_visible_fraction, min_share),
         )
 
 
-class _Ground(NamedTuple):
-    """The floor as far as it is known, and room to look at a picture.
+class _Background(NamedTuple):
+    """State of the background model, and the maps of the last image.
 
-    `floor` and `levels` are (rows, columns, 3), as numbers and rounded; `sure` is where it has
-    been seen.
+    `mean` and `levels` are (rows, columns, 3), as floats and rounded; `confirmed` is where it
+    has been visible.
     """
 
-    floor: NDArray[np.float32]
+    mean: NDArray[np.float32]
     levels: NDArray[np.uint8]
-    sure: NDArray[np.bool_]
-    picture: Picture
+    confirmed: NDArray[np.bool_]
+    maps: PixelMaps
 
 
-def _kind(species: Species) -> int:
+def _class_of(species: Species) -> int:
     return {1: RED, -1: BLUE, 0: GRAY}[hue_of(species.material)]
 
 
-def _rounded(floor: NDArray[np.float32]) -> NDArray[np.uint8]:
-    return np.asarray(np.clip(floor + 0.5, 0.0, 255.0), dtype=np.uint8)
+def _rounded(mean: NDArray[np.float32]) -> NDArray[np.uint8]:
+    return np.asarray(np.clip(mean + 0.5, 0.0, 255.0), dtype=np.uint8)
 
 
 def _detections(discs: NDArray[np.float64], fits: NDArray[np.float64]) -> Detections:
-    # Columns on their own: those of many rows are another type for the compiler than of one.
-    errors, radius_errors, outline_seen, area_seen = np.ascontiguousarray(fits.T)
+    # Contiguous columns: numba compiles strided and contiguous arrays separately.
+    errors, radius_errors, visible_outline, visible_share = np.ascontiguousarray(fits.T)
     return Detections(
-        places=discs[:, :2].copy(),
-        place_errors=errors,
+        positions=discs[:, :2].copy(),
+        position_errors=errors,
         radii=discs[:, 2].copy(),
         radius_errors=radius_errors,
-        outline_seen=outline_seen,
-        area_seen=area_seen,
+        visible_outline=visible_outline,
+        visible_share=visible_share,
     )

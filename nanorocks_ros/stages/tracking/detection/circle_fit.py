@@ -1,4 +1,4 @@
-"""The outline of a bead with sub-pixel accuracy: a circle through its edges."""
+"""Circle fit: the outline of a bead with sub-pixel accuracy."""
 
 from __future__ import annotations
 
@@ -7,44 +7,44 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.numerics.compiled import compiled, kernel
 from nanorocks_ros.stages.tracking.detection.bead_edges import (
-    NEAR_PX,
+    EDGE_CLEARANCE_PX,
     RAYS,
-    Planes,
+    EdgeMaps,
     Rays,
-    add_edges,
-    planes_of,
-    room_for_rays,
+    allocate_rays,
+    edge_maps,
+    normal_equations,
 )
-from nanorocks_ros.stages.tracking.detection.pixel_classes import Picture
+from nanorocks_ros.stages.tracking.detection.pixel_classes import PixelMaps
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-_ROUNDS = 3
-# A smaller outline has fewer pixels than rays: every other ray does.
-_ALL_RAYS_FROM_PX = 8.0
-# A step that needs no further one, [px].
-_SETTLED_PX = 0.06
-# Neighbouring rays see the same pixels; what a scatter of nothing would still hide, [px].
-_CORRELATED = 1.6
-_LEAST_SCATTER_PX = 0.06
-# How far a circle without edges may be from where it was guessed, [px].
-_GUESS_PX = 1.5
-# Share of an outline that is enough.
-_ENOUGH = 0.35
+_ITERATIONS = 3
+# Radius below which every other ray is used: the outline has fewer pixels than rays.
+_LARGE_RADIUS_PX = 8.0
+# Step below which the iteration has converged, [px].
+_CONVERGED_PX = 0.06
+# Variance factor, as neighbouring rays share pixels; and smallest scatter of an edge, [px].
+_CORRELATION_FACTOR = 1.6
+_MIN_SCATTER_PX = 0.06
+# Standard error of the start position, [px].
+_START_ERROR_PX = 1.5
+# Visible share of the outline below which the fit is repeated without other species.
+_MIN_VISIBLE_OUTLINE = 0.35
 
 
 @kernel
-def find_neighbours(discs: NDArray[np.float64], own: int, count: int, rays: Rays) -> int:
-    """How many discs touch, hide or nearly touch one, while it moves a little: see `Rays`."""
-    x, y, radius = discs[own, 0], discs[own, 1], discs[own, 2]
+def find_neighbours(discs: NDArray[np.float64], row: int, count: int, rays: Rays) -> int:
+    """Write the discs that may hide edges of one disc to `rays`; return their number."""
+    x, y, radius = discs[row, 0], discs[row, 1], discs[row, 2]
     n = 0
     for k in range(count):
-        reach = discs[k, 2] + radius + NEAR_PX + _GUESS_PX
+        reach = discs[k, 2] + radius + EDGE_CLEARANCE_PX + _START_ERROR_PX
         dx, dy = discs[k, 0] - x, discs[k, 1] - y
-        if dx * dx + dy * dy < reach * reach and k != own and n < rays.neighbours.shape[0]:
-            near = discs[k, 2] + 0.5 * NEAR_PX
+        if dx * dx + dy * dy < reach * reach and k != row and n < rays.neighbours.shape[0]:
+            near = discs[k, 2] + 0.5 * EDGE_CLEARANCE_PX
             rays.neighbours[n, 0], rays.neighbours[n, 1] = discs[k, 0], discs[k, 1]
             rays.neighbours[n, 2] = near * near
             n += 1
@@ -53,7 +53,7 @@ def find_neighbours(discs: NDArray[np.float64], own: int, count: int, rays: Rays
 
 @kernel
 def fit_circle(
-    planes: Planes,
+    maps: EdgeMaps,
     hue_sign: float,
     disc: NDArray[np.float64],
     neighbours: int,
@@ -65,40 +65,40 @@ def fit_circle(
 
     Parameters
     ----------
-    planes : Planes
+    maps : EdgeMaps
     hue_sign : float
         1 for a red, -1 for a blue, 0 for a gray bead.
     disc : ndarray (3,), [px]
         Column, row and radius; changed.
     neighbours : int
-        Of `find_neighbours`, which are in `rays`.
+        Number of neighbours in `rays`, from `find_neighbours`.
     expected : ndarray (2,), [px]
         Radius and its standard deviation.
     fit : ndarray (3 or more,)
-        Written: error of a coordinate and of the radius [px], share of the outline seen.
+        Written: error of a coordinate and of the radius [px], visible share of the outline.
     rays : Rays
     """
     x, y, radius = disc[0], disc[1], disc[2]
     start_x, start_y = x, y
-    every = 1 if radius >= _ALL_RAYS_FROM_PX else 2
+    stride = 1 if radius >= _LARGE_RADIUS_PX else 2
     column_variance, row_variance, radius_variance = 0.0, 0.0, 0.0
     seen, scatter2 = 0, 0.0
-    for turn in range(_ROUNDS):
-        seen, total, sides, xx, xy, xr, yy, yr, rr = add_edges(
-            planes, hue_sign, (x, y, radius), neighbours, every, turn > 0, rays
+    for iteration in range(_ITERATIONS):
+        seen, total, sides, xx, xy, xr, yy, yr, rr = normal_equations(
+            maps, hue_sign, (x, y, radius), neighbours, stride, iteration > 0, rays
         )
         scatter2 = total / max(seen - 3, 1)
-        prior = max(scatter2, _LEAST_SCATTER_PX * _LEAST_SCATTER_PX)
-        # What is known of the size and of the place, as further edges of the same scatter.
+        prior = max(scatter2, _MIN_SCATTER_PX * _MIN_SCATTER_PX)
+        # Priors of radius and position, as additional edges of the same scatter.
         size_weight = prior / (expected[1] * expected[1])
-        place_weight = prior / (_GUESS_PX * _GUESS_PX)
-        xx += place_weight
-        yy += place_weight
+        position_weight = prior / (_START_ERROR_PX * _START_ERROR_PX)
+        xx += position_weight
+        yy += position_weight
         rr += size_weight
-        side_x = sides[0] + place_weight * (start_x - x)
-        side_y = sides[1] + place_weight * (start_y - y)
+        side_x = sides[0] + position_weight * (start_x - x)
+        side_y = sides[1] + position_weight * (start_y - y)
         side_r = sides[2] + size_weight * (expected[0] - radius)
-        # The inverse of the symmetric matrix.
+        # Inverse of the symmetric matrix.
         c_xx, c_xy, c_xr = yy * rr - yr * yr, xr * yr - xy * rr, xy * yr - xr * yy
         c_yy, c_yr, c_rr = xx * rr - xr * xr, xy * xr - xx * yr, xx * yy - xy * xy
         determinant = xx * c_xx + xy * c_xy + xr * c_xr
@@ -111,18 +111,18 @@ def fit_circle(
         y += min(max(step_y, -2.0), 2.0)
         radius = max(radius + min(max(step_r, -2.0), 2.0), 1.5)
         column_variance, row_variance, radius_variance = c_xx, c_yy, c_rr
-        if turn > 0 and max(abs(step_x), max(abs(step_y), abs(step_r))) < _SETTLED_PX:
+        if iteration > 0 and max(abs(step_x), max(abs(step_y), abs(step_r))) < _CONVERGED_PX:
             break
     disc[0], disc[1], disc[2] = x, y, radius
-    spread = _CORRELATED * (scatter2 + _LEAST_SCATTER_PX * _LEAST_SCATTER_PX)
+    spread = _CORRELATION_FACTOR * (scatter2 + _MIN_SCATTER_PX * _MIN_SCATTER_PX)
     fit[0] = math.sqrt(0.5 * spread * (column_variance + row_variance))
     fit[1] = math.sqrt(spread * radius_variance)
-    fit[2] = seen * every / RAYS
+    fit[2] = seen * stride / RAYS
 
 
 @compiled
-def refit(
-    picture: Picture,
+def refit_circles(
+    pixels: PixelMaps,
     hue_sign: float,
     discs: NDArray[np.float64],
     first: int,
@@ -130,44 +130,46 @@ def refit(
     expected: NDArray[np.float64],
     fits: NDArray[np.float64],
 ) -> None:
-    """Fit the circles of one species again, now that all their neighbours are known.
+    """Fit the circles of one species again, with all neighbours known.
 
     Parameters
     ----------
-    picture, hue_sign, expected
+    pixels, hue_sign, expected
         See `fit_circle`.
     discs : ndarray (n, 3), [px]
-        Of all species; `count` of them from `first` on are replaced.
+        Discs of all species; `count` rows from `first` on are replaced.
     fits : ndarray (count, 4)
-        First three columns written, see `fit_circle`.
+        The first three columns are written, see `fit_circle`.
     """
-    alone = discs[first : first + count].copy()
-    _refit(planes_of(picture), hue_sign, discs, first, alone, expected, fits, room_for_rays())
+    same_species = discs[first : first + count].copy()
+    _refit_circles(
+        edge_maps(pixels), hue_sign, discs, first, same_species, expected, fits, allocate_rays()
+    )
 
 
 @kernel
-def _refit(
-    planes: Planes,
+def _refit_circles(
+    maps: EdgeMaps,
     hue_sign: float,
     discs: NDArray[np.float64],
     first: int,
-    alone: NDArray[np.float64],
+    same_species: NDArray[np.float64],
     expected: NDArray[np.float64],
     fits: NDArray[np.float64],
     rays: Rays,
 ) -> None:
-    """See `refit`; `alone` are the discs of the species, which know of no others."""
-    count = alone.shape[0]
+    """See `refit_circles`; `same_species` are the discs of this species only."""
+    count = same_species.shape[0]
     for k in range(count):
         disc, fit = discs[first + k], fits[k]
         neighbours = find_neighbours(discs, first + k, discs.shape[0], rays)
         if not neighbours:
             continue
         x, y, radius = disc[0], disc[1], disc[2]
-        fit_circle(planes, hue_sign, disc, neighbours, expected, fit, rays)
-        if fit[2] < _ENOUGH and hue_sign != 0.0:
-            # Edges against the other species show in the colour.
-            alone[k, 0], alone[k, 1], alone[k, 2] = x, y, radius
-            neighbours = find_neighbours(alone, k, count, rays)
-            fit_circle(planes, hue_sign, alone[k], neighbours, expected, fit, rays)
-            disc[0], disc[1], disc[2] = alone[k, 0], alone[k, 1], alone[k, 2]
+        fit_circle(maps, hue_sign, disc, neighbours, expected, fit, rays)
+        if fit[2] < _MIN_VISIBLE_OUTLINE and hue_sign != 0.0:
+            # Edges against other species are visible in the hue.
+            same_species[k, 0], same_species[k, 1], same_species[k, 2] = x, y, radius
+            neighbours = find_neighbours(same_species, k, count, rays)
+            fit_circle(maps, hue_sign, same_species[k], neighbours, expected, fit, rays)
+            disc[0], disc[1], disc[2] = same_species[k, 0], same_species[k, 1], same_species[k, 2]

@@ -1,9 +1,9 @@
-"""What each pixel of a tray shows: how dark it is, how red or blue, and so what lies there.
+"""Pixel classification: darkness and hue of each pixel, and the species it shows.
 
-A bead of any species is darker than the gray floor in at least one colour: acrylic in blue,
+A bead of any species is darker than the gray floor in at least one channel: acrylic in blue,
 glass in red, copper in blue, JSC-1 in all three. The darkness in the darkest channel is nearly
-flat over the disc of a bead, whatever its shading, so that half of it marks the outline. Which
-species it is follows from red minus blue over their sum, which shading does not change.
+constant over the disc of a bead, whatever its shading, so that half of it marks the outline. Red
+minus blue over their sum gives the species; shading does not change it.
 """
 
 from __future__ import annotations
@@ -18,114 +18,116 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FLOOR, RED, BLUE, GRAY, UNKNOWN = range(5)
-"""What a pixel shows; UNKNOWN is a highlight, a glare, or what fits no species of the tray."""
+"""Pixel classes; UNKNOWN is a highlight, a glare, or a colour of no species of the tray."""
 
 
-class Picture(NamedTuple):
-    """What the pixels of a tray show.
+class PixelMaps(NamedTuple):
+    """Maps of the pixels of a tray image.
 
     Parameters
     ----------
     darkness : ndarray of uint8, (rows, columns)
-        0 for the floor, 255 for black.
+        0 for the background, 255 for black.
     hue : ndarray of int16, (rows, columns), [gray levels]
-        Red minus blue, less that of the floor.
-    shown : ndarray of uint8, (rows, columns)
+        Red minus blue, minus that of the background.
+    pixel_class : ndarray of uint8, (rows, columns)
         FLOOR to UNKNOWN.
     covered : ndarray of uint8, (rows, columns)
-        Bit k is set where a bead of kind k was found.
+        Bit k is set where a bead of class k was found.
     """
 
     darkness: NDArray[np.uint8]
     hue: NDArray[np.int16]
-    shown: NDArray[np.uint8]
+    pixel_class: NDArray[np.uint8]
     covered: NDArray[np.uint8]
 
 
-# Of the floor to black in hundredths, where a pixel of a coloured bead begins; and where a gray
-# one does, which must not be taken for shadows that overlap.
-_DARK = 27
-_GRAY_DARK = 45
+# Smallest darkness of a pixel of a coloured bead, and of a gray one, in percent from background to
+# black. Overlapping shadows stay below the second.
+_DARK_PERCENT = 27
+_GRAY_DARK_PERCENT = 45
 # (red + blue) / (red - blue): copper and acrylic 1.4 to 2, glass -1.4, JSC-1 and floor 10;
 # twice that under chalk.
 _COLOURED = 5
-# Gray levels above the floor, in every channel, of a highlight.
-_BRIGHTER = 25
-# Darker than the floor by less is floor, without a closer look, in gray levels.
-_QUIET = 16
-# A floor as bright as this hides what lies on it.
+# Gray levels above the background, in every channel, of a highlight.
+_HIGHLIGHT_LEVELS = 25
+# Deviation from the background, in gray levels, below which a pixel is background.
+_NOISE_LEVELS = 16
+# Background level above which beads are not visible.
 _SATURATED = 248
 
 
 @compiled
-def look_at_pixels(
-    color: NDArray[np.uint8], floor: NDArray[np.uint8], gray_known: bool, picture: Picture
+def classify_pixels(
+    color: NDArray[np.uint8], background: NDArray[np.uint8], has_gray: bool, maps: PixelMaps
 ) -> None:
-    """Compare a picture with the empty floor, pixel by pixel.
+    """Classify the pixels of an image by comparison with the background.
 
     Parameters
     ----------
-    color, floor : ndarray of uint8, (rows, columns, 3), bgr
-    gray_known : bool
-        Whether the tray has a gray species: dark gray is UNKNOWN otherwise.
-    picture : Picture
-        Written, but for `covered`.
+    color, background : ndarray of uint8, (rows, columns, 3), bgr
+    has_gray : bool
+        Whether the tray has a gray species; without one, dark gray is UNKNOWN.
+    maps : PixelMaps
+        Written, except `covered`.
     """
-    # Flat arrays, unsigned places, short whole numbers and choices instead of branches: so the
-    # compiler does many pixels at once. No product needs more than 16 bits but that of `steps`.
-    pixels, empty = color.reshape(-1), floor.reshape(-1)
-    darkness, hue, shown = (
-        picture.darkness.reshape(-1),
-        picture.hue.reshape(-1),
-        picture.shown.reshape(-1),
-    )
-    dark_gray = np.uint8(GRAY) if gray_known else np.uint8(UNKNOWN)
+    # Flat arrays, unsigned indices, 16-bit integers and no branches let the compiler vectorise the
+    # loop. Only the product in `scaled` needs more than 16 bits.
+    pixels, empty = color.reshape(-1), background.reshape(-1)
+    darkness, hue = maps.darkness.reshape(-1), maps.hue.reshape(-1)
+    pixel_class = maps.pixel_class.reshape(-1)
+    dark_gray = np.uint8(GRAY) if has_gray else np.uint8(UNKNOWN)
     one, two, three, zero = np.uint64(1), np.uint64(2), np.uint64(3), np.int16(0)
-    for pixel in range(shown.size):
+    for pixel in range(pixel_class.size):
         k = np.uint64(pixel)
         # Signed: differences of uint8 would wrap around.
         blue, floor_b = np.int16(pixels[three * k]), np.int16(empty[three * k])
         green, floor_g = np.int16(pixels[three * k + one]), np.int16(empty[three * k + one])
         red, floor_r = np.int16(pixels[three * k + two]), np.int16(empty[three * k + two])
         b, g, r = np.int16(floor_b - blue), np.int16(floor_g - green), np.int16(floor_r - red)
-        down = max(b, max(g, r))
-        up = min(np.int16(-b), min(np.int16(-g), np.int16(-r)))
+        darkening = max(b, max(g, r))
+        brightening = min(np.int16(-b), min(np.int16(-g), np.int16(-r)))
         level = max(floor_b, max(floor_g, max(floor_r, np.int16(1))))
-        warm = np.int16(np.int16(red - blue) - np.int16(floor_r - floor_b))
-        hue[k] = warm
-        quiet = (down < _QUIET) & (down > -_QUIET) & (up <= _BRIGHTER) & (level < _SATURATED)
-        steps = np.int32(np.float32(255 * np.int32(max(down, zero))) / np.float32(level))
-        calm, loud = np.uint8(max(down, zero)), np.uint8(min(steps, np.int32(255)))
-        darkness[k] = calm if quiet else loud
-        depth, light, colour = (
-            np.int16(100 * down),
-            np.int16(red + blue),
-            np.int16(_COLOURED * warm),
+        redness = np.int16(np.int16(red - blue) - np.int16(floor_r - floor_b))
+        hue[k] = redness
+        is_background = (
+            (darkening < _NOISE_LEVELS)
+            & (darkening > -_NOISE_LEVELS)
+            & (brightening <= _HIGHLIGHT_LEVELS)
+            & (level < _SATURATED)
         )
-        bead = dark_gray if depth > np.int16(_GRAY_DARK * level) else np.uint8(UNKNOWN)
-        bead = np.uint8(BLUE) if np.int16(-colour) > light else bead
-        bead = np.uint8(RED) if colour > light else bead
-        bead = np.uint8(FLOOR) if depth <= np.int16(_DARK * level) else bead
-        hidden = (min(floor_b, min(floor_g, floor_r)) >= _SATURATED) | (up > _BRIGHTER)
-        bead = np.uint8(UNKNOWN) if hidden else bead
-        shown[k] = np.uint8(FLOOR) if quiet else bead
+        scaled = np.int32(np.float32(255 * np.int32(max(darkening, zero))) / np.float32(level))
+        small_darkness = np.uint8(max(darkening, zero))
+        scaled_darkness = np.uint8(min(scaled, np.int32(255)))
+        darkness[k] = small_darkness if is_background else scaled_darkness
+        depth, light = np.int16(100 * darkening), np.int16(red + blue)
+        colour = np.int16(_COLOURED * redness)
+        kind = dark_gray if depth > np.int16(_GRAY_DARK_PERCENT * level) else np.uint8(UNKNOWN)
+        kind = np.uint8(BLUE) if np.int16(-colour) > light else kind
+        kind = np.uint8(RED) if colour > light else kind
+        kind = np.uint8(FLOOR) if depth <= np.int16(_DARK_PERCENT * level) else kind
+        is_glare = (min(floor_b, min(floor_g, floor_r)) >= _SATURATED) | (
+            brightening > _HIGHLIGHT_LEVELS
+        )
+        kind = np.uint8(UNKNOWN) if is_glare else kind
+        pixel_class[k] = np.uint8(FLOOR) if is_background else kind
 
 
-# Gray levels of red minus blue, averaged over some pixels, of a bead under chalk.
-_DUSTY_HUE = 16
-# So many steps of darkness for a level of red minus blue: a quarter of a clean bead's is full.
-_DUSTY_STEPS = 5
+# Red minus blue of a chalky bead, averaged over some pixels, in gray levels.
+_CHALKY_HUE = 16
+# Darkness per gray level of red minus blue: a quarter of the hue of a clean bead is full scale.
+_CHALKY_DARKNESS = 5
 
 
-# Red and blue together of a well lit bead, and how much a dark one is lifted at most.
-_LIT = np.float32(250.0)
-_LIFTED = np.float32(3.0)
-_BLACK = np.float32(20.0)
+# Red plus blue of a well lit bead, largest correction factor, and offset for black.
+_LIT_LEVEL = np.float32(250.0)
+_MAX_FACTOR = np.float32(3.0)
+_DARK_OFFSET = np.float32(20.0)
 
 
 @compiled
-def lift_dark_hues(color: NDArray[np.uint8], hue: NDArray[np.int16]) -> None:
-    """Give the dark side of a bead the hue of its lit side.
+def brighten_dark_hues(color: NDArray[np.uint8], hue: NDArray[np.int16]) -> None:
+    """Scale the hue of the dark side of beads to that of the lit side.
 
     Parameters
     ----------
@@ -137,30 +139,30 @@ def lift_dark_hues(color: NDArray[np.uint8], hue: NDArray[np.int16]) -> None:
     two, three = np.uint64(2), np.uint64(3)
     for pixel in range(lifted.size):
         k = np.uint64(pixel)
-        light = np.float32(pixels[three * k]) + np.float32(pixels[three * k + two]) + _BLACK
-        factor = min(max(_LIT / light, np.float32(1.0)), _LIFTED)
+        light = np.float32(pixels[three * k]) + np.float32(pixels[three * k + two]) + _DARK_OFFSET
+        factor = min(max(_LIT_LEVEL / light, np.float32(1.0)), _MAX_FACTOR)
         lifted[k] = np.int16(np.float32(lifted[k]) * factor)
 
 
 @compiled
-def look_at_dusty_pixels(floor: NDArray[np.uint8], picture: Picture) -> None:
-    """The same for beads and floor under chalk, and glare: only the hue tells them apart.
+def classify_chalky_pixels(background: NDArray[np.uint8], maps: PixelMaps) -> None:
+    """Classify the pixels of a tray under chalk, by hue only.
 
     Parameters
     ----------
-    floor : ndarray of uint8, (rows, columns, 3), bgr
-    picture : Picture
-        With its hue, smoothed: patches of chalk on a bead have none. `shown` is written, and
-        `darkness`, to how much hue there is.
+    background : ndarray of uint8, (rows, columns, 3), bgr
+    maps : PixelMaps
+        `hue` must be smoothed, as patches of chalk on a bead have none. `pixel_class` and
+        `darkness` are written; `darkness` is the size of the hue.
     """
-    empty, hue = floor.reshape(-1), picture.hue.reshape(-1)
-    darkness, shown = picture.darkness.reshape(-1), picture.shown.reshape(-1)
+    empty, hue = background.reshape(-1), maps.hue.reshape(-1)
+    darkness, pixel_class = maps.darkness.reshape(-1), maps.pixel_class.reshape(-1)
     one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
-    for pixel in range(shown.size):
+    for pixel in range(pixel_class.size):
         k = np.uint64(pixel)
-        warm = np.int32(hue[k])
-        darkness[k] = np.uint8(min(_DUSTY_STEPS * abs(warm), np.int32(255)))
-        least = min(empty[three * k], min(empty[three * k + one], empty[three * k + two]))
-        bead = np.uint8(UNKNOWN) if least >= _SATURATED else np.uint8(FLOOR)
-        bead = np.uint8(BLUE) if warm < -_DUSTY_HUE else bead
-        shown[k] = np.uint8(RED) if warm > _DUSTY_HUE else bead
+        redness = np.int32(hue[k])
+        darkness[k] = np.uint8(min(_CHALKY_DARKNESS * abs(redness), np.int32(255)))
+        darkest = min(empty[three * k], min(empty[three * k + one], empty[three * k + two]))
+        kind = np.uint8(UNKNOWN) if darkest >= _SATURATED else np.uint8(FLOOR)
+        kind = np.uint8(BLUE) if redness < -_CHALKY_HUE else kind
+        pixel_class[k] = np.uint8(RED) if redness > _CHALKY_HUE else kind

@@ -1,4 +1,4 @@
-"""What a picture shows along the rays of a circle, and the edges there."""
+"""Samples of an image along the rays of a circle, and the edges on them."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from nanorocks_ros.numerics.compiled import compiled, inlined
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Places along a ray where a picture is looked at.
-_MOST_SAMPLES = 7
+# Largest number of samples along a ray.
+_MAX_SAMPLES = 7
 
 
 class Samples(NamedTuple):
-    """What a picture shows along rays: of all of them inside first, then further outside.
+    """Samples along rays: the innermost samples of all rays first, then further outside.
 
     Parameters
     ----------
     starts, steps : ndarrays (2, rays), [px]
-        Of each ray: column and row of its end, and of one step along it.
-    places : ndarray of int32, (places,)
-        The pixel to the upper left of each place, counted from the first one, row by row.
-    right, down : ndarrays (places,)
-        Share of the way to the next pixel.
-    corners : ndarray of int32, (4, places)
-        Of the four pixels around: upper left, upper right, lower left, lower right.
-    values : ndarray (places,)
-        Between the pixels.
+        Column and row of the end of each ray, and of one step along it.
+    indices : ndarray of int32, (samples,)
+        Flat index of the pixel to the upper left of each sample.
+    right, down : ndarrays (samples,)
+        Fraction of the distance to the next pixel.
+    corners : ndarray of int32, (4, samples)
+        Values of the four pixels around: upper left, upper right, lower left, lower right.
+    values : ndarray (samples,)
+        Bilinear interpolation.
     outside, step, edges : ndarrays (rays,)
-        Of each ray: the value outside, the step from there, and the distance of the edge.
+        For each ray: the value outside, the step from there, and the distance of the edge.
     """
 
     starts: NDArray[np.float64]
     steps: NDArray[np.float64]
-    places: NDArray[np.int32]
+    indices: NDArray[np.int32]
     right: NDArray[np.float64]
     down: NDArray[np.float64]
     corners: NDArray[np.int32]
@@ -47,17 +47,17 @@ class Samples(NamedTuple):
 
 
 @compiled
-def room_for_samples(rays: int) -> Samples:
-    """Room that nothing is written in yet."""
-    most = _MOST_SAMPLES * rays
+def allocate_samples(rays: int) -> Samples:
+    """Allocate uninitialised arrays."""
+    size = _MAX_SAMPLES * rays
     return Samples(
         np.empty((2, rays)),
         np.empty((2, rays)),
-        np.empty(most, dtype=np.int32),
-        np.empty(most),
-        np.empty(most),
-        np.empty((4, most), dtype=np.int32),
-        np.empty(most),
+        np.empty(size, dtype=np.int32),
+        np.empty(size),
+        np.empty(size),
+        np.empty((4, size), dtype=np.int32),
+        np.empty(size),
         np.empty(rays),
         np.empty(rays),
         np.empty(rays),
@@ -65,7 +65,7 @@ def room_for_samples(rays: int) -> Samples:
 
 
 @inlined
-def look_along(
+def sample_rays(
     pixels: NDArray[np.integer[Any]],
     width: int,
     sign: float,
@@ -73,26 +73,26 @@ def look_along(
     count: int,
     samples: Samples,
 ) -> None:
-    """Look at a picture along some rays: each step for many places at once."""
+    """Sample an image along rays; each step is a loop over all samples."""
     start_x, start_y = samples.starts[0], samples.starts[1]
     step_x, step_y = samples.steps[0], samples.steps[1]
     columns = np.int32(width)
     for t in range(-reach, reach + 1):
         first = (t + reach) * count
-        places = samples.places[first : first + count]
+        indices = samples.indices[first : first + count]
         right, down = samples.right[first : first + count], samples.down[first : first + count]
         for q in range(count):
             x, y = start_x[q] + t * step_x[q], start_y[q] + t * step_y[q]
             column, row = np.int32(x), np.int32(y)
-            places[q] = row * columns + column
+            indices[q] = row * columns + column
             right[q], down[q] = x - column, y - row
     one, below = np.uint64(1), np.uint64(width)
     upper_left, upper_right = samples.corners[0], samples.corners[1]
     lower_left, lower_right = samples.corners[2], samples.corners[3]
     right, down, values = samples.right, samples.down, samples.values
     for q in range((2 * reach + 1) * count):
-        # Unsigned places need no look at whether they count from the end.
-        k = np.uint64(samples.places[q])
+        # Unsigned indices need no test for negative values.
+        k = np.uint64(samples.indices[q])
         upper_left[q], upper_right[q] = pixels[k], pixels[k + one]
         lower_left[q], lower_right[q] = pixels[k + below], pixels[k + below + one]
     for q in range((2 * reach + 1) * count):
@@ -103,25 +103,25 @@ def look_along(
 
 @inlined
 def find_edges(
-    reach: int, least: float, most_outside: float, count: int, samples: Samples
+    reach: int, min_step: float, max_outside: float, count: int, samples: Samples
 ) -> None:
     """Distance of an edge from the end of each ray, [px]; NaN where there is none."""
     outside, step, edges = samples.outside, samples.step, samples.edges
-    nearest, near = samples.values[:count], samples.values[count : 2 * count]
+    innermost, inner = samples.values[:count], samples.values[count : 2 * count]
     last = 2 * reach * count
-    far, farthest = samples.values[last - count : last], samples.values[last : last + count]
+    outer, outermost = samples.values[last - count : last], samples.values[last : last + count]
     for q in range(count):
-        outside[q] = 0.5 * (farthest[q] + far[q])
-        step[q] = 0.5 * (near[q] + nearest[q]) - outside[q]
+        outside[q] = 0.5 * (outermost[q] + outer[q])
+        step[q] = 0.5 * (inner[q] + innermost[q]) - outside[q]
         # The outermost samples are 1 and 0 by the choice of the levels.
         total = 1.0 - (reach + 0.5)
-        total += min(max((near[q] - outside[q]) / step[q], 0.0), 1.0)
-        edges[q] = total + min(max((far[q] - outside[q]) / step[q], 0.0), 1.0)
+        total += min(max((inner[q] - outside[q]) / step[q], 0.0), 1.0)
+        edges[q] = total + min(max((outer[q] - outside[q]) / step[q], 0.0), 1.0)
     for t in range(2, 2 * reach - 1):
         values = samples.values[t * count : (t + 1) * count]
         for q in range(count):
             edges[q] += min(max((values[q] - outside[q]) / step[q], 0.0), 1.0)
-    most = 2.0 * most_outside
+    max_sum = 2.0 * max_outside
     for q in range(count):
-        none = (far[q] > most) | (farthest[q] > most) | (outside[q] > most_outside)
-        edges[q] = np.nan if none | (step[q] < least) else edges[q]
+        no_edge = (outer[q] > max_sum) | (outermost[q] > max_sum) | (outside[q] > max_outside)
+        edges[q] = np.nan if no_edge | (step[q] < min_step) else edges[q]

@@ -1,4 +1,4 @@
-"""Which detection belongs to which track: the pairing of least total cost."""
+"""Linear assignment of detections to tracks at the lowest total cost."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ if TYPE_CHECKING:
 
 
 class _Pairing(NamedTuple):
-    """Who is paired with whom, prices, and the search for the next pair.
+    """State of the assignment, with dual prices and the search for the next augmenting path.
 
-    `distance`, `reached_from` and `done` are of columns, `touched` lists those with a distance,
-    `visited` the rows on the way, with their `row_distance`.
+    `distance`, `reached_from` and `settled` are of columns, `touched` lists the columns with a
+    distance, `visited` the rows on the path, with their `row_distance`.
     """
 
-    partner: NDArray[np.int64]
-    owner: NDArray[np.int64]
+    column_of_row: NDArray[np.int64]
+    row_of_column: NDArray[np.int64]
     row_price: NDArray[np.float64]
     column_price: NDArray[np.float64]
     distance: NDArray[np.float64]
     reached_from: NDArray[np.int64]
-    done: NDArray[np.bool_]
+    settled: NDArray[np.bool_]
     touched: NDArray[np.int64]
     row_distance: NDArray[np.float64]
     visited: NDArray[np.int64]
 
 
 class Costs(NamedTuple):
-    """Costs of the pairs that are possible.
+    """Sparse cost matrix in compressed rows.
 
     Parameters
     ----------
     starts : ndarray of int64, (n + 1,)
-        Where the pairs of each row begin in the others.
+        Start of each row in the other arrays.
     columns : ndarray of int64, (pairs,)
-        Rising within a row.
+        Ascending within a row.
     values : ndarray (pairs,)
     """
 
@@ -49,16 +49,16 @@ class Costs(NamedTuple):
 
 
 @compiled
-def assign(costs: Costs, columns: int, alone: float) -> NDArray[np.int64]:
-    """Pair rows with columns, or leave them alone, at the least total cost.
+def assign(costs: Costs, columns: int, unlinked_cost: float) -> NDArray[np.int64]:
+    """Assign rows to columns, or leave rows unassigned, at the lowest total cost.
 
     Parameters
     ----------
     costs : Costs
     columns : int
-        How many there are.
-    alone : float
-        Cost of a row without a column.
+        Number of columns.
+    unlinked_cost : float
+        Cost of an unassigned row.
 
     Returns
     -------
@@ -82,70 +82,70 @@ def assign(costs: Costs, columns: int, alone: float) -> NDArray[np.int64]:
         np.empty(n),
         np.empty(n, dtype=np.int64),
     )
-    _add_rows(costs, alone, state)
-    return state.partner
+    _add_rows(costs, unlinked_cost, state)
+    return state.column_of_row
 
 
 @kernel
-def _add_rows(costs: Costs, alone: float, state: _Pairing) -> None:
-    for start in range(state.partner.size):
-        _add_row(costs, alone, state, start)
+def _add_rows(costs: Costs, unlinked_cost: float, state: _Pairing) -> None:
+    for start in range(state.column_of_row.size):
+        _add_row(costs, unlinked_cost, state, start)
 
 
 @kernel
 def _add_row(
     costs: Costs,
-    alone: float,
+    unlinked_cost: float,
     state: _Pairing,
     start: int,
 ) -> None:
-    """Pair one more row, along the path of least cost by which others make room for it."""
+    """Add a row along the augmenting path of lowest cost."""
     reached, visits = 0, 1
     state.visited[0] = start
     state.row_distance[start] = 0.0
     row, end_column = start, -1
-    end_row, end_distance = start, alone - state.row_price[start]
+    end_row, end_distance = start, unlinked_cost - state.row_price[start]
     while True:
-        reached = _reach_from(costs, state, row, reached)
-        nearest, nearest_distance = _nearest(state, reached, end_distance)
+        reached = _relax_from(costs, state, row, reached)
+        nearest, nearest_distance = _nearest_column(state, reached, end_distance)
         if nearest < 0:
             break
-        state.done[nearest] = True
-        if state.owner[nearest] < 0:
+        state.settled[nearest] = True
+        if state.row_of_column[nearest] < 0:
             end_column, end_distance = nearest, nearest_distance
             break
-        row = state.owner[nearest]
+        row = state.row_of_column[nearest]
         state.row_distance[row] = nearest_distance
         state.visited[visits] = row
         visits += 1
-        given_up = nearest_distance + alone - state.row_price[row]
-        if given_up < end_distance:
-            end_row, end_distance = row, given_up
-    _settle_prices(state, visits, reached, end_distance)
-    # Go back from the end of the path, every row giving up its column to the one before.
+        unlinked_distance = nearest_distance + unlinked_cost - state.row_price[row]
+        if unlinked_distance < end_distance:
+            end_row, end_distance = row, unlinked_distance
+    _update_prices(state, visits, reached, end_distance)
+    # Go back along the path: each row passes its column to the row before.
     column = end_column
     if column < 0:
-        column = state.partner[end_row]
-        state.partner[end_row] = -1
+        column = state.column_of_row[end_row]
+        state.column_of_row[end_row] = -1
     while column >= 0:
         row = state.reached_from[column]
-        before = state.partner[row]
-        state.partner[row] = column
-        state.owner[column] = row
+        before = state.column_of_row[row]
+        state.column_of_row[row] = column
+        state.row_of_column[column] = row
         column = before
 
 
 @kernel
-def _reach_from(
+def _relax_from(
     costs: Costs,
     state: _Pairing,
     row: int,
     reached: int,
 ) -> int:
-    """Update the distances of the columns that a row may be paired with; how many have one."""
+    """Relax the distances of the columns of a row; return the number of touched columns."""
     for k in range(costs.starts[row], costs.starts[row + 1]):
         j = costs.columns[k]
-        if state.done[j]:
+        if state.settled[j]:
             continue
         reduced = costs.values[k] - state.row_price[row] - state.column_price[j]
         if state.row_distance[row] + reduced < state.distance[j]:
@@ -158,24 +158,24 @@ def _reach_from(
 
 
 @kernel
-def _nearest(state: _Pairing, reached: int, limit: float) -> tuple[int, float]:
+def _nearest_column(state: _Pairing, reached: int, limit: float) -> tuple[int, float]:
     nearest, distance = -1, limit
     for k in range(reached):
         j = state.touched[k]
-        if not state.done[j] and state.distance[j] < distance:
+        if not state.settled[j] and state.distance[j] < distance:
             nearest, distance = j, state.distance[j]
     return nearest, distance
 
 
 @kernel
-def _settle_prices(state: _Pairing, visits: int, reached: int, end: float) -> None:
-    """Keep all reduced costs positive, and make ready for the next row."""
+def _update_prices(state: _Pairing, visits: int, reached: int, end: float) -> None:
+    """Update the prices so that reduced costs stay positive, and clear the search."""
     for k in range(visits):
         row = state.visited[k]
         state.row_price[row] += end - state.row_distance[row]
     for k in range(reached):
         j = state.touched[k]
-        if state.done[j]:
+        if state.settled[j]:
             state.column_price[j] -= end - min(state.distance[j], end)
         state.distance[j] = np.inf
-        state.done[j] = False
+        state.settled[j] = False

@@ -1,4 +1,4 @@
-"""How likely each of the beads that are seen is each of those that are known."""
+"""Link probabilities between known beads and the detections of a frame."""
 
 from __future__ import annotations
 
@@ -13,196 +13,217 @@ from nanorocks_ros.stages.tracking.linking.assignment import Costs, assign
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-SIZE_JITTER_PX = 0.3
-"""Of the size of a bead from picture to picture, beyond what its errors say, [px]."""
-SLOWEST_PX_S = 6.0
-"""Slowest change of velocity in a collision that is reckoned with, [px/s]."""
+RADIUS_NOISE_PX = 0.3
+"""Noise of a measured radius between frames, beside its stated error, [px]."""
+MIN_VELOCITY_CHANGE_PX_S = 6.0
+"""Smallest change of velocity in a collision that the linking allows for, [px/s]."""
 
-# Shares of the beads that collide, or are shaken, between two pictures.
-_COLLIDING, _SHAKEN = 0.15, 0.002
-# Share of the places that are off by more than their error says, and by how much, in radii:
-# within its radius there is no other bead to confuse one with, unless above or below it.
-_MISPLACED, _MISPLACED_BY = 0.02, 0.4
-# Usual changes of velocity in a collision, squared, that are the limit.
-_REACH2 = 16.0
-_LARGEST_SIZE_COST = 6.0
-# Of the variance of a change of velocity, what is left when the place is looked for half way
-# between where the bead was and where it would be: its velocity is lost, and no more.
-_HALF_WAY = 0.5
-# Share of the beads that must be out of reach of collisions for a tray to have been shaken.
-_LOST = 0.3
-# A pair that is so much less likely than the best, as a logarithm, is none.
-_WORTH = 10.0
+# Shares of the beads that collide, or are shaken, between two frames.
+_COLLISION_SHARE, _SHAKEN_SHARE = 0.15, 0.002
+# Share of outliers among the positions, and their size in radii: within one radius there is no
+# other bead, except above or below.
+_OUTLIER_SHARE, _OUTLIER_RADII = 0.02, 0.4
+# Largest squared deviation of a link, in variances.
+_MAX_SQUARED_SIGMAS = 16.0
+_MAX_RADIUS_COST = 6.0
+# Variance of a position after a collision about the midpoint between the last and the predicted
+# position, over that of the change of velocity times the time.
+_COLLISION_VARIANCE_FACTOR = 0.5
+# Share of beads without a possible link above which the tray was shaken.
+_MAX_LOST_SHARE = 0.3
+# Largest cost of a link above the lowest cost of the same bead.
+_MAX_COST_DIFFERENCE = 10.0
 
 
-class Known(NamedTuple):
-    """Beads that are followed.
+class KnownBeads(NamedTuple):
+    """Predictions for the known beads.
 
     Parameters
     ----------
     predicted, variances : ndarrays (n, 2), (n,), [px], [px^2]
-        Where they should be, and the variance of a coordinate.
-    last : ndarray (n, 2), [px]
-        Where they were seen last.
-    waits : ndarray (n,), [s]
-        Since then.
-    sizes : ndarray (n,), [px]
-        Radii.
+        Predicted positions, and the variance of a coordinate.
+    last_positions : ndarray (n, 2), [px]
+        Positions where they were last detected.
+    elapsed : ndarray (n,), [s]
+        Time since then.
+    expected_radii : ndarray (n,), [px]
+        Radii of the tracks.
     """
 
     predicted: NDArray[np.float64]
     variances: NDArray[np.float64]
-    last: NDArray[np.float64]
-    waits: NDArray[np.float64]
-    sizes: NDArray[np.float64]
+    last_positions: NDArray[np.float64]
+    elapsed: NDArray[np.float64]
+    expected_radii: NDArray[np.float64]
 
 
-class Seen(NamedTuple):
-    """Beads in a picture: places (m, 2), errors of a coordinate, radii and their errors, [px]."""
+class DetectedBeads(NamedTuple):
+    """Detections in a frame: positions (m, 2), their errors, radii, their errors, [px]."""
 
-    places: NDArray[np.float64]
+    positions: NDArray[np.float64]
     errors: NDArray[np.float64]
     radii: NDArray[np.float64]
     radius_errors: NDArray[np.float64]
 
 
 @compiled
-def pair_up(known: Known, seen: Seen, collided: float, fastest: float) -> NDArray[np.int64]:
-    """Which of the beads that are seen is each of those known, or -1.
+def link_detections(
+    known: KnownBeads, detected: DetectedBeads, velocity_change: float, max_speed: float
+) -> NDArray[np.int64]:
+    """Link known beads with detections: index of the detection of each bead, or -1.
 
-    Any bead may collide, but when many are not where even a collision could have sent them, the
-    tray was shaken.
+    Any bead may collide. If many beads are out of reach even of collisions, the tray was shaken.
 
     Parameters
     ----------
-    known, seen : Known, Seen
-    collided : float, [px/s]
-        Usual change of a component of the velocity in a collision.
-    fastest : float, [px/s]
+    known, detected : KnownBeads, DetectedBeads
+    velocity_change : float, [px/s]
+        Standard deviation of the change of a velocity component in a collision.
+    max_speed : float, [px/s]
 
     Returns
     -------
     ndarray of int64, (n,)
     """
-    n, m = known.waits.size, seen.radii.size
+    n, m = known.elapsed.size, detected.radii.size
     starts = np.zeros(n + 1, dtype=np.int64)
     costs = Costs(starts, np.empty(n * m, dtype=np.int64), np.empty(n * m))
     squares = np.empty(m)
-    most = _pair_costs(known, seen, collided, fastest, False, squares, costs)
-    if _shaken(known.waits, starts):
-        most = _pair_costs(known, seen, collided, fastest, True, squares, costs)
-    # Any pair within reach is better than none.
-    return assign(costs, m, most + 1.0)
+    largest_cost = _write_link_costs(
+        known, detected, velocity_change, max_speed, False, squares, costs
+    )
+    if _detect_shaking(known.elapsed, starts):
+        largest_cost = _write_link_costs(
+            known, detected, velocity_change, max_speed, True, squares, costs
+        )
+    # Any link within reach costs less than none.
+    return assign(costs, m, largest_cost + 1.0)
 
 
 @kernel
-def _shaken(waits: NDArray[np.float64], starts: NDArray[np.int64]) -> bool:
-    """Whether too many of the beads that were seen in the last picture have no pair."""
-    latest = np.inf
-    for i in range(waits.size):
-        latest = min(latest, waits[i])
-    fresh, lost = 0, 0
-    for i in range(waits.size):
-        if waits[i] <= 1.5 * latest:
-            fresh += 1
+def _detect_shaking(elapsed: NDArray[np.float64], starts: NDArray[np.int64]) -> bool:
+    """Whether too many of the beads detected in the last frame have no possible link."""
+    shortest = np.inf
+    for i in range(elapsed.size):
+        shortest = min(shortest, elapsed[i])
+    recent, lost = 0, 0
+    for i in range(elapsed.size):
+        if elapsed[i] <= 1.5 * shortest:
+            recent += 1
             lost += starts[i] == starts[i + 1]
-    return bool(lost > _LOST * fresh)
+    return bool(lost > _MAX_LOST_SHARE * recent)
 
 
 @kernel
-def _pair_costs(
-    known: Known,
-    seen: Seen,
-    collided: float,
-    fastest: float,
-    shaken_now: bool,
+def _write_link_costs(
+    known: KnownBeads,
+    detected: DetectedBeads,
+    velocity_change: float,
+    max_speed: float,
+    is_shaken: bool,
     squares: NDArray[np.float64],
     costs: Costs,
 ) -> float:
-    """Write minus the logarithm of the likelihood of every pair within reach.
+    """Write minus the log-likelihood of every possible link.
 
     Parameters
     ----------
-    known, seen, collided, fastest
-        See `pair_up`.
-    shaken_now : bool
-        Whether beads may have got any speed since the last picture.
+    known, detected, velocity_change, max_speed
+        See `link_detections`.
+    is_shaken : bool
+        Whether beads may have any speed up to `max_speed`.
     squares : ndarray (m,)
-        Room.
+        Work space.
     costs : Costs
         Written.
 
     Returns
     -------
     float
-        The largest cost; -1 when there is no pair.
+        The largest cost; -1 without a link.
     """
-    worst = 0.0
-    for j in range(seen.errors.size):
-        worst = max(worst, seen.errors[j])
-    largest, count = -math.inf, 0
-    for i in range(known.waits.size):
-        wait, variance, size = known.waits[i], known.variances[i], known.sizes[i]
-        reach = fastest * wait
-        far = _REACH2 * (variance + worst * worst + (collided * wait) ** 2)
-        far = max(far, size * size)
-        if shaken_now:
-            far = max(far, reach * reach)
+    largest_error = 0.0
+    for j in range(detected.errors.size):
+        largest_error = max(largest_error, detected.errors[j])
+    largest_cost, count = -math.inf, 0
+    for i in range(known.elapsed.size):
+        dt, variance, radius = known.elapsed[i], known.variances[i], known.expected_radii[i]
+        reach = max_speed * dt
+        max_square = _MAX_SQUARED_SIGMAS * (
+            variance + largest_error * largest_error + (velocity_change * dt) ** 2
+        )
+        max_square = max(max_square, radius * radius)
+        if is_shaken:
+            max_square = max(max_square, reach * reach)
         x, y = known.predicted[i, 0], known.predicted[i, 1]
-        # Most are far: many at once, without a choice.
+        # Most are far away: no branch in this loop, so that it is vectorised.
         for j in range(squares.size):
-            dx, dy = seen.places[j, 0] - x, seen.places[j, 1] - y
+            dx, dy = detected.positions[j, 0] - x, detected.positions[j, 1] - y
             squares[j] = dx * dx + dy * dy
-        first, least = count, math.inf
+        first, lowest = count, math.inf
         for j in range(squares.size):
-            if squares[j] > far:
+            if squares[j] > max_square:
                 continue
-            cost = _cost(known, seen, (i, j), squares[j], collided * wait, reach, shaken_now)
+            cost = _link_cost(
+                known, detected, (i, j), squares[j], velocity_change * dt, reach, is_shaken
+            )
             if cost < math.inf:
                 costs.columns[count], costs.values[count] = j, cost
-                least = min(least, cost)
+                lowest = min(lowest, cost)
                 count += 1
-        # A bead that is hidden must not push the others from their places.
-        most = least + _WORTH
-        last, count = count, first
-        for k in range(first, last):
-            if costs.values[k] <= most:
+        # Links that are much less likely than the best would let a hidden bead displace others.
+        max_cost = lowest + _MAX_COST_DIFFERENCE
+        end, count = count, first
+        for k in range(first, end):
+            if costs.values[k] <= max_cost:
                 costs.columns[count], costs.values[count] = costs.columns[k], costs.values[k]
-                largest = max(largest, costs.values[k])
+                largest_cost = max(largest_cost, costs.values[k])
                 count += 1
         costs.starts[i + 1] = count
-    return largest if count else -1.0
+    return largest_cost if count else -1.0
 
 
 @inlined
-def _cost(
-    known: Known,
-    seen: Seen,
+def _link_cost(
+    known: KnownBeads,
+    detected: DetectedBeads,
     pair: tuple[int, int],
-    d2: float,
-    kick: float,
+    square: float,
+    deflection: float,
     reach: float,
-    shaken_now: bool,
+    is_shaken: bool,
 ) -> float:
-    """Of one pair, apart by the square root of `d2`; infinite out of reach."""
+    """Cost of one link, apart by the square root of `square`; infinite out of reach."""
     i, j = pair
-    size = known.sizes[i]
-    free = known.variances[i] + seen.errors[j] * seen.errors[j]
-    # The collision may have been at any time since: on average half way.
-    ax = seen.places[j, 0] - 0.5 * (known.predicted[i, 0] + known.last[i, 0])
-    ay = seen.places[j, 1] - 0.5 * (known.predicted[i, 1] + known.last[i, 1])
-    a2 = ax * ax + ay * ay
-    hit = free + _HALF_WAY * kick**2
-    missed = free + (_MISPLACED_BY * size) ** 2
-    shaken = free + (0.4 * reach) ** 2
-    near = a2 <= _REACH2 * hit or d2 <= size * size
-    if not near and not (shaken_now and d2 <= reach * reach):
+    radius = known.expected_radii[i]
+    variance = known.variances[i] + detected.errors[j] * detected.errors[j]
+    # The collision may have been at any time since: at the middle on average.
+    collision_dx = detected.positions[j, 0] - 0.5 * (
+        known.predicted[i, 0] + known.last_positions[i, 0]
+    )
+    collision_dy = detected.positions[j, 1] - 0.5 * (
+        known.predicted[i, 1] + known.last_positions[i, 1]
+    )
+    collision_square = collision_dx * collision_dx + collision_dy * collision_dy
+    collision_variance = variance + _COLLISION_VARIANCE_FACTOR * deflection**2
+    outlier_variance = variance + (_OUTLIER_RADII * radius) ** 2
+    shaken_variance = variance + (0.4 * reach) ** 2
+    is_near = (
+        collision_square <= _MAX_SQUARED_SIGMAS * collision_variance or square <= radius * radius
+    )
+    if not is_near and not (is_shaken and square <= reach * reach):
         return math.inf
-    likelihood = (1.0 - _COLLIDING) / free * math.exp(-0.5 * d2 / free)
-    likelihood += _COLLIDING / hit * math.exp(-0.5 * a2 / hit)
-    likelihood += _MISPLACED / missed * math.exp(-0.5 * d2 / missed)
-    likelihood += _SHAKEN / shaken * math.exp(-0.5 * d2 / shaken)
-    off = seen.radii[j] - size
-    usual = SIZE_JITTER_PX * SIZE_JITTER_PX + seen.radius_errors[j] * seen.radius_errors[j]
-    unlike = 0.5 * off * off / usual
-    return float(min(unlike, _LARGEST_SIZE_COST) - math.log(likelihood))
+    likelihood = (1.0 - _COLLISION_SHARE) / variance * math.exp(-0.5 * square / variance)
+    likelihood += (
+        _COLLISION_SHARE
+        / collision_variance
+        * math.exp(-0.5 * collision_square / collision_variance)
+    )
+    likelihood += _OUTLIER_SHARE / outlier_variance * math.exp(-0.5 * square / outlier_variance)
+    likelihood += _SHAKEN_SHARE / shaken_variance * math.exp(-0.5 * square / shaken_variance)
+    radius_residual = detected.radii[j] - radius
+    radius_variance = (
+        RADIUS_NOISE_PX * RADIUS_NOISE_PX + detected.radius_errors[j] * detected.radius_errors[j]
+    )
+    radius_cost = 0.5 * radius_residual * radius_residual / radius_variance
+    return float(min(radius_cost, _MAX_RADIUS_COST) - math.log(likelihood))

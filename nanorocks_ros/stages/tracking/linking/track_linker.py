@@ -1,4 +1,4 @@
-"""Tracks of one species: which bead of this picture is which of the last."""
+"""Linking of detections to tracks for one species."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.stages.tracking.linking.link_probabilities import (
-    SIZE_JITTER_PX,
-    SLOWEST_PX_S,
-    Known,
-    Seen,
-    pair_up,
+    MIN_VELOCITY_CHANGE_PX_S,
+    RADIUS_NOISE_PX,
+    DetectedBeads,
+    KnownBeads,
+    link_detections,
 )
-from nanorocks_ros.stages.tracking.linking.motion_prediction import Walls, hint_at, predict
-from nanorocks_ros.stages.tracking.linking.track_snapshot import InView, show
+from nanorocks_ros.stages.tracking.linking.motion_prediction import Walls, predict, write_hints
+from nanorocks_ros.stages.tracking.linking.track_snapshot import TrackSnapshot, write_snapshot
 from nanorocks_ros.stages.tracking.linking.track_store import (
-    CONFIRM,
-    Habits,
-    advance,
-    room_to_follow,
+    CONFIRM_FRAMES,
+    LinkSettings,
+    allocate_tracks,
+    update_tracks,
 )
 
 if TYPE_CHECKING:
@@ -27,113 +27,118 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.stages.tracking.detection.bead_detector import Detections
 
-# Collisions of a bead that nobody sees.
-_COLLIDING_A_SECOND = 5.0
-# Of a usual velocity component, how much a collision changes one.
-_COLLISION = 1.4
+# Rate of unseen collisions of a bead, [1/s].
+_COLLISION_RATE = 5.0
+# Change of a velocity component in a collision, over its standard deviation.
+_COLLISION_FACTOR = 1.4
 
 
 class Linker:
-    """Keeps the tracks of one species; lengths in pixels, times in seconds.
+    """Links the detections of one species; lengths in pixels, times in seconds.
 
     Parameters
     ----------
     expected : int
-        Beads there are.
+        Number of beads in the tray.
     size : tuple of 2 floats, [px]
         Columns and rows of the tray.
-    fastest : float, [px/s]
-    longest_gap, window : float, [s]
+    max_speed : float, [px/s]
+    memory, window : float, [s]
     systematic : float, [px]
-        Error of all places of a bead together.
+        Error that all positions of a bead share.
     """
 
     def __init__(
         self,
         expected: int,
         size: tuple[float, float],
-        fastest: float,
-        longest_gap: float,
+        max_speed: float,
+        memory: float,
         window: float,
         systematic: float,
     ) -> None:
         self.systematic = systematic
         self._size = np.array(size)
-        self._fastest = fastest
-        self._habits = Habits(expected, longest_gap, window)
+        self._max_speed = max_speed
+        self._settings = LinkSettings(expected, memory, window)
         self._speed = 0.0
         self._started = False
-        self._followed = room_to_follow(2 * expected)
-        self._used = 0
-        self._last_predicted: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
+        self._tracks = allocate_tracks(2 * expected)
+        self._n_tracks = 0
+        self._last_prediction: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
 
     def __len__(self) -> int:
-        return self._used
+        return self._n_tracks
 
     @property
-    def numbers(self) -> NDArray[np.int32]:
-        """Of the tracks, (n,)."""
-        return self._followed.numbers[: self._used]
+    def ids(self) -> NDArray[np.int32]:
+        """Numbers of the tracks, (n,)."""
+        return self._tracks.ids[: self._n_tracks]
 
     @property
-    def last(self) -> NDArray[np.float64]:
-        """When each was seen last, (n,), [s]."""
-        return self._followed.last[: self._used]
+    def last_seen(self) -> NDArray[np.float64]:
+        """Time of the last detection of each track, (n,), [s]."""
+        return self._tracks.last_seen[: self._n_tracks]
 
     def push(
-        self, time: float, found: Detections, shift: NDArray[np.float64], first_number: int
+        self, time: float, detections: Detections, shift: NDArray[np.float64], first_id: int
     ) -> int:
-        """Take the beads of the next picture.
+        """Link the detections of the next frame.
 
         Parameters
         ----------
         time : float, [s]
-        found : Detections
+        detections : Detections
         shift : ndarray (2,), [px]
-            Where the corner of the tray is now.
-        first_number : int
-            Of the first new track.
+            Position of the corner of the tray in the camera frame.
+        first_id : int
+            Number of the first new track.
 
         Returns
         -------
         int
-            New tracks.
+            Number of new tracks.
         """
-        used, followed = self._used, self._followed
-        places, variances = self._predicted(time, shift)
-        last, sizes = followed.last[:used], followed.radii[:used]
-        # A column of many rows is another type for the compiler than one of a single row.
-        here = followed.places[:used, 0].copy()
-        seen = Seen(found.places, found.place_errors, found.radii, found.radius_errors)
-        collided = max(_COLLISION * self._speed, SLOWEST_PX_S)
-        known = Known(places, variances, here, time - last, sizes)
-        chosen = pair_up(known, seen, collided, self._fastest)
-        self._make_room(used, found.radii.size)
-        self._used, new, self._speed = advance(
-            self._followed,
-            used,
-            chosen,
-            seen,
-            found.area_seen,
+        n_tracks, tracks = self._n_tracks, self._tracks
+        positions, variances = self._predicted(time, shift)
+        last_seen, radii = tracks.last_seen[:n_tracks], tracks.radii[:n_tracks]
+        # A copy: numba compiles strided and contiguous arrays separately.
+        last_positions = tracks.positions[:n_tracks, 0].copy()
+        detected = DetectedBeads(
+            detections.positions,
+            detections.position_errors,
+            detections.radii,
+            detections.radius_errors,
+        )
+        velocity_change = max(_COLLISION_FACTOR * self._speed, MIN_VELOCITY_CHANGE_PX_S)
+        known_beads = KnownBeads(positions, variances, last_positions, time - last_seen, radii)
+        links = link_detections(known_beads, detected, velocity_change, self._max_speed)
+        self._grow(n_tracks, detections.radii.size)
+        self._n_tracks, n_new, self._speed = update_tracks(
+            self._tracks,
+            n_tracks,
+            links,
+            detected,
+            detections.visible_share,
             time,
-            self._habits,
+            self._settings,
             self._speed,
-            first_number,
-            1 if self._started else CONFIRM,
+            first_id,
+            1 if self._started else CONFIRM_FRAMES,
         )
         self._started = True
-        self._last_predicted = None
-        return int(new)
+        self._last_prediction = None
+        return int(n_new)
 
-    def _make_room(self, used: int, more: int) -> None:
-        """Have room for more tracks than are in use."""
-        if used + more <= self._followed.last.size:
+    def _grow(self, n_tracks: int, n_new: int) -> None:
+        """Enlarge the store if it cannot hold `n_new` more tracks."""
+        if n_tracks + n_new <= self._tracks.last_seen.size:
             return
-        old: tuple[NDArray[Any], ...] = self._followed
-        self._followed = room_to_follow(2 * (used + more))
-        new: tuple[NDArray[Any], ...] = self._followed
-        for column, values in zip(new, old, strict=True):
-            column[:used] = values[:used]
+        tracks: tuple[NDArray[Any], ...] = self._tracks
+        self._tracks = allocate_tracks(2 * (n_tracks + n_new))
+        larger: tuple[NDArray[Any], ...] = self._tracks
+        for column, values in zip(larger, tracks, strict=True):
+            column[:n_tracks] = values[:n_tracks]
 
     def _walls(self, shift: NDArray[np.float64]) -> Walls:
         return Walls(shift, shift + self._size)
@@ -141,45 +146,52 @@ class Linker:
     def _predicted(
         self, time: float, shift: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where the beads should be, (n, 2), [px], and the variance of a coordinate, (n,).
+        """Predicted positions, (n, 2), [px], and the variance of a coordinate, (n,).
 
-        Beads that would have reached a wall come back from it.
+        Walls reflect.
         """
-        # Asked for twice before the next picture is known.
-        if self._last_predicted is None or self._last_predicted[0] != time:
-            places, variances = np.empty((self._used, 2)), np.empty(self._used)
-            predict(self._followed, time, self._walls(shift), places, variances)
-            self._last_predicted = time, places, variances
-        return self._last_predicted[1:]
+        # Called twice for each frame.
+        if self._last_prediction is None or self._last_prediction[0] != time:
+            positions, variances = np.empty((self._n_tracks, 2)), np.empty(self._n_tracks)
+            predict(self._tracks, time, self._walls(shift), positions, variances)
+            self._last_prediction = time, positions, variances
+        return self._last_prediction[1:]
 
     def hints(self, time: float, shift: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where beads should be: column, row, radius and its error, (n, 4), [px].
+        """Hints for the detection: column, row, radius and its error, (n, 4), [px].
 
-        Those of which most was seen come first: they lie on top.
+        Beads with the largest visible share come first: they lie on top.
         """
-        places, _ = self._predicted(time, shift)
-        order = np.argsort(-self._followed.shares[: self._used], kind='stable')
-        hints = np.empty((self._used, 4))
-        hint_at(self._followed, order, places, shift, SIZE_JITTER_PX, hints)
+        positions, _ = self._predicted(time, shift)
+        order = np.argsort(-self._tracks.visible_shares[: self._n_tracks], kind='stable')
+        hints = np.empty((self._n_tracks, 4))
+        write_hints(self._tracks, order, positions, shift, RADIUS_NOISE_PX, hints)
         return hints
 
-    def places(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Last place of each bead, (n, 2), and the error of a coordinate, (n,), [px]."""
-        return self._followed.places[: self._used, 0], self._followed.errors[: self._used, 0]
+    def positions(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Last position of each bead, (n, 2), and the error of a coordinate, (n,), [px]."""
+        return self._tracks.positions[: self._n_tracks, 0], self._tracks.errors[
+            : self._n_tracks, 0
+        ]
 
-    def show(
-        self, time: float, shift: NDArray[np.float64], species: int, view: InView, first: int
+    def write_snapshot(
+        self,
+        time: float,
+        shift: NDArray[np.float64],
+        species: int,
+        snapshot: TrackSnapshot,
+        first: int,
     ) -> int:
-        """Write the beads that are believed, as they are now, and where they end."""
-        collisions = _COLLIDING_A_SECOND, _COLLISION * self._speed
-        return show(
-            self._followed,
-            self._used,
+        """Write the confirmed tracks into a snapshot; return the row after the last one."""
+        collisions = _COLLISION_RATE, _COLLISION_FACTOR * self._speed
+        return write_snapshot(
+            self._tracks,
+            self._n_tracks,
             time,
             self._walls(shift),
             self.systematic,
             collisions,
             species,
-            view,
+            snapshot,
             first,
         )

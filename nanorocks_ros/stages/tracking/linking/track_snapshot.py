@@ -1,4 +1,4 @@
-"""The beads of a tray that are believed, as they are now."""
+"""Snapshot of the confirmed tracks of a tray at one time."""
 
 from __future__ import annotations
 
@@ -8,28 +8,32 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled, kernel
-from nanorocks_ros.stages.tracking.linking.motion_prediction import SIZE_FLOOR2, Walls, predicted
-from nanorocks_ros.stages.tracking.linking.track_store import CONFIRM, Followed
+from nanorocks_ros.stages.tracking.linking.motion_prediction import (
+    MIN_RADIUS_VARIANCE,
+    Walls,
+    predict_one,
+)
+from nanorocks_ros.stages.tracking.linking.track_store import CONFIRM_FRAMES, TrackStore
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-class InView(NamedTuple):
-    """Beads that are believed; lengths in pixels, NaN where a velocity is not known.
+class TrackSnapshot(NamedTuple):
+    """Confirmed tracks at one time; lengths in pixels, NaN for an unknown velocity.
 
     Parameters
     ----------
     ids, species : ndarrays of int32, (n,)
-    places, velocities : ndarray (n, 2), [px], [px/s]
+    positions, velocities : ndarray (n, 2), [px], [px/s]
     errors, velocity_errors, radii, radius_errors : ndarray (n,)
     seen : ndarray of bool, (n,)
-        In this picture; of others the place is where they should be.
+        Whether the bead is detected in this frame; positions of others are predictions.
     """
 
     ids: NDArray[np.int32]
     species: NDArray[np.int32]
-    places: NDArray[np.float64]
+    positions: NDArray[np.float64]
     errors: NDArray[np.float64]
     velocities: NDArray[np.float64]
     velocity_errors: NDArray[np.float64]
@@ -39,118 +43,127 @@ class InView(NamedTuple):
 
 
 @compiled
-def room_in_view(room: int) -> InView:
-    """Room for so many beads."""
-    return InView(
-        np.empty(room, dtype=np.int32),
-        np.empty(room, dtype=np.int32),
-        np.empty((room, 2)),
-        np.empty(room),
-        np.empty((room, 2)),
-        np.empty(room),
-        np.empty(room),
-        np.empty(room),
-        np.empty(room, dtype=np.bool_),
+def allocate_snapshot(size: int) -> TrackSnapshot:
+    """Allocate an uninitialised snapshot for so many beads."""
+    return TrackSnapshot(
+        np.empty(size, dtype=np.int32),
+        np.empty(size, dtype=np.int32),
+        np.empty((size, 2)),
+        np.empty(size),
+        np.empty((size, 2)),
+        np.empty(size),
+        np.empty(size),
+        np.empty(size),
+        np.empty(size, dtype=np.bool_),
     )
 
 
 @kernel
-def show(
-    followed: Followed,
-    used: int,
+def write_snapshot(
+    tracks: TrackStore,
+    n_tracks: int,
     time: float,
     walls: Walls,
     systematic: float,
     collisions: tuple[float, float],
     species: int,
-    view: InView,
+    snapshot: TrackSnapshot,
     first: int,
 ) -> int:
-    """Write those tracks that are believed.
+    """Write the confirmed tracks.
 
     Parameters
     ----------
-    followed, used, time
-        See `take`.
+    tracks, n_tracks, time
+        See `append_detections`.
     walls : Walls
     systematic : float, [px]
-        Error of all places of a bead together.
+        Error that all positions of a bead share.
     collisions : tuple of 2 floats, [1/s], [px/s]
-        How often a bead collides, and how much that changes its velocity.
+        Collision rate of a bead, and standard deviation of its change of velocity.
     species : int
-    view : InView
-        Written from number `first` on.
+    snapshot : TrackSnapshot
+        Written from row `first` on.
 
     Returns
     -------
     int
-        Where they end.
+        Row after the last one.
     """
-    rate, kick = collisions
+    rate, velocity_change = collisions
     row = first
-    for k in range(used):
-        if followed.hits[k] < CONFIRM:
+    for k in range(n_tracks):
+        if tracks.hits[k] < CONFIRM_FRAMES:
             continue
-        line = followed.lines[k]
-        seen = followed.last[k] == time
+        line = tracks.lines[k]
+        seen = tracks.last_seen[k] == time
         if seen:
-            x, y = followed.places[k, 0, 0], followed.places[k, 0, 1]
-            error = followed.errors[k, 0]
+            x, y = tracks.positions[k, 0, 0], tracks.positions[k, 0, 1]
+            error = tracks.errors[k, 0]
         else:
-            # By collisions that nobody saw; on average one was half way.
-            wait = time - followed.last[k]
-            strayed = min(rate * wait, 1.0) * (kick * wait) * (kick * wait) / 3.0
-            x, y, variance = predicted(line, followed.radii[k], time, walls)
-            error = math.sqrt(variance + strayed)
-        known = abs(line[6]) < math.inf
-        view.ids[row], view.species[row], view.seen[row] = followed.numbers[k], species, seen
-        view.places[row, 0], view.places[row, 1] = x, y
-        view.errors[row] = math.sqrt(error * error + systematic * systematic)
+            # Unseen collisions, uniformly distributed in time.
+            dt = time - tracks.last_seen[k]
+            collision_variance = (
+                min(rate * dt, 1.0) * (velocity_change * dt) * (velocity_change * dt) / 3.0
+            )
+            x, y, variance = predict_one(line, tracks.radii[k], time, walls)
+            error = math.sqrt(variance + collision_variance)
+        has_velocity = abs(line[6]) < math.inf
+        snapshot.ids[row], snapshot.species[row], snapshot.seen[row] = tracks.ids[k], species, seen
+        snapshot.positions[row, 0], snapshot.positions[row, 1] = x, y
+        snapshot.errors[row] = math.sqrt(error * error + systematic * systematic)
         for axis in range(2):
-            view.velocities[row, axis] = line[3 + axis] if known else np.nan
-        view.velocity_errors[row] = math.sqrt(line[6]) if known else np.nan
-        view.radii[row] = followed.radii[k]
-        view.radius_errors[row] = math.sqrt(1.0 / followed.radius_weights[k] + SIZE_FLOOR2)
+            snapshot.velocities[row, axis] = line[3 + axis] if has_velocity else np.nan
+        snapshot.velocity_errors[row] = math.sqrt(line[6]) if has_velocity else np.nan
+        snapshot.radii[row] = tracks.radii[k]
+        snapshot.radius_errors[row] = math.sqrt(
+            1.0 / tracks.radius_weights[k] + MIN_RADIUS_VARIANCE
+        )
         row += 1
     return row
 
 
 @compiled
 def in_metres(
-    view: InView, order: NDArray[np.int64], metre: float, displacement: NDArray[np.float64]
-) -> InView:
-    """The same beads in another order, with lengths in metres and places in the tray.
+    snapshot: TrackSnapshot,
+    order: NDArray[np.int64],
+    metres_per_pixel: float,
+    displacement: NDArray[np.float64],
+) -> TrackSnapshot:
+    """Sort a snapshot and convert it to metres in the tray frame.
 
     Parameters
     ----------
-    view : InView
+    snapshot : TrackSnapshot
     order : ndarray of int64, (n,)
-        Which comes first.
-    metre : float, [m/px]
+        Rows in the new order.
+    metres_per_pixel : float, [m/px]
     displacement : ndarray (2,), [m]
-        Of the tray.
+        Displacement of the tray.
     """
-    found = room_in_view(order.size)
+    scaled = allocate_snapshot(order.size)
     for row in range(order.size):
         k = order[row]
-        found.ids[row], found.species[row] = view.ids[k], view.species[k]
-        found.seen[row] = view.seen[k]
+        scaled.ids[row], scaled.species[row] = snapshot.ids[k], snapshot.species[k]
+        scaled.seen[row] = snapshot.seen[k]
         for axis in range(2):
-            found.places[row, axis] = metre * view.places[k, axis] - displacement[axis]
-            found.velocities[row, axis] = metre * view.velocities[k, axis]
-        found.errors[row] = metre * view.errors[k]
-        found.velocity_errors[row] = metre * view.velocity_errors[k]
-        found.radii[row] = metre * view.radii[k]
-        found.radius_errors[row] = metre * view.radius_errors[k]
-    return found
+            scaled.positions[row, axis] = (
+                metres_per_pixel * snapshot.positions[k, axis] - displacement[axis]
+            )
+            scaled.velocities[row, axis] = metres_per_pixel * snapshot.velocities[k, axis]
+        scaled.errors[row] = metres_per_pixel * snapshot.errors[k]
+        scaled.velocity_errors[row] = metres_per_pixel * snapshot.velocity_errors[k]
+        scaled.radii[row] = metres_per_pixel * snapshot.radii[k]
+        scaled.radius_errors[row] = metres_per_pixel * snapshot.radius_errors[k]
+    return scaled
 
 
 @compiled
 def count_seen(
-    species: NDArray[np.int32], seen: NDArray[np.bool_], kinds: int
+    species: NDArray[np.int32], seen: NDArray[np.bool_], n_species: int
 ) -> NDArray[np.int64]:
-    """How many beads of each of so many species are seen."""
-    counts = np.zeros(kinds, dtype=np.int64)
+    """Number of visible beads of each species."""
+    counts = np.zeros(n_species, dtype=np.int64)
     for k in range(species.size):
         counts[species[k]] += seen[k]
     return counts

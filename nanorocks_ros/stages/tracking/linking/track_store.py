@@ -1,4 +1,4 @@
-"""The beads of a species that are followed: what is kept of each, from picture to picture."""
+"""Track store of one species: flight, size and visibility of each track."""
 
 from __future__ import annotations
 
@@ -9,183 +9,188 @@ import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled, inlined, kernel
 from nanorocks_ros.stages.tracking.linking.free_flight import (
-    KEPT,
+    MAX_POINTS,
     extend_flight,
     median_square_speed,
 )
-from nanorocks_ros.stages.tracking.linking.link_probabilities import Seen
+from nanorocks_ros.stages.tracking.linking.link_probabilities import DetectedBeads
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-CONFIRM = 3
-"""Pictures in a row that a new bead must be seen in."""
+CONFIRM_FRAMES = 3
+"""Number of frames in which a new bead must be seen before it is reported."""
 
-# Share of a new mean speed taken over in each picture.
-_SPEED_SHARE = 0.1
+# Weight of a frame in the exponential mean of the speed.
+_SPEED_WEIGHT = 0.1
 
 
-class Followed(NamedTuple):
-    """Tracks, one an entry, and room for more; lengths in pixels, times in seconds.
+class TrackStore(NamedTuple):
+    """Arrays with one row for each track, and spare rows; lengths in pixels, times in seconds.
 
     Parameters
     ----------
-    numbers : ndarray of int32, (room,)
-    last : ndarray (room,), [s]
-        When each was seen last.
-    hits : ndarray of int64, (room,)
-        In how many pictures.
-    radii, radius_weights : ndarray (room,), [px], [1/px^2]
-    shares : ndarray (room,)
-        Of the disc that was seen last, halved in each picture since.
-    times, places, errors : ndarrays (room, KEPT), (room, KEPT, 2), (room, KEPT)
-        Of the flight, newest first.
-    counts : ndarray of int64, (room,)
-        Places of it.
-    lines : ndarray (room, 9)
+    ids : ndarray of int32, (capacity,)
+    last_seen : ndarray (capacity,), [s]
+        Time of the last detection.
+    hits : ndarray of int64, (capacity,)
+        Number of detections.
+    radii, radius_weights : ndarray (capacity,), [px], [1/px^2]
+    visible_shares : ndarray (capacity,)
+        Share of the disc that was visible last, halved in each frame since.
+    times, errors : ndarrays (capacity, MAX_POINTS)
+        Of the current flight, newest first.
+    positions : ndarray (capacity, MAX_POINTS, 2)
+    flight_points : ndarray of int64, (capacity,)
+        Number of positions of the flight.
+    lines : ndarray (capacity, 9)
         See `fit_line`.
     """
 
-    numbers: NDArray[np.int32]
-    last: NDArray[np.float64]
+    ids: NDArray[np.int32]
+    last_seen: NDArray[np.float64]
     hits: NDArray[np.int64]
     radii: NDArray[np.float64]
     radius_weights: NDArray[np.float64]
-    shares: NDArray[np.float64]
+    visible_shares: NDArray[np.float64]
     times: NDArray[np.float64]
-    places: NDArray[np.float64]
+    positions: NDArray[np.float64]
     errors: NDArray[np.float64]
-    counts: NDArray[np.int64]
+    flight_points: NDArray[np.int64]
     lines: NDArray[np.float64]
 
 
-class Habits(NamedTuple):
-    """What is known of the beads of a species, and how they are followed.
+class LinkSettings(NamedTuple):
+    """Number of beads of a species, and settings of the linking.
 
     Parameters
     ----------
     expected : int
-        Beads there are.
-    longest_gap, window : float, [s]
+        Number of beads in the tray.
+    memory, window : float, [s]
         See `TrackingSettings`.
     """
 
     expected: int
-    longest_gap: float
+    memory: float
     window: float
 
 
-def room_to_follow(room: int) -> Followed:
-    """Room for so many tracks, with nothing in it."""
-    return Followed(
-        numbers=np.empty(room, dtype=np.int32),
-        last=np.empty(room),
-        hits=np.empty(room, dtype=np.int64),
-        radii=np.empty(room),
-        radius_weights=np.empty(room),
-        shares=np.empty(room),
-        times=np.empty((room, KEPT)),
-        places=np.empty((room, KEPT, 2)),
-        errors=np.empty((room, KEPT)),
-        counts=np.empty(room, dtype=np.int64),
-        lines=np.empty((room, 9)),
+def allocate_tracks(capacity: int) -> TrackStore:
+    """Allocate an uninitialised store for so many tracks."""
+    return TrackStore(
+        ids=np.empty(capacity, dtype=np.int32),
+        last_seen=np.empty(capacity),
+        hits=np.empty(capacity, dtype=np.int64),
+        radii=np.empty(capacity),
+        radius_weights=np.empty(capacity),
+        visible_shares=np.empty(capacity),
+        times=np.empty((capacity, MAX_POINTS)),
+        positions=np.empty((capacity, MAX_POINTS, 2)),
+        errors=np.empty((capacity, MAX_POINTS)),
+        flight_points=np.empty(capacity, dtype=np.int64),
+        lines=np.empty((capacity, 9)),
     )
 
 
 @kernel
-def take(
-    followed: Followed,
-    used: int,
-    chosen: NDArray[np.int64],
-    found: Seen,
-    shares: NDArray[np.float64],
+def append_detections(
+    tracks: TrackStore,
+    n_tracks: int,
+    links: NDArray[np.int64],
+    detected: DetectedBeads,
+    visible_shares: NDArray[np.float64],
     time: float,
-    habits: Habits,
+    settings: LinkSettings,
 ) -> None:
-    """Add to each track the place chosen for it, if any.
+    """Append to each track the detection linked to it, if any.
 
     Parameters
     ----------
-    followed : Followed
-        Of which the first `used` are tracks.
-    chosen : ndarray of int64, (used,)
-        Of the beads that are seen; or -1.
-    found, shares : Seen, ndarray (m,)
-        These, and how much of the disc of each is seen.
+    tracks : TrackStore
+        Its first `n_tracks` rows are in use.
+    links : ndarray of int64, (n_tracks,)
+        Index of the detection of each track, or -1.
+    detected, visible_shares : DetectedBeads, ndarray (m,)
+        Detections, and the visible share of the disc of each.
     time : float, [s]
-    habits : Habits
+    settings : LinkSettings
     """
-    for k in range(used):
-        j = chosen[k]
+    for k in range(n_tracks):
+        j = links[k]
         if j < 0:
-            followed.shares[k] *= 0.5
+            tracks.visible_shares[k] *= 0.5
             continue
-        followed.counts[k] = extend_flight(
-            followed.times[k],
-            followed.places[k],
-            followed.errors[k],
-            followed.counts[k],
-            followed.lines[k],
+        tracks.flight_points[k] = extend_flight(
+            tracks.times[k],
+            tracks.positions[k],
+            tracks.errors[k],
+            tracks.flight_points[k],
+            tracks.lines[k],
             time,
-            found.places[j, 0],
-            found.places[j, 1],
-            found.errors[j],
-            habits.window,
+            detected.positions[j, 0],
+            detected.positions[j, 1],
+            detected.errors[j],
+            settings.window,
         )
-        weight = 1.0 / (found.radius_errors[j] * found.radius_errors[j])
-        total = followed.radius_weights[k] + weight
-        followed.radii[k] += (found.radii[j] - followed.radii[k]) * weight / total
-        followed.radius_weights[k] = total
-        followed.last[k] = time
-        followed.shares[k] = shares[j]
-        followed.hits[k] += 1
+        weight = 1.0 / (detected.radius_errors[j] * detected.radius_errors[j])
+        total = tracks.radius_weights[k] + weight
+        tracks.radii[k] += (detected.radii[j] - tracks.radii[k]) * weight / total
+        tracks.radius_weights[k] = total
+        tracks.last_seen[k] = time
+        tracks.visible_shares[k] = visible_shares[j]
+        tracks.hits[k] += 1
 
 
 @compiled
-def learn_speed(followed: Followed, used: int, speed: float) -> float:
-    """A usual component of a velocity, [px/s]: half of the beads are faster."""
-    known = np.empty(used, dtype=np.bool_)
-    some = False
-    for k in range(used):
-        known[k] = followed.counts[k] >= 2 and followed.hits[k] >= CONFIRM
-        some |= known[k]
-    if not some:
+def update_speed(tracks: TrackStore, n_tracks: int, speed: float) -> float:
+    """Update the standard deviation of a velocity component, [px/s], from the median speed."""
+    has_velocity = np.empty(n_tracks, dtype=np.bool_)
+    any_velocity = False
+    for k in range(n_tracks):
+        has_velocity[k] = tracks.flight_points[k] >= 2 and tracks.hits[k] >= CONFIRM_FRAMES
+        any_velocity |= has_velocity[k]
+    if not any_velocity:
         return speed
-    square = median_square_speed(followed.lines[:used], known)
-    # Of a Maxwellian gas; the median does not heed beads that were confused.
-    usual = math.sqrt(square / (2.0 * math.log(2.0)))
-    share = 1.0 if usual > speed else _SPEED_SHARE
-    return speed + share * (usual - speed)
+    squared_speed = median_square_speed(tracks.lines[:n_tracks], has_velocity)
+    # For a Maxwellian gas; the median is robust against wrong links.
+    component = math.sqrt(squared_speed / (2.0 * math.log(2.0)))
+    weight = 1.0 if component > speed else _SPEED_WEIGHT
+    return speed + weight * (component - speed)
 
 
 @kernel
-def drop(
-    followed: Followed, used: int, chosen: NDArray[np.int64], time: float, habits: Habits
+def drop_tracks(
+    tracks: TrackStore,
+    n_tracks: int,
+    links: NDArray[np.int64],
+    time: float,
+    settings: LinkSettings,
 ) -> int:
-    """Forget those that were not confirmed or lost for too long; how many tracks are left.
+    """Drop tracks that were not confirmed, or not seen for too long; how many are left.
 
-    `chosen` is -1 for those that are not seen; changed.
+    `links` is -1 for tracks without a detection; changed.
     """
-    surplus = -habits.expected
-    for k in range(used):
-        confirmed = followed.hits[k] >= CONFIRM
-        if chosen[k] < 0 and not (confirmed and time - followed.last[k] <= habits.longest_gap):
-            chosen[k] = _DROPPED
-        surplus += confirmed and chosen[k] != _DROPPED
-    # There are no more beads than that: those lost for longest came back as others.
+    surplus = -settings.expected
+    for k in range(n_tracks):
+        confirmed = tracks.hits[k] >= CONFIRM_FRAMES
+        if links[k] < 0 and not (confirmed and time - tracks.last_seen[k] <= settings.memory):
+            links[k] = _DROPPED
+        surplus += confirmed and links[k] != _DROPPED
+    # More tracks than beads: those lost for longest have reappeared under another number.
     for _ in range(surplus):
-        longest, lost = -math.inf, -1
-        for k in range(used):
-            if chosen[k] == -1 and time - followed.last[k] > longest:
-                longest, lost = time - followed.last[k], k
+        longest_lost, lost = -math.inf, -1
+        for k in range(n_tracks):
+            if links[k] == -1 and time - tracks.last_seen[k] > longest_lost:
+                longest_lost, lost = time - tracks.last_seen[k], k
         if lost < 0:
             break
-        chosen[lost] = _DROPPED
+        links[lost] = _DROPPED
     kept = 0
-    for k in range(used):
-        if chosen[k] != _DROPPED:
+    for k in range(n_tracks):
+        if links[k] != _DROPPED:
             if kept < k:
-                _move(followed, k, kept)
+                _copy_track(tracks, k, kept)
             kept += 1
     return kept
 
@@ -194,92 +199,94 @@ _DROPPED = -2
 
 
 @inlined
-def _move(followed: Followed, here: int, there: int) -> None:
-    followed.numbers[there] = followed.numbers[here]
-    followed.last[there] = followed.last[here]
-    followed.hits[there] = followed.hits[here]
-    followed.radii[there] = followed.radii[here]
-    followed.radius_weights[there] = followed.radius_weights[here]
-    followed.shares[there] = followed.shares[here]
-    followed.counts[there] = followed.counts[here]
+def _copy_track(tracks: TrackStore, source: int, target: int) -> None:
+    tracks.ids[target] = tracks.ids[source]
+    tracks.last_seen[target] = tracks.last_seen[source]
+    tracks.hits[target] = tracks.hits[source]
+    tracks.radii[target] = tracks.radii[source]
+    tracks.radius_weights[target] = tracks.radius_weights[source]
+    tracks.visible_shares[target] = tracks.visible_shares[source]
+    tracks.flight_points[target] = tracks.flight_points[source]
     for k in range(9):
-        followed.lines[there, k] = followed.lines[here, k]
-    for k in range(followed.counts[here]):
-        followed.times[there, k] = followed.times[here, k]
-        followed.errors[there, k] = followed.errors[here, k]
-        followed.places[there, k, 0] = followed.places[here, k, 0]
-        followed.places[there, k, 1] = followed.places[here, k, 1]
+        tracks.lines[target, k] = tracks.lines[source, k]
+    for k in range(tracks.flight_points[source]):
+        tracks.times[target, k] = tracks.times[source, k]
+        tracks.errors[target, k] = tracks.errors[source, k]
+        tracks.positions[target, k, 0] = tracks.positions[source, k, 0]
+        tracks.positions[target, k, 1] = tracks.positions[source, k, 1]
 
 
 @kernel
-def add(
-    followed: Followed,
-    used: int,
+def add_tracks(
+    tracks: TrackStore,
+    n_tracks: int,
     new: NDArray[np.bool_],
-    found: Seen,
-    shares: NDArray[np.float64],
+    detected: DetectedBeads,
+    visible_shares: NDArray[np.float64],
     time: float,
-    first_number: int,
+    first_id: int,
     hits: int,
 ) -> int:
-    """Begin a track with each bead that is new, as often seen as `hits`; how many tracks are used.
+    """Begin a track with each new detection; return the number of tracks.
 
     Parameters
     ----------
-    followed, used, found, shares, time
-        See `take`; there must be room.
+    tracks, n_tracks, detected, visible_shares, time
+        See `append_detections`; the capacity must suffice.
     new : ndarray of bool, (m,)
-    first_number : int
-        Of the first new track.
+    first_id : int
+        Number of the first new track.
     """
-    first = used
+    first_row = n_tracks
     for j in range(new.size):
         if not new[j]:
             continue
-        followed.numbers[used] = first_number + used - first
-        followed.last[used], followed.hits[used] = time, hits
-        followed.radii[used] = found.radii[j]
-        followed.radius_weights[used] = 1.0 / (found.radius_errors[j] * found.radius_errors[j])
-        followed.shares[used], followed.counts[used] = shares[j], 1
-        followed.times[used, 0], followed.errors[used, 0] = time, found.errors[j]
-        line = followed.lines[used]
+        tracks.ids[n_tracks] = first_id + n_tracks - first_row
+        tracks.last_seen[n_tracks], tracks.hits[n_tracks] = time, hits
+        tracks.radii[n_tracks] = detected.radii[j]
+        tracks.radius_weights[n_tracks] = 1.0 / (
+            detected.radius_errors[j] * detected.radius_errors[j]
+        )
+        tracks.visible_shares[n_tracks], tracks.flight_points[n_tracks] = visible_shares[j], 1
+        tracks.times[n_tracks, 0], tracks.errors[n_tracks, 0] = time, detected.errors[j]
+        line = tracks.lines[n_tracks]
         line[0], line[3], line[4], line[7], line[8] = time, 0.0, 0.0, 0.0, 0.0
-        line[5], line[6] = found.errors[j] * found.errors[j], math.inf
+        line[5], line[6] = detected.errors[j] * detected.errors[j], math.inf
         for axis in range(2):
-            followed.places[used, 0, axis] = found.places[j, axis]
-            line[1 + axis] = found.places[j, axis]
-        used += 1
-    return used
+            tracks.positions[n_tracks, 0, axis] = detected.positions[j, axis]
+            line[1 + axis] = detected.positions[j, axis]
+        n_tracks += 1
+    return n_tracks
 
 
 @compiled
-def advance(
-    followed: Followed,
-    used: int,
-    chosen: NDArray[np.int64],
-    found: Seen,
-    shares: NDArray[np.float64],
+def update_tracks(
+    tracks: TrackStore,
+    n_tracks: int,
+    links: NDArray[np.int64],
+    detected: DetectedBeads,
+    visible_shares: NDArray[np.float64],
     time: float,
-    habits: Habits,
+    settings: LinkSettings,
     speed: float,
-    first_number: int,
+    first_id: int,
     hits: int,
 ) -> tuple[int, int, float]:
-    """Take, learn, drop and add what the next picture shows.
+    """Update all tracks with the linked detections of the next frame.
 
     Returns
     -------
     int, int
-        Tracks, and how many of them are new.
+        Number of tracks, and how many of them are new.
     float, [px/s]
-        See `learn_speed`.
+        See `update_speed`.
     """
-    new = np.ones(found.radii.size, dtype=np.bool_)
-    for k in range(used):
-        if chosen[k] >= 0:
-            new[chosen[k]] = False
-    take(followed, used, chosen, found, shares, time, habits)
-    speed = learn_speed(followed, used, speed)
-    kept = drop(followed, used, chosen, time, habits)
-    used = add(followed, kept, new, found, shares, time, first_number, hits)
-    return used, used - kept, speed
+    new = np.ones(detected.radii.size, dtype=np.bool_)
+    for k in range(n_tracks):
+        if links[k] >= 0:
+            new[links[k]] = False
+    append_detections(tracks, n_tracks, links, detected, visible_shares, time, settings)
+    speed = update_speed(tracks, n_tracks, speed)
+    kept = drop_tracks(tracks, n_tracks, links, time, settings)
+    n_tracks = add_tracks(tracks, kept, new, detected, visible_shares, time, first_id, hits)
+    return n_tracks, n_tracks - kept, speed

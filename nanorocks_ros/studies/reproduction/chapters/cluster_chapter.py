@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.numerics.sample_mean import mean_of
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table, number
 from nanorocks_ros.physics.dust_models import PAPER_STICKING_SPEEDS, collapse_time_factor
 from nanorocks_ros.physics.paper_clusters import PAPER_TABLE_3, paper_onset
@@ -292,5 +292,5 @@ def _draw_autocorrelation(context: Context, path: Path) -> None:
                              extent=(-side, side, -side, side))  # fmt: skip
         axes[row, 1].set_title('autocorrelation; shifts in mm', fontsize=10)
         axes[row, 0].set_axis_off()
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)

@@ -10,7 +10,7 @@ from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.experiment.paper_values import PAPER_TRACKED
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.numerics.sample_mean import mean_of
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table, number
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 from nanorocks_ros.studies.analysis.bag_tracks import track_bag
@@ -136,7 +136,7 @@ def _write_frame(film: Path, path: Path) -> None:
         height = round(_WIDTH * frame.image.shape[0] / frame.image.shape[1])
         small = cv2.resize(frame.image, (_WIDTH, height), interpolation=cv2.INTER_AREA)
         _, content = cv2.imencode('.jpg', small, [cv2.IMWRITE_JPEG_QUALITY, 80])
-        with whole_file(path) as part:
+        with atomic_file(path) as part:
             part.write_bytes(content.tobytes())
         return
     raise RecordingError(bag.where, 'is too short', 'make the films again')
@@ -151,5 +151,5 @@ def _draw_tracks(context: Context, path: Path) -> None:
     )
     picture = overlay(bag.pictures[1], bag.tracks[1], bag.pixels_per_metre, path_frames=600)
     _, content = cv2.imencode('.png', picture)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_bytes(content.tobytes())

@@ -8,9 +8,9 @@ from nanorocks_ros.experiment.paper_values import PAPER_ROTATION
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.outputs.html_report import Erratum, Section, Table, number
 from nanorocks_ros.physics.rough_spheres import (
+    rms_spin,
     rough_temperature_ratio,
     smooth_equivalent,
-    spin_of,
 )
 from nanorocks_ros.studies.reproduction.chapters.chapter_context import (
     Chapter,
@@ -28,7 +28,7 @@ def rotation_chapter(context: Context) -> Chapter:
     """What rotation does to the decay, and what the camera could see of it."""
     context.progress(1.0)
     diameter = load_trays()[1].diameter
-    spins = [math.degrees(spin_of(speed, diameter)) for speed in _SPEEDS]
+    spins = [math.degrees(rms_spin(speed, diameter)) for speed in _SPEEDS]
     section = Section(
         title='Rotation',
         parts=[

@@ -12,7 +12,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from nanorocks_ros.experiment.paper_values import PAPER_PEAK_SPEED
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.numerics.sample_mean import mean_of
-from nanorocks_ros.outputs.atomic_files import whole_file
+from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table, number
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.studies.inspection.speed_comparison import compare_speeds
@@ -115,7 +115,7 @@ def _draw_ratios(path: Path, found: ComparedSpeeds, cycle: int) -> None:
         if not speeds:
             continue
         true = found.true_speeds(speeds)
-        ratio = np.array([speed.mean_projected_speed for speed in speeds]) / true
+        ratio = np.array([speed.mean_projected_speed.value for speed in speeds]) / true
         axes.plot(_MM * true, ratio, marker, color=colour, ms=3, alpha=0.6, label=_NAMES[method])
     axes.axhline(1.0, color='0.5', lw=1)
     axes.set(xscale='log', yscale='log', xlabel='true mean projected speed [mm/s]',
@@ -126,7 +126,7 @@ def _draw_ratios(path: Path, found: ComparedSpeeds, cycle: int) -> None:
         axis.set_minor_formatter(NullFormatter())
     axes.grid(alpha=0.25)
     axes.legend(frameon=False)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
 
 
@@ -145,5 +145,5 @@ def _draw_peaks(path: Path, peaks: dict[int, tuple[float, float, float]]) -> Non
     axes.set(xlabel='tray', ylabel='peak speed [mm/s]', ylim=(0.0, None))
     axes.grid(alpha=0.25)
     axes.legend(frameon=False)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=110)

@@ -1,10 +1,10 @@
-"""Beads in single pictures against where they were drawn."""
+"""Beads detected in single images against the positions they were drawn at."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from tracking_films import SCALE, paired, tray_film
+from tracking_films import SCALE, match_positions, tray_film
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.settings import TrackingSettings
@@ -12,42 +12,42 @@ from nanorocks_ros.stages.tracking.detection.bead_detector import BeadDetector
 
 
 def _errors(number, index, frames=24, clear=0.8):
-    """Of the beads whose outline is seen: place and radius less the truth, [px]; share found."""
+    """Errors of position and radius of unobstructed beads, [px]; share of beads found."""
     detector = BeadDetector(TrackingSettings(), load_trays()[number], SCALE)
-    apart, sizes, found, true = [], [], 0, 0
+    position_errors, radius_errors, n_found, n_true = [], [], 0, 0
     for image, truth in tray_film(number, frames):
-        one = detector.detect(image.color)[index]
-        own = truth.species == index
-        places, radii = truth.positions[own, :2] * SCALE, truth.radii[own] * SCALE
-        rows, columns = paired(places, one.places, 0.6 * radii.min())
-        found, true = found + rows.size, true + own.sum()
-        free = one.outline_seen[columns] >= clear
-        apart.append((one.places[columns] - places[rows])[free])
-        sizes.append((one.radii[columns] - radii[rows])[free])
-    return np.concatenate(apart), np.concatenate(sizes), found / true
+        detections = detector.detect(image.color)[index]
+        is_species = truth.species == index
+        positions, radii = truth.positions[is_species, :2] * SCALE, truth.radii[is_species] * SCALE
+        rows, columns = match_positions(positions, detections.positions, 0.6 * radii.min())
+        n_found, n_true = n_found + rows.size, n_true + is_species.sum()
+        is_clear = detections.visible_outline[columns] >= clear
+        position_errors.append((detections.positions[columns] - positions[rows])[is_clear])
+        radius_errors.append((detections.radii[columns] - radii[rows])[is_clear])
+    return np.concatenate(position_errors), np.concatenate(radius_errors), n_found / n_true
 
 
 def test_a_free_bead_of_25_px_is_placed_within_a_twentieth_of_a_pixel():
-    apart, sizes, found = _errors(1, 0)
-    assert found == 1.0
-    assert np.sqrt(np.mean(apart**2)) < 0.05
-    assert np.abs(sizes).max() < 0.15
+    position_errors, radius_errors, share = _errors(1, 0)
+    assert share == 1.0
+    assert np.sqrt(np.mean(position_errors**2)) < 0.05
+    assert np.abs(radius_errors).max() < 0.15
 
 
 def test_a_free_bead_of_12_px_beside_large_ones_is_placed_within_a_tenth_of_a_pixel():
-    apart, _, found = _errors(3, 1)
-    assert found > 0.93
-    assert np.quantile(np.abs(apart), 0.9) < 0.1
+    position_errors, _, share = _errors(3, 1)
+    assert share > 0.93
+    assert np.quantile(np.abs(position_errors), 0.9) < 0.1
 
 
-def test_beads_of_all_sizes_get_a_size_of_their_own():
-    apart, sizes, found = _errors(5, 1)
-    assert found > 0.9
-    assert np.median(np.abs(sizes)) < 0.25
-    assert np.median(np.abs(apart)) < 0.1
+def test_the_radius_of_each_bead_is_measured_in_a_species_of_many_sizes():
+    position_errors, radius_errors, share = _errors(5, 1)
+    assert share > 0.9
+    assert np.median(np.abs(radius_errors)) < 0.25
+    assert np.median(np.abs(position_errors)) < 0.1
 
 
-def test_no_bead_is_seen_in_an_empty_tray():
+def test_an_empty_tray_has_no_detections():
     rng = np.random.default_rng(3)
     floor = np.clip(rng.normal(150.0, 3.0, (188, 188, 3)), 0, 255).astype(np.uint8)
     detector = BeadDetector(TrackingSettings(), load_trays()[1], SCALE)
@@ -55,22 +55,22 @@ def test_no_bead_is_seen_in_an_empty_tray():
 
 
 @pytest.mark.parametrize('level', [0, 255])
-def test_a_black_or_white_picture_shows_no_bead_and_is_no_error(level):
-    picture = np.full((188, 188, 3), level, dtype=np.uint8)
+def test_a_black_or_white_image_has_no_detections(level):
+    image = np.full((188, 188, 3), level, dtype=np.uint8)
     detector = BeadDetector(TrackingSettings(), load_trays()[1], SCALE)
-    assert detector.detect(picture)[0].radii.size == 0
+    assert detector.detect(image)[0].radii.size == 0
 
 
 def test_light_that_fades_by_a_third_loses_no_bead():
     detector = BeadDetector(TrackingSettings(), load_trays()[1], SCALE)
     for k, (image, truth) in enumerate(tray_film(1, 90)):
         dimmed = (image.color * (1.0 - 0.33 * k / 90.0)).astype(np.uint8)
-        one = detector.detect(dimmed)[0]
-        rows, _ = paired(truth.positions[:, :2] * SCALE, one.places, 3.0)
+        detections = detector.detect(dimmed)[0]
+        rows, _ = match_positions(truth.positions[:, :2] * SCALE, detections.positions, 3.0)
         assert rows.size == 15
 
 
-def test_grains_too_many_to_be_told_apart_are_left_alone():
+def test_crowded_grains_are_not_detected():
     detector = BeadDetector(TrackingSettings(), load_trays()[6], SCALE)
     image, _ = next(tray_film(6, 1))
     glass, grains = detector.detect(image.color)

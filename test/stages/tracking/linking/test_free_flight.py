@@ -1,27 +1,27 @@
-"""A line through the places of a free bead, and when it ends."""
+"""Line fits to free flights, and collisions that end them."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from nanorocks_ros.stages.tracking.linking.free_flight import KEPT, extend_flight
+from nanorocks_ros.stages.tracking.linking.free_flight import MAX_POINTS, extend_flight
 
 
 class _Flight:
     def __init__(self, window=2.0):
-        self.times, self.places = np.zeros(KEPT), np.zeros((KEPT, 2))
-        self.errors, self.line = np.zeros(KEPT), np.zeros(9)
+        self.times, self.positions = np.zeros(MAX_POINTS), np.zeros((MAX_POINTS, 2))
+        self.errors, self.line = np.zeros(MAX_POINTS), np.zeros(9)
         self.count, self.window = 0, window
 
     def add(self, time, x, y, error=0.1):
         self.count = extend_flight(
-            self.times, self.places, self.errors, self.count, self.line,
+            self.times, self.positions, self.errors, self.count, self.line,
             time, x, y, error, self.window,
         )  # fmt: skip
 
 
-def test_the_velocity_of_a_straight_flight_has_the_error_it_claims():
+def test_the_velocity_of_a_straight_flight_has_the_stated_error():
     rng = np.random.default_rng(1)
     pulls = []
     for _ in range(300):

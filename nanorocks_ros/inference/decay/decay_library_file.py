@@ -1,0 +1,111 @@
+"""Files of decay libraries: reading them, and the arrays they consist of.
+
+Tested in test/inference/decay/test_decay_library.py.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.inference.calibration_archives import load_archive
+from nanorocks_ros.inference.decay.decay_library import DecayLibrary, term_count, tray_key
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+
+_ARRAYS = (
+    'base',
+    'misfit',
+    'distances',
+    'coefficients',
+    'covariance_restitution',
+    'covariance_wall',
+    'covariance',
+)
+_FORMAT = 1
+
+
+def build_command(tray: Tray) -> str:
+    """Command that makes the library of a tray."""
+    return f'nanorocks library --tray {tray.number} -o tray_{tray.number}.npz'
+
+
+def library_of(tray: Tray, path: str | Path = '') -> DecayLibrary:
+    """The library of a tray, from a file or from the package.
+
+    Parameters
+    ----------
+    tray : Tray
+    path : str or Path
+        Empty: the file in the package.
+
+    Raises
+    ------
+    ConfigurationError
+        When it cannot be read, or was made for another tray.
+    """
+    library = load_library(str(path) or f'libraries/tray_{tray.number}.npz', packaged=not path)
+    if library.tray != tray_key(tray):
+        where = str(path) or f'tray {tray.number}'
+        raise ConfigurationError(
+            where,
+            f'the decay library is of a tray with other beads or sides than tray {tray.number}',
+            f'make one: {build_command(tray)}, and pass it as cooling.decay_library; or choose '
+            'cooling.relation paper',
+        )
+    return library
+
+
+@lru_cache(maxsize=16)
+def load_library(name: str, *, packaged: bool) -> DecayLibrary:
+    """A library from a file.
+
+    Parameters
+    ----------
+    name : str
+        Path, or name of a file in the package.
+    packaged : bool
+
+    Raises
+    ------
+    ConfigurationError
+        When it cannot be read.
+    """
+    return load_archive(
+        name,
+        __package__ if packaged else None,
+        _library,
+        kind='decay library',
+        command='nanorocks library',
+    )
+
+
+def _library(arrays: Mapping[str, NDArray[Any]]) -> DecayLibrary:
+    if int(arrays['format']) != _FORMAT or len(arrays['coefficients']) != term_count():
+        raise ValueError('of another release')
+    return DecayLibrary(
+        tray=str(arrays['tray']),
+        made_by=str(arrays['made_by']),
+        misfit=float(arrays['misfit']),
+        **{name: arrays[name].astype(np.float64) for name in _ARRAYS if name != 'misfit'},
+    )
+
+
+def library_arrays(library: DecayLibrary) -> dict[str, NDArray[Any]]:
+    """Arrays of the file of a library."""
+    return {
+        **{name: np.asarray(getattr(library, name)) for name in _ARRAYS},
+        'covariance': library.covariance.astype(np.float32),
+        'format': np.array(_FORMAT),
+        'tray': np.array(library.tray),
+        'made_by': np.array(library.made_by),
+    }

@@ -1,0 +1,124 @@
+"""Decay library tabulated on a grid of restitutions, with its slopes by the nuisances.
+
+Tested in test/inference/test_posterior.py.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL, NUISANCES, UNITS, count_step
+from nanorocks_ros.inference.decay.decay_likelihood import DecayTables
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.inference.decay.decay_library import DecayLibrary
+    from nanorocks_ros.settings import PriorSettings
+
+# Nodes of the grid along each restitution, denser towards 1: evenly spaced in these powers of
+# 1 - restitution, in which likelihoods are smooth.
+_BEAD_NODES, _WALL_NODES = 35, 15
+BEAD_POWER, WALL_POWER = 1.0 / 1.5, 0.5
+# Cells of ln t over which curves of the library are smoothed.
+_SMOOTH_CELLS = 9
+
+
+@lru_cache(maxsize=16)
+def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> DecayTables:
+    """The library on the grid of restitutions, with the effect of each nuisance.
+
+    Parameters
+    ----------
+    library : DecayLibrary
+    tray : Tray
+    settings : PriorSettings
+        Standard deviations of the nuisances.
+    """
+    restitution = 1.0 - np.linspace(1.0, 0.0, _BEAD_NODES) ** (1.0 / BEAD_POWER)
+    wall = 1.0 - (1.0 - LOWEST_WALL) * np.linspace(1.0, 0.0, _WALL_NODES) ** (1.0 / WALL_POWER)
+    beads, walls = (axis.ravel() for axis in np.meshgrid(restitution, wall, indexing='ij'))
+    mean = _smooth(library.log_speed(beads, walls))
+    slopes = [_floor_and_lid(library, beads, walls, settings.floor_lid_spread)]
+    for number, spread in enumerate(_spreads(tray, settings)):
+        change = np.zeros((beads.size, len(NUISANCES)))
+        change[:, number] = UNITS[number]
+        high = library.log_speed(beads, walls, None, change)
+        low = library.log_speed(beads, walls, None, -change)
+        slopes.append(0.5 * (high - low) * spread / UNITS[number])
+    corners, shares = _corners(library, beads, walls)
+    return DecayTables(
+        decays=library,
+        restitution=restitution,
+        wall_restitution=wall,
+        mean=mean,
+        slopes=_smooth(np.stack(slopes, axis=1)),
+        corners=corners,
+        shares=shares,
+    )
+
+
+def _smooth(curves: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Curves of the library without the noise of its runs.
+
+    Their slopes determine how far amplitude and scale compensate each other. Where the speed falls
+    as 1/t they nearly do, so that noise of 0.01 from cell to cell would dominate.
+    """
+    return np.asarray(savgol_filter(curves, _SMOOTH_CELLS, 3, axis=-1))
+
+
+def _spreads(tray: Tray, settings: PriorSettings) -> tuple[float, ...]:
+    """One standard deviation of each of `NUISANCES`."""
+    counted = all(species.mass is None for species in tray.species)
+    count = settings.count_error / count_step(tray) if counted else 1.0
+    return (
+        settings.height_error,
+        settings.diameter_error,
+        settings.anisotropy_spread,
+        count,
+        settings.speed_distribution_spread,
+    )
+
+
+def _floor_and_lid(
+    library: DecayLibrary,
+    beads: NDArray[np.float64],
+    walls: NDArray[np.float64],
+    spread: float,
+) -> NDArray[np.float64]:
+    """Change of ln f when the loss at floor and lid is exp(spread) times that at the sides."""
+    if spread == 0.0:
+        return np.zeros((beads.size, library.distances.size))
+    more, less = (1.0 - (1.0 - walls) * math.exp(logarithm) for logarithm in (spread, -spread))
+    high = library.log_speed(beads, walls, np.maximum(more, LOWEST_WALL - 0.05))
+    return np.asarray(0.5 * (high - library.log_speed(beads, walls, less)))
+
+
+def _corners(
+    library: DecayLibrary, beads: NDArray[np.float64], walls: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Corners of the covariance grid around each point, and their weights."""
+    falling = -library.covariance_restitution
+    rising = library.covariance_wall
+    i, s = _cell(falling, -beads)
+    j, t = _cell(rising, walls)
+    width = rising.size
+    corners = np.stack(
+        [i * width + j, i * width + j + 1, (i + 1) * width + j, (i + 1) * width + j + 1], axis=1
+    )
+    shares = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=1)
+    return corners, shares
+
+
+def _cell(
+    axis: NDArray[np.float64], at: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    cell = np.clip(np.searchsorted(axis, at, side='right') - 1, 0, axis.size - 2)
+    share = (at - axis[cell]) / (axis[cell + 1] - axis[cell])
+    return cell.astype(np.int64), np.clip(share, 0.0, 1.0)

@@ -1,0 +1,126 @@
+"""Warnings about the topics of a node: no publisher, several publishers, incompatible QoS."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+from rclpy.clock import ROSClock
+
+from nanorocks_ros.nodes.base.qos_compatibility import mismatches
+from nanorocks_ros.nodes.base.ros_messages import node_name_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.clock import Clock
+    from rclpy.node import Node
+
+_PATIENCE_S = 5.0
+_ONE_CAMERA = 'stop all but one, or give each a namespace of its own (-r __ns:=/NAME)'
+# A publisher is discovered before the node that it belongs to; so many checks wait for the name.
+_UNKNOWN_NODE, _MAX_WAITS = '_NODE_NAME_UNKNOWN_', 5
+
+
+class TopicMonitor:
+    """Checks the topics of a node, and logs each problem once.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    clock : rclpy.clock.Clock
+        That the checks are timed by.
+
+    Attributes
+    ----------
+    required : list of str
+        Topics that need a publisher.
+    """
+
+    def __init__(self, node: Node, clock: Clock) -> None:
+        self._node = node
+        self._clock = clock
+        self._single: dict[str, str] = {}
+        self._waits: Counter[str] = Counter()
+        self.required: list[str] = []
+        self._check_later(self._check_clock)
+
+    def _check_later(self, check: Callable[[], None]) -> None:
+        """Call a check once, after 5 s."""
+
+        def check_once() -> None:
+            timer.cancel()
+            check()
+
+        timer = self._node.create_timer(_PATIENCE_S, check_once, clock=self._clock)
+
+    def _warn(self, text: str) -> None:
+        self._node.get_logger().warning(text)
+
+    def require_publisher(self, name: str) -> None:
+        """Warn when nobody publishes a topic within 5 s."""
+        self.required.append(name)
+        self._check_later(lambda: self._check_publishers(name))
+
+    def require_single_publisher(self, name: str, remedy: str = _ONE_CAMERA) -> None:
+        """Warn when more than one node publishes a topic: their messages would be mixed."""
+        self._single[name] = remedy
+
+    def missing_publishers(self) -> list[str]:
+        """The required topics that nobody publishes now."""
+        return [name for name in self.required if self._node.count_publishers(name) == 0]
+
+    def check_single_publishers(self) -> None:
+        """Check the topics that only one node should publish."""
+        for name, remedy in list(self._single.items()):
+            topic = self._node.resolve_topic_name(name)
+            if self._node.count_publishers(topic) < 2:
+                continue
+            endpoints = self._node.get_publishers_info_by_topic(topic)
+            unknown = any(endpoint.node_name == _UNKNOWN_NODE for endpoint in endpoints)
+            if unknown and self._waits[name] < _MAX_WAITS:
+                self._waits[name] += 1
+                continue
+            del self._single[name]
+            nodes = sorted(node_name_of(endpoint) for endpoint in endpoints)
+            self._warn(
+                f'{topic}: published by {" and ".join(nodes)}, their messages are mixed; {remedy}'
+            )
+
+    def report_incompatible_qos(self, name: str, _: Any) -> None:
+        """Warn that a publisher offers less than this node requests; the middleware calls it."""
+        topic = self._node.resolve_topic_name(name)
+        offered = [
+            endpoint.qos_profile for endpoint in self._node.get_publishers_info_by_topic(topic)
+        ]
+        requested = [
+            endpoint.qos_profile
+            for endpoint in self._node.get_subscriptions_info_by_topic(topic)
+            if endpoint.node_name == self._node.get_name()
+        ]
+        found = mismatches(offered, requested)
+        differences = ', '.join(
+            f'{mismatch.policy} {mismatch.offered} but this node requests {mismatch.requested}'
+            for mismatch in found
+        )
+        overrides = ', '.join(
+            f'qos_overrides.{topic}.subscription.{mismatch.policy}' for mismatch in found
+        )
+        self._warn(f'{topic}: no data, the publisher offers {differences}; set {overrides}')
+
+    def _check_publishers(self, name: str) -> None:
+        if self._node.count_publishers(name) == 0:
+            self._warn(
+                f'{name}: no publisher within {_PATIENCE_S:g} s; start one, remap the topic, or '
+                'check the namespace and ROS_DOMAIN_ID'
+            )
+
+    def _check_clock(self) -> None:
+        clock = self._node.get_clock()
+        simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
+        if simulated and clock.now().nanoseconds == 0:
+            self._warn(
+                f'/clock: no message within {_PATIENCE_S:g} s although use_sim_time is set, so '
+                'time stands still; start bag_player (or ros2 bag play --clock), or set '
+                'use_sim_time:=false'
+            )

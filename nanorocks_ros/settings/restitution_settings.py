@@ -1,0 +1,169 @@
+"""Settings of the fits: sticking speed, cooling window, priors of the restitution.
+
+Tested in test/settings/test_setting_fields.py.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nanorocks_ros.settings.setting_fields import setting
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StickingSettings:
+    """From merges to the sticking speed."""
+
+    measure: str = setting(
+        'normal',
+        'relative speed of two beads that is compared with the sticking speed: its component '
+        'along the line of centres, or the total',
+        choices=('normal', 'total'),
+    )
+    rate_error: float = setting(
+        0.1, 'relative standard error of the collision rates of bodies', low=0.0, high=1.0
+    )
+    probability: float = setting(0.95, 'probability of the interval', low=0.5, high=0.999)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoolingSettings:
+    """From speeds to the coefficient of restitution."""
+
+    relation: str = setting(
+        'library',
+        'relation between decay and restitution: a library of simulated decays of the tray, or '
+        'the closed form of the paper, which is wrong and kept for comparison',
+        choices=('library', 'paper'),
+    )
+    decay_library: str = setting(
+        '',
+        'file of simulated decays, made by `nanorocks library`; empty: the file in the package '
+        'for the tray',
+    )
+    delay: float = setting(
+        1.75, 'time from the shaking event to the first speed used', 's', low=0.0, high=600.0
+    )
+    duration: float = setting(
+        20.0,
+        'length of the time window of the fit, from the shaking event or, if later, from the '
+        'moment the tray came to rest',
+        's',
+        low=0.5,
+        high=3600.0,
+    )
+    max_tray_to_bead_speed: float = setting(
+        0.05,
+        'largest ratio of tray speed to mean bead speed at which the fit starts; after shaking '
+        'the tray oscillates on its springs',
+        deprecated='calm_share',
+        low=0.0,
+        high=10.0,
+    )
+    until_merge: bool = setting(
+        True,
+        'end the fit at the first merge of the cycle: beads that stick lose more energy than '
+        'beads that bounce',
+    )
+    rebounds: bool = setting(
+        True, 'use rebounds from the side walls, found in the tracks, besides the decay'
+    )
+    collisions: bool = setting(
+        True, 'use collisions of two beads, found in the tracks, besides the decay'
+    )
+    update_interval: float = setting(
+        0.5, 'time between two live estimates', 's', low=0.0, high=60.0
+    )
+    min_samples: int = setting(
+        8, 'smallest number of speeds for a fit', deprecated='fewest_samples', low=4, high=10000
+    )
+    probability: float = setting(0.95, 'probability of the interval', low=0.5, high=0.999)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PriorSettings:
+    """Priors of the restitutions of beads and walls, and systematic errors."""
+
+    min_wall_restitution: float = setting(
+        0.8,
+        'lower end of the flat prior of the wall restitution',
+        deprecated='wall_low',
+        low=0.78,
+        high=1.0,
+    )
+    max_wall_restitution: float = setting(
+        1.0,
+        'upper end of the flat prior of the wall restitution; equal to the lower end if it is '
+        'known',
+        deprecated='wall_high',
+        low=0.78,
+        high=1.0,
+    )
+    floor_lid_spread: float = setting(
+        0.4,
+        'standard deviation of the logarithm of the ratio of 1 - restitution of floor and lid to '
+        'that of the side walls; 0: equal',
+        low=0.0,
+        high=1.0,
+    )
+    height_error: float = setting(
+        0.1e-3, 'standard error of the inner height of a tray', 'm', low=0.0, high=1e-3
+    )
+    diameter_error: float = setting(
+        0.01, 'relative standard error of the bead diameter', low=0.0, high=0.1
+    )
+    count_error: float = setting(
+        0.3, 'standard error of the number of beads, if counted', low=0.0, high=100.0
+    )
+    anisotropy_spread: float = setting(
+        0.5,
+        'standard deviation of the logarithm of the ratio of vertical to horizontal speed after a '
+        'shaking event',
+        low=0.0,
+        high=2.0,
+    )
+    speed_distribution_spread: float = setting(
+        1.0,
+        'standard deviation of the shape of the speed distribution after a shaking event; shape '
+        '-1: uniform, 0: half way, 1: Maxwellian',
+        deprecated='start_spread',
+        low=0.0,
+        high=2.0,
+    )
+    scale_error: float = setting(
+        0.005, 'relative standard error of the image scale', low=0.0, high=0.1
+    )
+    speed_bias: float = setting(
+        0.01,
+        'standard deviation of the relative speed error that grows by this amount per factor e in '
+        'speed',
+        low=0.0,
+        high=0.2,
+    )
+    grain_scale_error: float = setting(
+        0.3,
+        'relative standard error of structure-function speeds in trays with grains, whose '
+        'outlines change as they rotate',
+        low=0.0,
+        high=1.0,
+    )
+    grain_speed_bias: float = setting(
+        0.1,
+        '`speed_bias` of structure-function speeds in trays with grains',
+        low=0.0,
+        high=0.5,
+    )
+    collision_bias: float = setting(
+        0.008,
+        'standard deviation of the common systematic error of the bead restitutions measured from '
+        'collisions',
+        low=0.0,
+        high=0.2,
+    )
+    rebound_bias: float = setting(
+        0.001,
+        'standard deviation of the common systematic error of the wall restitutions measured from '
+        'rebounds',
+        low=0.0,
+        high=0.2,
+    )

@@ -1,0 +1,64 @@
+"""Counts, processing times and the most serious problem of a node reach ``/diagnostics``."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+from nanorocks_ros.errors import FrameError
+
+
+@pytest.fixture
+def report(own_node):
+    """A node, and a function that gives its next status and the values in it."""
+    node, spin_until = own_node
+    statuses = []
+    node.create_subscription(
+        DiagnosticArray, '/diagnostics', lambda message: statuses.extend(message.status), 10
+    )
+
+    def next_status():
+        statuses.clear()
+        # The first one may have been sent before.
+        spin_until(lambda: len(statuses) >= 2)
+        return statuses[-1], {pair.key: pair.value for pair in statuses[-1].values}
+
+    return node, next_status
+
+
+def refuse(_):
+    raise FrameError('camera', 'too dark', 'switch on the light')
+
+
+def test_messages_are_counted_and_timed(report):
+    node, next_status = report
+    for number in range(3):
+        node.diagnostics.process(lambda _: None, number)
+    status, values = next_status()
+    assert status.name == '/nanorocks/own'
+    assert status.level == DiagnosticStatus.OK
+    assert values['received'] == '3'
+    assert values['refused'] == '0'
+
+
+def test_an_unusable_message_is_counted_and_shown(report):
+    node, next_status = report
+    node.diagnostics.process(refuse, None)
+    node.diagnostics.process(lambda _: None, None)
+    status, values = next_status()
+    assert status.level == DiagnosticStatus.ERROR
+    assert status.message == values['last refusal'] == 'camera: too dark; switch on the light'
+    assert (values['received'], values['refused']) == ('2', '1')
+
+
+def test_a_warning_and_a_missing_publisher_are_shown_in_this_order(report):
+    node, next_status = report
+    node.topic_monitor.require_publisher('/nowhere')
+    status, _ = next_status()
+    assert (status.level, status.message) == (DiagnosticStatus.WARN, 'no publisher on /nowhere')
+    node.diagnostics.warning = 'the disk is full'
+    status, _ = next_status()
+    assert (status.level, status.message) == (DiagnosticStatus.WARN, 'the disk is full')

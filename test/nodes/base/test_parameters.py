@@ -1,0 +1,73 @@
+"""Parameters: invalid ones end a node with one line, invalid changes are rejected."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+
+SPEED = 'qos_overrides./nanorocks/tray_1/speed.subscription'
+
+
+@pytest.mark.parametrize(
+    ('name', 'parameter', 'message'),
+    [
+        ('haff_fitter', 'cooling.duration:=.nan', 'parameter cooling.duration'),
+        ('haff_fitter', 'cooling.duration:=-3.0', 'parameter cooling.duration'),
+        ('speed_estimator', 'trays:=[9]', 'trays: 9 is outside [1, 8]'),
+        ('pipeline', 'speed.method:=guess', "'guess' is none of auto"),
+        ('pipeline', 'simulation.tray:=3', 'parameter simulation.tray: 3 is not among trays'),
+        ('pipeline', 'bag:=x', 'parameter bag: given, but source is simulator; set source:=bag'),
+        ('preprocessor', 'trays_file:=/nowhere.yaml', '/nowhere.yaml: No such file'),
+        ('simulator', 'noise:=-1.0', 'parameter noise'),
+        ('bag_player', 'rate:=1.0', 'parameter bag: is empty; give the path of a bag'),
+        ('bag_player', 'bag:=2015', """2015 is not a string; quote it twice: -p "bag:='2015'\""""),
+        ('haff_fitter', f'{SPEED}.reliability:=best_efort', "'best_efort' is not one of system"),
+        (
+            'haff_fitter',
+            f'{SPEED.replace("speed", "sped")}.depth:=3',
+            "(did you mean '/nanorocks/tray_1/speed'?)",
+        ),
+        ('simulator', 'nois:=1.0', "no parameter 'nois' (did you mean 'noise'?)"),
+    ],
+)
+def test_a_bad_parameter_ends_the_node_with_one_line(graph, name, parameter, message):
+    finished = graph.wait(graph.start(name, parameter))
+    assert finished.code == 2
+    assert message in finished.output
+    assert len(finished.output.splitlines()) == 1, finished.output
+
+
+def set_parameter(graph, node, name, value):
+    client = graph.node.create_client(SetParameters, f'/nanorocks/{node}/set_parameters')
+    graph.until(client.service_is_ready)
+    parameter = Parameter(name, value=value).to_parameter_msg()
+    future = client.call_async(SetParameters.Request(parameters=[parameter]))
+    graph.until(future.done)
+    return future.result().results[0]
+
+
+def test_a_bad_change_of_a_parameter_is_rejected_with_the_reason(graph):
+    process = graph.start('haff_fitter')
+    bad = set_parameter(graph, 'haff_fitter', 'cooling.probability', float('nan'))
+    assert not bad.successful
+    assert 'cooling.probability' in bad.reason
+    good = set_parameter(graph, 'haff_fitter', 'cooling.probability', 0.68)
+    assert good.successful, good.reason
+    whole = set_parameter(graph, 'haff_fitter', 'cooling.duration', 15)
+    assert whole.successful, whole.reason
+    assert graph.interrupt(process).code == 0
+
+
+def test_a_change_that_does_not_fit_the_other_parameters_is_rejected_and_the_node_lives(graph):
+    process = graph.start('preprocessor')
+    mix = set_parameter(graph, 'preprocessor', 'preprocess.gray_mix', [1.0, 1.0, 1.0])
+    assert not mix.successful
+    assert 'whose sum is at most 1' in mix.reason
+    trays = set_parameter(graph, 'preprocessor', 'trays', [1, 2])
+    assert not trays.successful
+    assert process.poll() is None
+    assert graph.interrupt(process).code == 0

@@ -1,0 +1,86 @@
+"""The result arrays of tray 1 that a graph publishes, compared with those of an analysis."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+from std_msgs.msg import Float32MultiArray
+
+from nanorocks_ros.nodes.base.ros_messages import qos_of
+from nanorocks_ros.records import (
+    ClusterEstimate,
+    CorEstimate,
+    CorStatus,
+    GroundTruth,
+    PairCollision,
+    Rebound,
+    SpeedEstimate,
+)
+from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.studies.analysis.offline_analysis import analyse
+from nanorocks_ros.wire import topics
+from nanorocks_ros.wire.array_layouts import from_array, to_array
+
+SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
+TOPICS = {
+    SpeedEstimate: topics.SPEED,
+    ClusterEstimate: topics.CLUSTER,
+    CorEstimate: topics.COR,
+    Rebound: topics.REBOUND,
+    PairCollision: topics.COLLISION,
+}
+
+
+class ResultArrays:
+    """Every result array of tray 1 that was published, by type of record."""
+
+    def __init__(self, node):
+        self.messages = defaultdict(list)
+        for record_type, topic in {**TOPICS, GroundTruth: topics.TRUTH}.items():
+            node.create_subscription(
+                Float32MultiArray, topic.of(1), self.messages[record_type].append, qos_of(topic)
+            )
+
+    def records(self, record_type):
+        return [
+            from_array(record_type, message.data, tray=1, epoch_ns=0, where='test')
+            for message in self.messages[record_type]
+        ]
+
+    def final_cors(self):
+        return [cor for cor in self.records(CorEstimate) if cor.status is CorStatus.FINAL]
+
+
+def offline_arrays():
+    """The arrays that the analysis of the sample bag gives."""
+    analysis = analyse(SAMPLE, PipelineSettings())
+    results = analysis.trays[1]
+    by_type = {
+        SpeedEstimate: results.speeds,
+        ClusterEstimate: results.clusters,
+        CorEstimate: results.cors,
+        Rebound: results.rebounds,
+        PairCollision: results.collisions,
+    }
+    return {
+        record_type: np.array([to_array(record, analysis.epoch_ns) for record in records])
+        for record_type, records in by_type.items()
+    }
+
+
+def assert_same_numbers(arrays, rounding, missed=None):
+    for record_type, expected in offline_arrays().items():
+        messages = arrays.messages[record_type]
+        published = np.array([message.data for message in messages], dtype=np.float32)
+        assert len(published) > 30, record_type
+        # A listener may be discovered a moment after the first message; from then on every
+        # message arrives. What was provisional when the bag ended is final offline alone.
+        first = int(np.argmin(np.abs(expected[:, 0] - published[0, 0])))
+        assert first <= (len(expected) // 2 if missed is None else missed), record_type
+        # Those of clusters are held back for two seconds.
+        held_back = 11 if record_type is ClusterEstimate else 1
+        assert 0 <= len(expected) - first - len(published) <= held_back, record_type
+        same = expected[first : first + len(published)]
+        np.testing.assert_allclose(published, same, rtol=rounding, atol=1e-9)

@@ -1,0 +1,77 @@
+"""Work in a thread: results in order, delivered in the thread of the node."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from nanorocks_ros.nodes.workers.background_worker import BackgroundWorker
+
+
+def test_results_come_in_order_and_in_the_thread_of_the_node(spun):
+    node, spin_until = spun
+    taken, threads = [], set()
+
+    def work(number):
+        threads.add(threading.get_ident())
+        # The first jobs take longest.
+        time.sleep(0.02 if number < 3 else 0.0)
+        return number
+
+    def take(number):
+        taken.append((number, threading.get_ident()))
+
+    background = BackgroundWorker(node, work, take)
+    for number in range(20):
+        background.put(number)
+    spin_until(lambda: len(taken) == 20)
+    background.close()
+    assert taken == [(number, threading.get_ident()) for number in range(20)]
+    assert threading.get_ident() not in threads
+    assert len(threads) == 1
+
+
+def test_draining_delivers_all_results(spun):
+    node, _ = spun
+    taken = []
+    background = BackgroundWorker(node, lambda number: number, taken.append)
+    for number in range(100):
+        background.put(number)
+    background.drain()
+    background.close()
+    assert taken == list(range(100))
+
+
+def test_an_error_is_raised_where_the_node_runs(spun):
+    node, spin_until = spun
+
+    def work(_):
+        raise ValueError('no such tray')
+
+    background = BackgroundWorker(node, work, None)
+    background.put(1)
+    with pytest.raises(ValueError, match='no such tray'):
+        spin_until(lambda: False)
+    background.close()
+
+
+def test_closing_forgets_what_waits(spun):
+    node, _ = spun
+    begun, go_on, done = threading.Event(), threading.Event(), []
+
+    def work(number):
+        begun.set()
+        go_on.wait(20.0)
+        done.append(number)
+
+    background = BackgroundWorker(node, work, lambda _: None)
+    for number in range(5):
+        background.put(number)
+    assert begun.wait(20.0)
+    threading.Timer(0.2, go_on.set).start()
+    background.close()
+    assert done == [0]

@@ -1,0 +1,114 @@
+"""What `pipeline record:=PATH` leaves behind: at the end, after a kill, and beside a player."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from std_msgs.msg import Float32MultiArray
+
+from nanorocks_ros.nodes.base.ros_messages import qos_of
+from nanorocks_ros.recordings.bag.reader import open_bag
+from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.studies.analysis.offline_analysis import analyse
+from nanorocks_ros.wire import topics
+
+SAMPLE = Path(__file__).parents[3] / 'bags' / 'tray_1_sample'
+CAMERA = topics.RAW_COMPRESSED.absolute()
+SMALL = (
+    'simulation.width_px:=240',
+    'simulation.height_px:=240',
+    'simulation.first_shake:=0.5',
+)
+
+
+def recorded(bag, topic, tray=1):
+    return [bag.deserialize(message) for message in bag.messages([topic.absolute(tray)])]
+
+
+def pictures(bag):
+    return [bytes(message.data) for message in recorded(bag, topics.RAW_COMPRESSED)]
+
+
+def test_a_recording_of_the_simulator_gives_the_same_speeds_again(graph, tmp_path):
+    path = tmp_path / 'räume und' / 'bag'
+    graph_of = graph.start('pipeline', *SMALL, 'rate:=0.0', 'duration:=6.0', f'record:={path}')
+    finished = graph.wait(graph_of)
+    assert finished.code == 0, finished.output
+    bag = open_bag(path)
+    assert bag.complete
+    assert not bag.notices
+    assert bag.metadata['source'] == 'simulator'
+    assert bag.topics[CAMERA].count == 180
+    assert bag.topics[topics.TRUTH.absolute(1)].count == 180
+    live = np.array([message.data[:5] for message in recorded(bag, topics.SPEED)])
+    (epoch,) = recorded(bag, topics.EPOCH)
+    again = analyse(path, PipelineSettings())
+    assert again.epoch_ns == epoch.sec * 10**9 + epoch.nanosec
+    times = [(speed.stamp_ns - again.epoch_ns) / 1e9 for speed in again.trays[1].speeds]
+    assert times == pytest.approx(live[:, 0].tolist(), abs=1e-3)
+    speeds = [speed.mean_projected_speed.value for speed in again.trays[1].speeds]
+    # The recording holds JPEGs, the pipeline saw the frames before.
+    moving = live[:, 0] > 2.0
+    assert np.mean(np.array(speeds)[moving]) == pytest.approx(np.mean(live[moving, 3]), rel=0.03)
+
+
+def test_after_a_kill_all_results_older_than_two_seconds_are_readable(graph, tmp_path):
+    heard = {topics.SPEED: [], topics.TRUTH: []}
+    for topic, received in heard.items():
+        graph.node.create_subscription(
+            Float32MultiArray,
+            topic.of(1),
+            lambda message, received=received: received.append((time.monotonic(), message)),
+            qos_of(topic),
+        )
+    path = tmp_path / 'bag'
+    process = graph.start('pipeline', *SMALL, f'record:={path}')
+    graph.until(lambda: len(heard[topics.TRUTH]) >= 150)
+    killed = time.monotonic()
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    bag = open_bag(path)
+    assert not bag.complete
+    assert not (path / 'metadata.yaml').exists()
+    for topic, received in heard.items():
+        due = {message.data.tobytes() for at, message in received if at < killed - 2.0}
+        in_bag = {message.data.tobytes() for message in recorded(bag, topic)}
+        assert len(due) > 15, topic.name
+        assert due <= in_bag, topic.name
+    # Of each truth there was a frame.
+    seconds = (bag.end_ns - bag.start_ns) / 1e9
+    assert abs(bag.topics[CAMERA].count - 30 * seconds) <= 3
+
+
+def test_a_player_without_pace_loses_nothing_on_its_way_into_a_recording(graph, tmp_path):
+    """Frames are kept as they came, and the same ones make the same numbers."""
+    path = tmp_path / 'bag'
+    pipeline = graph.start('pipeline', 'source:=topic', 'transport:=compressed', f'record:={path}')
+    player = graph.start(
+        'bag_player', f'bag:={SAMPLE}', 'rate:=0.0', 'listeners:=1', 'start:=1.0', 'duration:=6.0'
+    )
+    assert graph.wait(player).code == 0
+    ended = graph.interrupt(pipeline)
+    assert ended.code == 0, ended.output
+    source, bag = open_bag(SAMPLE), open_bag(path)
+    first_ns = source.start_ns + 10**9
+    played = source.messages([CAMERA], first_ns, first_ns + 6 * 10**9 - 1)
+    assert pictures(bag) == [bytes(source.deserialize(message).data) for message in played]
+    (epoch,) = recorded(bag, topics.EPOCH)
+    assert epoch.sec * 10**9 + epoch.nanosec == source.start_ns
+    live = np.array([message.data for message in recorded(bag, topics.SPEED)])
+    again = np.array(
+        [
+            speed.mean_projected_speed.value
+            for speed in analyse(path, PipelineSettings()).trays[1].speeds
+        ]
+    )
+    np.testing.assert_array_equal(live[:, 3], again[: len(live)].astype(np.float32))
+    assert len(again) - len(live) <= 1
