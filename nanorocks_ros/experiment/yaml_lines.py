@@ -62,12 +62,12 @@ class YamlLines:
 
     Parameters
     ----------
-    name : str
-        Of the file.
+    file : str
+        Name of the file.
     """
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, file: str) -> None:
+        self.file = file
 
     def error(self, node: yaml.Node | None, what: str, do: str) -> ConfigurationError:
         """What is wrong with a node, or with the whole file."""
@@ -75,7 +75,7 @@ class YamlLines:
 
     def place(self, node: yaml.Node | None) -> str:
         """File and line of a node."""
-        return self._name if node is None else f'{self._name}:{node.start_mark.line + 1}'
+        return self.file if node is None else f'{self.file}:{node.start_mark.line + 1}'
 
     def pairs(self, node: yaml.Node | None) -> list[tuple[object, yaml.Node]]:
         """Keys and values, no key twice."""

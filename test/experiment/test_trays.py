@@ -93,7 +93,13 @@ def test_a_tray_that_does_not_exist_is_named_with_those_that_do():
         ('diameter_mm: 2', 'diameter_mm: -2', r':6: -2 is no positive number'),
         ('diameter_mm: 2', 'diameter_mm: 4', r':6: beads of 4 mm in a tray of 3 mm'),
         ('diameter_mm: 2', 'diameter_mm: [2, 1]', r':6: diameter \[2.0, 1.0\]'),
-        ('material: acrylic', 'material: lead', r":6: no density for 'lead' \(known: acrylic\)"),
+        (
+            'material: acrylic',
+            'material: lead',
+            r":6: material 'lead' is not described \(known: JSC-1, acrylic, copper, glass\); "
+            r'add "materials: \{lead: \{density_g_cm3: 1\.0, color_bgr: \[90, 90, 90\]\}\}"',
+        ),
+        ('{acrylic: 1.18}', '{acrylic: 0}', ':1: 0 is no positive number'),
         (', count: 15', '', r':6: lacks count; add it'),
         ('count: 15', 'count: 15, colour: red', r":6: unknown entry 'colour'; use count"),
         ('[15, 15, 3]', '[15, 15]', r':4: 2 dimensions; give length, width, height'),

@@ -89,7 +89,7 @@ def test_beads_larger_than_the_tray_are_refused():
         acrylic(1, float('nan')),
         acrylic(1, 0.002, 0.001),
         acrylic(-1),
-        replace(acrylic(), density=0.0),
+        replace(acrylic(), properties=replace(acrylic().properties, density=0.0)),
     ],
 )
 def test_species_that_cannot_be_are_refused(species):

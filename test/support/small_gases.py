@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from nanorocks_ros.experiment.materials import known_materials
 from nanorocks_ros.experiment.trays import Species, Tray
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for
 from nanorocks_ros.settings import SimulationSettings
@@ -16,10 +17,9 @@ BOX = (0.015, 0.015, 0.003)
 
 def acrylic(count=15, low=0.002, high=None):
     return Species(
-        material='acrylic',
+        properties=known_materials()['acrylic'],
         diameter_low=low,
         diameter_high=high or low,
-        density=1180.0,
         count=count,
     )
 

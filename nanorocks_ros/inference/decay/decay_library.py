@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
@@ -215,8 +215,9 @@ def count_step(tray: Tray) -> int:
 def tray_key(tray: Tray) -> str:
     """What decides how a tray cools, as a JSON object: its inside and its beads."""
     species = [
-        {name: value for name, value in asdict(one).items() if name not in ('material', 'mass')}
-        for one in tray.species
+        {'diameter_low': beads.diameter_low, 'diameter_high': beads.diameter_high}
+        | {'density': beads.density, 'count': beads.count}
+        for beads in tray.species
     ]
     return json.dumps({'dimensions': tray.dimensions, 'species': species})
 

@@ -24,7 +24,7 @@ COLUMN, ROW, HALF_WIDTH, HALF_HEIGHT, RADIUS, MATRIX = range(6)
 COSINE, SINE, DUST = range(9, 12)
 PLACE = 12
 
-# Columns of a look, as the fields of materials.Look; the first three are blue, green and red.
+# Columns of a look, as the fields of experiment.materials.Look; 0 to 2 are blue, green and red.
 AMBIENT, DIFFUSE, DARKENING, GLOW, SHEEN, HIGHLIGHT = range(3, 9)
 
 # Rows of the buffer: place of a pixel, share of it that is covered, levels; of beads further how

@@ -14,7 +14,7 @@ from nanorocks_ros.numerics.stable_sort import rising
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Columns of a look, as the fields of materials.Look.
+# Columns of a look, as the fields of experiment.materials.Look.
 _BLUE, _GREEN, _RED, _AMBIENT, _DIFFUSE, _DARKENING, _GLOW, _SHEEN, _HIGHLIGHT = range(9)
 
 # Unit vector to the lamp, upper left of the picture and above it; x right, y down, z up.

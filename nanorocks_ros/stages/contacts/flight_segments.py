@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ['LONGEST', 'Histories', 'Kink']
 
-# Of grains with corners a collision says nothing of the kind.
-_NOT_ROUND = ('JSC-1',)
 # Error of a measured radius, over it, that outlines leave besides the stated one.
 _OUTLINE = 0.02
 _SLOTS = 64
@@ -78,7 +76,8 @@ class Histories:
 
     def __init__(self, tray: Tray) -> None:
         species = tray.species
-        self._round = np.array([one.material not in _NOT_ROUND for one in species])
+        # Collisions of grains with corners do not follow from their tracks.
+        self._round = np.array([beads.properties.shape != 'grain' for beads in species])
         alike = [one.diameter_low == one.diameter_high for one in species]
         self._known_radii = np.array(
             [0.5 * one.diameter if same else math.nan

@@ -20,19 +20,16 @@ from nanorocks_ros.stages.tracking.linking.track_snapshot import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from nanorocks_ros.experiment.materials import Material
     from nanorocks_ros.experiment.trays import Species, Tray
     from nanorocks_ros.settings import PipelineSettings
 
 _NS = 1e9
 # Of the beads of a species, a share below which speeds and counts are not to be relied upon.
 _FEW = 0.85
-# What light, shadow and an uneven outline move a bead by, the same from picture to picture, so
-# that velocities have no part in it, [px]: measured with all effects of the simulated camera;
-# under chalk; and among grains that are not followed.
-_SYSTEMATIC_PX = {'acrylic': 0.09, 'glass': 0.09, 'copper': 0.2, 'JSC-1': 0.3}
-_CHALKY_PX = {'acrylic': 0.5, 'glass': 0.6, 'copper': 1.3}
+# Systematic error of a position in a tray with grains too crowded to follow, [px]; the same from
+# frame to frame, so that velocities have no part in it.
 _CROWDED_PX = 0.6
-_UNKNOWN_PX = 0.3
 
 
 class Tracker:
@@ -105,15 +102,13 @@ class Tracker:
             self._settings.fastest * self._scale,
             self._settings.longest_gap,
             self._settings.window,
-            self._systematic(species.material),
+            self._systematic(species.properties),
         )
 
-    def _systematic(self, material: str) -> float:
+    def _systematic(self, material: Material) -> float:
         if self._tray.chalk:
-            return _CHALKY_PX.get(material, _CROWDED_PX)
-        if self._detector.crowded:
-            return _CROWDED_PX
-        return _SYSTEMATIC_PX.get(material, _UNKNOWN_PX)
+            return material.chalk_position_error_px
+        return _CROWDED_PX if self._detector.crowded else material.position_error_px
 
     def _tracks(self, image: TrayImage, time: float, displacement: NDArray[np.float64]) -> Tracks:
         shift = displacement * self._scale

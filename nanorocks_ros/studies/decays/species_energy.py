@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import FitError, RecordingError
-from nanorocks_ros.experiment.colours import COLOURS
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
 from nanorocks_ros.physics.haff_law import granular_energy, haff_speed
 from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 
 _NANOJOULE, _MM = 1e9, 1e3
 _MOST_GRAY = 255.0
-_UNKNOWN = (90.0, 90.0, 90.0)
 # Of a line over points of its own colour.
 _DARKER = 0.7
 
@@ -152,7 +150,7 @@ def draw_species(axes: Axes, found: Sequence[SpeciesEnergy], origin: float = 0.0
     for energy, line in zip(found, ('-', '--'), strict=False):
         curve, fit, name = energy.curve, energy.fit, energy.species.material
         scale = relative_energy(1.0, energy.species.bead_mass) * _NANOJOULE
-        colour = np.array(COLOURS.get(name, _UNKNOWN))[::-1] / _MOST_GRAY
+        colour = np.array(energy.species.properties.color)[::-1] / _MOST_GRAY
         axes.errorbar(
             curve.times,
             scale * curve.speed**2,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.experiment.materials import known_materials
 from nanorocks_ros.experiment.trays import Species, Tray
 from nanorocks_ros.jobs.tasks import Workers, as_finished
 from nanorocks_ros.settings import SimulationSettings
@@ -154,9 +155,8 @@ def load_compiled_code() -> None:
     """Load the compiled code, which takes a second in each process and is no part of the work."""
     settings = SimulationSettings()
     for count in (2, MOST_FOR_SCAN + 1):
-        species = Species(
-            material='', diameter_low=1e-3, diameter_high=1e-3, density=1e3, count=count
-        )
+        material = known_materials()['acrylic']
+        species = Species(properties=material, diameter_low=1e-3, diameter_high=1e-3, count=count)
         tray = Tray(number=1, dimensions=(0.02, 0.02, 0.02), species=(species,), chalk=False)
         plan = SimulationPlan(settings=settings, tray=tray, duration=0.1, samples=2, events=True)
         _followed(plan, 0)

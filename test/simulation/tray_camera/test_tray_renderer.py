@@ -10,10 +10,10 @@ import pytest
 from small_gases import acrylic, tray_of
 
 from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.experiment.materials import known_materials
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
-from nanorocks_ros.simulation.tray_camera.bead_colours import LOOKS
 from nanorocks_ros.simulation.tray_camera.bead_drawing import draw_bead
 from nanorocks_ros.simulation.tray_camera.tray_film import film
 from nanorocks_ros.simulation.tray_camera.tray_renderer import TrayCamera
@@ -55,7 +55,7 @@ def test_a_disc_has_its_area_and_its_centre_to_a_hundredth_of_a_pixel(radius, co
 
 
 @pytest.mark.parametrize('place', [(0.0075, 0.0075), (0.00412, 0.01123), (0.0031, 0.0049)])
-@pytest.mark.parametrize('material', sorted(LOOKS))
+@pytest.mark.parametrize('material', sorted(known_materials()))
 def test_a_bead_in_a_picture_is_where_and_as_large_as_it_should_be(place, material):
     camera = camera_of(QUIET, material=material)
     position = np.array([[*place, 0.0015]])
@@ -102,7 +102,7 @@ def test_the_upper_bead_hides_the_lower_one():
 
 def test_beads_differ_from_the_floor_and_from_each_other_in_colour():
     mean = {}
-    for material in LOOKS:
+    for material in known_materials():
         camera = camera_of(QUIET, material=material)
         column, row = camera.to_pixels(np.full((1, 2), 0.0075))[0].astype(int)
         picture = camera.picture(np.full((1, 3), 0.0075), 0)
@@ -207,6 +207,8 @@ def test_what_cannot_be_drawn_is_refused():
         camera_of(replace(QUIET, width_px=200))
     with pytest.raises(SimulationError, match='materials: 1 of them'):
         TrayCamera(QUIET, TRAY, np.full(2, 0.001), ('glass',))
+    with pytest.raises(SimulationError, match=r"material 'lead': is not described \(known: JSC-1"):
+        camera_of(QUIET, material='lead')
     with pytest.raises(SimulationError, match='radii: not all positive'):
         camera_of(QUIET, radius=float('nan'))
     with pytest.raises(SimulationError, match='edge_width_px'):

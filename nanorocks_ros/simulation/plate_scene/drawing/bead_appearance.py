@@ -11,7 +11,7 @@ import numpy as np
 from nanorocks_ros.simulation.initial_state import stock
 from nanorocks_ros.simulation.plate_scene.drawing.grains import FACETS, LOBES, SHAPE
 from nanorocks_ros.simulation.plate_scene.drawing.scene_bodies import GRAIN, SPHERE
-from nanorocks_ros.simulation.tray_camera.bead_colours import looks_of
+from nanorocks_ros.simulation.tray_camera.bead_looks import looks_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import SceneSettings
 
 _SHAPES = 97
-# Columns of a look, as the fields of materials.Look.
+# Columns of a look, as the fields of experiment.materials.Look.
 _AMBIENT, _DIFFUSE, _DARKENING, _GLOW, _SHEEN, _HIGHLIGHT = range(3, 9)
 # Spread of brightness from bead to bead, and from facet to facet of a grain.
 _SPREAD, _MINERALS = 0.06, 0.22
@@ -86,15 +86,16 @@ def appearance_of(tray: Tray, scene: SceneSettings, rng: np.random.Generator) ->
     angles = rng.uniform(0.0, 2.0 * math.pi, n)
     rates = scene.turning * rng.standard_normal(n)
     dust = 0.55 + 0.9 * rng.random(n)
-    looks = looks_of(drawn.materials)
+    materials = [tray.materials[name] for name in drawn.materials]
+    looks = looks_of(materials)
     looks[:, :3] *= np.maximum(brightness, 0.5)[:, np.newaxis]
     _shade(looks, scene)
-    is_copper = np.array([name == 'copper' for name in drawn.materials])
-    is_grain = np.array([name == 'JSC-1' for name in drawn.materials])
+    is_oval = np.array([material.shape == 'oval' for material in materials])
+    is_grain = np.array([material.shape == 'grain' for material in materials])
     return Appearance(
         looks=looks,
         kinds=np.where(is_grain, GRAIN, SPHERE).astype(np.int64),
-        stretch=np.where(is_copper, np.sqrt(np.minimum(ratio, 1.8)), 1.0),
+        stretch=np.where(is_oval, np.sqrt(np.minimum(ratio, 1.8)), 1.0),
         angles=angles,
         rates=rates,
         dust=dust * (scene.chalk if tray.chalk else 0.0),

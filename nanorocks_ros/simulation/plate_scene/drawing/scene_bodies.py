@@ -48,7 +48,7 @@ def draw_bodies(
         (2 x 2) from pixels to parts of the radius; cosine and sine of the angle that the body
         has turned by; share of dust.
     looks : ndarray of float32, (n, 9)
-        Columns as the fields of `materials.Look`, levels below 1000.
+        Columns as the fields of `experiment.materials.Look`, levels below 1000.
     kinds : ndarray of int64, (n,)
         `SPHERE` or `GRAIN`.
     shapes : ndarray of float32, (n_shapes, SHAPE)

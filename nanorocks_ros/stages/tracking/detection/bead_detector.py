@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import cv2
 import numpy as np
 
-from nanorocks_ros.experiment.colours import hue_of
 from nanorocks_ros.stages.tracking.detection.background_model import first_floor, renew_floor
 from nanorocks_ros.stages.tracking.detection.circle_fit import refit
 from nanorocks_ros.stages.tracking.detection.disc_scores import Search
@@ -225,7 +224,7 @@ class _Ground(NamedTuple):
 
 
 def _kind(species: Species) -> int:
-    return {1: RED, -1: BLUE, 0: GRAY}[hue_of(species.material)]
+    return {1: RED, -1: BLUE, 0: GRAY}[species.properties.hue]
 
 
 def _rounded(floor: NDArray[np.float32]) -> NDArray[np.uint8]:
