@@ -1,6 +1,6 @@
-"""The calibration file: the lens, the pose of the plate, and where each tray is, in one.
+"""The calibration file: lens, pose of the plate, and regions of the trays.
 
-YAML, with the lens in the words of sensor_msgs/CameraInfo, so that other tools can use it::
+YAML, with the lens as in sensor_msgs/CameraInfo, so that other tools can read it::
 
     camera_info:
       width: 1920
@@ -103,7 +103,7 @@ class _File(YamlLines):
         return regions
 
     def _numbers(self, node: yaml.Node, count: int | None) -> tuple[float, ...]:
-        values = tuple(self.number(one) for one in self.listed(node))
+        values = tuple(self.number(value) for value in self.listed(node))
         if count is not None and len(values) != count:
             raise self.error(node, f'{len(values)} numbers', f'give {count}')
         return values
@@ -117,7 +117,7 @@ def write_calibration(calibration: Calibration, path: Path, remark: str) -> None
     calibration : Calibration
     path : Path
     remark : str
-        One line for whoever opens the file.
+        Comment in the first line of the file.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def write_calibration(calibration: Calibration, path: Path, remark: str) -> None
 
 
 def calibrated(settings: PipelineSettings) -> PipelineSettings:
-    """The settings with scale and regions as the calibration file says, where one is named.
+    """The settings with scale and regions of the calibration file, if one is named.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def calibrated(settings: PipelineSettings) -> PipelineSettings:
             f'holds no region of tray {", ".join(missing)}',
             'calibrate with these trays, or leave them out of `trays`',
         )
-    flat = tuple(one for number in settings.trays for one in calibration.regions[number])
+    flat = tuple(value for number in settings.trays for value in calibration.regions[number])
     preprocess = replace(
         settings.preprocess, regions_px=flat, pixels_per_metre=calibration.pixels_per_metre
     )

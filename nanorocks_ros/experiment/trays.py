@@ -1,4 +1,4 @@
-"""The sample cells: what lay in which tray ([B19] table 1), checked when loaded."""
+"""The sample cells and their beads ([B19] table 1), checked when loaded."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ class Tray:
 
 
 def load_trays(path: str | Path | None = None) -> dict[int, Tray]:
-    """The trays of a YAML file, by number; those that were flown when no file is named.
+    """The trays of a YAML file, by number; by default those that were flown.
 
     Raises
     ------

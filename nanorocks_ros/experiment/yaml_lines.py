@@ -1,4 +1,4 @@
-"""YAML read so that an error names the line: what the files of trays and calibrations share."""
+"""YAML reader whose errors name the line, for the files of trays and calibrations."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from nanorocks_ros.errors import ConfigurationError
 
 
 def composed(name: str, text: str) -> yaml.Node | None:
-    """The nodes of a YAML text, which know their lines; None for an empty one.
+    """The node tree of a YAML text, with line numbers; None for an empty text.
 
     Parameters
     ----------
     name : str
-        Of the file, for the error.
+        Name of the file, for errors.
     text : str
 
     Raises
@@ -43,7 +43,7 @@ def read_text(path: Path, wanted: str) -> str:
     ----------
     path : Path
     wanted : str
-        What to name instead of a file that cannot be read.
+        Kind of file that is expected, for the error.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def read_text(path: Path, wanted: str) -> str:
 
 
 class YamlLines:
-    """Takes nodes apart; every error names the file and the line.
+    """Reads YAML nodes; every error names the file and the line.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class YamlLines:
         self.file = file
 
     def error(self, node: yaml.Node | None, what: str, do: str) -> ConfigurationError:
-        """What is wrong with a node, or with the whole file."""
+        """An error about a node, or about the whole file."""
         return ConfigurationError(self.place(node), what, do)
 
     def place(self, node: yaml.Node | None) -> str:
@@ -78,7 +78,7 @@ class YamlLines:
         return self.file if node is None else f'{self.file}:{node.start_mark.line + 1}'
 
     def pairs(self, node: yaml.Node | None) -> list[tuple[object, yaml.Node]]:
-        """Keys and values, no key twice."""
+        """Keys and values; a duplicate key is refused."""
         if not isinstance(node, yaml.MappingNode):
             raise self.error(node, 'expected "name: value" entries', 'correct this line')
         seen: set[object] = set()
@@ -94,7 +94,7 @@ class YamlLines:
     def mapping(
         self, node: yaml.Node | None, needed: set[str], allowed: set[str]
     ) -> dict[str, yaml.Node]:
-        """Entries of which some must be there, and no others than these and some more."""
+        """Entries of a mapping; missing and unknown ones are refused."""
         entry = {str(key): value for key, value in self.pairs(node)}
         missing = sorted(needed - set(entry))
         unknown = sorted(set(entry) - needed - allowed)
@@ -106,7 +106,7 @@ class YamlLines:
         return entry
 
     def scalar(self, node: yaml.Node) -> Any:
-        """A single value, as YAML reads it."""
+        """A scalar, parsed as YAML."""
         if not isinstance(node, yaml.ScalarNode):
             raise self.error(node, 'expected a single value', 'correct this line')
         try:
@@ -132,5 +132,5 @@ class YamlLines:
         return value
 
     def listed(self, node: yaml.Node) -> list[yaml.Node]:
-        """The items of a list; a single value does for a list of one."""
+        """The items of a list; a scalar counts as a list of one."""
         return list(node.value) if isinstance(node, yaml.SequenceNode) else [node]

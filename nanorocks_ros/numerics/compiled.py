@@ -80,10 +80,12 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
         # numba refuses to cache where neither the package nor the home can be written.
         return _njit(function, options)
     # numba looks at the file of the function only, but what that calls, and the constants that it
-    # uses, are compiled into it: after an update there would be old code in new.
+    # uses, are compiled into it: after an update there would be old code in new. The stamp is made
+    # part of the version, which numba compares before it unpickles an index: unpickling fails when
+    # the module of an argument's type has been moved.
     with suppress(AttributeError):
         file = dispatcher._cache._cache_file
-        file._source_stamp = (file._source_stamp, _stamp(function.__module__))
+        file._version = (file._version, _stamp(function.__module__))
     return cast('Function', dispatcher)
 
 

@@ -22,8 +22,8 @@ def test_as_opencv_has_it():
     normalised = ((GRID - LENS.centre) / LENS.focal).reshape(-1, 1, 2)
     expected = cv2.fisheye.distortPoints(normalised, LENS.matrix, np.array(DISTORTION))
     # OpenCV counts from the centre of the first pixel.
-    found = LENS.distorted(GRID).reshape(-1, 1, 2) - 0.5
-    np.testing.assert_allclose(found, expected, atol=1e-6)
+    expected_px = LENS.distorted(GRID).reshape(-1, 1, 2) - 0.5
+    np.testing.assert_allclose(expected_px, expected, atol=1e-6)
 
 
 def test_a_point_on_the_axis_stays_and_others_move_inwards():

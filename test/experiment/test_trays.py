@@ -30,39 +30,43 @@ def test_a_tray_is_as_table_1_of_the_paper_says(number):
     assert [1e3 * side for side in tray.dimensions] == pytest.approx(printed['dims_mm'])
     assert tray.chalk == printed.get('chalk', False)
     assert len(tray.species) == len(printed['species'])
-    for one, expected in zip(tray.species, printed['species'], strict=True):
+    for beads, expected in zip(tray.species, printed['species'], strict=True):
         diameters = expected['d_mm']
         low, high = diameters if isinstance(diameters, list) else (diameters, diameters)
-        assert one.material == expected['material']
-        assert (one.diameter_low, one.diameter_high) == pytest.approx((1e-3 * low, 1e-3 * high))
+        assert beads.material == expected['material']
+        assert (beads.diameter_low, beads.diameter_high) == pytest.approx(
+            (1e-3 * low, 1e-3 * high)
+        )
         if 'N' in expected:
-            assert one.count == expected['N']
+            assert beads.count == expected['N']
         else:
-            assert one.mass == pytest.approx(1e-3 * expected['mass_g'])
+            assert beads.mass == pytest.approx(1e-3 * expected['mass_g'])
 
 
 def test_densities_are_those_of_the_paper():
-    found = {one.material: one.density for tray in load_trays().values() for one in tray.species}
+    densities = {
+        beads.material: beads.density for tray in load_trays().values() for beads in tray.species
+    }
     for material, density in PAPER['densities_g_cm3'].items():
         if material != 'where':
-            assert found[material] == pytest.approx(1e3 * density)
+            assert densities[material] == pytest.approx(1e3 * density)
 
 
 @pytest.mark.parametrize('number', [6, 7, 8])
 def test_jsc1_counts_follow_from_table_3(number):
     tray = load_trays()[number]
     clusters, size, _, percent = PAPER['table3_clusters']['rows'][str(number)]
-    counted = sum(one.count for one in tray.species if one.mass is None)
+    counted = sum(beads.count for beads in tray.species if beads.mass is None)
     grains = tray.count - counted
     assert grains == pytest.approx(100 * clusters * size / percent - counted, abs=1.0)
 
 
 @pytest.mark.parametrize('number', [6, 7, 8])
 def test_jsc1_counts_from_mass_are_kept_beside_them_and_agree_within_a_third(number):
-    one = load_trays()[number].species[-1]
-    by_mass = one.mass / (one.density * math.pi / 6 * (0.75e-3) ** 3)
-    assert one.count_from_mass == pytest.approx(by_mass)
-    assert 0.66 < one.count_from_mass / one.count < 1.33
+    beads = load_trays()[number].species[-1]
+    by_mass = beads.mass / (beads.density * math.pi / 6 * (0.75e-3) ** 3)
+    assert beads.count_from_mass == pytest.approx(by_mass)
+    assert 0.66 < beads.count_from_mass / beads.count < 1.33
 
 
 def test_derived_quantities_of_tray_1_are_those_of_the_worked_example():

@@ -8,7 +8,9 @@ from nanorocks_ros.experiment.materials import known_materials
 from nanorocks_ros.experiment.trays import Species, Tray
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for
 from nanorocks_ros.settings import SimulationSettings
-from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.beads import Beads
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 from nanorocks_ros.simulation.initial_state import resting_beads
 from nanorocks_ros.simulation.velocities import uniform_speeds
 

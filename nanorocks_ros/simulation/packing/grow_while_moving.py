@@ -1,4 +1,4 @@
-"""Beads that find no room one after the other: they enter small, and grow while all move.
+"""Dense packings: beads enter small and grow during Monte Carlo moves.
 
 Random places one after the other jam where a third of a wide box is filled, long before the
 beads themselves would. Here those left over enter at a part of their radius, so that each finds
@@ -20,7 +20,13 @@ import numpy as np
 from nanorocks_ros.numerics.compiled import compiled, kernel
 from nanorocks_ros.numerics.counter_rng import hashed
 from nanorocks_ros.simulation.packing.cell_list import Packing, is_free
-from nanorocks_ros.simulation.packing.monte_carlo import adapt, first_steps, insert, move_all, stir
+from nanorocks_ros.simulation.packing.monte_carlo import (
+    adapt_steps,
+    equilibrate,
+    initial_steps,
+    insert_at_random,
+    metropolis_sweep,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -58,8 +64,8 @@ _FIRST_CHECK_MOVES = 20_000
 
 
 @compiled
-def grown(packing: Packing, placed: int, key: np.uint64) -> bool:
-    """Find places for beads that fill a box too densely to be put there one after the other.
+def grow_while_moving(packing: Packing, placed: int, key: np.uint64) -> bool:
+    """Find positions for beads that are too dense for random sequential insertion.
 
     Parameters
     ----------
@@ -83,25 +89,25 @@ def grown(packing: Packing, placed: int, key: np.uint64) -> bool:
     inside = placed
     while moves < _MOST_MOVES:
         enter_key, grow_key = hashed(key, 3 * attempt), hashed(key, 3 * attempt + 1)
-        if insert(packing, inside, enter_key, _TRIES, _SHRINKS) < n:
+        if insert_at_random(packing, inside, enter_key, _TRIES, _SHRINKS) < n:
             break
         # The first attempt goes on from what is there, as fast as it can.
         sweeps, lack = _grow(packing, 1.0 if attempt == 0 else pace, grow_key)
         if lack == 0.0:
-            stir(packing, hashed(key, 3 * attempt + 2), _LAST_SWEEPS + _LAST_MOVES // n)
+            equilibrate(packing, hashed(key, 3 * attempt + 2), _LAST_SWEEPS + _LAST_MOVES // n)
             return _are_apart(packing)
         moves += sweeps * n
         pace *= 0.5
         attempt += 1
-        _take_out(packing)
+        _empty_box(packing)
         inside = 0
-    _put_back(packing, before)
+    _restore_positions(packing, before)
     return False
 
 
 @compiled
 def _grow(packing: Packing, pace: float, key: np.uint64) -> tuple[int, float]:
-    """Move all beads and let them grow, until they are full or do not get on.
+    """Move all beads and let them grow, until all have full size or growth stalls.
 
     Parameters
     ----------
@@ -117,14 +123,14 @@ def _grow(packing: Packing, pace: float, key: np.uint64) -> tuple[int, float]:
         What all beads lack of full size, in radii.
     """
     n = packing.radii.size
-    steps, tallies = first_steps(packing)
+    steps, tallies = initial_steps(packing)
     most = _MOST_SWEEPS + _MOST_MOVES // n
     check = _FIRST_CHECK + _FIRST_CHECK_MOVES // n + np.int64(1.0 / pace)
     lacked = np.inf
     lack = np.inf
     for sweep in range(1, most + 1):
-        move_all(packing, steps, tallies, hashed(key, sweep))
-        adapt(packing, steps, tallies)
+        metropolis_sweep(packing, steps, tallies, hashed(key, sweep))
+        adapt_steps(packing, steps, tallies)
         lack = _grow_all(packing, pace, 1.0 / (1 << (1 + sweep % _PARTS)))
         if lack == 0.0:
             return sweep, lack
@@ -138,7 +144,7 @@ def _grow(packing: Packing, pace: float, key: np.uint64) -> tuple[int, float]:
 
 @kernel
 def _grow_all(packing: Packing, pace: float, part: float) -> float:
-    """Let beads grow where there is room; returns what all lack of full size, in radii.
+    """Let beads grow where there is room; returns the missing size of all beads, in radii.
 
     Parameters
     ----------
@@ -177,8 +183,8 @@ def _are_apart(packing: Packing) -> bool:
 
 
 @kernel
-def _take_out(packing: Packing) -> None:
-    """Empty the box, and make all beads small."""
+def _empty_box(packing: Packing) -> None:
+    """Empty the box and reset all beads to the small size."""
     for cell in range(packing.heads.size):
         packing.heads[cell] = -1
     for i in range(packing.radii.size):
@@ -186,8 +192,8 @@ def _take_out(packing: Packing) -> None:
 
 
 @kernel
-def _put_back(packing: Packing, positions: NDArray[np.float64]) -> None:
-    """Put beads where they were."""
+def _restore_positions(packing: Packing, positions: NDArray[np.float64]) -> None:
+    """Restore stored positions."""
     for i in range(packing.radii.size):
         for axis in range(3):
             packing.positions[i, axis] = positions[i, axis]

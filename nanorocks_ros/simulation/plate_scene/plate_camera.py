@@ -1,4 +1,4 @@
-"""The camera over the plate: from the places of all beads to the picture of the scene."""
+"""The camera over the plate: from bead positions to the picture of the scene."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class SceneCamera:
     Raises
     ------
     ConfigurationError
-        For a lens that cannot be, or a plate that does not fit into the picture.
+        For an invalid lens, or a plate that does not fit into the picture.
     SimulationError
-        For beads that the trays do not hold.
+        For radii that do not match the beads of the trays.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""The camera over the tray: from the places of the beads to the picture of the whole scene."""
+"""The camera over one tray: from bead positions to the picture."""
 
 from __future__ import annotations
 
@@ -89,11 +89,11 @@ class TrayCamera:
 
     @property
     def region(self) -> Region:
-        """Where the floor of the tray is in the picture."""
+        """Region of the floor of the tray in the picture."""
         return self._region
 
     def to_pixels(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points of the tray are in the picture.
+        """Pixel coordinates of points of the tray.
 
         Parameters
         ----------

@@ -12,7 +12,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.engine.gas import EventCounts
+    from nanorocks_ros.simulation.engine.event_counts import EventCounts
     from nanorocks_ros.studies.synthetic.simulated_plan import SimulationPlan
 
 
@@ -37,7 +37,7 @@ class SimulatedRun:
     body : ndarray of int32, (n_kept, n)
         The smallest number of a bead in the body of each bead.
     events : structured ndarray (n_events,)
-        As `engine.course.EVENT`; empty unless they are kept.
+        As `run_record.EVENT`; empty unless they are kept.
     """
 
     number: int

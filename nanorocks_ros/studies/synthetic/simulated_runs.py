@@ -15,7 +15,9 @@ from nanorocks_ros.experiment.materials import known_materials
 from nanorocks_ros.experiment.trays import Species, Tray
 from nanorocks_ros.jobs.tasks import Workers, as_finished
 from nanorocks_ros.settings import SimulationSettings
-from nanorocks_ros.simulation.engine.gas import MOST_FOR_SCAN, EventCounts, HardSphereGas
+from nanorocks_ros.simulation.engine.event_counts import EventCounts
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.kernel_choice import MOST_FOR_SCAN
 from nanorocks_ros.simulation.initial_state import resting_beads, rules_of
 from nanorocks_ros.simulation.shaken_tray import after_shaking
 from nanorocks_ros.studies.synthetic.simulated_plan import SimulationPlan
@@ -24,7 +26,7 @@ from nanorocks_ros.studies.synthetic.simulated_result import SimulatedRun, Simul
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from nanorocks_ros.simulation.engine.run_record import Course
+    from nanorocks_ros.simulation.engine.run_record import RunRecord
 
 # Work that takes less is done before other processes are up [s].
 _WORTH_PROCESSES = 3.0
@@ -126,7 +128,7 @@ def _followed(
     return _as_run(gas, course, run, time.thread_time() - start)
 
 
-def _as_run(gas: HardSphereGas, course: Course, run: int, seconds: float) -> SimulatedRun:
+def _as_run(gas: HardSphereGas, course: RunRecord, run: int, seconds: float) -> SimulatedRun:
     n_times, n = course.positions.shape[:2]
     alone = np.broadcast_to(np.arange(n, dtype=np.int32), (n_times, n))
     return SimulatedRun(

@@ -9,7 +9,7 @@ import numpy as np
 
 from nanorocks_ros.outputs.atomic_files import whole_file
 from nanorocks_ros.outputs.parquet import Column, write_parquet
-from nanorocks_ros.simulation.initial_state import stock
+from nanorocks_ros.simulation.initial_state import inventory
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -107,7 +107,7 @@ def _event_rows(run: SimulatedRun) -> dict[str, NDArray[Any]]:
 
 def _bead_arrays(found: SimulatedRuns) -> dict[str, Callable[[], Any]]:
     """How to make each array: one at a time is in memory twice."""
-    drawn = stock(found.plan.tray)
+    drawn = inventory(found.plan.tray)
 
     def joined(name: str) -> Callable[[], Any]:
         if len(found.runs) == 1:
@@ -162,7 +162,7 @@ def _bead_columns(found: SimulatedRuns) -> tuple[Column, ...]:
 
 def _bead_rows(found: SimulatedRuns, run: SimulatedRun) -> dict[str, NDArray[Any]]:
     """A row for each bead at each time, times first."""
-    drawn = stock(found.plan.tray)
+    drawn = inventory(found.plan.tray)
     times = found.plan.times
     n_times, n = run.body.shape
 

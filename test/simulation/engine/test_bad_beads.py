@@ -10,7 +10,9 @@ import pytest
 from gases import ALWAYS, KERNELS, beads_of, gas_of
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.beads import Beads
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 NAN, INF = math.nan, math.inf
 BOX = (10.0, 10.0, 10.0)
@@ -179,8 +181,8 @@ def test_times_that_are_not_on_the_way_are_refused(gas, kind, times, message):
     with pytest.raises(SimulationError, match=f'{kind}: .*{message}|{kind}: {message}'):
         gas.follow(3.0, **{kind: times})
     assert gas.now == 1.5
-    course = gas.follow(3.0, [1.5, 3.0])
-    assert course.positions[1, :, 0] == pytest.approx([2, 8])
+    record = gas.follow(3.0, [1.5, 3.0])
+    assert record.positions[1, :, 0] == pytest.approx([2, 8])
 
 
 def test_a_kick_that_cannot_be_is_refused_and_leaves_the_gas_as_it_was(gas):

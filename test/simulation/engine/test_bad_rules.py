@@ -9,12 +9,12 @@ import pytest
 from gases import BOX
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine.collision_rules import (
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
+from nanorocks_ros.simulation.engine.rules.restitution_laws import (
     UniformRestitution,
     ViscoelasticRestitution,
-    WallMotion,
 )
-from nanorocks_ros.simulation.engine.gas import CollisionRules
+from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 
 NAN, INF = math.nan, math.inf
 MOTION = WallMotion(amplitude=(1, 0, 0), angular_frequency=1.0)

@@ -10,7 +10,9 @@ import pytest
 from gases import BOX, KERNELS, RULES, mixture
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas, Kernel
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.kernel_choice import Kernel
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 HALF, END = 7.3, 20.0
 TIMES = np.linspace(HALF, END, 12)
@@ -26,16 +28,16 @@ def rest_of(gas):
     return gas.follow(END, TIMES, TIMES, log=True)
 
 
-def assert_identical(one, other):
+def assert_identical(first, second):
     """Every bit of two courses."""
     for field in ('times', 'positions', 'velocities', 'spins', 'bodies', 'events'):
-        a, b = getattr(one, field), getattr(other, field)
+        a, b = getattr(first, field), getattr(second, field)
         assert (a is None) == (b is None), field
         if a is not None:
             np.testing.assert_array_equal(a, b)
-    for field in type(one.observations).__slots__:
+    for field in type(first.observations).__slots__:
         np.testing.assert_array_equal(
-            getattr(one.observations, field), getattr(other.observations, field)
+            getattr(first.observations, field), getattr(second.observations, field)
         )
 
 
@@ -53,7 +55,7 @@ def test_a_saved_gas_goes_on_bit_by_bit(tmp_path, name, kernel):
     assert_identical(rest_of(loaded), expected)
     assert len(expected.events) > 30
     assert loaded.counts == straight.counts
-    for field in ('books', 'bodies', 'stuck', 'radii', 'masses'):
+    for field in ('ledger', 'bodies', 'stuck', 'radii', 'masses'):
         np.testing.assert_array_equal(getattr(loaded, field), getattr(straight, field))
 
 
@@ -98,9 +100,9 @@ def test_a_loaded_gas_can_be_kicked_and_seen_by_species(tmp_path):
     loaded = HardSphereGas.load(tmp_path / 'gas')
     velocities = np.random.default_rng(1).normal(size=(20, 3))
     courses = []
-    for each in (gas, loaded):
-        each.kick(velocities)
-        courses.append(rest_of(each))
+    for copy in (gas, loaded):
+        copy.kick(velocities)
+        courses.append(rest_of(copy))
     assert_identical(*courses)
     np.testing.assert_array_equal(loaded.beads().species, mixture(8, 20, SPECIES).species)
 
@@ -147,9 +149,9 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
 
 
 def test_a_file_cut_short_anywhere_is_refused(saved):
-    whole = saved.read_bytes()
-    for length in range(0, len(whole), max(1, len(whole) // 60)):
-        saved.write_bytes(whole[:length])
+    content = saved.read_bytes()
+    for length in range(0, len(content), max(1, len(content) // 60)):
+        saved.write_bytes(content[:length])
         refused(saved)
 
 
@@ -163,19 +165,19 @@ def loaded_or_refused(path):
 
 def test_a_file_with_one_changed_bit_is_refused_or_the_same_gas(saved):
     """Some bits of a zip archive are of no consequence: dates, versions."""
-    whole = saved.read_bytes()
+    content = saved.read_bytes()
     expected = HardSphereGas.load(saved)
     random = np.random.default_rng(1)
     refusals = 0
-    for place in random.choice(len(whole), 150, replace=False):
-        changed = bytearray(whole)
+    for place in random.choice(len(content), 150, replace=False):
+        changed = bytearray(content)
         changed[place] ^= 1 << random.integers(8)
         saved.write_bytes(changed)
-        found = loaded_or_refused(saved)
-        if found is None:
+        loaded_gas = loaded_or_refused(saved)
+        if loaded_gas is None:
             refusals += 1
         else:
-            for a, b in zip(found._state, expected._state, strict=True):
+            for a, b in zip(loaded_gas._state, expected._state, strict=True):
                 np.testing.assert_array_equal(a, b)
     assert refusals > 75
 

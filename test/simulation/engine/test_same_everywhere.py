@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from gases import ALWAYS, BOX, KERNELS, RULES, Beads, placed
 
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 # CRC-32 of places and velocities after 30 s. The rules are those that need no more than
 # + - * /, square roots and integers; sines and powers differ from machine to machine.
@@ -41,10 +42,10 @@ def beads_for(rules, n=20):
 def fingerprint(name, kernel):
     box = tuple(1.5 * side for side in BOX)
     rules = CollisionRules(box=box, **RULES[name])
-    course = HardSphereGas(beads_for(rules), rules, kernel).follow(30.0, [30.0])
+    record = HardSphereGas(beads_for(rules), rules, kernel).follow(30.0, [30.0])
     return tuple(
         zlib.crc32(np.ascontiguousarray(array).tobytes())
-        for array in (course.positions, course.velocities)
+        for array in (record.positions, record.velocities)
     )
 
 
@@ -67,8 +68,8 @@ def test_the_last_bit_of_one_place_changes_the_course(kernel):
     beads = beads_for(rules, 6)
     moved = beads.positions.copy()
     moved[0, 0] = np.nextafter(moved[0, 0], np.inf)
-    one, other = (
+    first, second = (
         HardSphereGas(replace(beads, positions=positions), rules, kernel).follow(30.0, [30.0])
         for positions in (beads.positions, moved)
     )
-    assert not np.array_equal(one.positions, other.positions)
+    assert not np.array_equal(first.positions, second.positions)

@@ -52,7 +52,7 @@ def one_after_the_other(radii, sides, periodic, key):
 def beads_of(tray, run):
     """Radii of the beads of a tray as a simulation draws them, and the key of their places."""
     sizes_key = key_for(SEED, run, Purpose.DIAMETERS)
-    kinds = [one for one in tray.species for _ in range(one.count)]
+    kinds = [item for item in tray.species for _ in range(item.count)]
     radii = [
         0.5
         * (kind.diameter_low + (kind.diameter_high - kind.diameter_low) * uniform(sizes_key, i))
@@ -68,7 +68,7 @@ def cube_filled_to(filling, radii):
 
 def smallest_gap(positions, radii, sides, periodic):
     """Smallest distance between the surfaces of two beads, or of one and a wall."""
-    images = itertools.product(*((-1, 0, 1) if one else (0,) for one in periodic))
+    images = itertools.product(*((-1, 0, 1) if item else (0,) for item in periodic))
     i, j = np.triu_indices(radii.size, 1)
     gaps = [math.inf]
     for image in images:
@@ -259,10 +259,10 @@ def test_dense_places_are_the_same_bits_on_every_machine():
 def test_flags_may_be_one_or_three():
     radii, sides = np.full(30, 0.5), (4.0, 4.0, 4.0)
     expected = placed_at_random(radii, sides, periodic=(True, True, True), key=KEY)
-    found = placed_at_random(radii, sides, periodic=True, key=KEY)
-    np.testing.assert_array_equal(found, expected)
-    found, _ = place(radii, np.array(sides), np.array([True] * 3), KEY, MOST_TRIES)
-    np.testing.assert_array_equal(found, expected)
+    packed = placed_at_random(radii, sides, periodic=True, key=KEY)
+    np.testing.assert_array_equal(packed, expected)
+    packed, _ = place(radii, np.array(sides), np.array([True] * 3), KEY, MOST_TRIES)
+    np.testing.assert_array_equal(packed, expected)
 
 
 @pytest.mark.parametrize(

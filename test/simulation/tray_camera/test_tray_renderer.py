@@ -60,8 +60,8 @@ def test_a_bead_in_a_picture_is_where_and_as_large_as_it_should_be(place, materi
     camera = camera_of(QUIET, material=material)
     position = np.array([[*place, 0.0015]])
     elsewhere = np.array([[0.015 - place[0] + 0.003, 0.0128, 0.0015]])
-    here, there = (crop(camera, camera.picture(p, 0)) for p in (position, elsewhere))
-    change = np.abs(here - there).max(axis=2)
+    at_place, elsewhere_crop = (crop(camera, camera.picture(p, 0)) for p in (position, elsewhere))
+    change = np.abs(at_place - elsewhere_crop).max(axis=2)
     column, row = camera.to_pixels(position)[0] - np.array(camera.region[:2])
     near = (
         np.hypot(*(np.mgrid[0.5:202.0, 0.5:202.0] - np.array([row, column])[:, None, None])) < 20
@@ -161,17 +161,19 @@ def test_without_noise_nothing_moves_but_the_beads():
 
 
 def test_frames_are_the_same_on_every_machine():
-    found = []
+    checksums = []
     for number in (1, 5):
         settings = SimulationSettings(first_shake=0.0, tray=number, width_px=640, height_px=480)
         frames = film(settings, load_trays()[number], 3)
-        found.append([zlib.crc32(frame.image.tobytes()) for frame, _ in frames])
-    assert found == GOLDEN
+        checksums.append([zlib.crc32(frame.image.tobytes()) for frame, _ in frames])
+    assert checksums == GOLDEN
 
 
 def test_another_seed_gives_other_frames():
-    one, other = (next(film(SimulationSettings(seed=seed), TRAY, 1))[0].image for seed in (1, 2))
-    assert not np.array_equal(one, other)
+    first_frame, second_frame = (
+        next(film(SimulationSettings(seed=seed), TRAY, 1))[0].image for seed in (1, 2)
+    )
+    assert not np.array_equal(first_frame, second_frame)
 
 
 def test_a_film_pairs_each_frame_with_its_truth():

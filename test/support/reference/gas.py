@@ -33,7 +33,7 @@ class Event:
 
 
 @dataclass
-class Books:
+class Ledger:
     """What left the beads.
 
     `wall_impulse` and `fixed_impulse` are the momentum vectors given to each wall and to fixed
@@ -62,7 +62,7 @@ class ReferenceGas:
         self.tray = Tray(rules.box, rules.periodic, rules.motion)
         self.wall_restitution = np.broadcast_to(rules.wall_restitution, 6)
         self.time = 0.0
-        self.books = Books()
+        self.ledger = Ledger()
         self.last_touched = {}  # (bead, 'bead' or 'wall', partner): time
 
     positions = property(lambda self: self.beads.positions.copy())
@@ -109,10 +109,10 @@ class ReferenceGas:
         before = self.beads.energy(i, j)
         if measure(self.rules, u, u @ normal) < self.rules.sticking_speed:
             kind, impulse = 'merge', self.merge(i, j, u)
-            self.books.energy_lost_in_merges += before - self.beads.energy(i, j)
+            self.ledger.energy_lost_in_merges += before - self.beads.energy(i, j)
         else:
             kind, impulse = 'pair', self.bounce_pair(i, j, normal, u, lately)
-            self.books.energy_lost_in_pairs += before - self.beads.energy(i, j)
+            self.ledger.energy_lost_in_pairs += before - self.beads.energy(i, j)
         self.beads.count(i, j)
         return Event(self.time, kind, i, j, abs(u @ normal), math.sqrt(impulse @ impulse))
 
@@ -135,8 +135,8 @@ class ReferenceGas:
         radii = beads.radii[i], beads.radii[j]
         slipping = slip(normal, u, radii[0] * self.spins[i] + radii[1] * self.spins[j])
         along = normal_impulse(normal, u, per_masses, restitution)
-        most = self.rules.friction * math.sqrt(along @ along)
-        across = tangential_impulse(slipping, per_masses, radii, per_inertias, tangential, most)
+        limit = self.rules.friction * math.sqrt(along @ along)
+        across = tangential_impulse(slipping, per_masses, radii, per_inertias, tangential, limit)
         self.note_on_fixed(i, j, along + across)
         beads.push(i, -(along + across))
         beads.push(j, along + across)
@@ -152,9 +152,9 @@ class ReferenceGas:
     def note_on_fixed(self, i, j, impulse):
         """Note momentum that a fixed body gets, `impulse` being that on the body of j."""
         if self.fixed[i]:
-            self.books.fixed_impulse -= impulse
+            self.ledger.fixed_impulse -= impulse
         if self.fixed[j]:
-            self.books.fixed_impulse += impulse
+            self.ledger.fixed_impulse += impulse
 
     def meet_wall(self, contact):
         i, wall = contact.i, contact.partner
@@ -169,8 +169,8 @@ class ReferenceGas:
             self.beads.fix(i)
         else:
             kind, impulse = 'wall', self.bounce_wall(i, wall, u, lately)
-        self.books.energy_lost_at_walls += before - self.beads.energy(i)
-        self.books.wall_impulse[wall] += impulse
+        self.ledger.energy_lost_at_walls += before - self.beads.energy(i)
+        self.ledger.wall_impulse[wall] += impulse
         self.beads.count(i)
         return Event(self.time, kind, i, wall, abs(u[axis]), math.sqrt(impulse @ impulse))
 
@@ -189,9 +189,9 @@ class ReferenceGas:
         radii, per_inertias = (beads.radii[i],), (beads.per_inertia(i),)
         slipping = slip(normal, u, radii[0] * self.spins[i])
         along = beads.mass(i) * (approach + rebound) * normal
-        most = self.rules.wall_friction * math.sqrt(along @ along)
+        limit = self.rules.wall_friction * math.sqrt(along @ along)
         across = tangential_impulse(
-            slipping, (beads.per_mass(i),), radii, per_inertias, tangential, most
+            slipping, (beads.per_mass(i),), radii, per_inertias, tangential, limit
         )
         wall_velocity = self.tray.velocity(self.time)[axis]
         beads.push(i, -across)

@@ -1,4 +1,4 @@
-"""Lists and cells for a gas: how far they reach, in which order beads stand, how much room."""
+"""Sizes of neighbour lists and cells: skin, order of the beads, room."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from nanorocks_ros.simulation.engine.neighbours.neighbour_lists import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
     from nanorocks_ros.simulation.engine.gas_state import State
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 # Measured (`python -m benchmarks engine`): lists of about six are the fastest, whatever the
 # density, and so are shells whose centre lies this far ahead of the bead.
@@ -42,7 +42,7 @@ _CELLS_AROUND = 27
 _MOST_CELLS = 4
 
 
-def skin_for(radii: NDArray[np.float64], rules: Rules) -> float:
+def list_skin(radii: NDArray[np.float64], rules: Rules) -> float:
     """Skin of the neighbour lists, [m]; 0 when a periodic box is too small for lists."""
     sides = np.array(rules.sides)
     diameter = 2.0 * float(np.mean(radii))
@@ -57,8 +57,8 @@ def skin_for(radii: NDArray[np.float64], rules: Rules) -> float:
     return skin if skin > 0.05 * diameter else 0.0
 
 
-def in_space_order(positions: NDArray[np.float64], width: float) -> NDArray[np.int64]:
-    """Order in which neighbours in space stand close together: along a Z-shaped curve."""
+def z_order(positions: NDArray[np.float64], width: float) -> NDArray[np.int64]:
+    """Order of the beads along a Z-order curve, so that neighbours are close in memory."""
     cells = np.floor((positions - positions.min(axis=0)) / width).astype(np.uint64)
     code = np.zeros(len(positions), dtype=np.uint64)
     for bit in range(21):
@@ -69,7 +69,7 @@ def in_space_order(positions: NDArray[np.float64], width: float) -> NDArray[np.i
 
 
 def with_lists(state: State, rules: Rules, skin: float) -> State:
-    """The state with lists and cells, filled."""
+    """The state with neighbour lists and cells, filled."""
     n = state.rows.shape[0]
     sides = np.array(rules.sides)
     reach = state.reach.copy()
@@ -85,11 +85,11 @@ def with_lists(state: State, rules: Rules, skin: float) -> State:
     state = state._replace(reach=reach, references=np.zeros((n, 4), dtype=np.float32))
     state = _with_room(state, int(cells.prod()), _FIRST_ROOM, _FIRST_CELL_ROOM)
     set_references(state, rules)
-    return built(state, rules)
+    return rebuilt_lists(state, rules)
 
 
-def built(state: State, rules: Rules) -> State:
-    """The state with all lists built anew, with as much room as they need."""
+def rebuilt_lists(state: State, rules: Rules) -> State:
+    """The state with all lists rebuilt, with as much room as they need."""
     room, cell_room = state.neighbours.shape[1] - 1, state.cells.shape[1] - 1
     while True:
         status = build_lists(state, rules)

@@ -1,4 +1,4 @@
-"""All bodies of the scene, drawn one over the other."""
+"""Drawing of all bodies of the scene, from the lowest to the highest."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def draw_bodies(
     dust: NDArray[np.float32],
     width: float,
 ) -> None:
-    """Draw bodies over what is there and over each other.
+    """Draw bodies over the canvas and over each other.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def draw_bodies(
     shapes : ndarray of float32, (n_shapes, SHAPE)
         Grains take one after the other.
     dust : ndarray of float32, (size, size)
-        Where dust is on beads; each begins elsewhere in it.
+        Pattern of dust; each bead starts at another place of it.
     width : float32, [px]
         Of the outlines.
     """

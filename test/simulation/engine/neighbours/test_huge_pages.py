@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.beads import Beads
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.engine.neighbours.huge_pages import in_large_pages
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 LINE = 64
 
@@ -54,8 +56,8 @@ def test_the_course_does_not_depend_on_where_it_lies(large, tmp_path):
     elsewhere._state = type(elsewhere._state)(*(array.copy() for array in elsewhere._state))
     file = tmp_path / 'gas.npz'
     large.save(file)
-    for gas in (large, elsewhere, other := HardSphereGas.load(file)):
+    for gas in (large, elsewhere, loaded := HardSphereGas.load(file)):
         gas.run_until(0.3)
     assert large.counts.pair > 1000
-    for gas in (elsewhere, other):
+    for gas in (elsewhere, loaded):
         np.testing.assert_array_equal(gas.beads().positions, large.beads().positions)
