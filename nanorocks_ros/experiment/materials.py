@@ -8,7 +8,7 @@ from importlib import resources
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.experiment.yaml_lines import YamlLines, composed
+from nanorocks_ros.experiment.yaml_lines import YamlLines, parse_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -94,7 +94,7 @@ class Material:
 def known_materials() -> MappingProxyType[str, Material]:
     """The materials that come with the package, by name."""
     text = resources.files(__package__).joinpath(FILE).read_text(encoding='utf-8')
-    return MappingProxyType(MaterialReader(FILE, {}).materials(composed(FILE, text)))
+    return MappingProxyType(MaterialReader(FILE, {}).materials(parse_yaml(FILE, text)))
 
 
 def paste_remedy(name: str, density_given: bool = False) -> str:

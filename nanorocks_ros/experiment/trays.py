@@ -18,7 +18,7 @@ from nanorocks_ros.experiment.materials import (
     known_materials,
     paste_remedy,
 )
-from nanorocks_ros.experiment.yaml_lines import YamlLines, composed, read_text
+from nanorocks_ros.experiment.yaml_lines import YamlLines, parse_yaml, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -142,7 +142,7 @@ def load_trays(path: str | Path | None = None) -> dict[int, Tray]:
     else:
         name = str(path)
         text = read_text(Path(path), 'a readable YAML file of trays')
-    return _TrayFile(name).trays(composed(name, text))
+    return _TrayFile(name).trays(parse_yaml(name, text))
 
 
 def tray_values(tray: Tray) -> dict[str, Any]:

@@ -114,7 +114,7 @@ def view_from_matrices(
     camera: Lens,
     rotation: Sequence[float],
     projection: Sequence[float],
-    where: str,
+    place: str,
 ) -> View:
     """The view that R and P of a sensor_msgs/CameraInfo describe.
 
@@ -136,9 +136,9 @@ def view_from_matrices(
     turn = np.array(rotation, dtype=np.float64).reshape(3, 3)
     project = np.array(projection, dtype=np.float64).reshape(3, 4)[:, :3]
     if not np.abs(turn @ turn.T - np.eye(3)).max() < _ROUNDING:
-        raise ConfigurationError(where, 'r is no rotation', 'calibrate the camera again')
+        raise ConfigurationError(place, 'r is no rotation', 'calibrate the camera again')
     if not (np.isfinite(project).all() and min(project[0, 0], project[1, 1]) > 0.0):
-        raise ConfigurationError(where, 'p has no focal lengths', 'calibrate the camera again')
+        raise ConfigurationError(place, 'p has no focal lengths', 'calibrate the camera again')
     matrix = _CORNER @ camera.matrix @ turn.T @ np.linalg.inv(_CORNER @ project)
     matrix = matrix / matrix[2, 2]
     if np.abs(matrix - np.eye(3)).max() < 1e-12:

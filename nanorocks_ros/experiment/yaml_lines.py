@@ -11,7 +11,7 @@ import yaml
 from nanorocks_ros.errors import ConfigurationError
 
 
-def composed(name: str, text: str) -> yaml.Node | None:
+def parse_yaml(name: str, text: str) -> yaml.Node | None:
     """The node tree of a YAML text, with line numbers; None for an empty text.
 
     Parameters
@@ -30,13 +30,13 @@ def composed(name: str, text: str) -> yaml.Node | None:
     except yaml.YAMLError as error:
         mark = getattr(error, 'problem_mark', None)
         line = mark.line + 1 if mark else 1
-        what = getattr(error, 'problem', None) or getattr(error, 'reason', 'cannot be read')
+        reason = getattr(error, 'problem', None) or getattr(error, 'reason', 'cannot be read')
         raise ConfigurationError(
-            f'{name}:{line}', f'not YAML: {what}', 'correct this line'
+            f'{name}:{line}', f'not YAML: {reason}', 'correct this line'
         ) from error
 
 
-def read_text(path: Path, wanted: str) -> str:
+def read_text(path: Path, expected: str) -> str:
     """The text of a file.
 
     Parameters
@@ -54,7 +54,7 @@ def read_text(path: Path, wanted: str) -> str:
         return path.read_text(encoding='utf-8')
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, 'strerror', None) or 'is not UTF-8 text'
-        raise ConfigurationError(str(path), reason, f'name {wanted}') from error
+        raise ConfigurationError(str(path), reason, f'name {expected}') from error
 
 
 class YamlLines:
@@ -81,13 +81,13 @@ class YamlLines:
         """Keys and values; a duplicate key is refused."""
         if not isinstance(node, yaml.MappingNode):
             raise self.error(node, 'expected "name: value" entries', 'correct this line')
-        seen: set[object] = set()
+        keys: set[object] = set()
         pairs = []
         for key_node, value in node.value:
             key = self.scalar(key_node)
-            if key in seen:
+            if key in keys:
                 raise self.error(key_node, f'{key!r} stands twice', 'remove one')
-            seen.add(key)
+            keys.add(key)
             pairs.append((key, value))
         return pairs
 

@@ -25,7 +25,7 @@ from nanorocks_ros.simulation.initial_state import (
     rules_of,
     sphere_masses,
 )
-from nanorocks_ros.simulation.packing.random_placement import MOST_TRIES, place
+from nanorocks_ros.simulation.packing.random_placement import MOST_TRIES, pack_beads
 from nanorocks_ros.simulation.shaken_tray import after_shaking, check_settings
 
 if TYPE_CHECKING:
@@ -191,7 +191,7 @@ def _cool(
     n = diameters.size
     sides = np.array((rules.sides[0], rules.sides[1], rules.sides[2]))
     radii = 0.5 * diameters
-    positions, placed = place(radii, sides, np.zeros(3, dtype=np.bool_), keys[1], MOST_TRIES)
+    positions, placed = pack_beads(radii, sides, np.zeros(3, dtype=np.bool_), keys[1], MOST_TRIES)
     if placed < n:
         return _NO_ROOM
     masses = sphere_masses(diameters, ranges[2])

@@ -16,7 +16,7 @@ from nanorocks_ros.simulation.engine.input_checks import check_room
 from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 from nanorocks_ros.simulation.engine.rules.restitution_laws import UniformRestitution
 from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
-from nanorocks_ros.simulation.packing.random_placement import placed_at_random
+from nanorocks_ros.simulation.packing.random_placement import random_positions
 from nanorocks_ros.simulation.velocities import maxwellian, uniform_speeds
 
 if TYPE_CHECKING:
@@ -59,17 +59,17 @@ def inventory(tray: Tray) -> Inventory:
     SimulationError
         For a tray without beads, or an invalid species.
     """
-    where = f'tray {tray.number}'
+    place = f'tray {tray.number}'
     for species in tray.species:
         sizes = (species.diameter_low, species.diameter_high, species.density)
         usable = all(math.isfinite(size) and size > 0.0 for size in sizes) and species.count >= 0
         if not usable or species.diameter_low > species.diameter_high:
             raise SimulationError(
-                where, f'species {species}', 'give positive sizes, the lower first'
+                place, f'species {species}', 'give positive sizes, the lower first'
             )
     counts = [species.count for species in tray.species]
     if sum(counts) < 1:
-        raise SimulationError(where, 'holds no bead', 'give at least one')
+        raise SimulationError(place, 'holds no bead', 'give at least one')
     return Inventory(
         diameter_low=np.repeat([species.diameter_low for species in tray.species], counts),
         diameter_high=np.repeat([species.diameter_high for species in tray.species], counts),
@@ -145,7 +145,7 @@ def resting_beads(settings: SimulationSettings, tray: Tray, run: int = 0) -> Bea
     Raises
     ------
     SimulationError
-        When the beads do not fit, or no place is found for one of them.
+        When the beads do not fit.
     """
     drawn = inventory(tray)
     rules = rules_of(settings, tray).compiled()
@@ -153,7 +153,7 @@ def resting_beads(settings: SimulationSettings, tray: Tray, run: int = 0) -> Bea
     diameters = draw_diameters(drawn.diameter_low, drawn.diameter_high, sizes_key)
     check_room(0.5 * diameters, rules)
     places_key = key_for(settings.seed, run, Purpose.POSITIONS)
-    positions = placed_at_random(0.5 * diameters, tray.dimensions, key=places_key)
+    positions = random_positions(0.5 * diameters, tray.dimensions, key=places_key)
     return Beads(
         radii=0.5 * diameters,
         masses=sphere_masses(diameters, drawn.density),

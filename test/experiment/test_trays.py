@@ -1,4 +1,4 @@
-"""The trays that were flown, and files that cannot be used."""
+"""The flown trays, and trays files that are refused."""
 
 from __future__ import annotations
 

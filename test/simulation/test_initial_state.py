@@ -1,4 +1,4 @@
-"""Beads start in the tray, apart, of the right sizes and with the speeds of a shaken gas."""
+"""Initial beads: inside the tray, without overlap, with the right sizes and speeds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pairs and bodies of the reference engine, worked out by hand."""
+"""Pairs and bodies of the reference engine, against solutions by hand."""
 
 from __future__ import annotations
 

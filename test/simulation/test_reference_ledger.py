@@ -1,4 +1,4 @@
-"""Energy, momentum and room in gases of the reference engine."""
+"""Energy, momentum and overlap in gases of the reference engine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Walls, at rest and shaken, and images in the reference engine, worked out by hand."""
+"""Walls and periodic images of the reference engine, against solutions by hand."""
 
 from __future__ import annotations
 

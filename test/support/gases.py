@@ -22,7 +22,7 @@ KERNELS = [Kernel.SCAN, Kernel.LISTS]
 
 ROUGH = {'tangential_restitution': 0.5, 'wall_tangential_restitution': 0.2}
 
-# One of everything that can happen, alone and together.
+# Every kind of rule, alone and combined.
 RULES = {
     'elastic': {},
     'inelastic': {'restitution': 0.8, 'wall_restitution': (0.9, 0.8, 0.7, 0.6, 0.95, 0.85)},

@@ -1,4 +1,4 @@
-"""Small scenes for the tests: the plate as flown, in a picture as small as shows what is meant."""
+"""Small scenes for the tests: the plate as flown, in a small picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A gas of inelastic spheres cools as kinetic theory says."""
+"""Cooling of inelastic spheres, against kinetic theory."""
 
 import math
 

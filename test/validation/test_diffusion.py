@@ -1,4 +1,4 @@
-"""Beads of a dense gas wander as far as is known."""
+"""Self-diffusion in a dense gas, against published values."""
 
 from functools import cache
 

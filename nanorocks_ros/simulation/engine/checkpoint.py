@@ -80,12 +80,12 @@ def load(path: Path) -> tuple[State, Rules, int]:
     if not np.array_equal(digest, _digest(arrays)):
         raise SimulationError(str(path), 'is damaged', 'use another saved state')
     form, n_species = arrays['form'].tolist()
-    wanted = {f'state.{name}' for name in State._fields} | {
+    required = {f'state.{name}' for name in State._fields} | {
         f'rules.{name}' for name in Rules._fields
     }
-    if form != _FORM or not wanted <= set(arrays):
+    if form != _FORM or not required <= set(arrays):
         raise SimulationError(
-            str(path), 'was saved by another release', 'go on with that one, or start again'
+            str(path), 'was saved by another release', 'use that release, or start again'
         )
     state = State(*(arrays[f'state.{name}'] for name in State._fields))
     return state, Rules(*(_rule(arrays[f'rules.{name}']) for name in Rules._fields)), n_species

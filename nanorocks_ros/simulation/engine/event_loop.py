@@ -89,7 +89,7 @@ def execute_event(state: State, rules: Rules, i: int, now: float) -> int:
     Returns
     -------
     int
-        Beads marked, whose next event must be found; ``FULL`` when a list is.
+        Number of marked beads, whose next event must be predicted; ``FULL`` when a list is.
     """
     partner = as_int64(state.links[i, PARTNER])
     state.last[0] = 0.0

@@ -159,9 +159,9 @@ def _finite(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> NDAr
             name, f'shape {array.shape}, expected {shape}', 'one row for each bead'
         )
     if not np.isfinite(array).all():
-        where = np.argwhere(~np.isfinite(array))[0].tolist()
+        first_bad = np.argwhere(~np.isfinite(array))[0].tolist()
         raise SimulationError(
-            name, f'{float(array[tuple(where)])!r} at {where}', 'give finite values'
+            name, f'{float(array[tuple(first_bad)])!r} at {first_bad}', 'give finite values'
         )
     return array
 
@@ -192,8 +192,8 @@ def overlapping_pair(state: State, rules: Rules) -> tuple[int, int]:
     rows = state.rows
     listed = state.references.shape[0] > 0
     for i in range(rows.shape[0]):
-        others = as_int64(state.neighbours[i, 0]) if listed else rows.shape[0] - i - 1
-        for k in range(others):
+        n_partners = as_int64(state.neighbours[i, 0]) if listed else rows.shape[0] - i - 1
+        for k in range(n_partners):
             j = as_int64(state.neighbours[i, k + 1]) if listed else i + 1 + k
             dx = minimum_image(rules, 0, rows[j, X] - rows[i, X])
             dy = minimum_image(rules, 1, rows[j, Y] - rows[i, Y])

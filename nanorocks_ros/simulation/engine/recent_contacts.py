@@ -16,8 +16,8 @@ from nanorocks_ros.simulation.engine.integer_width import as_int64
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Places looked at for one pair; with the oldest overwritten when none is free, a contact can
-# only be forgotten when this many others in the same row of places are as recent.
+# Slots checked for a pair. The oldest is overwritten when none is free, so a contact is lost only
+# when this many others in the same slots are more recent.
 _PLACES = 16
 
 _SCRAMBLE = np.uint64(0x9E3779B97F4A7C15)

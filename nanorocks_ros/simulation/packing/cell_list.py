@@ -1,9 +1,8 @@
 """Cell lists for beads of many sizes in a box.
 
-There are as many grids of cells as there are sizes. A bead belongs to the grid of its size: the
-radii of a grid differ by less than a factor of two, and its cells are at least as wide as its
-largest bead. So a grain of dust among marbles looks at few cells, and a marble is in few of
-those of the dust.
+There is one grid of cells for each factor of two in radius. The cells of a grid are at least as
+wide as its largest bead. So a small bead checks few cells for large neighbours, and a large bead
+few cells per grid.
 
 Results do not depend on the cells; they only avoid tests of distant beads.
 """
@@ -160,13 +159,13 @@ def _divide(
     sides: NDArray[np.float64], width: float, beads: int, counts: NDArray[np.int64]
 ) -> None:
     """Divide a box into cells of at least a width, with a limit on their number."""
-    most = _FEWEST_CELLS + _CELLS_PER_BEAD * beads
+    max_cells = _FEWEST_CELLS + _CELLS_PER_BEAD * beads
     while True:
         product = 1.0
         for axis in range(3):
-            counts[axis] = np.int64(min(max(sides[axis] / width, 1.0), 2.0 * most))
+            counts[axis] = np.int64(min(max(sides[axis] / width, 1.0), 2.0 * max_cells))
             product *= counts[axis]
-        if product <= most:
+        if product <= max_cells:
             return
         width *= _WIDEN
 

@@ -30,14 +30,14 @@ _GROWTH = 1 << 62
 _SPHERE = 4.0 / 3.0 * math.pi
 
 
-def placed_at_random(
+def random_positions(
     radii: ArrayLike,
     sides: Sequence[float],
     *,
     periodic: bool | Sequence[bool] = False,
     key: np.uint64,
 ) -> NDArray[np.float64]:
-    """Random positions of beads in a box, see `place`.
+    """Random positions of beads in a box, see `pack_beads`.
 
     Parameters
     ----------
@@ -56,13 +56,13 @@ def placed_at_random(
     Raises
     ------
     SimulationError
-        When a radius or a side cannot be, or no room is found for all beads.
+        For an invalid radius or side, or when the beads do not fit.
     """
     sizes = _positive('radii', radii, None)
     box = _positive('box', sides, 3)
     around = _three_flags(periodic)
     _check_room(sizes, box)
-    positions, placed = place(sizes, box, around, key, MOST_TRIES)
+    positions, placed = pack_beads(sizes, box, around, key, MOST_TRIES)
     if placed < sizes.size:
         raise SimulationError(
             'beads',
@@ -120,7 +120,7 @@ def _filling(radii: NDArray[np.float64], box: NDArray[np.float64]) -> float:
 
 
 @compiled
-def place(
+def pack_beads(
     radii: NDArray[np.float64],
     sides: NDArray[np.float64],
     periodic: tuple[bool, bool, bool] | NDArray[np.bool_],
@@ -147,8 +147,8 @@ def place(
     -------
     positions : ndarray (n, 3), [m]
     placed : int
-        Beads for which there was room. When it is less than n, these are the largest, equals
-        from the last; the others have no valid position.
+        Beads that were placed. When fewer than n, these are the largest, equal ones from the
+        last; the others have no valid position.
     """
     n = radii.size
     for i in range(n):

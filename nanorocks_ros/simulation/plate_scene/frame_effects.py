@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 BLOCK = 16
 """Side of the squares that the shift of a picture is given for, [px]."""
 
-# Light and noise are whole numbers: parts of 2^13, and of 2^19 gray levels.
+# Fixed point: light in units of 2^-13, noise in 2^-19 gray levels.
 _LIGHT_BITS = 13
 _LEVEL_BITS = 6 + _LIGHT_BITS
 ONE = 1 << _LIGHT_BITS
@@ -42,8 +42,8 @@ def shift_blocks(
         Written, in the part only.
     still : ndarray of uint16, (3, rows, columns)
     shifts : ndarray (m, n, 2), [px]
-        How far, along columns and rows, what is seen in each square of the part has moved;
-        along rows the shift goes evenly from the middle of a square to that of the next.
+        Shift of each square along columns and rows; along rows it is interpolated linearly
+        between the centres of squares.
     left, top : int, [px]
         Corner of the first square. All must lie so far inside that no source is outside.
     """

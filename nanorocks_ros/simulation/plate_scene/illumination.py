@@ -37,10 +37,10 @@ class Illumination:
         self._across = np.exp(-lost * x * x) * (1.0 - tilt * x)
         self._down = np.exp(-lost * y * y) * (1.0 - 0.5 * tilt * y * columns / rows)
         self._phase = 2.0 * math.pi * _BANDS * np.arange(rows) / rows
-        self.across: NDArray[np.uint32] = _parts(self._across)
+        self.column_factors: NDArray[np.uint32] = _parts(self._across)
 
-    def down(self, time: float) -> NDArray[np.uint32]:
-        """Illumination along a column at a time [s], (rows,), in units of 2^-13."""
+    def row_factors(self, time: float) -> NDArray[np.uint32]:
+        """Illumination of each row at a time [s], (rows,), in units of 2^-13."""
         angle = 2.0 * math.pi * time / self._period - self._phase
         return _parts(self._down * (1.0 + self._flicker * np.sin(angle)))
 

@@ -61,7 +61,7 @@ class MovingPlate:
         ]
         self._drawn_on = list(drawn_on)
 
-    def moved_to(self, displacement: tuple[float, float]) -> NDArray[np.uint16]:
+    def displaced(self, displacement: tuple[float, float]) -> NDArray[np.uint16]:
         """The canvas with the plate displaced, [m]; the caller draws on it.
 
         Raises

@@ -13,7 +13,7 @@ from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.records import BeadsTruth, Frame, GroundTruth
 from nanorocks_ros.settings import problem, rows, with_values
 from nanorocks_ros.simulation.initial_state import inventory
-from nanorocks_ros.simulation.plate_scene.drawing.bead_appearance import turned_since
+from nanorocks_ros.simulation.plate_scene.drawing.bead_appearance import turned_angle
 from nanorocks_ros.simulation.plate_scene.moving_plate import FURTHEST_PX
 from nanorocks_ros.simulation.plate_scene.plate_camera import SceneCamera
 from nanorocks_ros.simulation.plate_scene.plate_oscillation import plate_motion, wall_motion_of
@@ -62,7 +62,7 @@ class SceneMoment:
     frame : Frame
         ``bgr8``.
     trays : tuple of GroundTruth
-        Of each tray as a whole; speeds past the camera.
+        Of each tray; speeds relative to the camera.
     beads : tuple of BeadsTruth
         Of each tray; relative to its floor.
     """
@@ -84,12 +84,12 @@ class SceneFilm:
     trays : mapping of int to Tray, optional
         All cells of the plate; by default those that were flown.
     gases : mapping of int to SimulationSettings, optional
-        Of trays whose gas differs; seed, shaking events and camera are common to all.
+        Settings of trays that differ; seed, shaking events and camera are shared.
 
     Raises
     ------
     ConfigurationError
-        For a setting outside its range, or trays that cannot be filmed together.
+        For a setting outside its range, or trays that do not fit together.
     SimulationError
         When beads do not fit into their tray.
     """
@@ -163,7 +163,7 @@ class SceneFilm:
             number,
             time=time,
             motion=motion,
-            turned=turned_since(time, events),
+            turned=turned_angle(time, events),
         )
         return SceneMoment(
             frame=Frame(stamp_ns=stamp_ns, encoding='bgr8', image=image),
@@ -244,7 +244,7 @@ def check_scene(scene: SceneSettings) -> None:
     problems = ((row.name, problem(row, row.default)) for row in rows(scene))
     wrong = [f'{name}: {text}' for name, text in problems if text]
     if not scene.trays or len(set(scene.trays)) != len(scene.trays):
-        wrong.append(f'trays: {scene.trays} name none, or one twice')
+        wrong.append(f'trays: {scene.trays} is empty or has duplicates')
     if wrong:
         raise ConfigurationError(
             'scene', '; '.join(wrong), 'see docs/reference/parameters.md for names and ranges'

@@ -15,6 +15,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.materials import Material
 
 
-def looks_of(materials: Sequence[Material]) -> NDArray[np.float64]:
+def look_rows(materials: Sequence[Material]) -> NDArray[np.float64]:
     """Look of each bead, (n, 9), columns as the fields of `Look`."""
     return np.array([astuple(material.look) for material in materials], dtype=np.float64)

@@ -12,7 +12,7 @@ from nanorocks_ros.experiment.materials import known_materials
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.numerics.counter_rng import Purpose, hashed, key_for
 from nanorocks_ros.simulation.tray_camera.bead_drawing import copy_surface, draw_beads, expose
-from nanorocks_ros.simulation.tray_camera.bead_looks import looks_of
+from nanorocks_ros.simulation.tray_camera.bead_looks import look_rows
 from nanorocks_ros.simulation.tray_camera.tray_background import empty_tray, noisy_strip
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class TrayCamera:
                 f'is not described (known: {", ".join(sorted(known))})',
                 'name one that is, or describe it in the file of trays',
             )
-        self._looks = looks_of([known[name] for name in materials])
+        self._looks = look_rows([known[name] for name in materials])
         self._noise_key = key_for(settings.seed, 0, Purpose.NOISE)
         self._margin = self._fitting_margin()
         texture_key = key_for(settings.seed, 0, Purpose.TEXTURE)
@@ -153,8 +153,8 @@ class TrayCamera:
         region = self._region
         right = width - region.x - region.width
         below = height - region.y - region.height
-        wanted = math.ceil(RIM * self._scale) + math.ceil(self._width) + 1
-        return min(wanted, region.x, region.y, right, below)
+        full_margin = math.ceil(RIM * self._scale) + math.ceil(self._width) + 1
+        return min(full_margin, region.x, region.y, right, below)
 
     def _check(self, materials: tuple[str, ...]) -> None:
         if self._radii_px.ndim != 1 or len(materials) != self._radii_px.size:

@@ -1,4 +1,4 @@
-"""A gas that was saved goes on bit by bit as it would have; no other file is taken for one."""
+"""A checkpoint continues bit by bit; damaged and foreign files are refused."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def gas_for(name, kernel=Kernel.SCAN, n=20):
     return HardSphereGas(mixture(8, n, rules), rules, kernel)
 
 
-def rest_of(gas):
+def remaining_record(gas):
     return gas.follow(END, TIMES, TIMES, log=True)
 
 
@@ -48,11 +48,11 @@ def test_a_saved_gas_goes_on_bit_by_bit(tmp_path, name, kernel):
     straight = gas_for(name, kernel)
     straight.run_until(HALF)
     straight.save(path)
-    expected = rest_of(straight)
+    expected = remaining_record(straight)
     loaded = HardSphereGas.load(path)
     assert loaded.now == HALF
     assert loaded.kernel == kernel
-    assert_identical(rest_of(loaded), expected)
+    assert_identical(remaining_record(loaded), expected)
     assert len(expected.events) > 30
     assert loaded.counts == straight.counts
     for field in ('ledger', 'bodies', 'stuck', 'radii', 'masses'):
@@ -65,7 +65,7 @@ def test_saving_changes_nothing(tmp_path, kernel):
     for gas in (saved, unsaved):
         gas.run_until(HALF)
     saved.save(tmp_path / 'gas')
-    assert_identical(rest_of(saved), rest_of(unsaved))
+    assert_identical(remaining_record(saved), remaining_record(unsaved))
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
@@ -78,7 +78,7 @@ def test_a_gas_can_be_saved_before_its_first_event_and_again_and_again(tmp_path,
         gas.save(path)
         gas = HardSphereGas.load(path)
     expected.run_until(HALF)
-    assert_identical(rest_of(gas), rest_of(expected))
+    assert_identical(remaining_record(gas), remaining_record(expected))
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
@@ -90,7 +90,7 @@ def test_a_gas_stopped_in_the_middle_of_its_events_can_be_saved(tmp_path, kernel
     loaded = HardSphereGas.load(tmp_path / 'gas')
     for gas in (straight, loaded):
         gas.run_until(HALF)
-    assert_identical(rest_of(loaded), rest_of(straight))
+    assert_identical(remaining_record(loaded), remaining_record(straight))
 
 
 def test_a_loaded_gas_can_be_kicked_and_seen_by_species(tmp_path):
@@ -102,7 +102,7 @@ def test_a_loaded_gas_can_be_kicked_and_seen_by_species(tmp_path):
     courses = []
     for copy in (gas, loaded):
         copy.kick(velocities)
-        courses.append(rest_of(copy))
+        courses.append(remaining_record(copy))
     assert_identical(*courses)
     np.testing.assert_array_equal(loaded.beads().species, mixture(8, 20, SPECIES).species)
 

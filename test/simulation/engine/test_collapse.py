@@ -1,4 +1,4 @@
-"""Inelastic collapse: with a contact duration it ends, without one it ends in a clear error."""
+"""Inelastic collapse: avoided with a contact duration, a clear error without one."""
 
 from __future__ import annotations
 

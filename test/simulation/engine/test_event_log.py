@@ -1,4 +1,4 @@
-"""The log of events is complete: it tells every change of every velocity, and nothing else."""
+"""The event log holds every change of every velocity, and nothing else."""
 
 from __future__ import annotations
 

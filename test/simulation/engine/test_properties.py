@@ -1,4 +1,4 @@
-"""What holds for every gas, whatever the rules, and whatever is asked of it on the way."""
+"""Properties of every gas, for all rules and all kinds of output."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Both kernels and the reference engine agree event by event, until chaos parts them.
+"""Both kernels and the reference engine agree event by event, until chaos separates them.
 
 How long that is, a twin of the reference tells: its beads start 1e-13 of the box from their
 places, more than what rounding does to the engine. While the twin and the reference agree to

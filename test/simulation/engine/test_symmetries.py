@@ -1,4 +1,4 @@
-"""The engine has no favourite place, axis, direction, unit, frame of reference or way of time."""
+"""Symmetries of the engine: translation, axes, mirror, units, Galilei, time reversal."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ names = st.sampled_from(sorted(RULES))
 few = settings(deadline=None, max_examples=25, derandomize=True)
 
 
-def gas_and_course(beads, rules, kernel, end=None):
+def gas_and_record(beads, rules, kernel, end=None):
     """Follow for as many events as are compared, or to a time; frames on the way."""
     if end is None:
         events = HardSphereGas(beads, rules, kernel).follow(40.0, log=True).events
@@ -85,8 +85,8 @@ def test_axes_may_have_other_names(kernel, name, seed, order):
     rules = CollisionRules(box=BOX, **RULES[name])
     beads = mixture(seed, BEADS, rules)
     matrix = np.eye(3)[list(order)]
-    end, record = gas_and_course(beads, rules, kernel)
-    _, second = gas_and_course(*turned(beads, rules, matrix, 0.0), kernel, end)
+    end, record = gas_and_record(beads, rules, kernel)
+    _, second = gas_and_record(*turned(beads, rules, matrix, 0.0), kernel, end)
     assert_alike(record, second, matrix, spin_matrix=matrix * np.linalg.det(matrix))
 
 
@@ -97,8 +97,8 @@ def test_a_mirror_shows_the_mirrored_course(kernel, name, seed, signs):
     beads = mixture(seed, BEADS, rules)
     matrix = np.diag(signs)
     shift = np.where(np.array(signs) < 0, BOX, 0.0)
-    end, record = gas_and_course(beads, rules, kernel)
-    _, second = gas_and_course(*turned(beads, rules, matrix, shift), kernel, end)
+    end, record = gas_and_record(beads, rules, kernel)
+    _, second = gas_and_record(*turned(beads, rules, matrix, shift), kernel, end)
     assert_alike(record, second, matrix, shift, matrix * np.linalg.det(matrix))
 
 
@@ -119,8 +119,8 @@ def test_a_periodic_box_may_be_anywhere_and_in_motion(kernel, name, seed, shift,
     moved = replace(
         beads, positions=beads.positions + shift, velocities=beads.velocities + np.array(boost)
     )
-    end, record = gas_and_course(beads, rules, kernel)
-    _, second = gas_and_course(moved, rules, kernel, end)
+    end, record = gas_and_record(beads, rules, kernel)
+    _, second = gas_and_record(moved, rules, kernel, end)
     drift = np.array(shift) + np.multiply.outer(second.times, boost)
     second = replace(
         second,
@@ -136,9 +136,9 @@ def test_beads_may_start_in_any_image_of_a_periodic_box(kernel, seed, boxes):
     rules = CollisionRules(box=BOX, periodic=ALWAYS, restitution=0.9)
     beads = mixture(seed, BEADS, rules)
     away = np.array(boxes) * np.array(BOX)
-    end, record = gas_and_course(beads, rules, kernel)
+    end, record = gas_and_record(beads, rules, kernel)
     far = replace(beads, positions=beads.positions + away)
-    _, second = gas_and_course(far, rules, kernel, end)
+    _, second = gas_and_record(far, rules, kernel, end)
     assert_alike(record, second, shift=away)
 
 

@@ -1,4 +1,4 @@
-"""The picture of the scene shows everything where it is, and each effect does what it says."""
+"""Pictures of the scene: positions, sizes, and each effect of the camera."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A film of the scene tells the truth about every bead, and is the same every time."""
+"""Films of the scene: ground truth of every bead, and reproducibility."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ def test_no_effects_means_all_strengths_zero_but_shading():
 def test_scenes_that_cannot_be_filmed_are_refused():
     with pytest.raises(ConfigurationError, match=r'noise: -1.0 is outside \[0, 64\]; glare: nan'):
         SceneFilm(SHAKEN, replace(SMALL, noise=-1.0, glare=math.nan))
-    with pytest.raises(ConfigurationError, match='name none, or one twice'):
+    with pytest.raises(ConfigurationError, match='is empty or has duplicates'):
         SceneFilm(SHAKEN, replace(SMALL, trays=(1, 1)))
     with pytest.raises(ConfigurationError, match='has no place on the plate'):
         SceneFilm(SHAKEN, replace(SMALL, trays=(1,)), {1: replace(TRAYS[1], place=None)})

@@ -1,4 +1,4 @@
-"""Pictures show the beads where they are, as large as they are, with the noise asked for."""
+"""Pictures of a tray: positions, sizes and noise of the beads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How hard two bodies bounce: restitution of a pair, and the impulse between rough spheres."""
+"""Restitution and impulses of the reference engine."""
 
 from __future__ import annotations
 

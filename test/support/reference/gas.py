@@ -1,6 +1,6 @@
-"""A slow and obvious event-driven engine: every step, ask all, take the first, move all.
+"""A slow, simple event-driven engine: each step checks all pairs and moves all beads.
 
-Nothing is remembered between events but what the physics remembers.
+It stores nothing between events but the physical state.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .tray import Tray, axis_of, inward_of
 
 @dataclass(frozen=True)
 class Event:
-    """What happened: `kind` is 'pair', 'wall', 'merge' or 'fix'.
+    """An event; `kind` is 'pair', 'wall', 'merge' or 'fix'.
 
     `partner` is the higher bead of the pair, or the wall; `speed` the normal approach speed
     before; `impulse` the magnitude of the impulse vector.
@@ -34,7 +34,7 @@ class Event:
 
 @dataclass
 class Ledger:
-    """What left the beads.
+    """Energy and momentum that left the beads.
 
     `wall_impulse` and `fixed_impulse` are the momentum vectors given to each wall and to fixed
     bodies; `wall_momentum` is the component of the former along the axis of each wall.

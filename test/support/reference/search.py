@@ -1,4 +1,4 @@
-"""What happens next: ask every pair and every bead with every wall, take the first."""
+"""Search for the next contact among all pairs and all walls."""
 
 from __future__ import annotations
 

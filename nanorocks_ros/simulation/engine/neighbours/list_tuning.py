@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.gas_state import State
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
-# Measured (`python -m benchmarks engine`): lists of about six are the fastest, whatever the
-# density, and so are shells whose centre lies this far ahead of the bead.
+# Fastest mean length of the lists at all densities, and fastest offset of the centre of a shell
+# ahead of its bead (`python -m benchmarks engine`).
 _WANTED = 6.0
 _SKINS = 0.3, 2.5
 AHEAD_OF_BEAD = 0.85
-# A little more than the reach, for the rounding of references.
+# Cell width over reach: slightly above 1, for the rounding of references.
 _CELL_SLACK = 1.004
 _FIRST_ROOM = 12
 _FIRST_CELL_ROOM = 5
@@ -63,8 +63,8 @@ def z_order(positions: NDArray[np.float64], width: float) -> NDArray[np.int64]:
     code = np.zeros(len(positions), dtype=np.uint64)
     for bit in range(21):
         for axis in range(3):
-            one = (cells[:, axis] >> np.uint64(bit)) & np.uint64(1)
-            code |= one << np.uint64(3 * bit + axis)
+            bits = (cells[:, axis] >> np.uint64(bit)) & np.uint64(1)
+            code |= bits << np.uint64(3 * bit + axis)
     return np.argsort(code, kind='stable')
 
 
@@ -103,9 +103,9 @@ def rebuilt_lists(state: State, rules: Rules) -> State:
 def _with_room(state: State, cells: int, room: int, cell_room: int) -> State:
     n = state.rows.shape[0]
     # All that a cell and those around it can hold, or all of the largest body.
-    most = n if state.masses.shape[1] > 1 else min(n, _CELLS_AROUND * cell_room)
+    n_marked = n if state.masses.shape[1] > 1 else min(n, _CELLS_AROUND * cell_room)
     return state._replace(
         neighbours=np.zeros((n, 1 + room), dtype=np.int32),
         cells=np.zeros((cells, 1 + cell_room), dtype=np.int32),
-        dirty=np.zeros(most + 8, dtype=np.int32),
+        dirty=np.zeros(n_marked + 8, dtype=np.int32),
     )

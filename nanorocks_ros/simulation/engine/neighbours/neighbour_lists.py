@@ -1,9 +1,9 @@
 """Neighbour lists: the beads that a bead can hit before it leaves the shell around its reference.
 
-Lists are symmetric. A bead that leaves its shell gets a new list alone. Cells of space, by
-reference place, say whom to consider, so a bead changes cell only then. References are rounded
-to single precision, which makes them no less exact: a bead is followed from where its
-reference is, and the reach of a list has room for the rounding of its distances.
+Lists are symmetric. A bead that leaves its shell gets a new list alone. Cells of
+space, by reference position, give the candidates, so a bead changes its cell only then.
+References are in single precision without loss of exactness: the shell is centred on the rounded
+reference, and the reach of a list allows for the rounding of distances.
 """
 
 from __future__ import annotations
@@ -244,20 +244,20 @@ def find_neighbours(state: State, rules: Rules, i: int, above: bool) -> bool:
         Only those with a higher number: for building all lists at once.
     """
     neighbours = state.neighbours
-    most = neighbours.shape[1] - 1
-    mine = as_int64(neighbours[i, 0])
+    capacity = neighbours.shape[1] - 1
+    n_own = as_int64(neighbours[i, 0])
     for k in range(collect_neighbours(state, rules, i)):
         j = as_int64(state.dirty[k])
         if j == i or (above and j < i):
             continue
         n_others = neighbours[j, 0]
-        if mine == most or n_others == most:
+        if n_own == capacity or n_others == capacity:
             return False
-        mine += 1
-        neighbours[i, mine] = j
+        n_own += 1
+        neighbours[i, n_own] = j
         neighbours[j, n_others + 1] = i
         neighbours[j, 0] = n_others + 1
-    neighbours[i, 0] = mine
+    neighbours[i, 0] = n_own
     return True
 
 

@@ -99,7 +99,7 @@ class CollisionRules:
     wall_sticking_speed : float, [m/s], >= 0
         Bodies that meet a wall more slowly stay there.
     sticking_measure : 'normal' or 'total'
-        The speed compared: along the normal of the contact, or the whole relative velocity.
+        Speed to compare: normal component, or magnitude of the relative velocity.
     tangential_restitution, wall_tangential_restitution : float or None, -1 to 1
         Of rough spheres, which rotate: of the tangential velocity of the surfaces at the
         contact; -1 is smooth, 1 perfectly rough. None: beads have no spin; for the walls:
@@ -116,7 +116,7 @@ class CollisionRules:
     Raises
     ------
     SimulationError
-        For a value that cannot be used.
+        For an invalid value.
 
     References
     ----------
@@ -158,7 +158,7 @@ class CollisionRules:
         Raises
         ------
         SimulationError
-            For a value that cannot be used.
+            For an invalid value.
         """
         self._check_sticking()
         kind, table, first, second = self._law()
@@ -238,12 +238,14 @@ class CollisionRules:
         return CONSTANT, table, 0.0, 0.0
 
     def _walls(self) -> tuple[float, float, float, float, float, float]:
-        given = checked_restitutions('wall_restitution', self.wall_restitution, self.allow_gain)
-        if given.shape not in ((), (_WALLS,)):
+        restitutions = checked_restitutions(
+            'wall_restitution', self.wall_restitution, self.allow_gain
+        )
+        if restitutions.shape not in ((), (_WALLS,)):
             raise SimulationError(
-                'wall_restitution', f'shape {given.shape}', f'give one value or {_WALLS}'
+                'wall_restitution', f'shape {restitutions.shape}', f'give one value or {_WALLS}'
             )
-        a, b, c, d, e, f = np.broadcast_to(given, _WALLS).tolist()
+        a, b, c, d, e, f = np.broadcast_to(restitutions, _WALLS).tolist()
         return a, b, c, d, e, f
 
 

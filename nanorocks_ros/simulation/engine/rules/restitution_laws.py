@@ -27,7 +27,7 @@ class UniformRestitution:
     ----------
     mean : float, 0 to 1
     width : float, >= 0
-        Full width; the whole range must lie within 0 to 1.
+        Full width; the range must lie within 0 to 1.
     """
 
     mean: float

@@ -11,7 +11,7 @@ import numpy as np
 from nanorocks_ros.simulation.initial_state import inventory
 from nanorocks_ros.simulation.plate_scene.drawing.grains import FACETS, LOBES, SHAPE
 from nanorocks_ros.simulation.plate_scene.drawing.scene_bodies import GRAIN, SPHERE
-from nanorocks_ros.simulation.tray_camera.bead_looks import looks_of
+from nanorocks_ros.simulation.tray_camera.bead_looks import look_rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -87,7 +87,7 @@ def appearance_of(tray: Tray, scene: SceneSettings, rng: np.random.Generator) ->
     rates = scene.turning * rng.standard_normal(n)
     dust = 0.55 + 0.9 * rng.random(n)
     materials = [tray.materials[name] for name in drawn.materials]
-    looks = looks_of(materials)
+    looks = look_rows(materials)
     looks[:, :3] *= np.maximum(brightness, 0.5)[:, np.newaxis]
     _shade(looks, scene)
     is_oval = np.array([material.shape == 'oval' for material in materials])
@@ -113,7 +113,7 @@ def _shade(looks: NDArray[np.float64], scene: SceneSettings) -> None:
     looks[:, _HIGHLIGHT] *= scene.highlights
 
 
-def turned_since(time: float, events: list[float]) -> float:
+def turned_angle(time: float, events: list[float]) -> float:
     """Angle by which a body with an initial rate of 1 rad/s has turned, [rad].
 
     Parameters

@@ -54,7 +54,7 @@ class BeadPainter:
     Raises
     ------
     SimulationError
-        For radii that are not those of the beads of a tray.
+        For radii that do not match the beads of a tray.
     """
 
     def __init__(
@@ -93,8 +93,8 @@ class BeadPainter:
         corners = [geometry.regions[number][:2] for number in radii]
         floors = [_floor(geometry, number) for number in radii]
         self._corners, self._floors = (
-            np.repeat(np.array(one, dtype=np.float64).reshape(-1, size), counts, axis=0)
-            for one, size in ((corners, 2), (floors, 4))
+            np.repeat(np.array(points, dtype=np.float64).reshape(-1, size), counts, axis=0)
+            for points, size in ((corners, 2), (floors, 4))
         )
 
     def paint(
@@ -134,11 +134,11 @@ class BeadPainter:
                 f'give those of {sorted(self._counts)}',
             )
         for number, count in self._counts.items():
-            one = np.asarray(positions[number])
-            if one.shape != (count, 3) or not np.isfinite(one).all():
+            points = np.asarray(positions[number])
+            if points.shape != (count, 3) or not np.isfinite(points).all():
                 raise SimulationError(
                     f'positions of tray {number}',
-                    f'shape {one.shape}, expected {(count, 3)}',
+                    f'shape {points.shape}, expected {(count, 3)}',
                     'give finite positions',
                 )
         return np.concatenate([np.empty((0, 3)), *(positions[k] for k in self._counts)])

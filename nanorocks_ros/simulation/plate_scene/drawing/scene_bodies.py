@@ -58,12 +58,12 @@ def draw_bodies(
     width : float32, [px]
         Of the outlines.
     """
-    most = 0.0
+    max_pixels = 0.0
     for k in range(order.size):
         sides = places[k, HALF_WIDTH : HALF_HEIGHT + 1]
         across, down = 2.0 * sides[0] + width + 2.0 + LANES, 2.0 * sides[1] + width + 2.0
-        most = max(most, across * down)
-    buffer = np.empty((BUFFERS, int(most) + LANES), dtype=np.float32)
+        max_pixels = max(max_pixels, across * down)
+    buffer = np.empty((BUFFERS, int(max_pixels) + LANES), dtype=np.float32)
     turned = np.empty(PLACE, dtype=np.float32)
     levels = np.empty(FACETS, dtype=np.float32)
     for k in range(order.size):

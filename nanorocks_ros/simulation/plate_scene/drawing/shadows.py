@@ -87,11 +87,11 @@ def draw_shadows(
     strength : float32
         Share of the light that the deepest shadow takes.
     """
-    most = 0.0
+    max_pixels = 0.0
     for k in range(spots.shape[0]):
         side = 2.0 * spots[k, HALF_WIDTH] + spots[k, _BLUR] + 2.0
-        most = max(most, side * (side + LANES))
-    buffer = np.empty((BUFFERS, int(most) + LANES), dtype=np.float32)
+        max_pixels = max(max_pixels, side * (side + LANES))
+    buffer = np.empty((BUFFERS, int(max_pixels) + LANES), dtype=np.float32)
     for k in range(spots.shape[0]):
         spot, width = spots[k], spots[k, _BLUR]
         left, top, columns, rows = drawn_rectangle(canvas, spot, width)

@@ -1,4 +1,4 @@
-"""Where a large gas lies in memory."""
+"""The state of a large gas is copied into huge pages without a change of its values."""
 
 import numpy as np
 import pytest

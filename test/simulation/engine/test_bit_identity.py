@@ -1,4 +1,4 @@
-"""The same beads and rules have the same course, bit by bit, on every machine."""
+"""The same beads and rules give the same trajectories, bit by bit, on every machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A gas is given other velocities, or other beads, and goes on from there."""
+"""A gas is restarted with other velocities or positions."""
 
 from __future__ import annotations
 

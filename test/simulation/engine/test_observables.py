@@ -1,4 +1,4 @@
-"""Running observables say the same as frames taken at the same instants, and as the events."""
+"""Observables agree with the frames of the same instants and with the event log."""
 
 from __future__ import annotations
 

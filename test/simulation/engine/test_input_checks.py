@@ -1,4 +1,4 @@
-"""Beads and times that cannot be are refused, in a sentence that says which and why."""
+"""Invalid beads and times are refused; the error names the value and the reason."""
 
 from __future__ import annotations
 

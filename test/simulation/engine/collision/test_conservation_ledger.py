@@ -1,4 +1,4 @@
-"""The beads and the books together keep energy, momentum and angular momentum."""
+"""Beads and ledger together conserve energy, momentum and angular momentum."""
 
 from __future__ import annotations
 

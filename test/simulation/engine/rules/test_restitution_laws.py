@@ -147,9 +147,9 @@ def test_a_gas_of_viscoelastic_beads_becomes_more_elastic_as_it_cools(kernel):
     assert restitution_values[-50:].mean() > restitution_values[:50].mean() + 0.03
 
 
-@pytest.mark.parametrize('rules_changes', ['restitution', 'wall_restitution'])
-def test_above_one_heats_when_that_is_allowed(kernel, rules_changes):
-    rules = CollisionRules(box=BOX, allow_gain=True, **{rules_changes: 1.05})
+@pytest.mark.parametrize('rule', ['restitution', 'wall_restitution'])
+def test_above_one_heats_when_that_is_allowed(kernel, rule):
+    rules = CollisionRules(box=BOX, allow_gain=True, **{rule: 1.05})
     gas = HardSphereGas(mixture(1, 8, rules), rules, kernel)
     had = energy(gas.beads())
     gas.run_until(10.0)

@@ -1,4 +1,4 @@
-"""Beads that spin, and walls that move, worked out by hand."""
+"""Collisions of rough beads and with moving walls, against solutions by hand."""
 
 from __future__ import annotations
 

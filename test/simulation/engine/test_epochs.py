@@ -1,4 +1,4 @@
-"""Time is counted anew now and then, so that no digits are lost; nothing else comes of it."""
+"""Epochs keep the precision of times, and change nothing else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Smooth beads: two and three of them, and a bead at a wall, worked out by hand."""
+"""Collisions of smooth beads with each other and with walls, against solutions by hand."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from gases import ALWAYS, KERNELS, gas_of, near
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 
 
-def what_happened(record):
+def event_list(record):
     return [(row['kind'].item(), row['bead'], row['partner']) for row in record.events]
 
 
@@ -29,7 +29,7 @@ def test_two_beads_meet_head_on_when_and_as_momentum_and_restitution_say(kernel,
     assert record.velocities[1, :, 0] == near(after)
     assert not record.velocities[..., 1:].any()
     assert record.positions[2, :, 0] == near([4.25 + 0.25 * after[0], 6.25 + 0.25 * after[1]])
-    assert what_happened(record) == [('pair', 0, 1)]
+    assert event_list(record) == [('pair', 0, 1)]
     reduced = 0.75
     event = record.events[0]
     assert event['time'] == near(1.25)
@@ -66,7 +66,7 @@ def test_a_graze_just_within_reach_turns_beads_by_next_to_nothing(kernel):
     """Offset (1 - 1e-8) of the reach: normal speed 2 sqrt(2e-8) = 2.83e-4."""
     gas = gas_of([(2, 5, 5), (8, 7 - 2e-8, 5)], [(1, 0, 0), (-1, 0, 0)], kernel=kernel)
     record = gas.follow(4.0, [4.0], log=True)
-    assert what_happened(record) == [('pair', 0, 1)]
+    assert event_list(record) == [('pair', 0, 1)]
     closing = 2.0 * np.sqrt(1.0 - (1.0 - 1e-8) ** 2)
     assert record.events['normal_speed'] == pytest.approx([closing], rel=1e-6)
     assert record.velocities[0, 0, 1] == pytest.approx(-closing, rel=1e-6)
@@ -88,7 +88,7 @@ def test_three_in_a_row_with_restitution_one_half(kernel):
         kernel=kernel,
     )
     record = gas.follow(7.0, [7.0], log=True)
-    assert what_happened(record) == [('pair', 0, 1), ('pair', 1, 2), ('pair', 0, 1)]
+    assert event_list(record) == [('pair', 0, 1), ('pair', 1, 2), ('pair', 0, 1)]
     assert record.events['time'] == near([3 / 8, 3 / 8 + 2 / 3, 3 / 8 + 2 / 3 + 16 / 3])
     assert record.events['normal_speed'] == near([4.0, 3.0, 0.25])
     assert record.velocities[0, :, 0] == near([0.8125, 0.9375, 2.25])
@@ -99,7 +99,7 @@ def test_a_row_of_touching_beads_hands_the_speed_on_at_one_instant(kernel):
         [(1.5, 5, 5), (5, 5, 5), (7, 5, 5)], [(3, 0, 0), (0, 0, 0), (0, 0, 0)], kernel=kernel
     )
     record = gas.follow(0.6, [0.6], log=True)
-    assert what_happened(record) == [('pair', 0, 1), ('pair', 1, 2)]
+    assert event_list(record) == [('pair', 0, 1), ('pair', 1, 2)]
     assert record.events['time'] == near([0.5, 0.5])
     assert record.velocities[0, :, 0] == near([0, 0, 3])
 
@@ -112,7 +112,7 @@ def test_of_two_beads_that_are_hit_at_once_the_lower_number_is_hit_first(kernel)
         kernel=kernel,
     )
     record = gas.follow(0.7, [0.7], log=True)
-    assert what_happened(record) == [('pair', 0, 1), ('pair', 0, 2)]
+    assert event_list(record) == [('pair', 0, 1), ('pair', 0, 2)]
     assert record.events['time'] == near([0.6, 0.6])
     expected = np.array([(-0.504, -0.672, 0), (3.2, 2.4, 0), (2.304, -1.728, 0)])
     assert record.velocities[0] == near(expected)
@@ -129,7 +129,7 @@ def test_a_bead_leaves_each_wall_with_the_restitution_of_that_wall(kernel, axis,
     velocity[axis] = outward
     gas = gas_of([(5, 5, 5)], [velocity], wall_restitution=of_walls, masses=2.0, kernel=kernel)
     record = gas.follow(6.0, [6.0], log=True)
-    assert what_happened(record) == [('wall', 0, wall)]
+    assert event_list(record) == [('wall', 0, wall)]
     expected = np.full(3, 5 + 6 * 0.125)
     expected[axis] = 5 + outward * (4 - 2 * of_walls[wall])
     assert record.positions[0, 0] == near(expected)
@@ -145,7 +145,7 @@ def test_a_bead_leaves_each_wall_with_the_restitution_of_that_wall(kernel, axis,
 def test_a_bead_in_a_corner_meets_three_walls_one_after_the_other(kernel):
     gas = gas_of([(5, 5, 5)], [(1, 1, 1)], wall_restitution=0.5, kernel=kernel)
     record = gas.follow(5.0, [4.0, 5.0], log=True)
-    assert what_happened(record) == [('wall', 0, 1), ('wall', 0, 3), ('wall', 0, 5)]
+    assert event_list(record) == [('wall', 0, 1), ('wall', 0, 3), ('wall', 0, 5)]
     assert record.positions[0, 0].tolist() == [9.0, 9.0, 9.0]
     assert record.velocities[1, 0].tolist() == [-0.5, -0.5, -0.5]
 
@@ -154,7 +154,7 @@ def test_a_bead_meets_a_wall_before_a_bead_that_it_meets_at_the_same_instant(ker
     """It moves along x and y by 1; both contacts come after exactly 1 s."""
     gas = gas_of([(8, 2, 5), (9, 5, 5)], [(1, 1, 0), (0, 0, 0)], kernel=kernel)
     record = gas.follow(1.0, [1.0], log=True)
-    assert what_happened(record) == [('wall', 0, 1), ('pair', 0, 1)]
+    assert event_list(record) == [('wall', 0, 1), ('pair', 0, 1)]
     assert record.velocities[0].tolist() == [[-1, 0, 0], [0, 1, 0]]
 
 
@@ -177,7 +177,7 @@ def test_beads_that_part_in_a_periodic_box_meet_on_its_other_side(kernel, apart,
     gas = gas_of(places, velocities, box=(side,) * 3, periodic=ALWAYS, kernel=kernel)
     meeting = (side - apart - 2.0) / 2.0
     record = gas.follow(meeting + 0.5, [meeting + 0.5], log=True)
-    assert what_happened(record) == [('pair', 0, 1)]
+    assert event_list(record) == [('pair', 0, 1)]
     assert record.events['time'] == near([meeting])
     assert record.velocities[0, :, axis] == near([1, -1])
     assert record.positions[0, :, axis] == near([5.5 - meeting, 4.5 + apart + meeting])
@@ -194,7 +194,7 @@ def test_beads_that_approach_across_half_a_periodic_box_meet_in_its_middle(kerne
     gas = gas_of(places, velocities, box=(8, 8, 8), periodic=ALWAYS, kernel=kernel)
     meeting = 0.5 * (apart - 2.0)
     record = gas.follow(meeting + 0.5, [meeting + 0.5], log=True)
-    assert what_happened(record) == [('pair', 0, 1)]
+    assert event_list(record) == [('pair', 0, 1)]
     assert record.events['time'] == near([meeting])
     assert record.positions[0, :, axis] == near([2.5, 5.5])
 

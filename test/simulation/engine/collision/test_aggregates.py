@@ -1,4 +1,4 @@
-"""Bodies: beads that stick to each other and to walls, worked out by hand, and in gases."""
+"""Beads that stick to each other and to walls, against solutions by hand, and in gases."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 
 
-def what_happened(record):
+def event_list(record):
     return [(row['kind'].item(), row['bead'], row['partner']) for row in record.events]
 
 
@@ -65,7 +65,7 @@ def test_beads_meet_once_for_all_and_sticking_goes_before_the_contact_duration(k
         kernel=kernel,
     )
     record = gas.follow(50.0, [50.0], log=True)
-    assert what_happened(record) == [('pair', 0, 1), ('wall', 1, 1), ('merge', 0, 1)]
+    assert event_list(record) == [('pair', 0, 1), ('wall', 1, 1), ('merge', 0, 1)]
     assert record.bodies.tolist() == [[0, 0]]
 
 
@@ -80,7 +80,7 @@ def test_a_merged_body_bounces_as_one(kernel):
         kernel=kernel,
     )
     record = gas.follow(2.6, [1.5, 2.6], log=True)
-    assert what_happened(record) == [('merge', 0, 1), ('pair', 1, 2), ('wall', 0, 0)]
+    assert event_list(record) == [('merge', 0, 1), ('pair', 1, 2), ('wall', 0, 0)]
     assert record.velocities[0, :, 0] == near([-2, -2, 0.5])
     assert record.velocities[1, :, 0] == near([2, 2, 0.5])
     assert record.events['impulse'] == near([0.5, 5.0, 8.0])
@@ -97,7 +97,7 @@ def test_the_smallest_number_names_a_body_whoever_merges_last(kernel):
         kernel=kernel,
     )
     record = gas.follow(3.0, [0.9, 1.05, 3.0], log=True)
-    assert what_happened(record) == [('merge', 1, 2), ('merge', 0, 2)]
+    assert event_list(record) == [('merge', 1, 2), ('merge', 0, 2)]
     assert record.bodies.tolist() == [[0, 1, 2], [0, 1, 1], [0, 0, 0]]
     assert record.velocities[2, :, 0] == near([1 / 6] * 3)
     assert not gas.stuck.any()
@@ -115,7 +115,7 @@ def test_a_slow_bead_stays_at_a_wall_and_reflects_as_one_of_infinite_mass(kernel
         kernel=kernel,
     )
     record = gas.follow(8.0, [8.0], log=True)
-    assert what_happened(record) == [('fix', 0, 0), ('pair', 0, 1)]
+    assert event_list(record) == [('fix', 0, 0), ('pair', 0, 1)]
     assert record.events['time'] == near([4.0, 6.0])
     assert record.events['impulse'] == near([0.5, 3 * 1.5 * 2])
     assert gas.stuck.tolist() == [True, False]
@@ -140,7 +140,7 @@ def test_slow_beads_stay_at_a_wall_by_the_speed_that_is_to_count(kernel, kind, r
     """The speed is 1.3, along the normal 0.5."""
     gas = gas_of([(3, 2, 5)], [(-0.5, 1.2, 0)], kernel=kernel, **rules)
     record = gas.follow(5.0, [5.0], log=True)
-    assert what_happened(record) == [(kind, 0, 0)]
+    assert event_list(record) == [(kind, 0, 0)]
     assert record.events['normal_speed'] == near([0.5])
     assert record.events['impulse'] == near([1.3 if kind == 'fix' else 1.0])
     expected = (0, 0, 0) if kind == 'fix' else (0.5, 1.2, 0)
@@ -157,7 +157,7 @@ def test_what_sticks_to_a_bead_at_a_wall_is_stuck_too(kernel):
         kernel=kernel,
     )
     record = gas.follow(60.0, [5.0, 15.0, 60.0], log=True)
-    assert what_happened(record) == [('fix', 0, 0), ('merge', 0, 1), ('merge', 1, 2)]
+    assert event_list(record) == [('fix', 0, 0), ('merge', 0, 1), ('merge', 1, 2)]
     assert gas.stuck.all()
     assert gas.bodies.tolist() == [0, 0, 0]
     assert record.positions[2, :, 0] == near([1, 3, 5])
@@ -175,7 +175,7 @@ def test_a_body_stops_as_a_whole_at_a_wall_that_one_of_its_beads_reaches(kernel)
         kernel=kernel,
     )
     record = gas.follow(10.0, [10.0], log=True)
-    assert what_happened(record) == [('merge', 0, 1), ('fix', 0, 0)]
+    assert event_list(record) == [('merge', 0, 1), ('fix', 0, 0)]
     assert record.positions[0, :, 0] == near([1, 3])
     assert gas.stuck.all()
     assert gas.ledger[3] == near(2 * 0.5)
