@@ -65,7 +65,7 @@ class Calibration:
     residual_px: float = math.nan
 
 
-def view_of(info: CameraInfo, place: str) -> View:
+def rectified_view(info: CameraInfo, place: str) -> View:
     """The rectified view that a camera_info describes.
 
     Parameters

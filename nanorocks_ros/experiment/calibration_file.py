@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 import yaml
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, view_of
+from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, rectified_view
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.experiment.view import IDENTITY
 from nanorocks_ros.experiment.yaml_lines import YamlLines, parse_yaml, read_text
@@ -59,7 +59,7 @@ class _File(YamlLines):
             raise self.error(top['pixels_per_metre'], f'a scale of {scale:g}', 'give px per metre')
         residual = self._numbers(top['residual_px'], 1)[0] if 'residual_px' in top else math.nan
         return Calibration(
-            view=view_of(info, place),
+            view=rectified_view(info, place),
             pixels_per_metre=scale,
             regions=self._regions(top['trays']),
             residual_px=residual,

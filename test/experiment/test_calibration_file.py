@@ -7,7 +7,7 @@ import math
 import pytest
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, view_of
+from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, rectified_view
 from nanorocks_ros.experiment.calibration_file import (
     calibrated,
     load_calibration,
@@ -27,7 +27,7 @@ REGIONS = {1: Region(535, 102, 188, 188), 3: Region(985, 352, 400, 125)}
 
 
 def calibration(**values):
-    numbers = {'info': INFO, 'view': view_of(INFO, 'test'), 'pixels_per_metre': 12503.25}
+    numbers = {'info': INFO, 'view': rectified_view(INFO, 'test'), 'pixels_per_metre': 12503.25}
     return Calibration(**{'regions': REGIONS, 'residual_px': 0.125, **numbers, **values})
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.calibration import CameraInfo, view_of
+from nanorocks_ros.experiment.calibration import CameraInfo, rectified_view
 from nanorocks_ros.experiment.lens import Camera
 from nanorocks_ros.experiment.view import View
 
@@ -45,7 +45,7 @@ def by_opencv(camera_info):
 def test_every_pixel_comes_from_where_opencv_takes_it(model, d):
     camera_info = info(distortion_model=model, d=d, r=TURN, p=P)
     x, y = np.meshgrid(np.arange(0, 1920, 97), np.arange(0, 1080, 83))
-    source_px = view_of(camera_info, 'test').source(np.stack([x, y], axis=-1) + 0.5) - 0.5
+    source_px = rectified_view(camera_info, 'test').source(np.stack([x, y], axis=-1) + 0.5) - 0.5
     map_x, map_y = by_opencv(camera_info)
     assert source_px[..., 0] == pytest.approx(map_x[y, x], abs=2e-3)
     assert source_px[..., 1] == pytest.approx(map_y[y, x], abs=2e-3)
@@ -60,7 +60,7 @@ def test_without_r_and_p_the_view_is_that_of_the_camera_itself():
         centre=(955.5, 541.5),
         distortion=(-0.02, 0.004, 0.001, 0.0),
     )
-    assert view_of(zeros, 'test') == view_of(info(), 'test') == View(camera=camera)
+    assert rectified_view(zeros, 'test') == rectified_view(info(), 'test') == View(camera=camera)
 
 
 @pytest.mark.parametrize(
@@ -80,4 +80,4 @@ def test_without_r_and_p_the_view_is_that_of_the_camera_itself():
 )
 def test_a_camera_that_cannot_be_is_refused_by_name(values, message):
     with pytest.raises(ConfigurationError, match=f'^/camera_info: .*{message}'):
-        view_of(info(**values), '/camera_info')
+        rectified_view(info(**values), '/camera_info')
