@@ -24,7 +24,7 @@ trays:
 
 
 @pytest.mark.parametrize('number', range(1, 9))
-def test_a_tray_is_as_table_1_of_the_paper_says(number):
+def test_trays_agree_with_table_1_of_the_paper(number):
     tray = load_trays()[number]
     printed = PAPER['table1_trays'][str(number)]
     assert [1e3 * side for side in tray.dimensions] == pytest.approx(printed['dims_mm'])
@@ -76,7 +76,7 @@ def test_derived_quantities_of_tray_1_are_those_of_the_worked_example():
     assert 1e6 * tray.mean_mass == pytest.approx(expected['m_mg_from_density'])
 
 
-def test_a_good_file_of_ones_own_is_read(tmp_path):
+def test_a_user_file_is_read(tmp_path):
     path = tmp_path / 'mine.yaml'
     path.write_text(GOOD)
     assert load_trays(path)[1].count == 15

@@ -42,7 +42,7 @@ def by_opencv(camera_info):
         ('plumb_bob', (-0.11, 0.02, 0.001, -0.002, 0.003)),
     ],
 )
-def test_every_pixel_comes_from_where_opencv_takes_it(model, d):
+def test_the_map_agrees_with_opencv(model, d):
     camera_info = info(distortion_model=model, d=d, r=TURN, p=P)
     x, y = np.meshgrid(np.arange(0, 1920, 97), np.arange(0, 1080, 83))
     source_px = rectified_view(camera_info, 'test').source(np.stack([x, y], axis=-1) + 0.5) - 0.5
@@ -78,6 +78,6 @@ def test_without_r_and_p_the_view_is_that_of_the_camera_itself():
         ({'d': (-5.0, 0.0, 0.0, 0.0)}, 'folds the picture over'),
     ],
 )
-def test_a_camera_that_cannot_be_is_refused_by_name(values, message):
+def test_an_invalid_camera_info_is_refused(values, message):
     with pytest.raises(ConfigurationError, match=f'^/camera_info: .*{message}'):
         rectified_view(info(**values), '/camera_info')

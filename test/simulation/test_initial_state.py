@@ -92,7 +92,7 @@ def test_beads_larger_than_the_tray_are_refused():
         replace(acrylic(), properties=replace(acrylic().properties, density=0.0)),
     ],
 )
-def test_species_that_cannot_be_are_refused(species):
+def test_invalid_species_are_refused(species):
     with pytest.raises(SimulationError, match='give positive sizes'):
         inventory(tray_of(species))
 

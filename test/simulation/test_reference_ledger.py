@@ -69,7 +69,7 @@ GASES = {
 
 
 @pytest.mark.parametrize('name', GASES)
-def test_the_books_add_up_and_nothing_overlaps(name):
+def test_the_ledger_balances_and_nothing_overlaps(name):
     gas = shaken_gas(Rules(**GASES[name]))
     had, moved = energy(gas), momentum(gas)
     kinds, time = set(), 0.0

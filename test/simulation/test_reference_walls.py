@@ -109,7 +109,7 @@ def test_a_long_flight_passes_many_images():
     assert event.time > 50.0
 
 
-def test_beads_that_never_meet_are_left_alone():
+def test_beads_without_contact_do_not_change():
     gas = gas_of([(2, 2, 2), (6, 6, 6)], [(1, 0, 0), (1, 0, 0)], rules=Rules(periodic=ALWAYS))
     assert gas.step(1000.0) is None
     assert gas.time == 0.0

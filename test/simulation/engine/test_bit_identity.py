@@ -50,19 +50,19 @@ def fingerprint(name, kernel):
 
 
 @pytest.mark.parametrize('name', GOLDEN)
-def test_the_course_has_not_changed(name):
+def test_trajectories_match_stored_checksums(name):
     scan, lists = (fingerprint(name, kernel) for kernel in KERNELS)
     assert {'scan': scan, 'lists': lists} == GOLDEN[name]
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
 @pytest.mark.parametrize('name', RULES)
-def test_the_same_gas_twice_is_the_same(name, kernel):
+def test_two_runs_are_bit_identical(name, kernel):
     assert fingerprint(name, kernel) == fingerprint(name, kernel)
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
-def test_the_last_bit_of_one_place_changes_the_course(kernel):
+def test_one_changed_bit_of_a_position_changes_the_trajectories(kernel):
     """What is compared above is as sharp as can be."""
     rules = CollisionRules(box=BOX, periodic=ALWAYS)
     beads = beads_for(rules, 6)

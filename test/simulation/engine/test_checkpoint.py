@@ -29,7 +29,7 @@ def remaining_record(gas):
 
 
 def assert_identical(first, second):
-    """Every bit of two courses."""
+    """Assert that two run records agree bit by bit."""
     for field in ('times', 'positions', 'velocities', 'spins', 'bodies', 'events'):
         a, b = getattr(first, field), getattr(second, field)
         assert (a is None) == (b is None), field
@@ -43,7 +43,7 @@ def assert_identical(first, second):
 
 @pytest.mark.parametrize('kernel', KERNELS)
 @pytest.mark.parametrize('name', RULES)
-def test_a_saved_gas_goes_on_bit_by_bit(tmp_path, name, kernel):
+def test_a_loaded_gas_continues_bit_by_bit(tmp_path, name, kernel):
     path = tmp_path / 'gas.npz'
     straight = gas_for(name, kernel)
     straight.run_until(HALF)
@@ -99,11 +99,11 @@ def test_a_loaded_gas_can_be_kicked_and_seen_by_species(tmp_path):
     gas.save(tmp_path / 'gas')
     loaded = HardSphereGas.load(tmp_path / 'gas')
     velocities = np.random.default_rng(1).normal(size=(20, 3))
-    courses = []
+    records = []
     for copy in (gas, loaded):
         copy.kick(velocities)
-        courses.append(remaining_record(copy))
-    assert_identical(*courses)
+        records.append(remaining_record(copy))
+    assert_identical(*records)
     np.testing.assert_array_equal(loaded.beads().species, mixture(8, 20, SPECIES).species)
 
 
@@ -119,14 +119,14 @@ def saved(tmp_path):
     return path
 
 
-def test_a_file_is_replaced_whole_and_leaves_no_other_behind(saved):
+def test_a_checkpoint_is_replaced_atomically(saved):
     gas = gas_for('elastic', n=4)
     gas.save(saved)
     assert HardSphereGas.load(saved).radii.size == 4
     assert [path.name for path in saved.parent.iterdir()] == [saved.name]
 
 
-def test_where_nothing_can_be_written_the_error_names_the_file(tmp_path):
+def test_an_unwritable_path_is_named(tmp_path):
     gas = gas_for('elastic', n=3)
     for path in (tmp_path / 'no folder' / 'gas', tmp_path):
         with pytest.raises(SimulationError) as error:
@@ -143,7 +143,7 @@ def refused(path):
     return str(error.value)
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path):
+def test_a_missing_file_is_named(tmp_path):
     assert 'No such file' in refused(tmp_path / 'nothing')
     refused(tmp_path)
 

@@ -37,7 +37,7 @@ def crowd(seed=1):
 @pytest.mark.parametrize(
     ('restitution', 'of_walls'), [(0.3, 0.5), (0.0, 0.5), (0.5, 0.0), (0.0, 0.0)]
 )
-def test_a_gas_that_would_collapse_comes_to_its_end(kernel, restitution, of_walls):
+def test_the_contact_duration_prevents_collapse(kernel, restitution, of_walls):
     beads = crowd()
     rules = CollisionRules(box=TRAY, restitution=restitution, wall_restitution=of_walls)
     gas = HardSphereGas(beads, rules, kernel)
@@ -48,7 +48,7 @@ def test_a_gas_that_would_collapse_comes_to_its_end(kernel, restitution, of_wall
     assert smallest_gap(record.positions, beads.radii, rules) > -1e-10 * beads.radii.min()
 
 
-def test_beads_that_neither_bounce_nor_stick_come_to_rest_beside_one_another(kernel):
+def test_beads_of_restitution_0_come_to_rest_in_contact(kernel):
     """Restitution 0: all of the normal velocity goes, at once and once."""
     gas = gas_of(
         [(3, 5, 5), (7, 5, 5)],
@@ -62,7 +62,7 @@ def test_beads_that_neither_bounce_nor_stick_come_to_rest_beside_one_another(ker
     assert record.positions[1] == near(np.array([(4, 6.5, 5), (6, 6.5, 5)]))
 
 
-def test_a_bead_that_does_not_bounce_slides_along_the_wall(kernel):
+def test_a_bead_of_restitution_0_slides_along_the_wall(kernel):
     gas = gas_of([(3, 5, 5)], [(-1, 0.25, 0)], wall_restitution=0.0, kernel=kernel)
     record = gas.follow(10.0, [10.0], log=True)
     assert len(record.events) == 1
@@ -194,13 +194,13 @@ class TestWithoutAContactDuration:
             gas.run_until(30.0)
         return gas, str(error.value)
 
-    def test_collapse_ends_in_an_error_that_says_what_to_do(self, kernel):
+    def test_collapse_ends_in_an_error_with_the_remedy(self, kernel):
         gas, message = self.collapsed(kernel)
         assert 'events taken and only 2 s of 30 s reached' in message
         assert 'raise most_events, the contact duration or the restitution' in message
         assert gas.now == near(2.0, 1e-5)
 
-    def test_the_collapsed_gas_can_still_be_looked_at(self, kernel):
+    def test_a_collapsed_gas_can_still_be_read(self, kernel):
         gas, _ = self.collapsed(kernel)
         beads = gas.beads()
         assert beads.positions[:, 0] == near([1, 3])
@@ -254,7 +254,7 @@ def test_the_log_does_not_lengthen_what_most_events_allow(kernel):
     assert all_taken(gas.counts) == 5000
 
 
-def test_progress_is_told_while_a_gas_is_followed(kernel):
+def test_progress_is_reported_during_a_run(kernel):
     rules = CollisionRules(box=(8, 7, 6.5))
     gas = HardSphereGas(mixture(1, 10, rules), rules, kernel)
     reported = []

@@ -37,7 +37,7 @@ def pair_of_gases(beads, rules, kernel, quantum=OFTEN):
 
 @pytest.mark.parametrize('quantum', [2.0**-10, OFTEN, 0.125])
 @pytest.mark.parametrize('name', RULES)
-def test_the_course_until_chaos_is_the_same(kernel, name, quantum):
+def test_trajectories_agree_until_chaos(kernel, name, quantum):
     """With events much rarer than time is counted anew, as rare, and more frequent."""
     rules = CollisionRules(box=BOX, **RULES[name])
     gas, often = pair_of_gases(mixture(9, 10, rules), rules, kernel, quantum)
@@ -63,7 +63,7 @@ def test_the_course_until_chaos_is_the_same(kernel, name, quantum):
     assert often.now == end
 
 
-def test_contacts_are_remembered_while_time_is_counted_anew(kernel):
+def test_contacts_are_kept_across_epochs(kernel):
     """The second contact of the pair comes 8 s after the first, within 8.1 s but not 7.9 s."""
     for duration, speed in ((7.9, 0.25), (8.1, 0.5)):
         gas = gas_of(
@@ -81,7 +81,7 @@ def test_contacts_are_remembered_while_time_is_counted_anew(kernel):
         assert record.velocities[0, 1, 0] == near(speed)
 
 
-def test_walls_go_on_moving_while_time_is_counted_anew(kernel):
+def test_walls_move_on_across_epochs(kernel):
     motion = WallMotion(amplitude=(0.3, 0, 0), angular_frequency=2 * np.pi, start=20.25)
     gas = gas_of([(5, 5, 5)], [(0, 0.25, 0)], motion=motion, kernel=kernel)
     gas._state.clock[QUANTUM] = 0.5
@@ -93,7 +93,7 @@ def test_walls_go_on_moving_while_time_is_counted_anew(kernel):
     assert gas.follow(21.0, log=True).events['partner'].tolist() == [3]
 
 
-def test_frames_fall_where_they_should_whatever_time_is_counted_from(kernel):
+def test_frame_times_do_not_depend_on_epochs(kernel):
     gas = gas_of([(5, 5, 5)], [(0.5, 0, 0)], box=(9, 10, 10), kernel=kernel)
     gas._state.clock[QUANTUM] = 0.25
     times = np.arange(0.0, 1000.0, 0.37)
@@ -141,7 +141,7 @@ def test_a_run_of_very_many_epochs_keeps_energy_and_gaps(kernel, periodic):
     assert rates[1] == pytest.approx(rates[0], rel=0.2)
 
 
-def test_time_is_counted_anew_by_itself_in_a_long_run(kernel):
+def test_a_long_run_starts_new_epochs(kernel):
     gas = gas_of([(5, 5, 5)], [(1, 0.7, 0.4)], kernel=kernel)
     quantum = gas._state.clock[QUANTUM]
     crossing = 10 / np.sqrt(1.65)

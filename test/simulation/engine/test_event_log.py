@@ -128,7 +128,7 @@ def test_a_long_log_holds_every_event_once(kernel):
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
-def test_a_log_changes_nothing(kernel):
+def test_the_event_log_does_not_change_the_trajectories(kernel):
     rules = CollisionRules(box=BOX, restitution=0.99)
     beads = mixture(7, BEADS, rules)
     logged, silent = (HardSphereGas(beads, rules, kernel) for _ in range(2))

@@ -25,7 +25,7 @@ cases = pytest.mark.parametrize('kernel', KERNELS)
 
 @cases
 @pytest.mark.parametrize('name', RULES)
-def test_means_are_those_of_the_frames(name, kernel):
+def test_means_agree_with_the_frames(name, kernel):
     beads, _, record = followed(name, kernel)
     seen = record.observations
     v = record.velocities
@@ -42,7 +42,7 @@ def test_means_are_those_of_the_frames(name, kernel):
 
 @cases
 @pytest.mark.parametrize('name', RULES)
-def test_counts_are_those_of_the_events_until_then(name, kernel):
+def test_counts_agree_with_the_event_log(name, kernel):
     _, gas, record = followed(name, kernel)
     seen, events = record.observations, record.events
     for kind, counts in (
@@ -64,7 +64,7 @@ def test_counts_are_those_of_the_events_until_then(name, kernel):
 
 @cases
 @pytest.mark.parametrize('name', RULES)
-def test_the_books_are_those_of_the_frames_and_events_until_then(name, kernel):
+def test_the_ledger_agrees_with_frames_and_events(name, kernel):
     beads, gas, record = followed(name, kernel)
     seen = record.observations
     left = energy(beads, record.velocities, record.spins)
@@ -82,7 +82,7 @@ def test_the_books_are_those_of_the_frames_and_events_until_then(name, kernel):
 
 
 @cases
-def test_what_is_written_down_counts_on_when_a_gas_is_followed_further(kernel):
+def test_observations_continue_over_several_runs(kernel):
     rules = CollisionRules(box=BOX, restitution=0.9)
     beads = mixture(3, 14, rules)
     straight = HardSphereGas(beads, rules, kernel).follow(END, (), TIMES).observations
@@ -94,7 +94,7 @@ def test_what_is_written_down_counts_on_when_a_gas_is_followed_further(kernel):
 
 
 @cases
-def test_temperatures_of_species_without_beads_are_not_known(kernel):
+def test_temperatures_of_species_without_beads_are_nan(kernel):
     gas = gas_of(
         [(2, 5, 5), (8, 5, 5)],
         [(1, 2, 3), (0.5, 0, 0)],
@@ -110,7 +110,7 @@ def test_temperatures_of_species_without_beads_are_not_known(kernel):
 
 
 @cases
-def test_species_may_be_told_apart_though_they_bounce_alike(kernel):
+def test_species_may_have_equal_restitutions(kernel):
     gas = gas_of(
         [(3, 5, 5), (7, 5, 5)],
         [(1, 0, 0), (-1, 0, 0)],
@@ -125,7 +125,7 @@ def test_species_may_be_told_apart_though_they_bounce_alike(kernel):
 
 
 @cases
-def test_nothing_asked_for_is_an_empty_course(kernel):
+def test_a_run_without_output_has_an_empty_record(kernel):
     rules = CollisionRules(box=BOX)
     record = HardSphereGas(mixture(3, 5, rules), rules, kernel).follow(1.0)
     assert record.positions.shape == record.velocities.shape == (0, 5, 3)

@@ -100,7 +100,7 @@ def test_energy_never_rises_and_nothing_overlaps_while_the_walls_are_at_rest(cas
     st.lists(st.floats(0.0, END), max_size=30),
     st.lists(st.floats(0.0, END), max_size=8),
 )
-def test_neither_frames_nor_observations_nor_pauses_change_the_course(case, looks, pauses):
+def test_frames_observations_and_pauses_do_not_change_the_trajectories(case, looks, pauses):
     rules, beads, kernel = case
     straight = HardSphereGas(beads, rules, kernel)
     paused = HardSphereGas(beads, rules, kernel)
@@ -153,7 +153,7 @@ smooth_and_loose = rules_at_rest(bouncing).map(
 
 @settings(deadline=None, max_examples=40)
 @given(gases(smooth_and_loose), st.randoms(use_true_random=False))
-def test_other_numbers_for_smooth_loose_beads_change_no_bit_of_the_scan(case, random):
+def test_renumbered_smooth_beads_change_no_bit_of_the_scan(case, random):
     rules, beads, _ = case
     order = np.arange(len(beads.radii))
     random.shuffle(order)
@@ -168,7 +168,7 @@ def test_other_numbers_for_smooth_loose_beads_change_no_bit_of_the_scan(case, ra
 
 @settings(deadline=None, max_examples=40, derandomize=True)
 @given(gases(rules_at_rest(bouncing)), st.randoms(use_true_random=False))
-def test_other_numbers_for_the_beads_change_rounding_alone(case, random):
+def test_renumbered_beads_change_only_rounding(case, random):
     rules, beads, kernel = case
     order = np.arange(len(beads.radii))
     random.shuffle(order)

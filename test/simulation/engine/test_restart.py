@@ -23,7 +23,7 @@ def running(name, kernel, n=14):
 
 
 @pytest.mark.parametrize('name', ['inelastic', 'periodic', 'species'])
-def test_a_kick_keeps_places_and_starts_time_again(kernel, name):
+def test_a_kick_keeps_positions_and_restarts_time(kernel, name):
     gas, _ = running(name, kernel)
     before, counts, ledger = gas.beads(), gas.counts, gas.ledger
     velocities = np.random.default_rng(1).normal(size=(14, 3))
@@ -40,7 +40,7 @@ def test_a_kick_keeps_places_and_starts_time_again(kernel, name):
         np.testing.assert_array_equal(getattr(after, field), getattr(before, field))
 
 
-def test_a_kick_parts_bodies_frees_what_was_stuck_and_stops_spins(kernel):
+def test_a_kick_separates_bodies_and_stops_spins(kernel):
     gas, _ = running('rough and sticking', kernel)
     assert gas.counts.merge > 0
     assert gas.stuck.any()
@@ -55,7 +55,7 @@ def test_a_kick_parts_bodies_frees_what_was_stuck_and_stops_spins(kernel):
     assert gas.counts.pair > collisions + 10
 
 
-def test_a_kick_of_nothing_stops_a_gas(kernel):
+def test_a_kick_of_zero_velocities_stops_a_gas(kernel):
     gas, _ = running('inelastic', kernel)
     places = gas.beads().positions
     collisions = gas.counts.pair
@@ -89,7 +89,7 @@ def test_many_kicks_add_no_energy_but_their_own(kernel):
     assert energy(gas.beads()) + gas.ledger[0] == near(given)
 
 
-def test_a_gas_can_be_set_going_with_the_same_beads_elsewhere(kernel):
+def test_a_gas_restarts_with_its_beads_at_other_positions(kernel):
     gas, rules = running('rough', kernel)
     counts = gas.counts
     beads = mixture(12, 14, rules)
@@ -101,7 +101,7 @@ def test_a_gas_can_be_set_going_with_the_same_beads_elsewhere(kernel):
     assert gas.counts.pair > counts.pair
 
 
-def test_a_gas_is_not_set_going_with_other_beads(kernel):
+def test_a_restart_with_another_number_of_beads_is_refused(kernel):
     gas, rules = running('inelastic', kernel)
     before = gas.beads()
     with pytest.raises(SimulationError, match='beads: 13 of them; give 14'):

@@ -39,7 +39,7 @@ def gas_and_record(beads, rules, kernel, end=None):
 
 
 def assert_alike(record, second, matrix=None, shift=0.0, spin_matrix=None):
-    """Whether one course is the other, turned and shifted."""
+    """Assert that a run record is another one, rotated and shifted."""
     matrix = np.eye(3) if matrix is None else matrix
     np.testing.assert_allclose(second.positions, record.positions @ matrix.T + shift, atol=CHAOS)
     np.testing.assert_allclose(second.velocities, record.velocities @ matrix.T, atol=CHAOS)
@@ -81,7 +81,7 @@ def turned(beads, rules, matrix, shift):
 
 @few
 @given(name=names, seed=seeds, order=st.permutations(range(3)))
-def test_axes_may_have_other_names(kernel, name, seed, order):
+def test_permuted_axes_permute_the_trajectories(kernel, name, seed, order):
     rules = CollisionRules(box=BOX, **RULES[name])
     beads = mixture(seed, BEADS, rules)
     matrix = np.eye(3)[list(order)]
@@ -92,7 +92,7 @@ def test_axes_may_have_other_names(kernel, name, seed, order):
 
 @few
 @given(name=names, seed=seeds, signs=st.tuples(*[st.sampled_from([1.0, -1.0])] * 3))
-def test_a_mirror_shows_the_mirrored_course(kernel, name, seed, signs):
+def test_a_mirrored_gas_has_mirrored_trajectories(kernel, name, seed, signs):
     rules = CollisionRules(box=BOX, **RULES[name])
     beads = mixture(seed, BEADS, rules)
     matrix = np.diag(signs)
@@ -197,7 +197,7 @@ def test_units_that_are_powers_of_two_change_no_bit(kernel, name):
 
 @few
 @given(seed=seeds, periodic=st.tuples(*[st.booleans()] * 3))
-def test_an_elastic_gas_turned_round_goes_back_to_where_it_came_from(kernel, seed, periodic):
+def test_an_elastic_gas_is_time_reversible(kernel, seed, periodic):
     rules = CollisionRules(box=BOX, periodic=periodic)
     random = np.random.default_rng(seed)
     beads = mixture(seed, BEADS, rules)

@@ -99,7 +99,7 @@ def test_a_flown_tray_is_filled_one_bead_after_the_other(number):
 
 
 @pytest.mark.parametrize('periodic', [AROUND, (True, False, False), (False, True, True)])
-def test_so_is_a_periodic_box_with_beads_of_many_sizes(periodic):
+def test_random_sequential_insertion_of_many_sizes_in_a_periodic_box(periodic):
     radii = np.linspace(0.02, 1.0, 60) ** 2
     sides = cube_filled_to(0.25, radii) * [1.3, 1.0, 1.0 / 1.3]
     positions, placed = pack_beads(radii, sides, periodic, KEY, MOST_TRIES)
@@ -112,7 +112,7 @@ def test_so_is_a_periodic_box_with_beads_of_many_sizes(periodic):
 @pytest.mark.parametrize('periodic', [WALLS, AROUND])
 @pytest.mark.parametrize('filling', [0.10, 0.20, 0.30, 0.35, 0.40, 0.45])
 @pytest.mark.parametrize('count', [40, 300])
-def test_alike_beads_fill_a_cube_up_to_0_45(count, filling, periodic):
+def test_equal_beads_fill_a_cube_up_to_0_45(count, filling, periodic):
     radii = np.full(count, 0.001)
     sides = cube_filled_to(filling, radii)
     positions = random_positions(radii, sides, periodic=periodic, key=KEY)
@@ -120,7 +120,7 @@ def test_alike_beads_fill_a_cube_up_to_0_45(count, filling, periodic):
 
 
 @pytest.mark.parametrize('count', range(2, 9))
-def test_so_do_very_few_where_there_are_no_walls(count):
+def test_very_few_beads_fill_a_periodic_box_up_to_0_45(count):
     radii = np.full(count, 0.5)
     sides = cube_filled_to(0.45, radii)
     for key in range(20):
@@ -309,7 +309,7 @@ def test_those_that_found_room_are_the_largest_and_have_valid_places():
         ([0.5] * 99, (3, 3, 3), r'beads: fill 1\.92 of the box; give fewer beads'),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(radii, sides, message):
+def test_invalid_input_is_refused_in_one_line(radii, sides, message):
     for periodic in (False, True):
         with pytest.raises(SimulationError, match=f'^{message}') as caught:
             random_positions(radii, sides, periodic=periodic, key=KEY)
@@ -317,13 +317,13 @@ def test_what_cannot_be_is_refused_in_one_line(radii, sides, message):
 
 
 @pytest.mark.parametrize('flags', [(True, False), 'yes', 1, None])
-def test_flags_that_are_none_are_refused(flags):
+def test_invalid_flags_are_refused(flags):
     with pytest.raises(SimulationError, match=r'^periodic: .*; give True or False, or three'):
         random_positions([0.5], (4, 4, 4), periodic=flags, key=KEY)
 
 
 @pytest.mark.parametrize('radius', [0.0, -0.5, math.nan, math.inf, 2.0])
-def test_compiled_code_places_none_where_one_cannot_be(radius):
+def test_compiled_code_places_no_bead_when_one_does_not_fit(radius):
     radii = np.array([0.5, radius, 0.5])
     assert pack_beads(radii, np.full(3, 4.0), WALLS, KEY, 100)[1] == 0
 

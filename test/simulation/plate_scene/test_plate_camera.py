@@ -100,7 +100,7 @@ def test_the_plate_moves_by_its_displacement_to_a_twentieth_of_a_pixel():
     np.testing.assert_allclose(shift, np.array(displacement) * SCALE, atol=0.05)
 
 
-def test_no_picture_leaves_a_trace_in_the_next():
+def test_pictures_do_not_depend_on_earlier_ones():
     scene = replace(SceneSettings(), pixels_per_metre=SCALE, noise=0.0)
     first, second = (camera_with_one.__wrapped__(2, scene) for _ in range(2))
     first_place, second_place = (0.004, 0.005, 0.001), (0.030, 0.0052, 0.002)
@@ -184,7 +184,7 @@ def test_light_falls_towards_the_edge_by_the_vignetting_and_rises_by_the_gradien
     assert falls[0] - falls[1] == pytest.approx(0.4, abs=0.03)
 
 
-def test_bands_of_light_roll_over_the_picture_and_come_round():
+def test_bands_of_light_are_periodic():
     camera = empty_camera(replace(PLAIN, flicker=0.1, flicker_period=4.0))
     levels = [
         camera.picture({}, 0, time=t).astype(float)[380].mean() for t in np.arange(0, 4, 0.25)
@@ -309,7 +309,7 @@ def test_beads_do_not_depend_on_what_other_effects_are_on():
     np.testing.assert_array_equal(glaring[part], first[part])
 
 
-def test_positions_that_cannot_be_drawn_are_refused():
+def test_invalid_positions_are_refused():
     camera = camera_with_one(1)
     with pytest.raises(SimulationError, match=r'positions of tray 1: shape \(2, 3\)'):
         camera.picture({1: np.zeros((2, 3))}, 0)
@@ -322,7 +322,7 @@ def test_positions_that_cannot_be_drawn_are_refused():
         camera.picture({1: np.full((1, 3), 0.005)}, 0, motion=far)
 
 
-def test_a_camera_that_cannot_be_is_refused():
+def test_an_invalid_camera_is_refused():
     with pytest.raises(ConfigurationError, match='lies outside a picture of 960 x 760 px'):
         empty_camera(SceneSettings(pixels_per_metre=14000.0))
     with pytest.raises(ConfigurationError, match='give four numbers and two'):

@@ -24,7 +24,7 @@ def film(simulation=SHAKEN, scene=SMALL):
     return SceneFilm(simulation, scene)
 
 
-def test_the_truth_is_that_of_the_gas_in_each_tray():
+def test_the_truth_agrees_with_the_gas_in_each_tray():
     scene_moment = film().at(9, 300_000_000)
     for truth, beads, number in zip(scene_moment.trays, scene_moment.beads, (1, 3), strict=True):
         gas = ShakenTray(replace(SHAKEN, tray=number), TRAYS[number], run=number)
@@ -41,12 +41,12 @@ def test_the_truth_is_that_of_the_gas_in_each_tray():
         ]
 
 
-def test_trays_with_the_same_beads_do_different_things():
+def test_trays_with_the_same_beads_differ():
     scene_moment = film(scene=replace(SMALL, trays=(2, 3))).at(9, 0)
     assert not np.array_equal(scene_moment.beads[0].velocities, scene_moment.beads[1].velocities)
 
 
-def test_one_tray_may_hold_another_gas_than_the_rest():
+def test_one_tray_may_have_other_settings():
     elastic = replace(SHAKEN, restitution=1.0, wall_restitution=1.0, seed=99, first_shake=0.2)
     moment = SceneFilm(SHAKEN, SMALL, gases={3: elastic}).at(9, 0)
     alone, same = film().at(9, 0).beads

@@ -204,7 +204,7 @@ def test_a_tray_that_fills_the_picture_has_no_surroundings():
     assert camera.picture(np.full((1, 3), 0.0075), 0).shape == (202, 202, 3)
 
 
-def test_what_cannot_be_drawn_is_refused():
+def test_invalid_input_of_the_camera_is_refused():
     with pytest.raises(SimulationError, match='202 x 202 px in a picture of 200 x 260'):
         camera_of(replace(QUIET, width_px=200))
     with pytest.raises(SimulationError, match='materials: 1 of them'):
@@ -221,6 +221,6 @@ def test_what_cannot_be_drawn_is_refused():
             camera.picture(bad, 0)
 
 
-def test_a_film_that_cannot_be_made_is_refused_at_once():
+def test_an_impossible_film_is_refused_at_once():
     with pytest.raises(SimulationError, match='found room for only'):
         film(SimulationSettings(), tray_of(acrylic(100)))

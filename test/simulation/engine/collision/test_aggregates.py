@@ -28,7 +28,7 @@ def event_list(record):
         ('merge', {'sticking_speed': 2.01, 'sticking_measure': 'total'}),
     ],
 )
-def test_slow_pairs_merge_by_the_speed_that_is_to_count(kernel, kind, rules):
+def test_slow_pairs_merge_by_the_chosen_speed_measure(kernel, kind, rules):
     """The relative speed is 2, along the normal 2 cos 30° = 1.732; masses 1 and 3."""
     gas = gas_of(
         [(2, 5, 5), (6, 6, 5)],
@@ -89,7 +89,7 @@ def test_a_merged_body_bounces_as_one(kernel):
     assert gas.counts.merge == 1
 
 
-def test_the_smallest_number_names_a_body_whoever_merges_last(kernel):
+def test_a_body_has_the_smallest_number_of_its_beads(kernel):
     gas = gas_of(
         [(8, 5, 5), (2, 5, 5), (5, 5, 5)],
         [(-0.5, 0, 0), (1, 0, 0), (0, 0, 0)],
@@ -136,7 +136,7 @@ def test_a_slow_bead_stays_at_a_wall_and_reflects_as_one_of_infinite_mass(kernel
         ('fix', {'wall_sticking_speed': 1.31, 'sticking_measure': 'total'}),
     ],
 )
-def test_slow_beads_stay_at_a_wall_by_the_speed_that_is_to_count(kernel, kind, rules):
+def test_slow_beads_stick_to_a_wall_by_the_chosen_speed_measure(kernel, kind, rules):
     """The speed is 1.3, along the normal 0.5."""
     gas = gas_of([(3, 2, 5)], [(-0.5, 1.2, 0)], kernel=kernel, **rules)
     record = gas.follow(5.0, [5.0], log=True)
@@ -147,7 +147,7 @@ def test_slow_beads_stay_at_a_wall_by_the_speed_that_is_to_count(kernel, kind, r
     assert record.velocities[0, 0] == near(expected)
 
 
-def test_what_sticks_to_a_bead_at_a_wall_is_stuck_too(kernel):
+def test_a_bead_that_sticks_to_a_stuck_bead_is_stuck(kernel):
     gas = gas_of(
         [(3, 5, 5), (8, 5, 5), (13, 5, 5)],
         [(-0.5, 0, 0), (-0.5, 0, 0), (-0.5, 0, 0)],

@@ -14,7 +14,7 @@ def event_list(record):
 
 
 @pytest.mark.parametrize('restitution', [0.0, 0.5, 0.89, 1.0])
-def test_two_beads_meet_head_on_when_and_as_momentum_and_restitution_say(kernel, restitution):
+def test_two_beads_collide_head_on(kernel, restitution):
     """Gap 2, closing speed 1.6: after 1.25 s. Their centre of mass moves at -0.2."""
     gas = gas_of(
         [(3, 5, 5), (7, 5, 5)],
@@ -56,7 +56,7 @@ def test_an_oblique_collision_changes_the_normal_velocity_alone(kernel):
     assert record.velocities[1] == near(np.array([(1.4, -2.7, 0), (1.2, 0.9, 0)]))
 
 
-def test_beads_that_pass_at_more_than_their_reach_do_not_collide(kernel):
+def test_beads_that_pass_at_a_distance_do_not_collide(kernel):
     gas = gas_of([(2, 5, 5), (8, 7.0000001, 5)], [(1, 0, 0), (-1, 0, 0)], kernel=kernel)
     gas.run_until(6.0)
     assert gas.counts.pair == 0
@@ -72,7 +72,7 @@ def test_a_graze_just_within_reach_turns_beads_by_next_to_nothing(kernel):
     assert record.velocities[0, 0, 1] == pytest.approx(-closing, rel=1e-6)
 
 
-def test_touching_beads_that_part_are_left_alone(kernel):
+def test_touching_beads_that_separate_do_not_collide(kernel):
     gas = gas_of([(4, 5, 5), (6, 5, 5)], [(-1, 0, 0), (1, 0, 0)], kernel=kernel)
     gas.run_until(2.5)
     assert gas.counts.pair == 0

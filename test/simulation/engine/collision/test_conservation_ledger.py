@@ -41,7 +41,7 @@ def states(gas):
 
 @pytest.mark.parametrize('kernel', KERNELS)
 @pytest.mark.parametrize('name', RULES)
-def test_energy_and_momentum_of_beads_and_books_are_kept(name, kernel):
+def test_energy_and_momentum_of_beads_and_ledger_are_conserved(name, kernel):
     gas, rules = gas_and_rules(name, kernel)
     start = gas.beads()
     had, moved = energy(start), momentum(start)
@@ -68,7 +68,7 @@ BOOKED = [
 
 @pytest.mark.parametrize('kernel', KERNELS)
 @pytest.mark.parametrize('name', BOOKED)
-def test_angular_momentum_of_rough_and_sticky_beads_and_books_is_kept(name, kernel):
+def test_angular_momentum_of_rough_and_sticky_beads_and_ledger_is_conserved(name, kernel):
     gas, rules = gas_and_rules(name, kernel)
     start = gas.beads()
     turned = angular_momentum(start)

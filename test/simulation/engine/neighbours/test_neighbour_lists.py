@@ -57,7 +57,7 @@ def most_in_a_cell(gas):
 
 @pytest.mark.parametrize('periodic', [NEVER, ALWAYS, (True, False, True)])
 @pytest.mark.parametrize(('spacing', 'events_per_bead'), [(2.05, 4), (3.0, 2), (7.0, 0.7)])
-def test_lists_find_what_asking_everybody_finds(periodic, spacing, events_per_bead):
+def test_lists_agree_with_the_scan(periodic, spacing, events_per_bead):
     """From half full to one part in a hundred, where chaos comes sooner; sizes from 0.5 to 1."""
     radii = np.random.default_rng(2).uniform(0.5, 1.0, 6 * 5 * 5)
     rules = CollisionRules(

@@ -41,7 +41,7 @@ def rebound(kernel, restitution, speed=2.0, **more):
     return (v[1] - v[0]) / speed
 
 
-def test_each_pair_of_species_has_its_own(kernel):
+def test_each_pair_of_species_has_its_own_restitution(kernel):
     table = [[0.1, 0.4, 0.3], [0.4, 0.9, 0.2], [0.3, 0.2, 0.7]]
     for a in range(3):
         for b in range(3):
@@ -57,7 +57,7 @@ def test_an_array_of_a_table_and_one_number_for_all_are_the_same(kernel):
     np.testing.assert_array_equal(one.positions, other.positions)
 
 
-def test_a_random_one_is_even_about_its_mean_and_within_its_range(kernel):
+def test_a_random_restitution_is_uniform_in_its_range(kernel):
     law = UniformRestitution(mean=0.95, width=0.1)
     rules = CollisionRules(box=BOX, restitution=law, wall_restitution=1.02, allow_gain=True)
     beads = mixture(1, 12, rules)
@@ -76,11 +76,11 @@ def test_a_random_one_is_even_about_its_mean_and_within_its_range(kernel):
     assert abs(np.corrcoef(drawn[1:], drawn[:-1])[0, 1]) < 4 / math.sqrt(n)
 
 
-def test_a_random_one_of_no_width_is_its_mean(kernel):
+def test_a_random_restitution_of_width_0_is_its_mean(kernel):
     assert rebound(kernel, UniformRestitution(mean=0.6, width=0.0)) == near(0.6)
 
 
-def test_random_ones_depend_on_the_seed_alone_and_not_on_the_kernel(kernel):
+def test_random_restitutions_depend_on_the_seed_not_on_the_kernel(kernel):
     def first(seed, kernel):
         rules = CollisionRules(
             box=BOX, restitution=UniformRestitution(mean=0.7, width=0.6), seed=seed
@@ -95,7 +95,7 @@ def test_random_ones_depend_on_the_seed_alone_and_not_on_the_kernel(kernel):
     assert np.abs(first(2, kernel) - values).max() > 0.1
 
 
-def test_a_kick_does_not_draw_the_same_ones_again(kernel):
+def test_a_kick_does_not_repeat_random_restitutions(kernel):
     law = UniformRestitution(mean=0.5, width=0.8)
     gas = gas_of([(3, 5, 5), (7, 5, 5)], [(1, 0, 0), (-1, 0, 0)], restitution=law, kernel=kernel)
     seen = []
@@ -116,7 +116,7 @@ def pade(z):
 
 
 @pytest.mark.parametrize('value', [0.2, 0.6, 0.9])
-def test_a_viscoelastic_one_is_the_published_function_of_speed(kernel, value):
+def test_a_viscoelastic_restitution_is_the_published_function_of_speed(kernel, value):
     law = ViscoelasticRestitution(value=value, at_speed=0.5)
     assert rebound(kernel, law, speed=0.5) == near(value)
     # The argument that has the value, by a plain search; it goes with speed^(1/10).
@@ -127,7 +127,7 @@ def test_a_viscoelastic_one_is_the_published_function_of_speed(kernel, value):
         assert rebound(kernel, law, speed=speed) == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_viscoelastic_one_falls_with_speed_and_is_elastic_in_the_limit_of_none(kernel):
+def test_a_viscoelastic_restitution_falls_with_speed_from_1(kernel):
     law = ViscoelasticRestitution(value=0.8, at_speed=1.0)
     speeds = [1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3]
     restitution_values = [rebound(kernel, law, speed=speed) for speed in speeds]
@@ -148,7 +148,7 @@ def test_a_gas_of_viscoelastic_beads_becomes_more_elastic_as_it_cools(kernel):
 
 
 @pytest.mark.parametrize('rule', ['restitution', 'wall_restitution'])
-def test_above_one_heats_when_that_is_allowed(kernel, rule):
+def test_a_restitution_above_1_heats_the_gas(kernel, rule):
     rules = CollisionRules(box=BOX, allow_gain=True, **{rule: 1.05})
     gas = HardSphereGas(mixture(1, 8, rules), rules, kernel)
     had = energy(gas.beads())
