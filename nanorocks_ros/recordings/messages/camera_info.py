@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
-from nanorocks_ros.experiment.calibration import CameraInfo, view_of
+from nanorocks_ros.experiment.calibration import CameraInfo, rectified_view
 from nanorocks_ros.recordings.messages.message_builders import camera_info_message
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def view_from_message(message: Any, where: str) -> View:
             where, 'is of a binned or cut picture', 'record the whole picture at full size'
         )
     try:
-        return view_of(info_from_message(message), where)
+        return rectified_view(info_from_message(message), where)
     except ConfigurationError as error:
         remedy = f'{error.do}, or set preprocess.calibration'
         raise FrameError(error.where, error.what, remedy) from error

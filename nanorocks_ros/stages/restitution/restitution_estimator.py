@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.experiment.colours import hue_of
 from nanorocks_ros.records import (
     CorEstimate,
     CorStatus,
@@ -68,7 +67,7 @@ class HaffFitter:
         self._tray = tray
         reading = LibraryReading if self._settings.relation == 'library' else PaperReading
         self._make_reading = partial(reading, settings, tray)
-        self._grains = any(hue_of(one.material) == 0 for one in tray.species)
+        self._grains = any(species.properties.hue == 0 for species in tray.species)
         self._contacts = CycleContacts(self._settings)
         self._restart()
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.experiment.colours import hue_of
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.quantiles import median
 from nanorocks_ros.records import (
@@ -82,7 +81,7 @@ class TrackSpeed:
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._interval_ns = round(settings.speed.interval * NS)
-        self._grains = any(hue_of(one.material) == 0 for one in tray.species)
+        self._grains = any(species.properties.hue == 0 for species in tray.species)
         least = _LEAST_GRAIN_PATH_PX if self._grains else _LEAST_PATH_PX
         self._least_distance = least / settings.preprocess.pixels_per_metre
         self._tray = tray

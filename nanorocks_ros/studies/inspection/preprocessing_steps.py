@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
-from nanorocks_ros.experiment.view import Straight, View
+from nanorocks_ros.experiment.view import IdentityLens, View
 from nanorocks_ros.stages.preprocess.rectify import (
     mix_weights,
     nodes_of,
@@ -200,7 +200,7 @@ class _Follower:
 
 def _steps(shot: Shot, images: BagImages, followers: dict[int, _Follower]) -> dict[int, TraySteps]:
     height, width = shot.frame.image.shape[:2]
-    view = images.view or View(camera=Straight(width=width, height=height))
+    view = images.view or View(camera=IdentityLens(width=width, height=height))
     found = {}
     for image in shot.images:
         region = images.stage.regions[image.tray]

@@ -127,4 +127,4 @@ def check_camera(settings: SimulationSettings, tray: Tray) -> None:
     SimulationError
         With the sizes of both.
     """
-    TrayCamera(settings, tray, np.array([tray.diameter]), ('',))
+    TrayCamera(settings, tray, np.array([tray.diameter]), (tray.species[0].material,))
