@@ -175,4 +175,4 @@ def test_frames_without_a_stamp_are_refused_and_set_no_epoch(tmp_path, capsys):
     path = without_stamps(tmp_path / 'none', range(30))
     assert main(['analyse', str(path), '--no-output']) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert 'a frame without a stamp; let the driver of the camera stamp its frames' in line
+    assert 'a frame has no time stamp; configure the camera driver to stamp its frames' in line
