@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
 
-from nanorocks_ros.recordings.film.film_source import NS, EncodedImage
+from nanorocks_ros.recordings.film.film_source import EncodedImage
+from nanorocks_ros.recordings.storage import NS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

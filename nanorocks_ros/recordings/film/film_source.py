@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from nanorocks_ros.recordings.messages.image_messages import decoded_gray, encode_jpeg
-from nanorocks_ros.recordings.storage import NS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -14,17 +13,6 @@ if TYPE_CHECKING:
 
     import numpy as np
     from numpy.typing import NDArray
-
-__all__ = [
-    'NS',
-    'DecodedImage',
-    'EncodedImage',
-    'Film',
-    'FilmFrame',
-    'FilmInfo',
-    'encoded',
-    'image_format',
-]
 
 _GRAY, _COLOUR = 'mono8', 'bgr8'
 

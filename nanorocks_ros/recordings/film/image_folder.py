@@ -13,7 +13,6 @@ from PIL import Image
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.recordings.film.film_source import (
-    NS,
     EncodedImage,
     FilmFrame,
     FilmInfo,
@@ -23,6 +22,7 @@ from nanorocks_ros.recordings.film.image_file import FULL_BITS, bits_used, read_
 from nanorocks_ros.recordings.film.natural_sort import natural, varying_numbers
 from nanorocks_ros.recordings.jpeg_header import is_whole_jpeg, jpeg_head, with_huffman_tables
 from nanorocks_ros.recordings.messages.iso8601 import parse_iso8601
+from nanorocks_ros.recordings.storage import NS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.film.display_rotation import UNROTATED, rotation_of, rotation_text
 from nanorocks_ros.recordings.film.film_source import (
-    NS,
     EncodedImage,
     FilmFrame,
     FilmInfo,
@@ -27,6 +26,7 @@ from nanorocks_ros.recordings.film.video_streams import (
 )
 from nanorocks_ros.recordings.jpeg_header import is_whole_jpeg, jpeg_head, with_huffman_tables
 from nanorocks_ros.recordings.messages.image_messages import is_decodable
+from nanorocks_ros.recordings.storage import NS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -13,11 +13,12 @@ from nanorocks_ros.recordings.bag.offered_topics import offered
 from nanorocks_ros.recordings.bag.provenance import checksum
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.film.duplicate_frames import DuplicateFilter
-from nanorocks_ros.recordings.film.film_source import NS, EncodedImage, FilmFrame, encoded
+from nanorocks_ros.recordings.film.film_source import EncodedImage, FilmFrame, encoded
 from nanorocks_ros.recordings.film.timestamp_repair import Stamped, TimestampRepair
 from nanorocks_ros.recordings.messages.camera_info import info_message
 from nanorocks_ros.recordings.messages.iso8601 import format_iso8601
 from nanorocks_ros.recordings.messages.message_builders import compressed_image_message
+from nanorocks_ros.recordings.storage import NS
 from nanorocks_ros.studies.film_import.film_inputs import (
     ImportSettings,
     check_order,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.recordings.film.film_source import NS
+from nanorocks_ros.recordings.storage import NS
 
 if TYPE_CHECKING:
     from pathlib import Path
