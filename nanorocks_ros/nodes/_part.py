@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.nodes._pace import NS
-from nanorocks_ros.recordings.bag.played_range import played_part
+from nanorocks_ros.recordings.bag.played_range import played_range
 
 _TOLD_NS = NS // 1000
 
@@ -37,7 +37,7 @@ class Part:
         self._loop = settings.loop
         self._told = set()
         self._whole = settings.start == 0.0 and duration == 0.0
-        self.first_ns, self.last_ns = played_part(reader, settings.start, duration)
+        self.first_ns, self.last_ns = played_range(reader, settings.start, duration)
 
     def require(self, names, kind):
         """Refuse a part in which there is nothing to play.

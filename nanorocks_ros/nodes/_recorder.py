@@ -9,10 +9,10 @@ from sensor_msgs.msg import CompressedImage
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import NanorocksError
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.reader import BagMessage
 from nanorocks_ros.recordings.bag.recorder import Recorder
-from nanorocks_ros.recordings.messages.image_messages import jpeg_of
+from nanorocks_ros.recordings.messages.image_messages import frame_to_jpeg
 from nanorocks_ros.recordings.messages.message_builders import (
     compressed_image_message,
     time_message,
@@ -49,7 +49,9 @@ class GraphRecorder:
         self._dropped = 0
         self._failed = False
         self._path = settings.record
-        per_tray = {topic.absolute(k): offered(topic) for topic in topics.TOPICS for k in trays}
+        per_tray = {
+            topic.absolute(k): offered_topic(topic) for topic in topics.TOPICS for k in trays
+        }
         self._recorder = Recorder(self._path, per_tray, metadata=provenance)
         node.create_timer(_LOOK_S, self._look, clock=node.steady_clock)
 
@@ -138,4 +140,4 @@ def _cdr(message):
 
 
 def _as_jpeg(frame, quality):
-    return compressed_image_message(frame.stamp_ns, 'camera', _JPEG, jpeg_of(frame, quality))
+    return compressed_image_message(frame.stamp_ns, 'camera', _JPEG, frame_to_jpeg(frame, quality))

@@ -16,12 +16,12 @@ from nanorocks_ros.nodes._part import Part
 from nanorocks_ros.nodes._playback import Playback, stamp_in
 from nanorocks_ros.nodes._shell import compressed_message, image_message, time_message
 from nanorocks_ros.nodes._sources import path_of_bag
-from nanorocks_ros.recordings.bag.played_range import latest
+from nanorocks_ros.recordings.bag.played_range import latched_messages
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.messages.image_messages import (
     frame_from_compressed,
     frame_from_image,
-    jpeg_of,
+    frame_to_jpeg,
 )
 from nanorocks_ros.settings import BagSettings, PacingSettings, PlayerSettings, rows
 from nanorocks_ros.settings import problem as wrong_with
@@ -143,14 +143,14 @@ class BagPlayerNode(NanorocksNode):
 
     def _encoded(self, message):
         frame = frame_from_image(self._content(message), message.topic)
-        jpeg = jpeg_of(frame, _JPEG_QUALITY)
+        jpeg = frame_to_jpeg(frame, _JPEG_QUALITY)
         self.send(topics.RAW_COMPRESSED, compressed_message(frame.stamp_ns, 'camera', jpeg))
 
     def _tell_latched(self, stamp_ns):
         """Publish what latched topics held at a time."""
         if self._epoch_ns is not None:
             self.send(topics.EPOCH, time_message(self._epoch_ns))
-        for message in latest(self._reader, self._playback.latched, stamp_ns):
+        for message in latched_messages(self._reader, self._playback.latched, stamp_ns):
             self._playback.send(message)
 
     def _tell_time(self, stamp_ns=None):

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.recordings.film.natural_sort import natural
+from nanorocks_ros.recordings.film.natural_sort import natural_key
 from nanorocks_ros.recordings.mcap import mcap_blocks
 from nanorocks_ros.recordings.mcap.mcap_file import McapFile
 from nanorocks_ros.recordings.sqlite import sqlite_file
@@ -184,7 +184,7 @@ def _names(path: Path, information: dict[str, Any]) -> list[str]:
     if any((path / name).is_file() for name in names):
         return names
     present = (p.name for p in path.iterdir() if p.suffix in STORAGE_SUFFIXES and p.is_file())
-    return sorted(present, key=natural)
+    return sorted(present, key=natural_key)
 
 
 def _refuse_compressed_files(path: Path, information: dict[str, Any]) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.bag.bag_folder import ROS1_MAGIC, STORAGE_SUFFIXES
-from nanorocks_ros.recordings.film.natural_sort import SYSTEM_FOLDERS, natural
+from nanorocks_ros.recordings.film.natural_sort import SYSTEM_FOLDERS, natural_key
 from nanorocks_ros.recordings.mcap.mcap_blocks import MAGIC
 from nanorocks_ros.recordings.sqlite.sqlite_file import MAGIC as SQLITE_MAGIC
 
@@ -162,4 +162,4 @@ def _without_duplicates(paths: Iterable[Path]) -> list[Path]:
 
 
 def _natural_order(path: Path) -> list[list[tuple[int, str]]]:
-    return [natural(part) for part in path.parts]
+    return [natural_key(part) for part in path.parts]

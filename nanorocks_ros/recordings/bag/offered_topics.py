@@ -51,7 +51,7 @@ class Topic(Protocol):
         """Depth of the queue."""
 
 
-def offered(topic: Topic) -> OfferedTopic:
+def offered_topic(topic: Topic) -> OfferedTopic:
     """Type and quality of service of a topic, for a `BagWriter`."""
     return OfferedTopic(
         msgtype=topic.type,

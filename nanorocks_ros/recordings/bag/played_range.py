@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _LOOK_BACK_NS = NS
 
 
-def played_part(reader: BagReader, start: float, duration: float) -> tuple[int, int]:
+def played_range(reader: BagReader, start: float, duration: float) -> tuple[int, int]:
     """First and last log time of the part that is played.
 
     Parameters
@@ -50,8 +50,10 @@ def played_part(reader: BagReader, start: float, duration: float) -> tuple[int, 
     return start_ns, min(reader.end_ns, start_ns + round(duration * NS) - 1)
 
 
-def latest(reader: BagReader, topics: Collection[str], stamp_ns: int) -> list[BagMessage]:
-    """Last message of each topic before a log time: what a latched topic would send at that time.
+def latched_messages(
+    reader: BagReader, topics: Collection[str], stamp_ns: int
+) -> list[BagMessage]:
+    """Last message of each topic before a log time, as a latched topic would send it.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from nanorocks_ros.recordings.film.film_source import (
     image_format,
 )
 from nanorocks_ros.recordings.film.image_file import FULL_BITS, bits_used, read_image
-from nanorocks_ros.recordings.film.natural_sort import natural, varying_numbers
+from nanorocks_ros.recordings.film.natural_sort import natural_key, varying_numbers
 from nanorocks_ros.recordings.jpeg_header import is_whole_jpeg, jpeg_head, with_huffman_tables
 from nanorocks_ros.recordings.messages.iso8601 import parse_iso8601
 from nanorocks_ros.recordings.storage import NS
@@ -59,7 +59,7 @@ def images_in(folder: Path) -> list[Path]:
         if path.suffix.lower() in IMAGE_SUFFIXES and not _is_hidden(path)
     )
     files = (path for path in paths if path.is_file())
-    return sorted(files, key=lambda file: natural(file.name))
+    return sorted(files, key=lambda file: natural_key(file.name))
 
 
 def _is_hidden(path: Path) -> bool:

@@ -12,7 +12,7 @@ SYSTEM_FOLDERS = frozenset({'lost+found', 'System Volume Information', '$RECYCLE
 """Folders of the operating system on a disk."""
 
 
-def natural(name: str) -> list[tuple[int, str]]:
+def natural_key(name: str) -> list[tuple[int, str]]:
     """Sort key that sorts ``run_10.mcap`` after ``run_9.mcap``."""
     parts = re.split(r'(\d+)', name)
     return [(int(part), '') if part.isdecimal() else (-1, part) for part in parts]

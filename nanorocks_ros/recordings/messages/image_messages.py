@@ -44,7 +44,7 @@ def stamp_ns_of(message: Any) -> int:
     return int(stamp.sec) * NS + int(stamp.nanosec)
 
 
-def usable_stamp_ns(message: Any, where: str) -> int:
+def valid_stamp_ns(message: Any, where: str) -> int:
     """Time stamp in the header of a message, checked to be after 1970, [ns].
 
     Raises
@@ -114,7 +114,7 @@ def frame_from_image(message: Any, where: str) -> Frame:
         )
     rows = data.reshape(height, step)[:, :row]
     image = rows.reshape(height, width, channels) if channels > 1 else rows
-    return Frame(stamp_ns=usable_stamp_ns(message, where), encoding=encoding, image=image)
+    return Frame(stamp_ns=valid_stamp_ns(message, where), encoding=encoding, image=image)
 
 
 def frame_from_compressed(message: Any, where: str) -> Frame:
@@ -138,7 +138,7 @@ def frame_from_compressed(message: Any, where: str) -> Frame:
         If the image cannot be decoded, is truncated or has no time stamp.
     """
     data = _bytes_of(message.data)
-    stamp_ns = usable_stamp_ns(message, where)
+    stamp_ns = valid_stamp_ns(message, where)
     # OpenCV decodes a truncated JPEG without an error and fills the missing part with gray.
     complete = data[:2].tobytes() != JPEG_START or is_whole_jpeg(data.data)
     image = _decoded(data) if complete else None
@@ -198,7 +198,7 @@ def encode_jpeg(image: NDArray[np.uint8], quality: int) -> bytes:
     return content.tobytes()
 
 
-def jpeg_of(frame: Frame, quality: int) -> bytes:
+def frame_to_jpeg(frame: Frame, quality: int) -> bytes:
     """Compress a frame of any encoding to JPEG.
 
     Raises

@@ -19,7 +19,7 @@ from nanorocks_ros.errors import RecordingError, UnwritableError
 from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.outputs.parquet import Column, write_parquet
 from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import float_array_message, time_message
 from nanorocks_ros.settings import rows
@@ -187,7 +187,7 @@ def _provenance(source: Path, settings: PipelineSettings) -> dict[str, str]:
 
 def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> None:
     epoch_topic = topics.EPOCH.absolute()
-    table = {epoch_topic: offered(topics.EPOCH)}
+    table = {epoch_topic: offered_topic(topics.EPOCH)}
     streams: list[Iterator[tuple[str, ArrayRecord]]] = []
     for number, results in analysis.trays.items():
         for topic, records in (
@@ -200,7 +200,7 @@ def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> No
             (topics.MERGE, results.merges),
         ):
             name = topic.absolute(number)
-            table[name] = offered(topic)
+            table[name] = offered_topic(topic)
             streams.append(zip(itertools.repeat(name), _in_order(records)))
     with BagWriter(path, table, metadata=provenance) as bag:
         bag.write(epoch_topic, analysis.epoch_ns, time_message(analysis.epoch_ns))

@@ -11,7 +11,7 @@ from nanorocks_ros.jobs.tasks import as_finished_apart
 from nanorocks_ros.outputs.safe_text import shown
 from nanorocks_ros.pipeline.composition import Pipeline
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
-from nanorocks_ros.recordings.film.natural_sort import natural
+from nanorocks_ros.recordings.film.natural_sort import natural_key
 from nanorocks_ros.studies.batch.batch_store import BatchStore, Entry
 from nanorocks_ros.studies.batch.batch_task import (
     DONE,
@@ -234,7 +234,7 @@ def _gathered(plan: BatchPlan, store: BatchStore) -> Batch:
     batch = Batch()
     for text, error in plan.bags.missing.items():
         batch.failed.append(Failure(name=shown(text), reason=shown(str(error))))
-    entries = sorted(store.entries.values(), key=lambda one: natural(str(one.path)))
+    entries = sorted(store.entries.values(), key=lambda one: natural_key(str(one.path)))
     found: list[tuple[Entry, dict[str, Any]]] = []
     for entry in entries:
         outcome = entry.outcome

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.film.image_folder import IMAGE_SUFFIXES, images_in
-from nanorocks_ros.recordings.film.natural_sort import SYSTEM_FOLDERS, natural
+from nanorocks_ros.recordings.film.natural_sort import SYSTEM_FOLDERS, natural_key
 from nanorocks_ros.recordings.film.video_streams import VIDEO_SUFFIXES, looks_like_film
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def films_in_folder(folder: Path) -> FoundFilms:
         If the folder cannot be read.
     """
     result = FoundFilms()
-    for path in sorted(folder.iterdir(), key=lambda entry: natural(entry.name)):
+    for path in sorted(folder.iterdir(), key=lambda entry: natural_key(entry.name)):
         if path.name.startswith('.') or path.name in SYSTEM_FOLDERS:
             continue
         try:

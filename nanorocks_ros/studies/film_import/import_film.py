@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.provenance import checksum
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.film.duplicate_frames import DuplicateFilter
@@ -109,7 +109,7 @@ class _Import:
     def run(self) -> ImportResult:
         result = self._result
         image, lens = topics.RAW_COMPRESSED, topics.CAMERA_INFO
-        offered_topics = {topic.absolute(): offered(topic) for topic in (image, lens)}
+        offered_topics = {topic.absolute(): offered_topic(topic) for topic in (image, lens)}
         result.provenance = self._provenance()
         with (
             ThreadPoolExecutor(self._workers + 1) as pool,

@@ -8,7 +8,7 @@ from rosbags.rosbag2 import Reader
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.recordings.bag.offered_topics import OfferedTopic
-from nanorocks_ros.recordings.bag.played_range import latest, played_part
+from nanorocks_ros.recordings.bag.played_range import latched_messages, played_range
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import float_array_message, time_message
@@ -36,25 +36,25 @@ def bag(tmp_path):
 
 
 def test_the_played_range_ends_before_its_duration_is_over(bag):
-    assert played_part(bag, 0.0, 0.0) == (100 * NS, 400 * NS)
-    assert played_part(bag, 10.0, 5.0) == (110 * NS, 115 * NS - 1)
-    assert played_part(bag, 299.0, 500.0) == (399 * NS, 400 * NS)
+    assert played_range(bag, 0.0, 0.0) == (100 * NS, 400 * NS)
+    assert played_range(bag, 10.0, 5.0) == (110 * NS, 115 * NS - 1)
+    assert played_range(bag, 299.0, 500.0) == (399 * NS, 400 * NS)
 
 
 def test_a_start_beyond_the_end_is_refused(bag):
     with pytest.raises(ConfigurationError, match=r'start: 301 s, but .* has 300\.000 s'):
-        played_part(bag, 301.0, 0.0)
+        played_range(bag, 301.0, 0.0)
 
 
 @pytest.mark.parametrize(('seconds', 'value'), [(0.6, 1.0), (150.0, 299.0), (300.0, 599.0)])
 def test_latched_topics_have_their_last_message_before_the_start(bag, seconds, value):
-    messages = latest(bag, list(TOPICS), 100 * NS + round(seconds * NS))
+    messages = latched_messages(bag, list(TOPICS), 100 * NS + round(seconds * NS))
     assert [message.topic for message in messages] == ['/epoch', '/cor']
     assert bag.deserialize(messages[1]).data[0] == value
 
 
 def test_at_the_start_no_message_is_latched(bag):
-    assert latest(bag, list(TOPICS), bag.start_ns) == []
+    assert latched_messages(bag, list(TOPICS), bag.start_ns) == []
 
 
 def test_the_metadata_are_what_ros2_bag_of_jazzy_reads(bag):

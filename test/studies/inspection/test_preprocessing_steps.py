@@ -10,7 +10,7 @@ import pytest
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
 from nanorocks_ros.records import MotionMask
@@ -174,7 +174,9 @@ def test_an_unusable_frame_is_reported_in_one_line(tmp_path, capsys):
     names = (topics.EPOCH, topics.RAW)
     path = tmp_path / 'black'
     rng = np.random.default_rng(1)
-    with BagWriter(path, {name.absolute(): offered(name) for name in names}, metadata={}) as bag:
+    with BagWriter(
+        path, {name.absolute(): offered_topic(name) for name in names}, metadata={}
+    ) as bag:
         bag.write(topics.EPOCH.absolute(), NS, time_message(NS))
         for number in range(5):
             pixels = rng.integers(90, 110, (210, 210, 3), dtype=np.uint8)
