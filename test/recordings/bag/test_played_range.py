@@ -57,7 +57,7 @@ def test_at_the_start_no_message_is_latched(bag):
     assert latched_messages(bag, list(TOPICS), bag.start_ns) == []
 
 
-def test_the_metadata_are_what_ros2_bag_of_jazzy_reads(bag):
+def test_the_metadata_has_the_format_of_ros2_bag_jazzy(bag):
     """Fields and types as `rosbag2_storage/yaml.hpp` decodes them for version 9 of the format."""
     text = (bag.path / 'metadata.yaml').read_text()
     information = yaml.safe_load(text)['rosbag2_bagfile_information']

@@ -47,7 +47,7 @@ def test_an_intact_bag_has_all_topics_and_no_notice(tmp_path, record):
     assert bag.end_ns == START_NS + 30 * 33_333_333
 
 
-def test_the_bare_file_reads_like_the_folder(tmp_path, record):
+def test_the_storage_file_alone_is_read_like_the_folder(tmp_path, record):
     path = record(tmp_path / 'run')
     from_folder = list(open_bag(path).messages())
     assert list(open_bag(str(path / 'run.mcap')).messages()) == from_folder
@@ -61,7 +61,7 @@ def test_only_the_requested_topics_are_read(tmp_path, record):
     assert list(bag.messages([])) == []
 
 
-def test_a_bag_can_be_read_twice_and_by_two_at_once(tmp_path, record):
+def test_a_bag_can_be_read_by_two_iterators_at_the_same_time(tmp_path, record):
     bag = open_bag(record(tmp_path / 'run'))
     pairs = list(zip(bag.messages(), bag.messages(), strict=True))
     assert all(message == other for message, other in pairs)
@@ -69,7 +69,7 @@ def test_a_bag_can_be_read_twice_and_by_two_at_once(tmp_path, record):
 
 
 @pytest.mark.parametrize('compression', list(CompressionType))
-def test_messages_come_in_order_of_time_whatever_their_order_in_the_file(tmp_path, compression):
+def test_messages_are_sorted_by_time(tmp_path, compression):
     stamps = np.random.default_rng(3).permutation(300)
     path = write_times(tmp_path / 'x.mcap', stamps, compression=compression, chunk_size=400)
     bag = open_bag(path)
@@ -86,7 +86,7 @@ def test_messages_come_in_order_of_time_whatever_their_order_in_the_file(tmp_pat
     {'use_chunking': False, 'use_statistics': False},
     {'enable_crcs': False},
 ])  # fmt: skip
-def test_files_without_parts_of_the_index_are_whole_all_the_same(tmp_path, options):
+def test_files_without_parts_of_the_index_are_complete(tmp_path, options):
     bag = open_bag(write_times(tmp_path / 'x.mcap', range(50), **options))
     assert [m.log_time_ns for m in bag.messages()] == list(range(50))
     assert bag.topics['/time'].count == 50
@@ -405,7 +405,7 @@ def test_a_damaged_sqlite_file_is_no_traceback(tmp_path):
     assert all('cannot be read as a recording' in text for text in refusals)
 
 
-def test_files_compressed_as_a_whole_are_refused_with_the_remedy(tmp_path):
+def test_file_compression_is_refused_with_a_remedy(tmp_path):
     folder = write_with_rosbags(tmp_path / 'run', StoragePlugin.SQLITE3, CompressionMode.FILE)
     with pytest.raises(RecordingError, match=r'compressed as a whole.*; unpack them with `zstd'):
         open_bag(folder)

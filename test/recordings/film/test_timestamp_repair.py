@@ -32,7 +32,7 @@ def test_rising_times_are_not_changed(times):
     assert repaired(times) == (times, list(range(len(times))), RepairCounts())
 
 
-def test_pictures_without_a_time_lie_between_their_neighbours():
+def test_frames_without_a_time_are_interpolated():
     stamps, _, repairs = repaired([0, 40, None, 120, None, 160, None, None])
     assert stamps == [0, 40, 80, 120, 140, 160, 200, 240]
     assert repairs.missing == 4
@@ -56,7 +56,7 @@ def test_a_duplicate_time_is_replaced():
 
 
 @pytest.mark.parametrize('first', [[80, 0, 40], [40, 0, 80], [120, 0, 80, 40]])
-def test_the_first_pictures_are_sorted_by_their_times_too(first):
+def test_the_first_frames_are_sorted_by_time(first):
     times = [*first, *range(40 * len(first), 800, 40)]
     stamps, indices, repairs = repaired(times)
     assert stamps == sorted(times)
@@ -68,7 +68,7 @@ def test_the_first_pictures_are_sorted_by_their_times_too(first):
 @pytest.mark.parametrize('first', [
     [500, 540, 580], [280, 320, 360], [*range(1000, 1320, 40)], [9000],
 ])  # fmt: skip
-def test_a_clock_that_was_set_back_at_once_moves_no_picture(first):
+def test_a_clock_set_back_after_the_first_frames_moves_no_frame(first):
     times = [*first, *range(0, 800, 40)]
     stamps, indices, repairs = repaired(times)
     assert indices == list(range(len(times)))
@@ -77,7 +77,7 @@ def test_a_clock_that_was_set_back_at_once_moves_no_picture(first):
 
 
 @pytest.mark.parametrize('first', [[None], [None, None]])
-def test_a_film_whose_first_pictures_have_no_time_begins_a_step_earlier(first):
+def test_first_frames_without_a_time_are_extrapolated(first):
     stamps, _, repairs = repaired([*first, 1000, 1080, 1040, *range(1120, 1800, 40)])
     assert stamps == [*range(1000 - 40 * len(first), 1800, 40)]
     assert repairs == RepairCounts(missing=len(first), reordered=1)

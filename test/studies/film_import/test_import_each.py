@@ -31,7 +31,7 @@ from nanorocks_ros.studies.film_import.import_film import import_films
 NS = 1_000_000_000
 
 
-def test_each_video_of_a_folder_becomes_a_bag_and_bad_ones_stop_nothing(tmp_path):
+def test_each_video_of_a_folder_is_imported_and_invalid_ones_are_listed(tmp_path):
     folder = tmp_path / 'videos'
     folder.mkdir()
     for k in (10, 9, 1):

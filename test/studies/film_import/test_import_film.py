@@ -43,7 +43,7 @@ CAMERA = '/nanorocks/camera/image_raw/compressed'
 
 @pytest.mark.parametrize('name', ['a.mp4', 'a.avi', 'a.mov', 'a.mkv'])
 @pytest.mark.parametrize('codec', ['mjpeg', 'mpeg4', 'libx264'])
-def test_every_picture_of_a_video_comes_with_its_time(tmp_path, name, codec):
+def test_every_frame_of_a_video_is_imported_with_its_time(tmp_path, name, codec):
     film = write_video(tmp_path / name, range(12), codec=codec)
     result, numbers, times = imported(film, tmp_path / 'bag')
     assert numbers == list(range(12))
@@ -67,7 +67,7 @@ def test_colours_are_preserved(tmp_path):
 
 
 @pytest.mark.parametrize('name', ['a.avi', 'a.mp4'])
-def test_jpegs_of_a_video_go_in_byte_for_byte(tmp_path, name):
+def test_jpegs_of_a_video_are_copied_byte_for_byte(tmp_path, name):
     film = write_video(tmp_path / name, range(5))
     result, _, _ = imported(film, tmp_path / 'bag')
     bag = open_bag(tmp_path / 'bag')
