@@ -22,7 +22,7 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.recordings.bag.find_bags import find_bags
 from nanorocks_ros.recordings.bag.fingerprint import content_hash, file_states, total_size
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import (
@@ -107,7 +107,7 @@ def _looped(path: Path, film: Path, loops: int) -> Path:
     ]
     length = frames[-1][0] - frames[0][0] + _NS // 30
     epoch = topics.EPOCH.absolute()
-    table = {epoch: offered(topics.EPOCH), _CAMERA: offered(topics.RAW_COMPRESSED)}
+    table = {epoch: offered_topic(topics.EPOCH), _CAMERA: offered_topic(topics.RAW_COMPRESSED)}
     with BagWriter(path, table, metadata={}) as written:
         written.write(epoch, START_NS, time_message(START_NS))
         for loop in range(loops):
@@ -224,7 +224,9 @@ def broken_bags(folder: Path, film: Path) -> None:
     for place in range(len(content) // 3, len(content) // 2, 500):
         flipped[place] ^= 0x10
     (folder / 'flipped.mcap').write_bytes(flipped)
-    with BagWriter(folder / 'no_camera', {'/chatter': offered(topics.EPOCH)}, metadata={}) as bag:
+    with BagWriter(
+        folder / 'no_camera', {'/chatter': offered_topic(topics.EPOCH)}, metadata={}
+    ) as bag:
         bag.write('/chatter', START_NS, time_message(START_NS))
 
 

@@ -15,9 +15,12 @@ import numpy as np
 from benchmarks.engine_peers import report_peers
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.settings import SimulationSettings
-from nanorocks_ros.simulation.engine.collision_rules import UniformRestitution
-from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas, Kernel
+from nanorocks_ros.simulation.engine.beads import Beads
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.kernel_choice import Kernel
 from nanorocks_ros.simulation.engine.neighbours import list_tuning
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
+from nanorocks_ros.simulation.engine.rules.restitution_laws import UniformRestitution
 from nanorocks_ros.simulation.ensemble import cooling_runs
 
 # Collisions per bead before the clock starts, so that the crystal has melted, and after.

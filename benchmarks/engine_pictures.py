@@ -13,7 +13,9 @@ import matplotlib as mpl
 import numpy as np
 from scipy.optimize import curve_fit
 
-from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.beads import Beads
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 mpl.use('Agg')
 

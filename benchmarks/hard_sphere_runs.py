@@ -13,8 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.hard_spheres import collision_rate, contact_value, few_beads_ratio, pressure
-from nanorocks_ros.simulation.engine.collision_rules import WallMotion
-from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.beads import Beads
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
+from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 
 DIAMETER = 0.002
 MASS = 4.94e-6

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.recorder import Recorder
 from nanorocks_ros.recordings.messages.image_messages import encode_jpeg
 from nanorocks_ros.recordings.messages.message_builders import compressed_image_message
@@ -51,7 +51,7 @@ def _encoded(picture: np.ndarray, stamp_ns: int) -> object:
 
 def _run(make, size: int) -> tuple[float, float, float]:
     """Processor time of who hands over and of the writer, and time until all is on the disk."""
-    table = {_CAMERA: offered(topics.RAW_COMPRESSED)}
+    table = {_CAMERA: offered_topic(topics.RAW_COMPRESSED)}
     with tempfile.TemporaryDirectory() as folder:
         start, process = time.monotonic(), time.process_time()
         thread = time.thread_time()

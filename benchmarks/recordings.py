@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from rosbags.rosbag2 import Reader
 
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.bag.salvage import salvage
 from nanorocks_ros.recordings.bag.writer import BagWriter
@@ -100,7 +100,7 @@ def _bag(path: Path, size: float) -> int:
     count = int(size / _PICTURE_BYTES)
     pool = [np.random.default_rng(k).bytes(_PICTURE_BYTES) for k in range(8)]
     name = _CAMERA.absolute()
-    with BagWriter(path, {name: offered(_CAMERA)}, metadata={}) as bag:
+    with BagWriter(path, {name: offered_topic(_CAMERA)}, metadata={}) as bag:
         for number in range(count):
             stamp_ns = _NS + number * _STEP_NS
             message = compressed_image_message(stamp_ns, 'camera', 'jpeg', pool[number % 8])

@@ -33,7 +33,7 @@ _FLIGHT = 96e6 / 1800.0
 # What is timed: label, where it is looked up, its name.
 _PARTS = (
     ('gas in eight trays', plate_film.ShakenTray, 'at'),
-    ('plate, shifted while it swings', moving_plate.MovingPlate, 'moved_to'),
+    ('plate, shifted while it swings', moving_plate.MovingPlate, 'displaced'),
     ('shadows', painter, 'draw_shadows'),
     ('beads and grains', painter, 'draw_bodies'),
     ('glare', plate_camera, 'add_light'),

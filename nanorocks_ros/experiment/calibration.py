@@ -1,4 +1,4 @@
-"""What is known of the camera and the trays before a film: lens, pose, scale, regions."""
+"""Calibration of a film: lens, pose, scale, and regions of the trays."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MODELS = ('equidistant', 'plumb_bob')
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraInfo:
-    """What a sensor_msgs/CameraInfo says, as plain numbers.
+    """The numbers of a sensor_msgs/CameraInfo.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Calibration:
     regions : dict of int to Region
         Floors of the trays in the rectified picture, by number.
     residual_px : float, [px]
-        Rms distance of the edges that were seen from where they should be; NaN when unknown.
+        Rms reprojection error of the edges; NaN when unknown.
     info : CameraInfo
     """
 
@@ -65,7 +65,7 @@ class Calibration:
     residual_px: float = math.nan
 
 
-def view_of(info: CameraInfo, where: str) -> View:
+def rectified_view(info: CameraInfo, place: str) -> View:
     """The rectified view that a camera_info describes.
 
     Parameters
@@ -77,17 +77,17 @@ def view_of(info: CameraInfo, where: str) -> View:
     Raises
     ------
     ConfigurationError
-        For a model that is not known or numbers that no camera has.
+        For an unknown distortion model or invalid numbers.
     """
     if info.distortion_model not in MODELS:
         raise ConfigurationError(
-            where,
+            place,
             f'distortion model {info.distortion_model!r} is not supported',
             f'calibrate for {" or ".join(MODELS)}',
         )
     if len(info.k) != 9 or len(info.r) != 9 or len(info.p) not in (0, 12):
         raise ConfigurationError(
-            where,
+            place,
             f'{len(info.k)}, {len(info.r)}, {len(info.p)} numbers in k, r, p',
             'give 9, 9, 12',
         )
@@ -95,7 +95,7 @@ def view_of(info: CameraInfo, where: str) -> View:
     centre = (info.k[2] + 0.5, info.k[5] + 0.5)
     if info.k[0] == 0.0:
         raise ConfigurationError(
-            where, 'k is all zero: the camera is not calibrated', 'calibrate it, or leave it out'
+            place, 'k is all zero: the camera is not calibrated', 'calibrate it, or leave it out'
         )
     lens: Camera | PlumbBob
     try:
@@ -118,12 +118,12 @@ def view_of(info: CameraInfo, where: str) -> View:
                 distortion=(bend[0], bend[1], bend[2], bend[3], bend[4]),
             )
     except ConfigurationError as error:
-        raise ConfigurationError(where, error.what, error.do) from error
+        raise ConfigurationError(place, error.what, error.do) from error
     straight = (info.k[0], 0.0, info.k[2], 0.0, 0.0, info.k[4], info.k[5], 0.0, 0.0, 0.0, 1.0, 0.0)
-    # A camera that knows no P leaves it at zero.
+    # An uncalibrated P is all zero.
     projection = info.p if any(info.p) else straight
-    turn = info.r if any(info.r) else IDENTITY
-    return view_from_matrices(lens, turn, projection, where)
+    rotation_matrix = info.r if any(info.r) else IDENTITY
+    return view_from_matrices(lens, rotation_matrix, projection, place)
 
 
 def _padded(numbers: Sequence[float], count: int) -> tuple[float, ...]:

@@ -1,6 +1,6 @@
-"""The calibration file: the lens, the pose of the plate, and where each tray is, in one.
+"""The calibration file: lens, pose of the plate, and regions of the trays.
 
-YAML, with the lens in the words of sensor_msgs/CameraInfo, so that other tools can use it::
+YAML, with the lens as in sensor_msgs/CameraInfo, so that other tools can read it::
 
     camera_info:
       width: 1920
@@ -26,10 +26,10 @@ from typing import TYPE_CHECKING
 import yaml
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, view_of
+from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, rectified_view
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.experiment.view import IDENTITY
-from nanorocks_ros.experiment.yaml_lines import YamlLines, composed, read_text
+from nanorocks_ros.experiment.yaml_lines import YamlLines, parse_yaml, read_text
 
 if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
@@ -44,7 +44,7 @@ def load_calibration(path: str | Path) -> Calibration:
         When it cannot be read or an entry cannot be used; names the line.
     """
     text = read_text(Path(path), 'a calibration file')
-    return _File(str(path)).calibration(composed(str(path), text))
+    return _File(str(path)).calibration(parse_yaml(str(path), text))
 
 
 class _File(YamlLines):
@@ -53,13 +53,13 @@ class _File(YamlLines):
     def calibration(self, root: yaml.Node | None) -> Calibration:
         top = self.mapping(root, {'camera_info', 'pixels_per_metre', 'trays'}, {'residual_px'})
         info = self._info(top['camera_info'])
-        where = self.place(top['camera_info'])
+        place = self.place(top['camera_info'])
         (scale,) = self._numbers(top['pixels_per_metre'], 1)
         if scale <= 0.0:
             raise self.error(top['pixels_per_metre'], f'a scale of {scale:g}', 'give px per metre')
         residual = self._numbers(top['residual_px'], 1)[0] if 'residual_px' in top else math.nan
         return Calibration(
-            view=view_of(info, where),
+            view=rectified_view(info, place),
             pixels_per_metre=scale,
             regions=self._regions(top['trays']),
             residual_px=residual,
@@ -90,8 +90,8 @@ class _File(YamlLines):
             if isinstance(key, bool) or not isinstance(key, int) or key < 1:
                 raise self.error(value, f'tray {key!r}', 'number the trays 1, 2, ...')
             numbers = self._numbers(value, 4)
-            whole = all(number.is_integer() for number in numbers)
-            if not whole or min(numbers) < 0 or min(numbers[2:]) < 8:
+            are_integers = all(number.is_integer() for number in numbers)
+            if not are_integers or min(numbers) < 0 or min(numbers[2:]) < 8:
                 raise self.error(
                     value,
                     f'a region of {[f"{number:g}" for number in numbers]}',
@@ -103,7 +103,7 @@ class _File(YamlLines):
         return regions
 
     def _numbers(self, node: yaml.Node, count: int | None) -> tuple[float, ...]:
-        values = tuple(self.number(one) for one in self.listed(node))
+        values = tuple(self.number(value) for value in self.listed(node))
         if count is not None and len(values) != count:
             raise self.error(node, f'{len(values)} numbers', f'give {count}')
         return values
@@ -117,7 +117,7 @@ def write_calibration(calibration: Calibration, path: Path, remark: str) -> None
     calibration : Calibration
     path : Path
     remark : str
-        One line for whoever opens the file.
+        Comment in the first line of the file.
 
     Raises
     ------
@@ -130,13 +130,13 @@ def write_calibration(calibration: Calibration, path: Path, remark: str) -> None
     for name in ('d', 'k', 'r', 'p'):
         numbers = getattr(info, name)
         if numbers:
-            lines.append(f'  {name}: [{", ".join(repr(float(one)) for one in numbers)}]')
+            lines.append(f'  {name}: [{", ".join(repr(float(value)) for value in numbers)}]')
     lines.append(f'pixels_per_metre: {float(calibration.pixels_per_metre)!r}')
     if math.isfinite(calibration.residual_px):
         lines.append(f'residual_px: {calibration.residual_px:.4f}')
     lines.append('trays:')
     for number, region in sorted(calibration.regions.items()):
-        lines.append(f'  {number}: [{", ".join(str(one) for one in region)}]')
+        lines.append(f'  {number}: [{", ".join(str(side) for side in region)}]')
     try:
         path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
     except OSError as error:
@@ -146,7 +146,7 @@ def write_calibration(calibration: Calibration, path: Path, remark: str) -> None
 
 
 def calibrated(settings: PipelineSettings) -> PipelineSettings:
-    """The settings with scale and regions as the calibration file says, where one is named.
+    """The settings with scale and regions of the calibration file, if one is named.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def calibrated(settings: PipelineSettings) -> PipelineSettings:
             f'holds no region of tray {", ".join(missing)}',
             'calibrate with these trays, or leave them out of `trays`',
         )
-    flat = tuple(one for number in settings.trays for one in calibration.regions[number])
+    flat = tuple(value for number in settings.trays for value in calibration.regions[number])
     preprocess = replace(
         settings.preprocess, regions_px=flat, pixels_per_metre=calibration.pixels_per_metre
     )

@@ -1,4 +1,4 @@
-"""The camera: where a point of the rectified picture is in the picture that the lens makes.
+"""Lens models: from the rectified picture to the distorted one and back.
 
 Points are in pixels from the upper left corner of the picture; the centre of the first pixel is
 at (0.5, 0.5). ROS and OpenCV count from that centre, see `Camera.matrix`.
@@ -43,7 +43,7 @@ class Camera:
     Raises
     ------
     ConfigurationError
-        For numbers that no camera has: not finite, or a picture that folds over within itself.
+        For numbers that are not finite, or a distortion that is not monotonic in the picture.
     """
 
     width: int
@@ -68,7 +68,7 @@ class Camera:
         return _matrix(self)
 
     def distorted(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points of the rectified picture are in the picture of the lens.
+        """Distort points of the rectified picture.
 
         Parameters
         ----------
@@ -87,7 +87,7 @@ class Camera:
         return np.asarray(flat * ratio[..., np.newaxis] * self.focal + self.centre)
 
     def rectified(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points of the picture of the lens are in the rectified picture.
+        """Undistort points of the picture.
 
         Parameters
         ----------
@@ -96,7 +96,7 @@ class Camera:
         Returns
         -------
         ndarray (..., 2), [px]
-            NaN where no straight ray leads.
+            NaN for angles of 90 degrees or more.
         """
         bent = (np.asarray(points, dtype=np.float64) - self.centre) / self.focal
         radius = np.hypot(bent[..., 0], bent[..., 1])
@@ -152,7 +152,7 @@ class PlumbBob:
     Raises
     ------
     ConfigurationError
-        For numbers that no camera has.
+        For invalid numbers.
     """
 
     width: int
@@ -170,7 +170,7 @@ class PlumbBob:
         return _matrix(self)
 
     def distorted(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points of the straight picture are in the picture of the lens, [px]."""
+        """Distort points of the undistorted picture, [px]."""
         k1, k2, p1, p2, k3 = self.distortion
         flat = (np.asarray(points, dtype=np.float64) - self.centre) / self.focal
         x, y = flat[..., 0], flat[..., 1]

@@ -1,4 +1,4 @@
-"""What the paper reports, number by number, with where it stands; nothing is computed here.
+"""Values that the paper reports, with their place in it; nothing is computed here.
 
 References
 ----------

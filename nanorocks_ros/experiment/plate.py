@@ -1,4 +1,4 @@
-"""The aluminium plate with the sample cells, as the camera looks down on it."""
+"""The aluminium plate with the sample cells, seen from above."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Region(NamedTuple):
 def regions_on_plate(
     trays: Iterable[Tray], shape: tuple[int, int], pixels_per_metre: float
 ) -> dict[int, Region]:
-    """Where the floors of the trays are when the plate lies in the middle of the picture.
+    """Regions of the floors of the trays, with the plate in the middle of the picture.
 
     Parameters
     ----------

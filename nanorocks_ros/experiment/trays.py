@@ -1,24 +1,30 @@
-"""The sample cells: what lay in which tray ([B19] table 1), checked when loaded."""
+"""The sample cells and their beads ([B19] table 1), checked when loaded."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.yaml_lines import YamlLines, composed, read_text
+from nanorocks_ros.experiment.materials import (
+    GRAM_PER_CUBIC_CENTIMETRE,
+    Material,
+    MaterialReader,
+    known_materials,
+    paste_remedy,
+)
+from nanorocks_ros.experiment.yaml_lines import YamlLines, parse_yaml, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
 MILLIMETRE = 1e-3
 GRAM = 1e-3
-GRAM_PER_CUBIC_CENTIMETRE = 1e3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,21 +33,30 @@ class Species:
 
     Parameters
     ----------
-    material : str
+    properties : Material
+        What the beads are made of.
     diameter_low, diameter_high : float, [m]
         Ends of the range of diameters; equal when all beads are alike.
-    density : float, [kg/m^3]
     count : int
     mass : float or None, [kg]
         Total mass, where the paper gives that instead of a count.
     """
 
-    material: str
+    properties: Material
     diameter_low: float
     diameter_high: float
-    density: float
     count: int
     mass: float | None = None
+
+    @property
+    def material(self) -> str:
+        """Name of the material."""
+        return self.properties.name
+
+    @property
+    def density(self) -> float:
+        """Density of the material, [kg/m^3]."""
+        return self.properties.density
 
     @property
     def diameter(self) -> float:
@@ -85,7 +100,12 @@ class Tray:
     @property
     def count(self) -> int:
         """Number of beads of all species."""
-        return sum(one.count for one in self.species)
+        return sum(species.count for species in self.species)
+
+    @property
+    def materials(self) -> dict[str, Material]:
+        """Materials of the beads, by name."""
+        return {species.material: species.properties for species in self.species}
 
     @property
     def volume(self) -> float:
@@ -100,16 +120,16 @@ class Tray:
     @property
     def diameter(self) -> float:
         """Mean bead diameter over all beads, [m]."""
-        return sum(one.count * one.diameter for one in self.species) / self.count
+        return sum(species.count * species.diameter for species in self.species) / self.count
 
     @property
     def mean_mass(self) -> float:
         """Mean mass of a bead, [kg]."""
-        return sum(one.count * one.bead_mass for one in self.species) / self.count
+        return sum(species.count * species.bead_mass for species in self.species) / self.count
 
 
 def load_trays(path: str | Path | None = None) -> dict[int, Tray]:
-    """The trays of a YAML file, by number; those that were flown when no file is named.
+    """The trays of a YAML file, by number; by default those that were flown.
 
     Raises
     ------
@@ -122,7 +142,27 @@ def load_trays(path: str | Path | None = None) -> dict[int, Tray]:
     else:
         name = str(path)
         text = read_text(Path(path), 'a readable YAML file of trays')
-    return _TrayFile(name).trays(composed(name, text))
+    return _TrayFile(name).trays(parse_yaml(name, text))
+
+
+def tray_values(tray: Tray) -> dict[str, Any]:
+    """A tray as plain values for JSON; properties only of materials that its file describes."""
+    return asdict(tray) | {'species': [_species_values(species) for species in tray.species]}
+
+
+def _species_values(species: Species) -> dict[str, Any]:
+    values = {
+        'material': species.material,
+        'diameter_low': species.diameter_low,
+        'diameter_high': species.diameter_high,
+        'density': species.density,
+        'count': species.count,
+        'mass': species.mass,
+    }
+    known = known_materials().get(species.material)
+    if known is None or species.properties != replace(known, density=species.density):
+        values['properties'] = asdict(species.properties)
+    return values
 
 
 def tray_by_number(trays: Mapping[int, Tray], number: int) -> Tray:
@@ -144,25 +184,51 @@ class _TrayFile(YamlLines):
 
     def trays(self, root: yaml.Node | None) -> dict[int, Tray]:
         if root is None:
-            raise self.error(None, 'is empty', 'list densities_g_cm3 and trays')
-        top = self.mapping(root, {'densities_g_cm3', 'trays'}, set())
-        densities = {
-            str(key): self.positive(value) for key, value in self.pairs(top['densities_g_cm3'])
-        }
+            raise self.error(None, 'is empty', 'describe at least one tray under "trays:"')
+        top = self.mapping(root, {'trays'}, {'densities_g_cm3', 'materials'})
+        self._read_materials(top)
         trays = {}
         for key, node in self.pairs(top['trays']):
             number = self._tray_number(key, node)
-            trays[number] = self._tray(number, node, densities)
+            trays[number] = self._tray(number, node)
         if not trays:
             raise self.error(top['trays'], 'lists no tray', 'add at least one')
         return trays
+
+    def _read_materials(self, top: Mapping[str, yaml.Node]) -> None:
+        """Materials of the package with the densities of the file, and those it describes."""
+        densities = {}
+        if 'densities_g_cm3' in top:
+            pairs = self.pairs(top['densities_g_cm3'])
+            densities = {str(key): self.positive(value) for key, value in pairs}
+        self._densities = densities
+        self._materials = {
+            name: replace(material, density=densities[name] * GRAM_PER_CUBIC_CENTIMETRE)
+            if name in densities
+            else material
+            for name, material in known_materials().items()
+        }
+        if 'materials' in top:
+            reader = MaterialReader(self.file, densities)
+            self._materials |= reader.materials(top['materials'])
+
+    def _material(self, node: yaml.Node) -> Material:
+        name = str(self.scalar(node))
+        if name not in self._materials:
+            known = ', '.join(sorted(self._materials))
+            raise self.error(
+                node,
+                f'material {name!r} is not described (known: {known})',
+                paste_remedy(name, density_given=name in self._densities),
+            )
+        return self._materials[name]
 
     def _tray_number(self, key: object, node: yaml.Node) -> int:
         if isinstance(key, bool) or not isinstance(key, int) or key < 1:
             raise self.error(node, f'tray number {key!r}', 'number the trays 1, 2, ...')
         return key
 
-    def _tray(self, number: int, node: yaml.Node, densities: Mapping[str, float]) -> Tray:
+    def _tray(self, number: int, node: yaml.Node) -> Tray:
         entry = self.mapping(node, {'dimensions_mm', 'species'}, {'chalk', 'place_mm'})
         sides = self._lengths(entry['dimensions_mm'])
         if len(sides) != 3:
@@ -171,12 +237,13 @@ class _TrayFile(YamlLines):
             )
         if not isinstance(entry['species'], yaml.SequenceNode) or not entry['species'].value:
             raise self.error(entry['species'], 'species is no list', 'list at least one')
-        species = tuple(self._species(one, densities) for one in entry['species'].value)
-        for node_one, one in zip(entry['species'].value, species, strict=True):
-            if one.diameter_high > min(sides) * MILLIMETRE * (1.0 + 1e-12):
+        nodes = entry['species'].value
+        species = tuple(self._species(item) for item in nodes)
+        for item, beads in zip(nodes, species, strict=True):
+            if beads.diameter_high > min(sides) * MILLIMETRE * (1.0 + 1e-12):
                 raise self.error(
-                    node_one,
-                    f'beads of {one.diameter_high / MILLIMETRE:g} mm in a tray of '
+                    item,
+                    f'beads of {beads.diameter_high / MILLIMETRE:g} mm in a tray of '
                     f'{min(sides):g} mm',
                     'correct the diameter or the dimensions',
                 )
@@ -191,21 +258,14 @@ class _TrayFile(YamlLines):
     def _place(self, node: yaml.Node | None) -> tuple[float, float] | None:
         if node is None:
             return None
-        found = [self.number(one) for one in self.listed(node)]
-        if len(found) != 2 or min(found) < 0.0:
-            raise self.error(node, f'a place of {found}', 'give column and row, 0 or more')
-        return found[0] * MILLIMETRE, found[1] * MILLIMETRE
+        place = [self.number(item) for item in self.listed(node)]
+        if len(place) != 2 or min(place) < 0.0:
+            raise self.error(node, f'a place of {place}', 'give column and row, 0 or more')
+        return place[0] * MILLIMETRE, place[1] * MILLIMETRE
 
-    def _species(self, node: yaml.Node, densities: Mapping[str, float]) -> Species:
+    def _species(self, node: yaml.Node) -> Species:
         entry = self.mapping(node, {'material', 'diameter_mm', 'count'}, {'mass_g'})
-        material = str(self.scalar(entry['material']))
-        if material not in densities:
-            known = ', '.join(sorted(densities))
-            raise self.error(
-                entry['material'],
-                f'no density for {material!r} (known: {known})',
-                'add it to densities_g_cm3',
-            )
+        material = self._material(entry['material'])
         diameters = self._lengths(entry['diameter_mm'])
         if len(diameters) not in (1, 2) or diameters[0] > diameters[-1]:
             raise self.error(
@@ -213,16 +273,15 @@ class _TrayFile(YamlLines):
             )
         mass = entry.get('mass_g')
         return Species(
-            material=material,
             diameter_low=diameters[0] * MILLIMETRE,
             diameter_high=diameters[-1] * MILLIMETRE,
-            density=densities[material] * GRAM_PER_CUBIC_CENTIMETRE,
             count=self._count(entry['count']),
             mass=None if mass is None else self.positive(mass) * GRAM,
+            properties=material,
         )
 
     def _lengths(self, node: yaml.Node) -> list[float]:
-        return [self.positive(one) for one in self.listed(node)]
+        return [self.positive(item) for item in self.listed(node)]
 
     def _count(self, node: yaml.Node) -> int:
         value = self.positive(node)

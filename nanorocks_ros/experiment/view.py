@@ -1,4 +1,4 @@
-"""The rectified picture: the plate as seen from straight above, and where the lens shows it."""
+"""The rectified view: the plate seen from straight above, and its map to the camera picture."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-# How far a matrix of rotation may be from one, as written in a file.
+# Tolerance of the orthogonality of a rotation matrix in a file.
 _ROUNDING = 1e-3
 
 
 class Lens(Protocol):
-    """What a view needs of a camera; points and pixels are counted as in `Camera`."""
+    """Interface of a lens for a view; pixel coordinates as in `Camera`."""
 
     @property
     def width(self) -> int:
-        """Of the picture, [px]."""
+        """Size of the picture, [px]."""
 
     @property
     def height(self) -> int:
-        """Of the picture, [px]."""
+        """Size of the picture, [px]."""
 
     @property
     def matrix(self) -> NDArray[np.float64]:
         """K of ROS, (3, 3)."""
 
     def distorted(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points of the straight picture are in the picture of the lens, [px]."""
+        """Distort points of the undistorted picture, [px]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Straight:
-    """A lens that bends nothing, or that nothing is known of.
+class IdentityLens:
+    """A lens without distortion, or an unknown lens.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Straight:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """A camera and the plane picture that is made of what it sees.
+    """A camera and the homography of its rectified picture.
 
     Straight lines are straight in that picture, and where the camera looks at the plate at an
     angle it is the picture of a camera that does not: one scale holds everywhere on the plate.
@@ -92,7 +92,7 @@ class View:
             )
 
     def source(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points of the rectified picture are in the picture of the camera.
+        """Map points of the rectified picture to the camera picture.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ def view_from_matrices(
     camera: Lens,
     rotation: Sequence[float],
     projection: Sequence[float],
-    where: str,
+    place: str,
 ) -> View:
     """The view that R and P of a sensor_msgs/CameraInfo describe.
 
@@ -124,26 +124,26 @@ def view_from_matrices(
     rotation : 9 floats, row by row
         From the frame of the camera to that of the rectified picture.
     projection : 12 floats, row by row, [px]
-        P of ROS, which counts from the centre of a pixel; its last column is not looked at.
+        P of ROS, which counts from the centre of a pixel; its last column is ignored.
     where : str
         For errors.
 
     Raises
     ------
     ConfigurationError
-        For a rotation that is none, or a projection without focal lengths.
+        For a matrix that is no rotation, or a projection without focal lengths.
     """
     turn = np.array(rotation, dtype=np.float64).reshape(3, 3)
     project = np.array(projection, dtype=np.float64).reshape(3, 4)[:, :3]
     if not np.abs(turn @ turn.T - np.eye(3)).max() < _ROUNDING:
-        raise ConfigurationError(where, 'r is no rotation', 'calibrate the camera again')
+        raise ConfigurationError(place, 'r is no rotation', 'calibrate the camera again')
     if not (np.isfinite(project).all() and min(project[0, 0], project[1, 1]) > 0.0):
-        raise ConfigurationError(where, 'p has no focal lengths', 'calibrate the camera again')
+        raise ConfigurationError(place, 'p has no focal lengths', 'calibrate the camera again')
     matrix = _CORNER @ camera.matrix @ turn.T @ np.linalg.inv(_CORNER @ project)
     matrix = matrix / matrix[2, 2]
     if np.abs(matrix - np.eye(3)).max() < 1e-12:
         return View(camera=camera)
-    return View(camera=camera, homography=tuple(float(one) for one in matrix.ravel()))
+    return View(camera=camera, homography=tuple(float(value) for value in matrix.ravel()))
 
 
 # From the centre of the first pixel, where ROS counts from, to its corner.

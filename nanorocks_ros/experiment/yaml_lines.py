@@ -1,4 +1,4 @@
-"""YAML read so that an error names the line: what the files of trays and calibrations share."""
+"""YAML reader whose errors name the line, for the files of trays and calibrations."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import yaml
 from nanorocks_ros.errors import ConfigurationError
 
 
-def composed(name: str, text: str) -> yaml.Node | None:
-    """The nodes of a YAML text, which know their lines; None for an empty one.
+def parse_yaml(name: str, text: str) -> yaml.Node | None:
+    """The node tree of a YAML text, with line numbers; None for an empty text.
 
     Parameters
     ----------
     name : str
-        Of the file, for the error.
+        Name of the file, for errors.
     text : str
 
     Raises
@@ -30,20 +30,20 @@ def composed(name: str, text: str) -> yaml.Node | None:
     except yaml.YAMLError as error:
         mark = getattr(error, 'problem_mark', None)
         line = mark.line + 1 if mark else 1
-        what = getattr(error, 'problem', None) or getattr(error, 'reason', 'cannot be read')
+        reason = getattr(error, 'problem', None) or getattr(error, 'reason', 'cannot be read')
         raise ConfigurationError(
-            f'{name}:{line}', f'not YAML: {what}', 'correct this line'
+            f'{name}:{line}', f'not YAML: {reason}', 'correct this line'
         ) from error
 
 
-def read_text(path: Path, wanted: str) -> str:
+def read_text(path: Path, expected: str) -> str:
     """The text of a file.
 
     Parameters
     ----------
     path : Path
     wanted : str
-        What to name instead of a file that cannot be read.
+        Kind of file that is expected, for the error.
 
     Raises
     ------
@@ -54,47 +54,47 @@ def read_text(path: Path, wanted: str) -> str:
         return path.read_text(encoding='utf-8')
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, 'strerror', None) or 'is not UTF-8 text'
-        raise ConfigurationError(str(path), reason, f'name {wanted}') from error
+        raise ConfigurationError(str(path), reason, f'name {expected}') from error
 
 
 class YamlLines:
-    """Takes nodes apart; every error names the file and the line.
+    """Reads YAML nodes; every error names the file and the line.
 
     Parameters
     ----------
-    name : str
-        Of the file.
+    file : str
+        Name of the file.
     """
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, file: str) -> None:
+        self.file = file
 
     def error(self, node: yaml.Node | None, what: str, do: str) -> ConfigurationError:
-        """What is wrong with a node, or with the whole file."""
+        """An error about a node, or about the whole file."""
         return ConfigurationError(self.place(node), what, do)
 
     def place(self, node: yaml.Node | None) -> str:
         """File and line of a node."""
-        return self._name if node is None else f'{self._name}:{node.start_mark.line + 1}'
+        return self.file if node is None else f'{self.file}:{node.start_mark.line + 1}'
 
     def pairs(self, node: yaml.Node | None) -> list[tuple[object, yaml.Node]]:
-        """Keys and values, no key twice."""
+        """Keys and values; a duplicate key is refused."""
         if not isinstance(node, yaml.MappingNode):
             raise self.error(node, 'expected "name: value" entries', 'correct this line')
-        seen: set[object] = set()
+        keys: set[object] = set()
         pairs = []
         for key_node, value in node.value:
             key = self.scalar(key_node)
-            if key in seen:
+            if key in keys:
                 raise self.error(key_node, f'{key!r} stands twice', 'remove one')
-            seen.add(key)
+            keys.add(key)
             pairs.append((key, value))
         return pairs
 
     def mapping(
         self, node: yaml.Node | None, needed: set[str], allowed: set[str]
     ) -> dict[str, yaml.Node]:
-        """Entries of which some must be there, and no others than these and some more."""
+        """Entries of a mapping; missing and unknown ones are refused."""
         entry = {str(key): value for key, value in self.pairs(node)}
         missing = sorted(needed - set(entry))
         unknown = sorted(set(entry) - needed - allowed)
@@ -106,7 +106,7 @@ class YamlLines:
         return entry
 
     def scalar(self, node: yaml.Node) -> Any:
-        """A single value, as YAML reads it."""
+        """A scalar, parsed as YAML."""
         if not isinstance(node, yaml.ScalarNode):
             raise self.error(node, 'expected a single value', 'correct this line')
         try:
@@ -132,5 +132,5 @@ class YamlLines:
         return value
 
     def listed(self, node: yaml.Node) -> list[yaml.Node]:
-        """The items of a list; a single value does for a list of one."""
+        """The items of a list; a scalar counts as a list of one."""
         return list(node.value) if isinstance(node, yaml.SequenceNode) else [node]

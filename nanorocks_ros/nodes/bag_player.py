@@ -17,12 +17,12 @@ from nanorocks_ros.nodes.sources.bag_publishers import BagPublishers, stamp_in
 from nanorocks_ros.nodes.sources.bag_source import path_of_bag
 from nanorocks_ros.nodes.sources.play_range import PlayRange
 from nanorocks_ros.nodes.sources.player import Player
-from nanorocks_ros.recordings.bag.played_range import latest
+from nanorocks_ros.recordings.bag.played_range import latched_messages
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.messages.image_messages import (
     frame_from_compressed,
     frame_from_image,
-    jpeg_of,
+    frame_to_jpeg,
 )
 from nanorocks_ros.settings import BagSettings, PacingSettings, PlayerSettings, rows
 from nanorocks_ros.settings import problem as setting_problem
@@ -149,7 +149,7 @@ class BagPlayerNode(NanorocksNode):
 
     def _send_encoded(self, message: BagMessage) -> None:
         frame = frame_from_image(self._deserialized(message), message.topic)
-        jpeg = jpeg_of(frame, _JPEG_QUALITY)
+        jpeg = frame_to_jpeg(frame, _JPEG_QUALITY)
         image = compressed_message(frame.stamp_ns, 'camera', jpeg)
         self.outputs.send(topics.RAW_COMPRESSED, image)
 
@@ -157,7 +157,7 @@ class BagPlayerNode(NanorocksNode):
         """Publish the last messages of latched topics before a time."""
         if self._epoch_ns is not None:
             self.outputs.send(topics.EPOCH, time_message(self._epoch_ns))
-        for message in latest(self._reader, self._publishers_of_bag.latched, stamp_ns):
+        for message in latched_messages(self._reader, self._publishers_of_bag.latched, stamp_ns):
             self._publishers_of_bag.send(message)
 
     def _publish_clock(self, stamp_ns: int | None = None) -> None:

@@ -80,10 +80,12 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
         # numba does not cache if neither the package nor the home is writable.
         return _njit(function, options)
     # numba checks the file of the function only, but called functions and constants are compiled
-    # into it: after an update the cache would mix old and new code.
+    # into it: after an update the cache would mix old and new code. The stamp becomes part of the
+    # version, which numba compares before it unpickles an index: unpickling fails when the module
+    # of an argument's type has been moved.
     with suppress(AttributeError):
         file = dispatcher._cache._cache_file
-        file._source_stamp = (file._source_stamp, _stamp(function.__module__))
+        file._version = (file._version, _stamp(function.__module__))
     return cast('Function', dispatcher)
 
 

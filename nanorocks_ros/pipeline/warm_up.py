@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.experiment.view import Straight, View
+from nanorocks_ros.experiment.view import IdentityLens, View
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
 from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
 from nanorocks_ros.physics.sticking_rates import slow_contacts
@@ -65,7 +65,7 @@ def warm_up() -> None:
     """
     values = {'preprocess.regions_px': _REGION}
     settings = with_values(PipelineSettings(), values, 'warm-up')
-    view = View(camera=Straight(width=_SIDE, height=_SIDE))
+    view = View(camera=IdentityLens(width=_SIDE, height=_SIDE))
     noise = np.random.default_rng(0).integers(90, 110, (3, _SIDE, _SIDE, 3), dtype=np.uint8)
     x, y, width, height = _REGION
     # In the last frame the square is missing, and searched for.

@@ -1,17 +1,20 @@
-"""What stands in the head of a JPEG, and what cameras leave out of it."""
+"""JPEG headers: size, Huffman tables, and whether the file is complete."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-_START, _END = b'\xff\xd8', b'\xff\xd9'
-# Some cameras pad a JPEG with zeros; the end marker is looked for before them.
+START = b'\xff\xd8'
+"""First bytes of a JPEG (start-of-image marker)."""
+
+_END = b'\xff\xd9'
+# Some cameras pad a JPEG with zeros after the end marker.
 _PADDING = b'\x00'
 _TAIL_BYTES = 64
 _TABLES, _SCAN = 0xC4, 0xDA
-# Frame headers: all of C0 to CF but tables, extensions and arithmetic conditioning.
+# Frame headers: C0 to CF without tables, extensions and arithmetic conditioning.
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {_TABLES, 0xC8, 0xCC}
-# Annex K.3 of ITU-T T.81: what is meant where a camera leaves the tables out.
+# Annex K.3 of ITU-T T.81: the tables to use if the camera omits them.
 _STANDARD_TABLES = bytes.fromhex(
     'ffc4001f0000010501010101010100000000000000000102030405060708090a0b'
     'ffc400b5100002010303020403050504040000017d010203000411051221314106'
@@ -32,16 +35,16 @@ _STANDARD_TABLES = bytes.fromhex(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JpegHead:
-    """What a JPEG says of itself before its pixels.
+    """Header of a JPEG.
 
     Parameters
     ----------
     width, height : int, [px]
     channels : int
     tables : bool
-        It brings its Huffman tables along.
+        Whether it contains its Huffman tables.
     scan : int
-        Where the pixels begin, [bytes].
+        Offset of the scan (the pixel data), [bytes].
     """
 
     width: int
@@ -52,38 +55,39 @@ class JpegHead:
 
 
 def is_whole_jpeg(content: bytes | memoryview) -> bool:
-    """Whether it begins and ends as a JPEG does."""
+    """Whether the content begins with the start marker and ends with the end marker of a JPEG."""
     tail = bytes(content[-_TAIL_BYTES:]).rstrip(_PADDING)
-    return bytes(content[:2]) == _START and tail.endswith(_END)
+    return bytes(content[:2]) == START and tail.endswith(_END)
 
 
 def jpeg_head(content: bytes) -> JpegHead | None:
-    """The head of a JPEG, or None when it has none."""
-    if content[:2] != _START:
+    """Header of a JPEG; None if the content is not a JPEG or has no scan."""
+    if content[:2] != START:
         return None
-    place, tables, frame = 2, False, (0, 0, 0)
-    while place + 4 <= len(content) and content[place] == 0xFF:
-        marker = content[place + 1]
+    offset, tables, frame = 2, False, (0, 0, 0)
+    while offset + 4 <= len(content) and content[offset] == 0xFF:
+        marker = content[offset + 1]
         if marker == 0xFF:
-            place += 1
+            offset += 1
             continue
         if marker == _SCAN:
             height, width, channels = frame
             return JpegHead(
-                width=width, height=height, channels=channels, tables=tables, scan=place
+                width=width, height=height, channels=channels, tables=tables, scan=offset
             )
         tables = tables or marker == _TABLES
         if marker in _FRAMES:
             height, width = (
-                int.from_bytes(content[place + at : place + at + 2], 'big') for at in (5, 7)
+                int.from_bytes(content[offset + field : offset + field + 2], 'big')
+                for field in (5, 7)
             )
-            frame = (height, width, content[place + 9] if place + 9 < len(content) else 0)
-        place += 2 + int.from_bytes(content[place + 2 : place + 4], 'big')
+            frame = (height, width, content[offset + 9] if offset + 9 < len(content) else 0)
+        offset += 2 + int.from_bytes(content[offset + 2 : offset + 4], 'big')
     return None
 
 
 def with_huffman_tables(content: bytes, head: JpegHead) -> bytes:
-    """The JPEG with the standard tables, where a camera left them out; its pixels as they are."""
+    """Insert the standard Huffman tables if the JPEG has none; pixels are not changed."""
     if head.tables:
         return content
     return content[: head.scan] + _STANDARD_TABLES + content[head.scan :]

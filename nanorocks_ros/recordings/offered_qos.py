@@ -1,4 +1,4 @@
-"""How the topics of a recording were offered, as it keeps that: written and read again."""
+"""Quality of service of recorded topics: conversion to and from the metadata of a recording."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from rosbags.interfaces import (
     QosTime,
 )
 
-# What ROS 2 calls an infinite duration.
+# The infinite duration of ROS 2.
 _FOREVER = QosTime(9223372036, 854775807)
-# Recordings before version 9 keep the numbers of rmw.
+# Recordings before version 9 store the numbers of rmw instead of names.
 _RELIABLE = (1, 'reliable')
 _TRANSIENT_LOCAL = (1, 'transient_local')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OfferedQos:
-    """How a topic was, or would be, offered.
+    """Quality of service that a publisher offers.
 
     Parameters
     ----------
     reliable : bool
-        Else best effort.
+        True: reliable; False: best effort.
     transient_local : bool
-        A late subscriber still gets the last messages; else volatile.
+        True: late subscribers get the last messages; False: volatile.
     depth : int, >= 1
-        Messages kept.
+        Queue depth in messages.
     """
 
     reliable: bool = True
@@ -41,7 +41,7 @@ class OfferedQos:
     depth: int = 10
 
     def profile(self) -> Qos:
-        """The profile that recordings keep and players offer again."""
+        """The same as a profile of rosbags, for the metadata of a recording."""
         durability = QosDurability.TRANSIENT_LOCAL if self.transient_local else None
         return Qos(
             history=QosHistory.KEEP_LAST,
@@ -57,9 +57,9 @@ class OfferedQos:
 
 
 def recorded_qos(text: str) -> OfferedQos | None:
-    """How a topic was offered, from what a recording says of it.
+    """Parse the quality of service of a topic from the metadata of a recording.
 
-    Where several offered it, it is as good as the best of them.
+    If several publishers offered the topic, the best value of each policy is returned.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def recorded_qos(text: str) -> OfferedQos | None:
     Returns
     -------
     OfferedQos or None
-        None where it says nothing that can be understood.
+        None if the text is empty or cannot be parsed.
     """
     try:
         profiles: Any = yaml.safe_load(text) or []

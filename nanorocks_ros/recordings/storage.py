@@ -1,4 +1,4 @@
-"""What every kind of storage file offers, and the values it hands out."""
+"""The interface of storage files (MCAP, SQLite) and the values they return."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.recordings.offered_qos import OfferedQos
 
-# Recordings count signed nanoseconds since 1970; what is earlier or later was damaged.
+NS = 1_000_000_000
+# Recordings count signed 64-bit nanoseconds since 1970; any other time stamp is damaged.
 LAST_NS = 2**63 - 1
 
 
@@ -25,15 +26,15 @@ class TopicInfo:
     type : str
         For example ``sensor_msgs/msg/Image``.
     count : int
-        Messages, as far as the storage knows before they are read.
+        Number of messages, as far as the storage knows before they are read.
     encoding : str
-        Of the messages; only ``cdr`` can be deserialised.
+        Serialization format of the messages; only ``cdr`` can be deserialized.
     definition : str
-        Text of the message definition kept in the recording; empty where there is none.
+        Text of the message definition in the recording; empty if there is none.
     definition_format : str
         ``ros2msg`` or ``ros2idl``.
     qos : OfferedQos or None
-        How it was offered; None where the recording does not say.
+        Quality of service that the publisher offered; None if the recording does not state it.
     """
 
     name: str
@@ -53,7 +54,7 @@ class BagMessage:
     ----------
     topic, type : str
     log_time_ns : int, [ns]
-        When it was recorded; the instant that was measured stands in the message's header.
+        When it was recorded; the time of measurement is in the header of the message.
     cdr : bytes
     """
 
@@ -64,7 +65,7 @@ class BagMessage:
 
 
 class StorageFile(Protocol):
-    """One file of a recording, opened.
+    """One open file of a recording.
 
     Attributes
     ----------
@@ -73,13 +74,13 @@ class StorageFile(Protocol):
     start_ns, end_ns : int, [ns]
         Log times of the first and last message; both 0 when there is none.
     recorder_notes : str
-        A copy of ``metadata.yaml`` that some recorders keep in the file; empty without one.
+        Copy of ``metadata.yaml`` that some recorders store in the file; empty if there is none.
     complete : bool
-        Nothing is known to be missing, so far.
+        No data loss has been found so far.
     notices : tuple of str
-        What was salvaged and what is lost, so far.
+        Damage and recovery found so far, in sentences.
     messages_lost : int
-        Messages known to be lost, so far.
+        Number of lost messages found so far.
     """
 
     path: Path
@@ -90,15 +91,15 @@ class StorageFile(Protocol):
 
     @property
     def complete(self) -> bool:
-        """Nothing is known to be missing, so far."""
+        """Whether no data loss has been found so far."""
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What was salvaged and what is lost, so far."""
+        """Damage and recovery found so far, in sentences."""
 
     @property
     def messages_lost(self) -> int:
-        """Messages known to be lost, so far."""
+        """Number of lost messages found so far."""
 
     def messages(
         self,
@@ -106,4 +107,4 @@ class StorageFile(Protocol):
         start_ns: int | None = None,
         end_ns: int | None = None,
     ) -> Iterator[BagMessage]:
-        """The messages of some topics and of some time, or all, in order of log time."""
+        """Messages of the given topics and time range, in order of log time."""

@@ -1,1 +1,1 @@
-"""The hard-sphere gas in its tray, and the camera over it."""
+"""Simulation of the hard-sphere gas in a tray, and of the camera."""

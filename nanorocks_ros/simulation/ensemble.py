@@ -1,4 +1,4 @@
-"""Many runs of one tray, from shaking to rest."""
+"""Ensembles: many cooling runs of one tray."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for
 from nanorocks_ros.simulation.engine import observables as columns
-from nanorocks_ros.simulation.engine.collision_rules import for_species
-from nanorocks_ros.simulation.engine.event_loop import Output, run_until
-from nanorocks_ros.simulation.engine.gas import MOST_FOR_SCAN, HardSphereGas
+from nanorocks_ros.simulation.engine.event_loop import RunOutput, run_until
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.engine.gas_state import COUNTS, DONE, PAIR, WALL, new_state
 from nanorocks_ros.simulation.engine.input_checks import check_room, check_times
+from nanorocks_ros.simulation.engine.kernel_choice import MOST_FOR_SCAN
+from nanorocks_ros.simulation.engine.rules.collision_rules import restitution_table
 from nanorocks_ros.simulation.initial_state import (
     draw_diameters,
-    drawn_velocities,
+    draw_velocities,
+    inventory,
     resting_beads,
     rules_of,
     sphere_masses,
-    stock,
 )
-from nanorocks_ros.simulation.packing.random_placement import MOST_TRIES, place
+from nanorocks_ros.simulation.packing.random_placement import MOST_TRIES, pack_beads
 from nanorocks_ros.simulation.shaken_tray import after_shaking, check_settings
 
 if TYPE_CHECKING:
@@ -34,8 +35,8 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import SimulationSettings
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
-    from nanorocks_ros.simulation.initial_state import Stock
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
+    from nanorocks_ros.simulation.initial_state import Inventory
 
 _NO_ROOM = -1
 _MOST_EVENTS = 10_000_000
@@ -70,7 +71,7 @@ def cooling_runs(
     times: Sequence[float] | NDArray[np.float64],
     runs: Iterable[int],
 ) -> CoolingRuns:
-    """Let a tray cool after one shaking event, for each of some runs.
+    """Simulate the cooling of a tray after one shaking event, run by run.
 
     A run starts where `ShakenTray` of the same seed and run is after a shaking event at
     time 0, event by event.
@@ -94,19 +95,21 @@ def cooling_runs(
     check_settings(settings)
     last = float(np.max(times)) if np.size(times) else 0.0
     instants = check_times(0.0, last, times)
-    drawn = stock(tray)
+    drawn = inventory(tray)
     small = drawn.density.size <= MOST_FOR_SCAN and settings.speeds != 'shaken'
     rows = [
         (_small_run if small else _large_run)(settings, tray, drawn, instants, run) for run in runs
     ]
     n_columns = columns.columns(int(drawn.species.max()) + 1)
-    found = np.array(rows).reshape(len(rows), instants.size + 1, n_columns)
-    counts = found[:, -1, columns.FIRST_COUNT : columns.FIRST_COUNT + COUNTS].astype(np.int64)
+    rows_of_runs = np.array(rows).reshape(len(rows), instants.size + 1, n_columns)
+    counts = rows_of_runs[:, -1, columns.FIRST_COUNT : columns.FIRST_COUNT + COUNTS].astype(
+        np.int64
+    )
     return CoolingRuns(
         times=instants,
-        mean_speed=found[:, :-1, columns.MEAN_SPEED],
-        mean_projected_speed=found[:, :-1, columns.MEAN_PROJECTED_SPEED],
-        bodies=found[:, :-1, columns.BODIES].astype(np.int64),
+        mean_speed=rows_of_runs[:, :-1, columns.MEAN_SPEED],
+        mean_projected_speed=rows_of_runs[:, :-1, columns.MEAN_PROJECTED_SPEED],
+        bodies=rows_of_runs[:, :-1, columns.BODIES].astype(np.int64),
         pair_collisions=counts[:, PAIR],
         wall_collisions=counts[:, WALL],
     )
@@ -115,7 +118,7 @@ def cooling_runs(
 def _large_run(
     settings: SimulationSettings,
     tray: Tray,
-    drawn: Stock,
+    drawn: Inventory,
     instants: NDArray[np.float64],
     run: int,
 ) -> NDArray[np.float64]:
@@ -131,14 +134,14 @@ def _large_run(
 def _small_run(
     settings: SimulationSettings,
     tray: Tray,
-    drawn: Stock,
+    drawn: Inventory,
     instants: NDArray[np.float64],
     run: int,
 ) -> NDArray[np.float64]:
-    """The same without leaving compiled code."""
+    """The same, entirely in compiled code."""
     rules = rules_of(settings, tray, run).compiled()
     n_species = int(drawn.species.max()) + 1
-    rules = rules._replace(restitution=for_species(rules.restitution, n_species))
+    rules = rules._replace(restitution=restitution_table(rules.restitution, n_species))
     check_room(0.5 * drawn.diameter_high, rules)
     purposes = (Purpose.DIAMETERS, Purpose.POSITIONS, Purpose.VELOCITIES)
     keys = np.array([key_for(settings.seed, run, purpose) for purpose in purposes])
@@ -183,19 +186,19 @@ def _cool(
     times: NDArray[np.float64],
     rows: NDArray[np.float64],
 ) -> int:
-    """One run; writes observations (n_times, n_columns), and returns how it ended."""
+    """One run; writes observations (n_times, n_columns), and returns the status."""
     diameters = draw_diameters(ranges[0], ranges[1], keys[0])
     n = diameters.size
     sides = np.array((rules.sides[0], rules.sides[1], rules.sides[2]))
     radii = 0.5 * diameters
-    positions, placed = place(radii, sides, np.zeros(3, dtype=np.bool_), keys[1], MOST_TRIES)
+    positions, placed = pack_beads(radii, sides, np.zeros(3, dtype=np.bool_), keys[1], MOST_TRIES)
     if placed < n:
         return _NO_ROOM
     masses = sphere_masses(diameters, ranges[2])
-    velocities = drawn_velocities(masses, mean_speed, maxwell, vertical, keys[2], 0)
+    velocities = draw_velocities(masses, mean_speed, maxwell, vertical, keys[2], 0)
     state = new_state(positions, velocities, radii, masses, species, rules)
     nothing = np.empty((0, 0, 3))
-    output = Output(
+    output = RunOutput(
         times[:0],
         nothing,
         nothing,

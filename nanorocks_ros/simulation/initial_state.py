@@ -1,4 +1,4 @@
-"""The beads of a tray before anything happens: drawn sizes, random places, shaken speeds."""
+"""Initial state of a tray: drawn sizes, random positions, velocities after shaking."""
 
 from __future__ import annotations
 
@@ -11,14 +11,12 @@ import numpy as np
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for, uniform
-from nanorocks_ros.simulation.engine.collision_rules import (
-    CollisionRules,
-    UniformRestitution,
-    WallMotion,
-)
-from nanorocks_ros.simulation.engine.gas import Beads
+from nanorocks_ros.simulation.engine.beads import Beads
 from nanorocks_ros.simulation.engine.input_checks import check_room
-from nanorocks_ros.simulation.packing.random_placement import placed_at_random
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
+from nanorocks_ros.simulation.engine.rules.restitution_laws import UniformRestitution
+from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
+from nanorocks_ros.simulation.packing.random_placement import random_positions
 from nanorocks_ros.simulation.velocities import maxwellian, uniform_speeds
 
 if TYPE_CHECKING:
@@ -29,13 +27,13 @@ if TYPE_CHECKING:
 
 _SPHERE = math.pi / 6.0
 _SMOOTH = -1.0
-# Largest speed of the walls of a tray that is really shaken, in mean speeds of the beads.
+# Largest speed of the walls of a shaken tray, in mean speeds of the beads.
 _WALL_SPEED = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stock:
-    """What the beads of a tray are drawn from, one entry for each bead.
+class Inventory:
+    """Ranges from which the beads of a tray are drawn, one entry for each bead.
 
     Parameters
     ----------
@@ -43,7 +41,7 @@ class Stock:
     density : ndarray (n,), [kg/m^3]
     materials : tuple of str
     species : ndarray of int32, (n,)
-        Place of the species in the list of the tray.
+        Index of the species in the list of the tray.
     """
 
     diameter_low: NDArray[np.float64]
@@ -53,39 +51,43 @@ class Stock:
     species: NDArray[np.int32]
 
 
-def stock(tray: Tray) -> Stock:
+def inventory(tray: Tray) -> Inventory:
     """The beads of a tray, species after species.
 
     Raises
     ------
     SimulationError
-        For a tray without beads, or a species that cannot be.
+        For a tray without beads, or an invalid species.
     """
-    where = f'tray {tray.number}'
-    for one in tray.species:
-        sizes = (one.diameter_low, one.diameter_high, one.density)
-        usable = all(math.isfinite(size) and size > 0.0 for size in sizes) and one.count >= 0
-        if not usable or one.diameter_low > one.diameter_high:
-            raise SimulationError(where, f'species {one}', 'give positive sizes, the lower first')
-    counts = [one.count for one in tray.species]
+    place = f'tray {tray.number}'
+    for species in tray.species:
+        sizes = (species.diameter_low, species.diameter_high, species.density)
+        usable = all(math.isfinite(size) and size > 0.0 for size in sizes) and species.count >= 0
+        if not usable or species.diameter_low > species.diameter_high:
+            raise SimulationError(
+                place, f'species {species}', 'give positive sizes, the lower first'
+            )
+    counts = [species.count for species in tray.species]
     if sum(counts) < 1:
-        raise SimulationError(where, 'holds no bead', 'give at least one')
-    return Stock(
-        diameter_low=np.repeat([one.diameter_low for one in tray.species], counts),
-        diameter_high=np.repeat([one.diameter_high for one in tray.species], counts),
-        density=np.repeat([one.density for one in tray.species], counts),
-        materials=tuple(one.material for one in tray.species for _ in range(one.count)),
+        raise SimulationError(place, 'holds no bead', 'give at least one')
+    return Inventory(
+        diameter_low=np.repeat([species.diameter_low for species in tray.species], counts),
+        diameter_high=np.repeat([species.diameter_high for species in tray.species], counts),
+        density=np.repeat([species.density for species in tray.species], counts),
+        materials=tuple(
+            species.material for species in tray.species for _ in range(species.count)
+        ),
         species=np.repeat(np.arange(len(counts), dtype=np.int32), counts),
     )
 
 
 def rules_of(settings: SimulationSettings, tray: Tray, run: int = 0) -> CollisionRules:
-    """The box of a simulated tray, and what collisions do in it.
+    """Rules of collisions of a simulated tray.
 
     Raises
     ------
     SimulationError
-        For a restitution that reaches beyond 0 or 1.
+        For a range of restitutions outside 0 to 1.
     """
     restitution: float | UniformRestitution = settings.restitution
     if settings.restitution_width > 0.0:
@@ -122,7 +124,7 @@ def _walls(settings: SimulationSettings) -> tuple[float, ...]:
 
 
 def wall_motion(settings: SimulationSettings) -> WallMotion:
-    """How the walls of a tray move that is really shaken: to and fro along its diagonal."""
+    """Motion of the walls of a shaken tray: sinusoidal along its diagonal."""
     amplitude = _WALL_SPEED * settings.mean_speed / (2.0 * math.pi * settings.shake_frequency)
     along = amplitude / math.sqrt(3.0)
     return WallMotion.sinusoidal(
@@ -143,15 +145,15 @@ def resting_beads(settings: SimulationSettings, tray: Tray, run: int = 0) -> Bea
     Raises
     ------
     SimulationError
-        When the beads do not fit, or no place is found for one of them.
+        When the beads do not fit.
     """
-    drawn = stock(tray)
+    drawn = inventory(tray)
     rules = rules_of(settings, tray).compiled()
     sizes_key = key_for(settings.seed, run, Purpose.DIAMETERS)
     diameters = draw_diameters(drawn.diameter_low, drawn.diameter_high, sizes_key)
     check_room(0.5 * diameters, rules)
     places_key = key_for(settings.seed, run, Purpose.POSITIONS)
-    positions = placed_at_random(0.5 * diameters, tray.dimensions, key=places_key)
+    positions = random_positions(0.5 * diameters, tray.dimensions, key=places_key)
     return Beads(
         radii=0.5 * diameters,
         masses=sphere_masses(diameters, drawn.density),
@@ -165,7 +167,7 @@ def resting_beads(settings: SimulationSettings, tray: Tray, run: int = 0) -> Bea
 def draw_diameters(
     low: NDArray[np.float64], high: NDArray[np.float64], key: np.uint64
 ) -> NDArray[np.float64]:
-    """Diameters, even between the two ends of each bead's range, [m]."""
+    """Diameters, uniform in the range of each bead, [m]."""
     diameters = np.empty(low.size)
     for i in range(low.size):
         diameters[i] = low[i] + (high[i] - low[i]) * uniform(key, i)
@@ -184,7 +186,7 @@ def sphere_masses(
 
 
 @compiled
-def drawn_velocities(
+def draw_velocities(
     masses: NDArray[np.float64],
     mean_speed: float,
     maxwell: bool,

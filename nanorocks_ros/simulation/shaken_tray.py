@@ -1,4 +1,4 @@
-"""A tray that is shaken now and then, and cools in between: what happens in it, frame by frame."""
+"""A tray that is shaken at set times and cools in between, frame by frame."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ from nanorocks_ros.errors import ConfigurationError, SimulationError
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for
 from nanorocks_ros.records import GroundTruth
 from nanorocks_ros.settings import problem, rows
-from nanorocks_ros.simulation.engine.gas import Beads, EventCounts, HardSphereGas
+from nanorocks_ros.simulation.engine.beads import Beads
+from nanorocks_ros.simulation.engine.event_counts import EventCounts
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.initial_state import (
-    drawn_velocities,
+    draw_velocities,
+    inventory,
     resting_beads,
     rules_of,
-    stock,
     wall_motion,
 )
 
@@ -29,7 +31,8 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import SimulationSettings
-    from nanorocks_ros.simulation.engine.collision_rules import CollisionRules, WallMotion
+    from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
+    from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 
 # A frame this much before a shaking event shows it: decimal times are not exact in binary.
 _SIMULTANEOUS = 1e-9
@@ -63,7 +66,7 @@ class ShakenTray:
     run : int, >= 0
         Runs of one seed differ.
     swing : WallMotion, optional
-        How the walls move after each shaking event, and knock the beads; by default they rest.
+        Motion of the walls after each shaking event; by default they are at rest.
 
     Raises
     ------
@@ -83,7 +86,7 @@ class ShakenTray:
         check_settings(settings)
         self._settings = settings
         self._tray = tray
-        self.materials = stock(tray).materials
+        self.materials = inventory(tray).materials
         self._run = run
         self._rules = rules_of(settings, tray, run)
         self._swing = swing
@@ -117,12 +120,12 @@ class ShakenTray:
         return self._gas.counts
 
     def moments(self, frames: int | None = None, start_stamp_ns: int = 0) -> Iterator[Moment]:
-        """Go from frame to frame, from the present on; meant to be called once.
+        """Iterate over the frames from the present on; to be called once.
 
         Parameters
         ----------
         frames : int or None, >= 0
-            How many; None goes on for ever.
+            How many; None for an endless film.
         start_stamp_ns : int, [ns]
             Stamp of the frame at time 0.
 
@@ -146,7 +149,7 @@ class ShakenTray:
             )
 
     def at(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Follow the beads to a time, through any shaking event up to and including it.
+        """Advance the beads to a time, through the shaking events up to and including it.
 
         Parameters
         ----------
@@ -163,7 +166,7 @@ class ShakenTray:
         """
         while time >= self._next_shake() - _SIMULTANEOUS:
             self._shake()
-        # A frame within rounding of the shake belongs to the shake.
+        # A frame at the time of the event, within rounding, shows the tray after it.
         since = max(time - self._origin, 0.0) if self._cycle else time
         positions, velocities = self._gas.run_until(since, [since])
         return positions[0], velocities[0]
@@ -178,16 +181,16 @@ class ShakenTray:
             self._settings, self._rules, self._gas.beads(), self._run, self._cycle
         )
         if self._swing is not None and self._cycle == 0:
-            # Until now nothing moved: a new gas, in walls that swing from its time 0 on.
+            # Nothing has moved before: a new gas whose walls oscillate from its time 0 on.
             moving = replace(self._rules, motion=self._swing)
             self._gas = HardSphereGas(shaken, moving)
         else:
-            self._gas.set_going(shaken)
+            self._gas.restart(shaken)
         self._origin = instant
         self._cycle += 1
 
     def truth(self, stamp_ns: int, velocities: NDArray[np.float64]) -> GroundTruth:
-        """What is known of the present as a whole, given the velocities (n, 3), [m/s]."""
+        """Ground truth at the present time, given the velocities (n, 3), [m/s]."""
         mean_speed, mean_projected_speed = mean_speeds(velocities)
         return GroundTruth(
             stamp_ns=stamp_ns,
@@ -205,7 +208,7 @@ class ShakenTray:
 def after_shaking(
     settings: SimulationSettings, rules: CollisionRules, beads: Beads, run: int, cycle: int
 ) -> Beads:
-    """The beads of a tray at the end of a shaking event, all apart.
+    """The beads of a tray at the end of a shaking event, with no bodies.
 
     Parameters
     ----------
@@ -219,19 +222,19 @@ def after_shaking(
     Returns
     -------
     Beads
-        Where they were, unless the walls are really shaken: then where that leaves them, with
-        the velocities it gives them times one factor, which makes the mean speed the wanted.
-        With constant restitution that is the gas of a tray shaken so much faster.
+        At their old positions, with random velocities. With `speeds` shaken the walls are moved:
+        then at the positions that this gives, with its velocities times one factor that sets the
+        mean speed; with constant restitution this equals a faster shaking.
 
     Raises
     ------
     SimulationError
-        When the walls bring a gas into a state that cannot be followed.
+        When the simulation of the shaking fails.
     """
     key = key_for(settings.seed, run, Purpose.VELOCITIES)
     maxwell = settings.speeds == 'maxwellian'
     vertical = settings.vertical_speed_factor
-    velocities = drawn_velocities(beads.masses, settings.mean_speed, maxwell, vertical, key, cycle)
+    velocities = draw_velocities(beads.masses, settings.mean_speed, maxwell, vertical, key, cycle)
     started = replace(beads, velocities=velocities, spins=None)
     if settings.speeds != 'shaken' or settings.mean_speed == 0.0:
         return started
@@ -266,8 +269,8 @@ def check_settings(settings: SimulationSettings) -> None:
     ConfigurationError
         Naming every setting at fault.
     """
-    found = ((row.name, problem(row, row.default)) for row in rows(settings))
-    wrong = [f'{name}: {text}' for name, text in found if text]
+    problems = ((row.name, problem(row, row.default)) for row in rows(settings))
+    wrong = [f'{name}: {text}' for name, text in problems if text]
     if wrong:
         raise ConfigurationError(
             'simulation', '; '.join(wrong), 'see docs/reference/parameters.md for names and ranges'

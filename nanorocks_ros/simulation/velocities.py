@@ -1,4 +1,4 @@
-"""Velocities of a gas that was shaken, or that has come to equilibrium.
+"""Random velocities: after shaking, or Maxwellian.
 
 Normal deviates come from Marsaglia's polar method with a logarithm of our own. The usual ones
 call `log` and `cos`, whose last bits differ from one mathematical library to the next; this
@@ -34,7 +34,7 @@ _TERMS = 11
 
 @compiled
 def uniform_speeds(n: int, mean_speed: float, key: np.uint64, shake: int) -> NDArray[np.float64]:
-    """Velocities after a shaking event: speeds even in [0, 2 mean), directions even.
+    """Velocities after a shaking event: speeds uniform in [0, 2 mean), directions isotropic.
 
     Parameters
     ----------
@@ -93,13 +93,13 @@ def maxwellian(
     deviates_key = hashed(key, 2 * shake)
     mean = 0.0
     for i in range(n):
-        mean += _lightness(masses[i], equipartition)
+        mean += _speed_scale(masses[i], equipartition)
     mean /= n
     for i in range(n):
-        deviation = _DEVIATION * mean_speed * (_lightness(masses[i], equipartition) / mean)
-        own_key = hashed(deviates_key, i)
-        x, y, counter = normal_pair(own_key, 0)
-        z, _, _ = normal_pair(own_key, counter)
+        deviation = _DEVIATION * mean_speed * (_speed_scale(masses[i], equipartition) / mean)
+        bead_key = hashed(deviates_key, i)
+        x, y, counter = normal_pair(bead_key, 0)
+        z, _, _ = normal_pair(bead_key, counter)
         velocities[i, 0] = deviation * x
         velocities[i, 1] = deviation * y
         velocities[i, 2] = deviation * z
@@ -107,14 +107,14 @@ def maxwellian(
 
 
 @compiled
-def _lightness(mass: float, equipartition: bool) -> float:
-    """What the speeds of a bead are in proportion to."""
+def _speed_scale(mass: float, equipartition: bool) -> float:
+    """Factor of the speed of a bead by its mass."""
     return 1.0 / math.sqrt(mass) if equipartition else 1.0
 
 
 @compiled
 def normal_pair(key: np.uint64, counter: int) -> tuple[float, float, int]:
-    """Two random numbers of the normal law, and the counter after those they took."""
+    """Two normal deviates, and the counter after the numbers used."""
     while True:
         a = 2.0 * uniform(key, counter) - 1.0
         b = 2.0 * uniform(key, counter + 1) - 1.0

@@ -65,8 +65,8 @@ def truth(seconds, cycle=1):
     )
 
 
-def times(told, name):
-    return [row[0] for row in told[name]['rows']]
+def times(news, name):
+    return [row[0] for row in news[name]['rows']]
 
 
 @pytest.fixture
@@ -76,8 +76,8 @@ def board():
 
 def follow(board, cursor, rows):
     """What a page makes of the news: points of the curve of the speed."""
-    told = board.news(cursor, 0.0)['trays']['1']['speed']
-    return rows[: told['from']] + told['rows']
+    news = board.news(cursor, 0.0)['trays']['1']['speed']
+    return rows[: news['from']] + news['rows']
 
 
 def test_a_client_that_asks_seldom_has_the_same_curve_in_the_end(board):
@@ -119,12 +119,12 @@ def test_a_new_cycle_begins_with_an_empty_curve_and_the_last_stays_as_a_number(b
     board.news(cursor, 0.0)
     board.take(speed(62.0, cycle=2, start=61.0), 0.0)
     board.take(cor(60.0, status=CorStatus.FINAL, value=0.88), 0.0)
-    told = board.news(cursor, 0.0)['trays']['1']
-    assert (told['cycle'], told['start']) == (2, 61.0)
-    assert told['cor'] == {'from': 0, 'rows': []}
-    assert [row[0] for row in told['speed']['rows']] == [62.0]
-    assert 'cor' not in told['latest']
-    assert told['finals'] == [[1, 0.88, 0.86, 0.9]]
+    news = board.news(cursor, 0.0)['trays']['1']
+    assert (news['cycle'], news['start']) == (2, 61.0)
+    assert news['cor'] == {'from': 0, 'rows': []}
+    assert [row[0] for row in news['speed']['rows']] == [62.0]
+    assert 'cor' not in news['latest']
+    assert news['finals'] == [[1, 0.88, 0.86, 0.9]]
     board.take(speed(62.1, cycle=2, start=61.0), 0.0)
     assert 'finals' not in board.news(cursor, 0.0)['trays']['1']
 
@@ -135,8 +135,8 @@ def test_what_is_late_of_the_cycle_before_is_not_shown_in_this_one(board):
         stamp_ns=60 * NS, tray=1, cycle=1, level_area=1e-6, correlation_length=1e-3
     )
     board.take(late, 0.0)
-    told = board.news(Cursor(), 0.0)['trays']['1']
-    assert (told['cycle'], told['cluster']['rows']) == (2, [])
+    news = board.news(Cursor(), 0.0)['trays']['1']
+    assert (news['cycle'], news['cluster']['rows']) == (2, [])
 
 
 def test_a_source_that_starts_again_starts_the_page_again(board):
@@ -144,9 +144,9 @@ def test_a_source_that_starts_again_starts_the_page_again(board):
         board.take(speed(50.0 + k), 0.0)
     board.take(cor(54.0, status=CorStatus.FINAL), 0.0)
     board.take(speed(2.0), 0.0)
-    told = board.news(Cursor(), 0.0)['trays']['1']
-    assert [row[0] for row in told['speed']['rows']] == [2.0]
-    assert told['finals'] == []
+    news = board.news(Cursor(), 0.0)['trays']['1']
+    assert [row[0] for row in news['speed']['rows']] == [2.0]
+    assert news['finals'] == []
 
 
 def test_whoever_joins_in_the_middle_sees_results_beside_the_truth(board):
@@ -154,11 +154,11 @@ def test_whoever_joins_in_the_middle_sees_results_beside_the_truth(board):
     for k in range(5):
         board.take(truth(5.0 + k, cycle=3), 0.0)
         board.take(speed(5.5 + k, cycle=0, start=4.0), 0.0)
-    told = board.news(Cursor(), 0.0)['trays']['1']
-    assert (told['cycle'], told['start']) == (0, 4.0)
-    assert times(told, 'speed') == [5.5, 6.5, 7.5, 8.5, 9.5]
-    assert times(told, 'truth') == [5.0, 6.0, 7.0, 8.0, 9.0]
-    assert set(told['latest']) == {'speed', 'truth'}
+    news = board.news(Cursor(), 0.0)['trays']['1']
+    assert (news['cycle'], news['start']) == (0, 4.0)
+    assert times(news, 'speed') == [5.5, 6.5, 7.5, 8.5, 9.5]
+    assert times(news, 'truth') == [5.0, 6.0, 7.0, 8.0, 9.0]
+    assert set(news['latest']) == {'speed', 'truth'}
 
 
 def test_the_truth_goes_over_to_the_cycle_in_whose_time_it_is(board):
@@ -169,9 +169,9 @@ def test_the_truth_goes_over_to_the_cycle_in_whose_time_it_is(board):
         board.take(truth(57.0 + k, cycle=1 + (k > 3)), 0.0)
     board.news(cursor, 0.0)
     board.take(speed(61.5, cycle=2, start=61.0), 0.0)
-    told = board.news(cursor, 0.0)['trays']['1']
-    assert (told['truth']['from'], times(told, 'truth')) == (0, [61.0, 62.0, 63.0])
-    assert 'truth' in told['latest']
+    news = board.news(cursor, 0.0)['trays']['1']
+    assert (news['truth']['from'], times(news, 'truth')) == (0, [61.0, 62.0, 63.0])
+    assert 'truth' in news['latest']
 
 
 def test_the_truth_before_a_node_joined_is_not_shown(board):
@@ -192,9 +192,9 @@ def test_a_source_that_starts_again_has_its_new_truth_alone(board, truth_first):
     again = [speed(2.0), truth(2.1)]
     for record in reversed(again) if truth_first else again:
         board.take(record, 0.0)
-    told = board.news(cursor, 0.0)['trays']['1']
-    assert (told['truth']['from'], times(told, 'truth')) == (0, [2.1])
-    assert (told['speed']['from'], times(told, 'speed')) == (0, [2.0])
+    news = board.news(cursor, 0.0)['trays']['1']
+    assert (news['truth']['from'], times(news, 'truth')) == (0, [2.1])
+    assert (news['speed']['from'], times(news, 'speed')) == (0, [2.0])
 
 
 def test_a_clock_of_the_truth_that_goes_back_alone_takes_no_result_away(board):
@@ -204,9 +204,9 @@ def test_a_clock_of_the_truth_that_goes_back_alone_takes_no_result_away(board):
         board.take(truth(50.0 + k), 0.0)
     board.news(cursor, 0.0)
     board.take(truth(2.0), 0.0)
-    told = board.news(cursor, 0.0)['trays']['1']
-    assert (told['truth']['from'], times(told, 'truth')) == (0, [2.0])
-    assert 'speed' not in told
+    news = board.news(cursor, 0.0)['trays']['1']
+    assert (news['truth']['from'], times(news, 'truth')) == (0, [2.0])
+    assert 'speed' not in news
     assert len(times(board.news(Cursor(), 0.0)['trays']['1'], 'speed')) == 3
 
 
@@ -225,11 +225,11 @@ def test_a_merge_that_became_known_later_ends_the_curve_and_nothing_else(board):
         board.take(cor(62.0 + k, cycle=2), 0.0)
     board.news(cursor, 0.0)
     board.take(cor(64.5, cycle=2, status=CorStatus.FINAL, value=0.88), 0.0)
-    told = board.news(cursor, 0.0)['trays']['1']
-    assert 'speed' not in told
-    assert told['cor']['from'] == 0
-    assert [row[0] for row in told['cor']['rows']] == [62.0, 63.0, 64.0, 64.5]
-    assert [one[:2] for one in told['finals']] == [[1, 0.8], [2, 0.88]]
+    news = board.news(cursor, 0.0)['trays']['1']
+    assert 'speed' not in news
+    assert news['cor']['from'] == 0
+    assert [row[0] for row in news['cor']['rows']] == [62.0, 63.0, 64.0, 64.5]
+    assert [record[:2] for record in news['finals']] == [[1, 0.8], [2, 0.88]]
     assert len(board.news(Cursor(), 0.0)['trays']['1']['speed']['rows']) == 5
 
 
@@ -241,18 +241,18 @@ def test_whoever_hears_estimates_before_speeds_knows_when_the_tray_was_shaken(bo
 def test_what_is_not_known_is_null_and_states_are_words(board):
     board.take(speed(2.0), 0.0)
     board.take(replace(cor(2.0), haff_time=Measured(float('inf'))), 0.0)
-    told = json.loads(json.dumps(board.news(Cursor(), 0.0), allow_nan=False))['trays']['1']
-    assert told['latest']['cor']['haff_time'] is None
-    assert told['latest']['cor']['wall_restitution'] is None
-    assert told['latest']['cor']['status'] == 'cooling'
-    assert told['latest']['speed']['quality'] == ['glare']
-    assert told['description'] == '15 acrylic 2 mm'
+    news = json.loads(json.dumps(board.news(Cursor(), 0.0), allow_nan=False))['trays']['1']
+    assert news['latest']['cor']['haff_time'] is None
+    assert news['latest']['cor']['wall_restitution'] is None
+    assert news['latest']['cor']['status'] == 'cooling'
+    assert news['latest']['speed']['quality'] == ['glare']
+    assert news['description'] == '15 acrylic 2 mm'
 
 
 def test_a_tray_is_shown_before_anything_is_measured(board):
     board.expect(3, 7.0)
-    told = board.news(Cursor(), 9.0)['trays']['3']
-    assert (told['age'], told['latest'], told['start']) == (2.0, {}, None)
+    news = board.news(Cursor(), 9.0)['trays']['3']
+    assert (news['age'], news['latest'], news['start']) == (2.0, {}, None)
 
 
 def test_nodes_that_are_gone_are_forgotten_and_too_many_are_not_kept(board):

@@ -233,7 +233,8 @@ def test_text_is_readable_and_nothing_sticks_out(look, full, scheme, size):
 def test_texts_from_outside_stay_texts(look, serve, results):
     evil = '<img src=x onerror="alert(1)"><script>alert(2)</script>'
     trays = load_trays()
-    species = replace(trays[1].species[0], material=evil)
+    beads = trays[1].species[0]
+    species = replace(beads, properties=replace(beads.properties, name=evil))
     server = serve(namespace=f'/{evil}', trays={1: replace(trays[1], species=(species,))})
     for record in results.all:
         server.take(record)

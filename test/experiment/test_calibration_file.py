@@ -7,7 +7,7 @@ import math
 import pytest
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, view_of
+from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, rectified_view
 from nanorocks_ros.experiment.calibration_file import (
     calibrated,
     load_calibration,
@@ -27,7 +27,7 @@ REGIONS = {1: Region(535, 102, 188, 188), 3: Region(985, 352, 400, 125)}
 
 
 def calibration(**values):
-    numbers = {'info': INFO, 'view': view_of(INFO, 'test'), 'pixels_per_metre': 12503.25}
+    numbers = {'info': INFO, 'view': rectified_view(INFO, 'test'), 'pixels_per_metre': 12503.25}
     return Calibration(**{'regions': REGIONS, 'residual_px': 0.125, **numbers, **values})
 
 
@@ -38,7 +38,7 @@ def path(tmp_path):
     return file
 
 
-def test_what_is_written_is_read(path):
+def test_a_written_calibration_is_read_back(path):
     assert load_calibration(path) == calibration()
 
 
@@ -56,7 +56,7 @@ def test_the_settings_take_scale_and_regions_from_the_file_in_the_order_of_the_t
     assert calibrated(PipelineSettings()) == PipelineSettings()
 
 
-def test_a_tray_that_the_file_lacks_is_told(path):
+def test_a_tray_missing_from_the_file_is_named(path):
     values = {'trays': [1, 2, 5], 'preprocess.calibration': str(path)}
     with pytest.raises(ConfigurationError, match=r'mine.yaml: holds no region of tray 2, 5; '):
         calibrated(with_values(PipelineSettings(), values, 'test'))
@@ -79,7 +79,7 @@ def test_a_tray_that_the_file_lacks_is_told(path):
         ('trays:', 'trays: [', None, 'not YAML'),
     ],
 )
-def test_an_entry_that_cannot_be_used_names_its_line(path, old, new, line, message):
+def test_an_invalid_entry_names_its_line(path, old, new, line, message):
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new, 1))
@@ -89,7 +89,7 @@ def test_an_entry_that_cannot_be_used_names_its_line(path, old, new, line, messa
     assert f'mine.yaml:{line or ""}' in str(caught.value)
 
 
-def test_a_file_that_is_not_there_is_told(tmp_path):
+def test_a_missing_calibration_file_is_named(tmp_path):
     with pytest.raises(ConfigurationError, match='No such file'):
         load_calibration(tmp_path / 'none.yaml')
     with pytest.raises(ConfigurationError, match='write elsewhere'):

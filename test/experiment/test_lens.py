@@ -14,16 +14,16 @@ LENS = Camera(
 GRID = np.stack(np.meshgrid(np.linspace(0, 1920, 25), np.linspace(0, 1080, 15)), axis=-1)
 
 
-def test_there_and_back():
+def test_rectified_inverts_distorted():
     np.testing.assert_allclose(LENS.rectified(LENS.distorted(GRID)), GRID, atol=1e-9)
 
 
-def test_as_opencv_has_it():
+def test_distortion_agrees_with_opencv():
     normalised = ((GRID - LENS.centre) / LENS.focal).reshape(-1, 1, 2)
     expected = cv2.fisheye.distortPoints(normalised, LENS.matrix, np.array(DISTORTION))
     # OpenCV counts from the centre of the first pixel.
-    found = LENS.distorted(GRID).reshape(-1, 1, 2) - 0.5
-    np.testing.assert_allclose(found, expected, atol=1e-6)
+    expected_px = LENS.distorted(GRID).reshape(-1, 1, 2) - 0.5
+    np.testing.assert_allclose(expected_px, expected, atol=1e-6)
 
 
 def test_a_point_on_the_axis_stays_and_others_move_inwards():
@@ -61,7 +61,7 @@ def test_no_ray_leads_beyond_a_right_angle():
         {'width': 0},
     ],
 )
-def test_numbers_that_no_camera_has(wrong):
+def test_invalid_numbers_of_a_camera_are_refused(wrong):
     good = {'width': 1920, 'height': 1080, 'focal': (1400.0, 1400.0), 'centre': (960.0, 540.0)}
     with pytest.raises(ConfigurationError, match=r'^camera: '):
         Camera(**{**good, **wrong})

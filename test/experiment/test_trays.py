@@ -1,4 +1,4 @@
-"""The trays that were flown, and files that cannot be used."""
+"""The flown trays, and trays files that are refused."""
 
 from __future__ import annotations
 
@@ -24,45 +24,49 @@ trays:
 
 
 @pytest.mark.parametrize('number', range(1, 9))
-def test_a_tray_is_as_table_1_of_the_paper_says(number):
+def test_trays_agree_with_table_1_of_the_paper(number):
     tray = load_trays()[number]
     printed = PAPER['table1_trays'][str(number)]
     assert [1e3 * side for side in tray.dimensions] == pytest.approx(printed['dims_mm'])
     assert tray.chalk == printed.get('chalk', False)
     assert len(tray.species) == len(printed['species'])
-    for one, expected in zip(tray.species, printed['species'], strict=True):
+    for beads, expected in zip(tray.species, printed['species'], strict=True):
         diameters = expected['d_mm']
         low, high = diameters if isinstance(diameters, list) else (diameters, diameters)
-        assert one.material == expected['material']
-        assert (one.diameter_low, one.diameter_high) == pytest.approx((1e-3 * low, 1e-3 * high))
+        assert beads.material == expected['material']
+        assert (beads.diameter_low, beads.diameter_high) == pytest.approx(
+            (1e-3 * low, 1e-3 * high)
+        )
         if 'N' in expected:
-            assert one.count == expected['N']
+            assert beads.count == expected['N']
         else:
-            assert one.mass == pytest.approx(1e-3 * expected['mass_g'])
+            assert beads.mass == pytest.approx(1e-3 * expected['mass_g'])
 
 
 def test_densities_are_those_of_the_paper():
-    found = {one.material: one.density for tray in load_trays().values() for one in tray.species}
+    densities = {
+        beads.material: beads.density for tray in load_trays().values() for beads in tray.species
+    }
     for material, density in PAPER['densities_g_cm3'].items():
         if material != 'where':
-            assert found[material] == pytest.approx(1e3 * density)
+            assert densities[material] == pytest.approx(1e3 * density)
 
 
 @pytest.mark.parametrize('number', [6, 7, 8])
 def test_jsc1_counts_follow_from_table_3(number):
     tray = load_trays()[number]
     clusters, size, _, percent = PAPER['table3_clusters']['rows'][str(number)]
-    counted = sum(one.count for one in tray.species if one.mass is None)
+    counted = sum(beads.count for beads in tray.species if beads.mass is None)
     grains = tray.count - counted
     assert grains == pytest.approx(100 * clusters * size / percent - counted, abs=1.0)
 
 
 @pytest.mark.parametrize('number', [6, 7, 8])
 def test_jsc1_counts_from_mass_are_kept_beside_them_and_agree_within_a_third(number):
-    one = load_trays()[number].species[-1]
-    by_mass = one.mass / (one.density * math.pi / 6 * (0.75e-3) ** 3)
-    assert one.count_from_mass == pytest.approx(by_mass)
-    assert 0.66 < one.count_from_mass / one.count < 1.33
+    beads = load_trays()[number].species[-1]
+    by_mass = beads.mass / (beads.density * math.pi / 6 * (0.75e-3) ** 3)
+    assert beads.count_from_mass == pytest.approx(by_mass)
+    assert 0.66 < beads.count_from_mass / beads.count < 1.33
 
 
 def test_derived_quantities_of_tray_1_are_those_of_the_worked_example():
@@ -72,7 +76,7 @@ def test_derived_quantities_of_tray_1_are_those_of_the_worked_example():
     assert 1e6 * tray.mean_mass == pytest.approx(expected['m_mg_from_density'])
 
 
-def test_a_good_file_of_ones_own_is_read(tmp_path):
+def test_a_user_file_is_read(tmp_path):
     path = tmp_path / 'mine.yaml'
     path.write_text(GOOD)
     assert load_trays(path)[1].count == 15
@@ -93,7 +97,13 @@ def test_a_tray_that_does_not_exist_is_named_with_those_that_do():
         ('diameter_mm: 2', 'diameter_mm: -2', r':6: -2 is no positive number'),
         ('diameter_mm: 2', 'diameter_mm: 4', r':6: beads of 4 mm in a tray of 3 mm'),
         ('diameter_mm: 2', 'diameter_mm: [2, 1]', r':6: diameter \[2.0, 1.0\]'),
-        ('material: acrylic', 'material: lead', r":6: no density for 'lead' \(known: acrylic\)"),
+        (
+            'material: acrylic',
+            'material: lead',
+            r":6: material 'lead' is not described \(known: JSC-1, acrylic, copper, glass\); "
+            r'add "materials: \{lead: \{density_g_cm3: 1\.0, color_bgr: \[90, 90, 90\]\}\}"',
+        ),
+        ('{acrylic: 1.18}', '{acrylic: 0}', ':1: 0 is no positive number'),
         (', count: 15', '', r':6: lacks count; add it'),
         ('count: 15', 'count: 15, colour: red', r":6: unknown entry 'colour'; use count"),
         ('[15, 15, 3]', '[15, 15]', r':4: 2 dimensions; give length, width, height'),

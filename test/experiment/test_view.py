@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.calibration import CameraInfo, view_of
+from nanorocks_ros.experiment.calibration import CameraInfo, rectified_view
 from nanorocks_ros.experiment.lens import Camera
 from nanorocks_ros.experiment.view import View
 
@@ -21,15 +21,18 @@ def info(**values):
     return CameraInfo(**{'width': 1920, 'height': 1080, **numbers, **values})
 
 
-def by_opencv(one):
+def by_opencv(camera_info):
     """Where each pixel comes from, counted from the centre of the first pixel."""
-    k, r, p = (np.array(m).reshape(-1, n) for m, n in ((one.k, 3), (one.r, 3), (one.p, 4)))
-    size = (one.width, one.height)
-    if one.distortion_model == 'equidistant':
+    k, r, p = (
+        np.array(m).reshape(-1, n)
+        for m, n in ((camera_info.k, 3), (camera_info.r, 3), (camera_info.p, 4))
+    )
+    size = (camera_info.width, camera_info.height)
+    if camera_info.distortion_model == 'equidistant':
         return cv2.fisheye.initUndistortRectifyMap(
-            k, np.array(one.d), r, p[:, :3], size, cv2.CV_32FC1
+            k, np.array(camera_info.d), r, p[:, :3], size, cv2.CV_32FC1
         )
-    return cv2.initUndistortRectifyMap(k, np.array(one.d), r, p[:, :3], size, cv2.CV_32FC1)
+    return cv2.initUndistortRectifyMap(k, np.array(camera_info.d), r, p[:, :3], size, cv2.CV_32FC1)
 
 
 @pytest.mark.parametrize(
@@ -39,13 +42,13 @@ def by_opencv(one):
         ('plumb_bob', (-0.11, 0.02, 0.001, -0.002, 0.003)),
     ],
 )
-def test_every_pixel_comes_from_where_opencv_takes_it(model, d):
-    one = info(distortion_model=model, d=d, r=TURN, p=P)
+def test_the_map_agrees_with_opencv(model, d):
+    camera_info = info(distortion_model=model, d=d, r=TURN, p=P)
     x, y = np.meshgrid(np.arange(0, 1920, 97), np.arange(0, 1080, 83))
-    found = view_of(one, 'test').source(np.stack([x, y], axis=-1) + 0.5) - 0.5
-    map_x, map_y = by_opencv(one)
-    assert found[..., 0] == pytest.approx(map_x[y, x], abs=2e-3)
-    assert found[..., 1] == pytest.approx(map_y[y, x], abs=2e-3)
+    source_px = rectified_view(camera_info, 'test').source(np.stack([x, y], axis=-1) + 0.5) - 0.5
+    map_x, map_y = by_opencv(camera_info)
+    assert source_px[..., 0] == pytest.approx(map_x[y, x], abs=2e-3)
+    assert source_px[..., 1] == pytest.approx(map_y[y, x], abs=2e-3)
 
 
 def test_without_r_and_p_the_view_is_that_of_the_camera_itself():
@@ -57,7 +60,7 @@ def test_without_r_and_p_the_view_is_that_of_the_camera_itself():
         centre=(955.5, 541.5),
         distortion=(-0.02, 0.004, 0.001, 0.0),
     )
-    assert view_of(zeros, 'test') == view_of(info(), 'test') == View(camera=camera)
+    assert rectified_view(zeros, 'test') == rectified_view(info(), 'test') == View(camera=camera)
 
 
 @pytest.mark.parametrize(
@@ -75,6 +78,6 @@ def test_without_r_and_p_the_view_is_that_of_the_camera_itself():
         ({'d': (-5.0, 0.0, 0.0, 0.0)}, 'folds the picture over'),
     ],
 )
-def test_a_camera_that_cannot_be_is_refused_by_name(values, message):
+def test_an_invalid_camera_info_is_refused(values, message):
     with pytest.raises(ConfigurationError, match=f'^/camera_info: .*{message}'):
-        view_of(info(**values), '/camera_info')
+        rectified_view(info(**values), '/camera_info')

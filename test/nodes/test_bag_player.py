@@ -21,10 +21,12 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from nanorocks_ros.nodes.base.ros_messages import qos_of, stamp_of
+from nanorocks_ros.recordings.bag.offered_topics import OfferedTopic
 from nanorocks_ros.recordings.bag.reader import open_bag
-from nanorocks_ros.recordings.bag.writer import BagWriter, OfferedQos, OfferedTopic
+from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.image_messages import frame_from_compressed
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
+from nanorocks_ros.recordings.offered_qos import OfferedQos
 from nanorocks_ros.wire import topics
 
 SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'

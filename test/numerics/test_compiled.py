@@ -6,6 +6,12 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
+
+import nanorocks_ros
+
+# What these processes import, installed or not.
+ROOT = Path(nanorocks_ros.__file__).parents[1]
 
 CALLER = """
 from nanorocks_ros.numerics.compiled import compiled
@@ -31,12 +37,16 @@ print(caller(10), sum(caller.stats.cache_hits.values()))
 """
 
 
-def asked(folder):
+def asked(folder, question=ASK):
     """What the caller says, and how often it was found compiled."""
     done = subprocess.run(
-        [sys.executable, '-c', ASK],
+        [sys.executable, '-c', question],
         cwd=folder,
-        env={**os.environ, 'PYTHONPATH': str(folder), 'NUMBA_CACHE_DIR': str(folder / 'kept')},
+        env={
+            **os.environ,
+            'PYTHONPATH': os.pathsep.join((str(folder), str(ROOT))),
+            'NUMBA_CACHE_DIR': str(folder / 'kept'),
+        },
         capture_output=True,
         text=True,
         check=True,
@@ -67,3 +77,41 @@ def test_a_cached_function_follows_changes_of_the_functions_and_constants_it_use
     changed(package / 'constants.py', 'TERM = 5\n')
     assert asked(tmp_path) == (45, 0)
     assert asked(tmp_path) == (45, 1)
+
+
+PAIR = """
+from typing import NamedTuple
+
+class Pair(NamedTuple):
+    low: int
+    high: int
+"""
+TAKER = """
+from nanorocks_ros.numerics.compiled import compiled
+from tried.{module} import Pair
+
+@compiled
+def caller(x):
+    return total(Pair(x, x))
+
+@compiled
+def total(pair):
+    return pair.low + pair.high
+"""
+ASK_TOTAL = """
+from tried.caller import Pair, total
+print(total(Pair(3, 4)), sum(total.stats.cache_hits.values()))
+"""
+
+
+def test_the_module_of_an_argument_may_be_moved(tmp_path):
+    package = tmp_path / 'tried'
+    package.mkdir()
+    (package / '__init__.py').touch()
+    (package / 'before.py').write_text(PAIR)
+    (package / 'caller.py').write_text(TAKER.format(module='before'))
+    assert asked(tmp_path, ASK_TOTAL) == (7, 0)
+    assert asked(tmp_path, ASK_TOTAL) == (7, 1)
+    (package / 'before.py').rename(package / 'after.py')
+    changed(package / 'caller.py', TAKER.format(module='after'))
+    assert asked(tmp_path, ASK_TOTAL) == (7, 0)

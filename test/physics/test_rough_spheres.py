@@ -16,8 +16,9 @@ from nanorocks_ros.physics.rough_spheres import (
     smooth_equivalent,
     temperature_ratio_course,
 )
-from nanorocks_ros.simulation.engine.collision_rules import CollisionRules
-from nanorocks_ros.simulation.engine.gas import Beads, HardSphereGas
+from nanorocks_ros.simulation.engine.beads import Beads
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 ROUGH = [(0.89, -0.5), (0.89, 0.0), (0.7, 0.3), (0.5, 1.0), (1.0, 0.5)]
 

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import fields
+from dataclasses import astuple
 
 import cv2
 import numpy as np
@@ -70,8 +70,7 @@ def _frame(number):
 
 def _same(one, other):
     assert type(one) is type(other)
-    for field in fields(one):
-        np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
+    np.testing.assert_equal(astuple(one), astuple(other))
 
 
 def test_records_are_those_of_one_process_in_the_same_order(workers):

@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nanorocks_ros.recordings.bag.writer import BagWriter, OfferedQos, OfferedTopic
+from nanorocks_ros.recordings.bag.offered_topics import OfferedTopic
+from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import (
     compressed_image_message,
     float_array_message,
     time_message,
 )
+from nanorocks_ros.recordings.offered_qos import OfferedQos
 
 CAMERA = '/nanorocks/camera/image_raw/compressed'
 SPEED = '/nanorocks/tray_3/speed'

@@ -1,4 +1,4 @@
-"""Beads start in the tray, apart, of the right sizes and with the speeds of a shaken gas."""
+"""Initial beads: inside the tray, without overlap, with the right sizes and speeds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for
 from nanorocks_ros.settings import SimulationSettings
-from nanorocks_ros.simulation.initial_state import resting_beads, stock
+from nanorocks_ros.simulation.initial_state import inventory, resting_beads
 from nanorocks_ros.simulation.velocities import uniform_speeds
 
 SETTINGS = SimulationSettings()
@@ -89,17 +89,17 @@ def test_beads_larger_than_the_tray_are_refused():
         acrylic(1, float('nan')),
         acrylic(1, 0.002, 0.001),
         acrylic(-1),
-        replace(acrylic(), density=0.0),
+        replace(acrylic(), properties=replace(acrylic().properties, density=0.0)),
     ],
 )
-def test_species_that_cannot_be_are_refused(species):
+def test_invalid_species_are_refused(species):
     with pytest.raises(SimulationError, match='give positive sizes'):
-        stock(tray_of(species))
+        inventory(tray_of(species))
 
 
 def test_a_tray_without_beads_is_refused():
     with pytest.raises(SimulationError, match='holds no bead'):
-        stock(tray_of(acrylic(0)))
+        inventory(tray_of(acrylic(0)))
 
 
 def test_resting_beads_keep_clear_of_walls_and_each_other():

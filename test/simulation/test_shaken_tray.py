@@ -1,4 +1,4 @@
-"""Trays rest, are shaken when they should be, and cool as the prototype says."""
+"""Shaken trays: rest, times of shaking, cooling as in the prototype."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drawn velocities obey the law they are drawn from, to the last bit and into the tails."""
+"""Random velocities follow their distributions, also in the tails, and are reproducible."""
 
 from __future__ import annotations
 

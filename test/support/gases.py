@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nanorocks_ros.simulation.engine.collision_rules import (
+from nanorocks_ros.simulation.engine.beads import Beads
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.kernel_choice import Kernel
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
+from nanorocks_ros.simulation.engine.rules.restitution_laws import (
     UniformRestitution,
     ViscoelasticRestitution,
-    WallMotion,
 )
-from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas, Kernel
+from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 
 BOX = (8.0, 7.0, 6.5)
 NEVER = (False, False, False)
@@ -19,7 +22,7 @@ KERNELS = [Kernel.SCAN, Kernel.LISTS]
 
 ROUGH = {'tangential_restitution': 0.5, 'wall_tangential_restitution': 0.2}
 
-# One of everything that can happen, alone and together.
+# Every kind of rule, alone and combined.
 RULES = {
     'elastic': {},
     'inelastic': {'restitution': 0.8, 'wall_restitution': (0.9, 0.8, 0.7, 0.6, 0.95, 0.85)},

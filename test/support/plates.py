@@ -1,4 +1,4 @@
-"""Pictures of a plate with trays whose place is known exactly, through a lens or without."""
+"""Pictures of a plate with trays at known positions, with or without a lens."""
 
 from __future__ import annotations
 

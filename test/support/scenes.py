@@ -1,4 +1,4 @@
-"""Small scenes for the tests: the plate as flown, in a picture as small as shows what is meant."""
+"""Small scenes for the tests: the plate as flown, in a small picture."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from nanorocks_ros.experiment.materials import known_materials
 from nanorocks_ros.experiment.trays import Species, load_trays
 from nanorocks_ros.settings import SceneSettings, SimulationSettings
 from nanorocks_ros.simulation.plate_scene.plate_camera import SceneCamera
@@ -21,16 +22,15 @@ TRAYS = load_trays()
 
 def with_one(number, material='acrylic', diameter=0.002, chalk=None):
     """The plate with a single bead in one tray, and none elsewhere."""
-    one = Species(
-        material=material,
+    beads = Species(
+        properties=known_materials()[material],
         diameter_low=diameter,
         diameter_high=diameter,
-        density=1180.0,
         count=1,
     )
     tray = TRAYS[number]
     dusty = tray.chalk if chalk is None else chalk
-    return {**TRAYS, number: replace(tray, species=(one,), chalk=dusty)}
+    return {**TRAYS, number: replace(tray, species=(beads,), chalk=dusty)}
 
 
 # A picture depends on nothing that was drawn before, so cameras can be shared.

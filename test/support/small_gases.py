@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from nanorocks_ros.experiment.materials import known_materials
 from nanorocks_ros.experiment.trays import Species, Tray
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for
 from nanorocks_ros.settings import SimulationSettings
-from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.beads import Beads
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 from nanorocks_ros.simulation.initial_state import resting_beads
 from nanorocks_ros.simulation.velocities import uniform_speeds
 
@@ -16,10 +19,9 @@ BOX = (0.015, 0.015, 0.003)
 
 def acrylic(count=15, low=0.002, high=None):
     return Species(
-        material='acrylic',
+        properties=known_materials()['acrylic'],
         diameter_low=low,
         diameter_high=high or low,
-        density=1180.0,
         count=count,
     )
 

@@ -13,7 +13,7 @@ from nanorocks_ros.settings import (
     SimulationSettings,
     with_values,
 )
-from nanorocks_ros.simulation.initial_state import stock
+from nanorocks_ros.simulation.initial_state import inventory
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
 from nanorocks_ros.simulation.tray_camera.tray_renderer import TrayCamera
 
@@ -53,7 +53,7 @@ def tray_film(number, frames, speed=0.007, **values):
     shaken = ShakenTray(settings, tray)
     camera = TrayCamera(settings, tray, shaken.radii, shaken.materials)
     x, y, width, height = camera.region
-    species = stock(tray).species
+    species = inventory(tray).species
     for k, moment in enumerate(shaken.moments(frames)):
         picture = camera.picture(moment.positions, k)
         color = np.ascontiguousarray(picture[y : y + height, x : x + width])

@@ -1,4 +1,4 @@
-"""Small videos whose pictures carry their number, so that each can be told from every other."""
+"""Small videos whose frames contain their number."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ trays:
 
 
 def picture(number, width=WIDTH, height=HEIGHT):
-    """A disc that moves, and the number in black and white blocks at the top."""
+    """A moving disc, and the number in binary as black and white blocks at the top."""
     image = np.full((height, width, 3), (90, 110, 60), dtype=np.uint8)
     cv2.circle(image, (12 + 5 * number % (width - 24), height - 20), 10, (40, 160, 230), -1)
     for bit in range(_BITS):
@@ -47,55 +47,55 @@ def picture(number, width=WIDTH, height=HEIGHT):
 
 
 def number_of(image):
-    """The number in a picture."""
+    """Read the number in a frame."""
     gray = image if image.ndim == 2 else image.mean(axis=2)
     blocks = gray[2 : _BLOCK - 2, : _BITS * _BLOCK].reshape(_BLOCK - 4, _BITS, _BLOCK)
     return sum(1 << bit for bit, level in enumerate(blocks.mean(axis=(0, 2))) if level > 128)
 
 
 def write_video(path, numbers, *, codec='mjpeg', times=None, tags=None, **options):
-    """A video of the pictures with these numbers, shown at these times [1/1000 s]."""
-    times = [STEP * place for place in range(len(numbers))] if times is None else times
-    form = options.pop('form', 'yuvj420p' if codec == 'mjpeg' else 'yuv420p')
+    """Write a video of the frames with these numbers at these times, [1/1000 s]."""
+    times = [STEP * index for index in range(len(numbers))] if times is None else times
+    pixel_format = options.pop('pixel_format', 'yuvj420p' if codec == 'mjpeg' else 'yuv420p')
     with av.open(str(path), 'w') as container:
         container.metadata.update(tags or {})
         stream = container.add_stream(codec, rate=TICKS // STEP, options=options)
-        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, form
+        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, pixel_format
         stream.time_base = stream.codec_context.time_base = Fraction(1, TICKS)
         packets = []
-        for place, number in enumerate(numbers):
+        for index, number in enumerate(numbers):
             frame = av.VideoFrame.from_ndarray(picture(number), format='bgr24')
-            frame.pts, frame.time_base = STEP * place, Fraction(1, TICKS)
+            frame.pts, frame.time_base = STEP * index, Fraction(1, TICKS)
             packets += stream.encode(frame)
         packets += stream.encode()
-        for place, packet in enumerate(packets):
+        for index, packet in enumerate(packets):
             if codec in ('mjpeg', 'mpeg4', 'ffv1'):
-                # Containers want these to rise, not the times at which pictures are shown.
-                packet.pts, packet.dts = times[place], STEP * place - 10 * TICKS
+                # Containers require rising decoding times; presentation times may be in any order.
+                packet.pts, packet.dts = times[index], STEP * index - 10 * TICKS
             container.mux(packet)
     return path
 
 
 def packets_of(path):
-    """The compressed pictures of a video."""
+    """The compressed frames of a video."""
     with av.open(str(path)) as container:
         return [bytes(packet) for packet in container.demux(video=0) if packet.size]
 
 
-_UPRIGHT = np.array([1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30], dtype='>i4').tobytes()
+_IDENTITY = np.array([1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30], dtype='>i4').tobytes()
 
 
-def turn_video(path, a, b, c, d):
+def set_display_matrix(path, a, b, c, d):
     """Set the display matrix of an mp4 or mov."""
     matrix = np.array([a, b, 0, c, d, 0, 0, 0, 1 << 14], dtype='>i4') * (1 << 16)
     content = path.read_bytes()
-    place = content.index(_UPRIGHT, content.index(b'tkhd'))
-    path.write_bytes(content[:place] + matrix.astype('>i4').tobytes() + content[place + 36 :])
+    offset = content.index(_IDENTITY, content.index(b'tkhd'))
+    path.write_bytes(content[:offset] + matrix.astype('>i4').tobytes() + content[offset + 36 :])
     return path
 
 
 def write_images(folder, names):
-    """A folder of the pictures 0, 1, ... under these names."""
+    """Write a folder of the frames 0, 1, ... with these names."""
     folder.mkdir()
     for number, name in enumerate(names):
         cv2.imwrite(str(folder / name), picture(number))
@@ -103,13 +103,13 @@ def write_images(folder, names):
 
 
 def imported(paths, bag, settings=STARTED):
-    """What became of films, the numbers of the pictures in the bag, and their times [1/1000 s]."""
-    shares = []
-    found = import_films([paths] if isinstance(paths, os.PathLike) else paths, bag, settings,
-                         shares.append)  # fmt: skip
-    assert shares == sorted(shares)
-    assert shares[-1] <= 1.0
+    """Import films; returns the result, the frame numbers, and the times in [1/1000 s]."""
+    progress = []
+    films = [paths] if isinstance(paths, os.PathLike) else paths
+    result = import_films(films, bag, settings, progress.append)
+    assert progress == sorted(progress)
+    assert progress[-1] <= 1.0
     frames = list(BagFrames(bag).frames())
-    assert len(frames) == found.frames
+    assert len(frames) == result.frames
     times = [(frame.stamp_ns - START_NS) / 1e6 for frame in frames]
-    return found, [number_of(frame.image) for frame in frames], times
+    return result, [number_of(frame.image) for frame in frames], times

@@ -1,4 +1,4 @@
-"""Elastic spheres in a periodic box collide as often as is known."""
+"""Collision rate of elastic spheres in a periodic box, against published values."""
 
 from functools import cache
 

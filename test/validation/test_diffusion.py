@@ -1,4 +1,4 @@
-"""Beads of a dense gas wander as far as is known."""
+"""Self-diffusion in a dense gas, against published values."""
 
 from functools import cache
 
@@ -22,9 +22,9 @@ def test_self_diffusion_of_500_beads_is_the_published_one():
     # a periodic cube. Its polynomial is quoted from memory and could not be looked up, so the
     # tolerance of 3 % covers both the spread of the published runs (1 to 2 %) and four errors
     # of these (0.6 % each); without the polynomial it would be off by 5 %.
-    found = measured()
-    assert found.error / found.mean < 0.01
-    assert found.mean == pytest.approx(hard_spheres.speedy_diffusion(DENSITY), rel=0.03)
+    result = measured()
+    assert result.error / result.mean < 0.01
+    assert result.mean == pytest.approx(hard_spheres.speedy_diffusion(DENSITY), rel=0.03)
 
 
 def test_self_diffusion_exceeds_enskogs_as_published():
@@ -34,7 +34,7 @@ def test_self_diffusion_exceeds_enskogs_as_published():
     # doi:10.1021/jp0477147; `benchmarks engine_physics` shows that 500, 1372 and 4000 beads then
     # agree). Tolerance: 4 %, that is 1 % for the fit, 0.5 % for what is added and four errors of
     # these runs. Enskog alone would be off by 25 %.
-    found = measured()
-    whole = found.mean + hard_spheres.missing_diffusion(DENSITY, found.mean, BEADS, LAGS)
-    ratio = whole / hard_spheres.enskog_diffusion(DENSITY)
+    result = measured()
+    corrected = result.mean + hard_spheres.missing_diffusion(DENSITY, result.mean, BEADS, LAGS)
+    ratio = corrected / hard_spheres.enskog_diffusion(DENSITY)
     assert ratio == pytest.approx(hard_spheres.erpenbeck_wood_ratio(DENSITY), rel=0.04)

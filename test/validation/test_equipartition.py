@@ -1,4 +1,4 @@
-"""Every direction of motion of an elastic gas comes to hold the same energy.
+"""Equipartition in an elastic gas.
 
 Published: the theorem of equipartition, with the corrections for a momentum of zero (Maxwell
 1879; Shirts, Burt, Johnson 2006, J. Chem. Phys. 125, 164102, doi:10.1063/1.2359432). Tolerance:

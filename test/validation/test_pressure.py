@@ -1,4 +1,4 @@
-"""Impulses add up to the pressure that is known."""
+"""Pressure from impulses, against Carnahan and Starling."""
 
 import pytest
 

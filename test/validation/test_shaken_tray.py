@@ -1,4 +1,4 @@
-"""A tray that is shaken without end comes to a steady state, and its energy is accounted for."""
+"""Steady state and energy balance of a tray that is shaken without end."""
 
 from functools import cache
 

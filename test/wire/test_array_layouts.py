@@ -236,11 +236,11 @@ def test_the_layout_is_the_message_definition_as_an_independent_parser_reads_it(
     text = (DEFINITIONS / f'{name}.msg').read_text()
     parsed = get_types_from_msg(text, f'nanorocks_msgs/msg/{name}')
     constants, fields = parsed[f'nanorocks_msgs/msg/{name}']
-    one = layout(type(record))
-    assert [field.name for field in one.fields] == [field for field, _ in fields]
-    assert one.label == ','.join(field for field, _ in fields)
-    assert one.constants == {key: int(value) for key, _, value in constants}
-    assert all(field.unit and field.doc for field in one.fields)
+    array = layout(type(record))
+    assert [field.name for field in array.fields] == [field for field, _ in fields]
+    assert array.label == ','.join(field for field, _ in fields)
+    assert array.constants == {key: int(value) for key, _, value in constants}
+    assert all(field.unit and field.doc for field in array.fields)
 
 
 @pytest.mark.parametrize('record', RECORDS, ids=lambda record: type(record).__name__)
@@ -272,13 +272,13 @@ def test_every_array_starts_with_time_and_cycle_and_holds_the_whole_record(recor
     [(SpeedEstimate, (SpeedMethod,)), (CorEstimate, (CorStatus, CorRelation))],
 )
 def test_the_constants_are_those_of_the_code(record_type, enumerations):
-    expected = {one.name: one.value for kind in enumerations for one in kind}
+    expected = {member.name: member.value for kind in enumerations for member in kind}
     assert layout(record_type).constants == expected
 
 
 def test_the_constants_of_clusters_are_those_of_the_code():
-    expected = {one.name: one.value for one in SizeStatus}
-    expected |= {f'STICKING_{one.name}': one.value for one in StickingStatus}
+    expected = {member.name: member.value for member in SizeStatus}
+    expected |= {f'STICKING_{member.name}': member.value for member in StickingStatus}
     assert layout(ClusterEstimate).constants == expected
 
 

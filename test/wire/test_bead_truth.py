@@ -44,12 +44,12 @@ def test_the_truth_comes_back_from_its_array_to_float32_rounding():
 def test_the_layout_is_the_message_definition_as_an_independent_parser_reads_it():
     parsed = get_types_from_msg(DEFINITION.read_text(), 'nanorocks_msgs/msg/BeadsTruth')
     _, fields = parsed['nanorocks_msgs/msg/BeadsTruth']
-    one = beads_layout()
+    array = beads_layout()
     # A field of an array has its element type within.
     single = [name for name, kind in fields if not isinstance(kind[1], tuple) or kind[0] == 1]
-    assert [field.name for field in (*one.head, *one.bead)] == [name for name, _ in fields]
-    assert [field.name for field in one.head] == single
-    assert all(field.unit and field.doc for field in (*one.head, *one.bead))
+    assert [field.name for field in (*array.head, *array.bead)] == [name for name, _ in fields]
+    assert [field.name for field in array.head] == single
+    assert all(field.unit and field.doc for field in (*array.head, *array.bead))
 
 
 def test_the_dimensions_say_what_is_where():

@@ -1,4 +1,4 @@
-"""``nanorocks import VIDEO... -o BAG``: videos and folders of images into bags."""
+"""``nanorocks import VIDEO... -o BAG``: import videos and folders of images into bags."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from nanorocks_ros.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
-    from nanorocks_ros.studies.film_import.import_each import ImportedEach
-    from nanorocks_ros.studies.film_import.import_film import Imported
+    from nanorocks_ros.studies.film_import.import_each import ImportBatch
+    from nanorocks_ros.studies.film_import.import_result import ImportResult
 
-# Of the files that were left out.
+NS = 1_000_000_000
+# Number of skipped files that are named in the notice.
 _NAMED = 3
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser('import', help='make bags of videos or folders of images')
+    parser = commands.add_parser('import', help='import videos or folders of images into bags')
     parser.add_argument(
         'videos',
         nargs='+',
@@ -30,19 +31,19 @@ def add_parser(commands: Any) -> None:
         help='video or folder of images; several are parts of one recording, in order of time',
     )
     parser.add_argument(
-        '-o', '--output', required=True, help='bag to make; with --each the folder of the bags'
+        '-o', '--output', required=True, help='new bag; with --each the folder of the bags'
     )
     parser.add_argument(
         '--each',
         action='store_true',
-        help='a bag of each video; a folder stands for those in it; complete bags are left alone',
+        help='make a bag of each video, also of those in folders; complete bags are kept',
     )
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     parser.add_argument(
-        '--start', help='when the first picture was taken, ISO 8601; UTC unless it says the zone'
+        '--start', help='time of the first frame, ISO 8601; UTC unless it has a time zone'
     )
     parser.add_argument(
-        '--rate', help='pictures per second that the camera took; default: as the video says'
+        '--rate', help='frames per second of the camera; default: as stated in the video'
     )
     parser.add_argument(
         '--calibration', metavar='YAML', help='calibration file, for the camera_info in the bag'
@@ -51,33 +52,35 @@ def add_parser(commands: Any) -> None:
         '--quality',
         type=int,
         default=95,
-        help='of the JPEGs, 1 to 100, where pictures are not JPEG already; default 95',
+        help='JPEG quality of frames that are not JPEG already, 1 to 100; default 95',
     )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Import, print; the exit code."""
+    """Import the videos and print the result; returns the exit code."""
     settings = _settings(options)
     paths, output = [Path(video) for video in options.videos], Path(options.output)
-    return (_run_each if options.each else _run_one)(options, settings, paths, output)
+    return (_run_each if options.each else _run_single)(options, settings, paths, output)
 
 
 def _settings(options: argparse.Namespace) -> ImportSettings:
     from nanorocks_ros.experiment.calibration_file import load_calibration
-    from nanorocks_ros.recordings.messages.iso8601 import instant
+    from nanorocks_ros.recordings.messages.iso8601 import parse_iso8601
     from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
 
-    start_ns = instant(options.start) if options.start else None
+    start_ns = parse_iso8601(options.start) if options.start else None
     if options.start and start_ns is None:
         raise ConfigurationError(
-            '--start', f'{options.start!r} is no instant', 'give one like 2024-01-31T12:34:56Z'
+            '--start',
+            f'{options.start!r} is not an ISO 8601 time',
+            'give one like 2024-01-31T12:34:56Z',
         )
     try:
         rate = Fraction(options.rate) if options.rate else None
     except (ValueError, ZeroDivisionError) as error:
         raise ConfigurationError(
-            '--rate', f'{options.rate!r} is no rate', 'give one like 30 or 30000/1001'
+            '--rate', f'{options.rate!r} is not a number', 'give one like 30 or 30000/1001'
         ) from error
     name = options.calibration
     return ImportSettings(
@@ -89,16 +92,16 @@ def _settings(options: argparse.Namespace) -> ImportSettings:
     )
 
 
-def _run_one(
+def _run_single(
     options: argparse.Namespace, settings: ImportSettings, paths: list[Path], output: Path
 ) -> int:
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.studies.film_import.import_film import as_json, import_films
+    from nanorocks_ros.studies.film_import.import_film import import_films
 
     with Progress('importing') as progress:
         imported = import_films(paths, output, settings, progress.part)
-    _tell(imported)
-    print(json.dumps(as_json(imported)) if options.json else _text(imported))
+    _print_notices(imported)
+    print(json.dumps(_as_json(imported)) if options.json else _text(imported))
     return 0
 
 
@@ -106,68 +109,68 @@ def _run_each(
     options: argparse.Namespace, settings: ImportSettings, paths: list[Path], output: Path
 ) -> int:
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.studies.film_import.find_films import films_of
+    from nanorocks_ros.studies.film_import.find_films import find_films
     from nanorocks_ros.studies.film_import.import_each import import_each
 
     with Progress('importing') as progress:
-        searched = films_of(paths)
+        found = find_films(paths)
         try:
-            found = import_each(
-                searched.films, output, settings, lambda done, _: progress.part(done)
-            )
+            batch = import_each(found.films, output, settings, lambda done, _: progress.part(done))
         except KeyboardInterrupt as interruption:
-            raise KeyboardInterrupt('the same command goes on with what is left') from interruption
-    found.failed = searched.failed | found.failed
-    for imported in found.imported:
-        _tell(imported)
+            raise KeyboardInterrupt(
+                'run the same command again to import the remaining videos'
+            ) from interruption
+    batch.failed = found.failed | batch.failed
+    for imported in batch.imported:
+        _print_notices(imported)
     if options.json:
-        print(json.dumps(_each_as_json(found, searched.left_out)))
+        print(json.dumps(_batch_as_json(batch, found.left_out)))
     else:
-        for imported in found.imported:
+        for imported in batch.imported:
             print(_text(imported))
-        print(f'{len(found.imported)} imported, {len(found.skipped)} were there already')
-    _tell_left_out(searched.left_out)
-    return _tell_failures(found)
+        print(f'{len(batch.imported)} imported, {len(batch.skipped)} existed already')
+    _print_left_out(found.left_out)
+    return _print_failures(batch)
 
 
-def _tell(imported: Imported) -> None:
+def _print_notices(imported: ImportResult) -> None:
     from nanorocks_ros.outputs.safe_text import printable
 
     for notice in imported.notices:
         print(f'nanorocks: {printable(notice)}', file=sys.stderr)
 
 
-def _tell_left_out(files: list[Path]) -> None:
+def _print_left_out(files: list[Path]) -> None:
     if not files:
         return
     from nanorocks_ros.outputs.safe_text import printable
 
-    named = [*(printable(file.name) for file in files[:_NAMED]), *['...'] * (len(files) > _NAMED)]
-    names = ', '.join(named)
+    names = [*(printable(file.name) for file in files[:_NAMED]), *['...'] * (len(files) > _NAMED)]
     print(
-        f'nanorocks: left out {len(files)} files that may be films or pictures of one, but not by '
-        f'their names ({names}); pass those that are films by name',
+        f'nanorocks: skipped {len(files)} files without a supported video extension '
+        f'({", ".join(names)}); name a file to import it anyway',
         file=sys.stderr,
     )
 
 
-def _tell_failures(found: ImportedEach) -> int:
-    if not found.failed:
+def _print_failures(batch: ImportBatch) -> int:
+    """Print the errors of a batch; returns the exit code."""
+    if not batch.failed:
         return 0
     from nanorocks_ros.outputs.safe_text import printable
 
-    for error in found.failed.values():
+    for error in batch.failed.values():
         print(f'nanorocks: {printable(str(error))}', file=sys.stderr)
-    total = len(found.failed) + len(found.imported) + len(found.skipped)
+    total = len(batch.failed) + len(batch.imported) + len(batch.skipped)
     print(
-        f'nanorocks: {len(found.failed)} of {total} videos could not be imported, listed above; '
-        'the same command tries them again',
+        f'nanorocks: {len(batch.failed)} of {total} videos could not be imported, see above; '
+        'run the same command again to retry',
         file=sys.stderr,
     )
     return 1
 
 
-def _text(imported: Imported) -> str:
+def _text(imported: ImportResult) -> str:
     from nanorocks_ros.outputs.safe_text import printable
 
     dropped = imported.duplicates_dropped
@@ -178,18 +181,29 @@ def _text(imported: Imported) -> str:
     )
 
 
-def _each_as_json(found: ImportedEach, left_out: list[Path]) -> dict[str, Any]:
-    from nanorocks_ros.studies.film_import.import_film import as_json
-
+def _as_json(imported: ImportResult) -> dict[str, Any]:
     return {
-        'frames': sum(one.frames for one in found.imported),
-        'duplicates_dropped': sum(one.duplicates_dropped for one in found.imported),
-        'duration': sum(one.duration for one in found.imported),
-        'bag': str(found.folder),
-        'imported': [as_json(one) for one in found.imported],
-        'skipped': [str(path) for path in found.skipped],
+        'frames': imported.frames,
+        'duplicates_dropped': imported.duplicates_dropped,
+        'duration': imported.duration,
+        'bag': str(imported.bag),
+        'start': imported.start_ns / NS,
+        'frames_damaged': imported.damaged,
+        'pictures': imported.provenance['pictures'],
+        'notices': imported.notices,
+    }
+
+
+def _batch_as_json(batch: ImportBatch, left_out: list[Path]) -> dict[str, Any]:
+    return {
+        'frames': sum(imported.frames for imported in batch.imported),
+        'duplicates_dropped': sum(imported.duplicates_dropped for imported in batch.imported),
+        'duration': sum(imported.duration for imported in batch.imported),
+        'bag': str(batch.folder),
+        'imported': [_as_json(imported) for imported in batch.imported],
+        'skipped': [str(path) for path in batch.skipped],
         'left_out': [str(path) for path in left_out],
         'failed': [
-            {'video': str(film), 'reason': str(error)} for film, error in found.failed.items()
+            {'video': str(film), 'reason': str(error)} for film, error in batch.failed.items()
         ],
     }

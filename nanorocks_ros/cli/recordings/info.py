@@ -1,4 +1,4 @@
-"""``nanorocks info BAG``: what a bag holds, and whether it is well."""
+"""``nanorocks info BAG``: topics, calibration, provenance and problems of a bag."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ NS = 1_000_000_000
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser('info', help='say what a bag holds, and whether it is well')
+    parser = commands.add_parser('info', help='show the contents of a bag and its problems')
     parser.add_argument('bag', help='rosbag2 folder, .mcap or .db3 file')
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read the bag, print; the exit code."""
+    """Read the bag and print its contents; returns the exit code."""
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.inspection.bag_info import bag_info
 
@@ -36,19 +36,19 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _as_json(found: BagInfo) -> dict[str, Any]:
-    lens = found.calibration
+def _as_json(info: BagInfo) -> dict[str, Any]:
+    lens = info.calibration
     return {
-        'topics': [_topic_as_json(report) for report in found.topics.values()],
-        'duration': found.duration,
-        'complete': found.complete,
-        'start': found.start_ns / NS,
-        'end': found.end_ns / NS,
-        'messages_lost': found.messages_lost,
-        'size': found.size,
-        'trays': found.trays,
-        'camera': found.camera or None,
-        'pictures': found.pictures or None,
+        'topics': [_topic_as_json(report) for report in info.topics.values()],
+        'duration': info.duration,
+        'complete': info.complete,
+        'start': info.start_ns / NS,
+        'end': info.end_ns / NS,
+        'messages_lost': info.messages_lost,
+        'size': info.size,
+        'trays': info.trays,
+        'camera': info.camera or None,
+        'pictures': info.pictures or None,
         'calibration': None
         if lens is None
         else {
@@ -58,52 +58,54 @@ def _as_json(found: BagInfo) -> dict[str, Any]:
             'd': list(lens.d),
             'k': list(lens.k),
         },
-        'metadata': found.metadata,
-        'health': [{'what': ailment.what, 'remedy': ailment.remedy} for ailment in found.health],
+        'metadata': info.metadata,
+        'health': [{'what': problem.what, 'remedy': problem.remedy} for problem in info.health],
     }
 
 
-def _topic_as_json(one: TopicReport) -> dict[str, Any]:
-    stamps = one.stamps_ns
+def _topic_as_json(report: TopicReport) -> dict[str, Any]:
+    stamps = report.stamps_ns
     return {
-        'name': one.info.name,
-        'type': one.info.type,
+        'name': report.info.name,
+        'type': report.info.type,
         'count': len(stamps),
-        'rate': one.rate,
-        'gaps': one.gaps,
-        'longest_gap': one.longest_gap,
+        'rate': report.rate,
+        'gaps': report.gaps,
+        'longest_gap': report.longest_gap,
         'first': stamps[0] / NS if stamps else None,
         'last': stamps[-1] / NS if stamps else None,
     }
 
 
-def _print(found: BagInfo) -> None:
-    from nanorocks_ros.recordings.messages.iso8601 import instant_text
+def _print(info: BagInfo) -> None:
+    from nanorocks_ros.recordings.messages.iso8601 import format_iso8601
 
-    state = 'complete' if found.complete else 'NOT complete'
-    print(f'{_shown(str(found.path))}: {found.duration:.3f} s, {found.size / _MB:.1f} MB, {state}')
-    if found.topics:
-        print(f'from {instant_text(found.start_ns)} to {instant_text(found.end_ns)}')
-    for report in found.topics.values():
+    state = 'complete' if info.complete else 'NOT complete'
+    print(f'{_shown(str(info.path))}: {info.duration:.3f} s, {info.size / _MB:.1f} MB, {state}')
+    if info.topics:
+        print(f'from {format_iso8601(info.start_ns)} to {format_iso8601(info.end_ns)}')
+    for report in info.topics.values():
         rate = f', {report.rate:.4g} Hz' if report.rate else ''
         gaps = f', {report.gaps} gaps of up to {report.longest_gap:.2f} s' if report.gaps else ''
         name, kind = _shown(report.info.name), _shown(report.info.type)
         print(f'  {name} [{kind}]: {len(report.stamps_ns)}{rate}{gaps}')
-    if found.pictures:
-        print(f'pictures: {_shown(found.pictures)}')
-    if found.trays:
-        print(f'trays: {", ".join(str(tray) for tray in found.trays)}')
-    if found.calibration is not None:
-        lens = found.calibration
+    if info.pictures:
+        print(f'pictures: {_shown(info.pictures)}')
+    if info.trays:
+        print(f'trays: {", ".join(str(tray) for tray in info.trays)}')
+    if info.calibration is not None:
+        lens = info.calibration
         print(f'calibration: {lens.distortion_model}, {lens.width}x{lens.height} px')
-    for key, value in found.metadata.items():
+    for key, value in info.metadata.items():
         print(f'  {_shown(key)}: {_shown(value)}')
-    for ailment in found.health:
-        print(f'{_shown(ailment.what)}; {_shown(ailment.remedy)}')
-    if not found.health:
-        print('nothing is wrong with it')
+    for problem in info.health:
+        print(f'{_shown(problem.what)}; {_shown(problem.remedy)}')
+    if not info.health:
+        print('no problems info')
 
 
 def _shown(text: str) -> str:
-    """The text in one line; a terminal must not obey what a stranger wrote into a bag."""
-    return ''.join(one if one.isprintable() else repr(one)[1:-1] for one in text)
+    """Escape line breaks and terminal control sequences in a text from a bag."""
+    return ''.join(
+        character if character.isprintable() else repr(character)[1:-1] for character in text
+    )

@@ -16,7 +16,7 @@ first, so that near zero loss the rate rises steeply.
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -183,8 +183,9 @@ def count_step(tray: Tray) -> int:
 def tray_key(tray: Tray) -> str:
     """Properties that determine the cooling of a tray, as a JSON object: inside and beads."""
     species = [
-        {name: value for name, value in asdict(kind).items() if name not in ('material', 'mass')}
-        for kind in tray.species
+        {'diameter_low': beads.diameter_low, 'diameter_high': beads.diameter_high}
+        | {'density': beads.density, 'count': beads.count}
+        for beads in tray.species
     ]
     return json.dumps({'dimensions': tray.dimensions, 'species': species})
 

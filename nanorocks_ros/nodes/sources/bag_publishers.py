@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.nodes.base.node import NanorocksNode
     from nanorocks_ros.recordings.bag.reader import BagMessage, BagReader
-    from nanorocks_ros.recordings.bag.writer import OfferedQos
+    from nanorocks_ros.recordings.offered_qos import OfferedQos
     from nanorocks_ros.recordings.storage import TopicInfo
 
 _MAX_DEPTH = 1000

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.nodes.sources.playback_clock import NS
-from nanorocks_ros.recordings.bag.played_range import played_part
+from nanorocks_ros.recordings.bag.played_range import played_range
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -50,7 +50,7 @@ class PlayRange:
         self._loop = settings.loop
         self._logged: set[str] = set()
         self._is_whole = settings.start == 0.0 and duration == 0.0
-        self.first_ns, self.last_ns = played_part(reader, settings.start, duration)
+        self.first_ns, self.last_ns = played_range(reader, settings.start, duration)
 
     def require(self, names: Collection[str], kind: str) -> None:
         """Refuse a range without anything to play.

@@ -10,10 +10,10 @@ from sensor_msgs.msg import CompressedImage
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import NanorocksError
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.reader import BagMessage
 from nanorocks_ros.recordings.bag.recorder import Recorder
-from nanorocks_ros.recordings.messages.image_messages import jpeg_of
+from nanorocks_ros.recordings.messages.image_messages import frame_to_jpeg
 from nanorocks_ros.recordings.messages.message_builders import (
     compressed_image_message,
     time_message,
@@ -68,7 +68,7 @@ class GraphRecorder:
         self._failed = False
         self._path = settings.record
         by_name = {
-            topic.absolute(tray): offered(topic) for topic in topics.TOPICS for tray in trays
+            topic.absolute(tray): offered_topic(topic) for topic in topics.TOPICS for tray in trays
         }
         self._recorder = Recorder(self._path, by_name, metadata=provenance)
         node.create_timer(_CHECK_S, self._report, clock=node.steady_clock)
@@ -163,5 +163,5 @@ def _serialized(message: Any) -> bytes:
 
 
 def _as_jpeg(frame: Frame, quality: int) -> object:
-    jpeg = jpeg_of(frame, quality)
+    jpeg = frame_to_jpeg(frame, quality)
     return compressed_image_message(frame.stamp_ns, 'camera', _JPEG_FORMAT, jpeg)

@@ -1,4 +1,4 @@
-"""The storage files behind a path: a rosbag2 folder, or one file."""
+"""Open the storage files of a rosbag2 folder, or a single storage file, and read its metadata."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.recordings.film.natural_sort import natural
+from nanorocks_ros.recordings.film.natural_sort import natural_key
 from nanorocks_ros.recordings.mcap import mcap_blocks
 from nanorocks_ros.recordings.mcap.mcap_file import McapFile
 from nanorocks_ros.recordings.sqlite import sqlite_file
@@ -20,28 +20,28 @@ from nanorocks_ros.recordings.storage import StorageFile
 _KINDS = 'a rosbag2 folder or an .mcap file'
 ROS1_MAGIC = b'#ROSBAG V'
 STORAGE_SUFFIXES = frozenset({'.mcap', '.db3'})
-# Ten times as fast where PyYAML was built with it.
+# The C loader is ten times as fast; PyYAML may be built without it.
 _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Contents:
-    """What a path holds.
+class BagContents:
+    """Open storage files and metadata of a recording.
 
     Parameters
     ----------
     files : tuple of StorageFile
         At least one.
     metadata : dict of str to str
-        Provenance kept by whoever recorded.
+        Provenance (``custom_data``).
     compressed_messages : bool
-        Each message is compressed on its own (zstd).
+        Whether each message is compressed separately (zstd).
     notices : tuple of str
-        What is wrong with the folder.
+        Problems with the folder, in sentences.
     complete : bool
-        No file is missing.
+        Whether all files are present and readable.
     expected : int or None
-        Messages that the recorder counted; None where it does not say.
+        Number of messages according to the recorder; None if it is not stated.
     """
 
     files: tuple[StorageFile, ...]
@@ -52,23 +52,23 @@ class Contents:
     expected: int | None = None
 
 
-def contents(path: Path, *, salvaging: bool = False) -> Contents:
-    """Open what a path holds.
+def open_contents(path: Path, *, salvaging: bool = False) -> BagContents:
+    """Open all storage files at a path and read the metadata.
 
     Parameters
     ----------
     path : Path
     salvaging : bool
-        Files whose first bytes are damaged, too.
+        Open files whose first bytes are damaged, too.
 
     Returns
     -------
-    Contents
+    BagContents
 
     Raises
     ------
     RecordingError
-        When there is nothing, or no recording.
+        If nothing exists at the path, or it is not a recording.
     """
     try:
         if not path.exists():
@@ -77,7 +77,7 @@ def contents(path: Path, *, salvaging: bool = False) -> Contents:
             return _folder(path, salvaging)
         file = _open_file(path, salvaging)
         information = _recorder_notes([file])
-        return Contents(
+        return BagContents(
             files=(file,),
             metadata=_provenance(information),
             compressed_messages=_are_messages_compressed(information),
@@ -111,15 +111,15 @@ def _open_file(path: Path, salvaging: bool) -> StorageFile:
 
 
 def _conversion(path: Path) -> list[str]:
-    """The command that makes a ROS 2 recording of a ROS 1 bag, beside it."""
+    """Command that converts a ROS 1 bag to a ROS 2 recording in the same folder."""
     target = path.with_suffix('')
-    # The converter goes by the ending of what it is to make, and overwrites nothing.
+    # The converter chooses the format by the ending of its target and overwrites nothing.
     if target.suffix == '.bag' or target.exists():
         target = path.with_name(f'{path.stem.removesuffix(".bag")}_ros2')
     return ['rosbags-convert', '--src', str(path), '--dst', str(target)]
 
 
-def _folder(path: Path, salvaging: bool) -> Contents:
+def _folder(path: Path, salvaging: bool) -> BagContents:
     notices: list[str] = []
     information = _information(path, notices)
     names = _names(path, information)
@@ -131,7 +131,7 @@ def _folder(path: Path, salvaging: bool) -> Contents:
     files = _open_files(path, names, notices, salvaging)
     count = information.get('message_count')
     information = information or _recorder_notes(files)
-    return Contents(
+    return BagContents(
         files=tuple(files),
         metadata=_provenance(information),
         compressed_messages=_are_messages_compressed(information),
@@ -151,7 +151,7 @@ def _are_messages_compressed(information: dict[str, Any]) -> bool:
 
 
 def _recorder_notes(files: list[StorageFile]) -> dict[str, Any]:
-    """What the files say themselves, where metadata.yaml says nothing."""
+    """Copy of metadata.yaml in the storage files; empty if none has one."""
     for file in files:
         try:
             notes = yaml.load(file.recorder_notes, Loader=_LOADER)
@@ -163,26 +163,28 @@ def _recorder_notes(files: list[StorageFile]) -> dict[str, Any]:
 
 
 def _information(path: Path, notices: list[str]) -> dict[str, Any]:
-    place = path / 'metadata.yaml'
+    file = path / 'metadata.yaml'
     try:
-        document = yaml.load(place.read_text('utf-8'), Loader=_LOADER)
+        document = yaml.load(file.read_text('utf-8'), Loader=_LOADER)
         information = document['rosbag2_bagfile_information']
         return dict(information)
     except FileNotFoundError:
-        notices.append(f'{path}: has no metadata.yaml, as after a crash; it is read without')
+        notices.append(
+            f'{path}: has no metadata.yaml, as after a crash; the bag is read without it'
+        )
     except (yaml.YAMLError, KeyError, TypeError, ValueError, RecursionError):
-        notices.append(f'{place}: cannot be understood; the bag is read without')
+        notices.append(f'{file}: cannot be parsed; the bag is read without it')
     return {}
 
 
 def _names(path: Path, information: dict[str, Any]) -> list[str]:
     listed = information.get('relative_file_paths')
-    # Early versions listed paths that start with the folder.
+    # Early versions of rosbag2 listed paths that start with the folder.
     names = [PurePath(str(name)).name for name in listed] if isinstance(listed, list) else []
     if any((path / name).is_file() for name in names):
         return names
-    found = (p.name for p in path.iterdir() if p.suffix in STORAGE_SUFFIXES and p.is_file())
-    return sorted(found, key=natural)
+    present = (p.name for p in path.iterdir() if p.suffix in STORAGE_SUFFIXES and p.is_file())
+    return sorted(present, key=natural_key)
 
 
 def _refuse_compressed_files(path: Path, information: dict[str, Any]) -> None:

@@ -1,8 +1,8 @@
-"""What a recording is known by: a hash of its bytes, and the state of its files.
+"""Identity of a recording: a hash of its bytes, and the state of its files.
 
-Bytes are hashed once, by whoever is about to read them anyway: a gigabyte takes a second, and is
-in memory afterwards. As long as the files have not been touched since, which their sizes and times
-tell, nothing is read again.
+Hashing takes about one second per gigabyte and leaves the bytes in the page cache, so it is done
+just before a recording is analysed. As long as size, inode and times of the files are unchanged,
+the recording need not be hashed again.
 """
 
 from __future__ import annotations
@@ -15,32 +15,33 @@ from nanorocks_ros.recordings.bag.bag_folder import STORAGE_SUFFIXES
 if TYPE_CHECKING:
     from pathlib import Path
 
-# Name, size, number of the inode, times of the last change of content and of anything else [ns].
+# Name, size, inode number, time of the last content change (mtime), time of the last change of
+# content or metadata (ctime), [ns].
 FileState = tuple[str, int, int, int, int]
-_BLOCK = 1 << 22
+_BLOCK_BYTES = 1 << 22
 
 
 def file_states(path: Path) -> tuple[FileState, ...]:
-    """State of the files of a recording, by name; they differ once anything was changed.
+    """State of each file of a recording, in order of name; it changes with any change of a file.
 
     Raises
     ------
     OSError
-        When it cannot be looked at.
+        If a file cannot be accessed.
     """
     return tuple(_state(file) for file in _files(path))
 
 
 def content_hash(path: Path) -> str:
-    """A hash of everything in a recording, whatever it is called and wherever it lies.
+    """Hash of the content of a recording; it does not depend on its name and folder.
 
     Raises
     ------
     OSError
-        When it cannot be read.
+        If a file cannot be read.
     """
     digest = hashlib.blake2b(digest_size=16)
-    block = memoryview(bytearray(_BLOCK))
+    block = memoryview(bytearray(_BLOCK_BYTES))
     for file in _files(path):
         digest.update(file.stat().st_size.to_bytes(8, 'little'))
         with file.open('rb', buffering=0) as stream:
@@ -50,7 +51,7 @@ def content_hash(path: Path) -> str:
 
 
 def total_size(states: tuple[FileState, ...]) -> int:
-    """Bytes of a recording."""
+    """Size of a recording, [bytes]."""
     return sum(state[1] for state in states)
 
 
@@ -58,12 +59,12 @@ def _files(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
     return sorted(
-        one
-        for one in path.iterdir()
-        if one.is_file() and (one.name == 'metadata.yaml' or STORAGE_SUFFIXES & {*one.suffixes})
+        file
+        for file in path.iterdir()
+        if file.is_file() and (file.name == 'metadata.yaml' or STORAGE_SUFFIXES & {*file.suffixes})
     )
 
 
 def _state(path: Path) -> FileState:
-    found = path.stat()
-    return path.name, found.st_size, found.st_ino, found.st_mtime_ns, found.st_ctime_ns
+    status = path.stat()
+    return path.name, status.st_size, status.st_ino, status.st_mtime_ns, status.st_ctime_ns

@@ -1,23 +1,24 @@
-"""Which part of a recording is played, and what has to be told in the middle of it."""
+"""Time range of a recording that is played, and the latched messages at its start."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.recordings.storage import NS
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
     from nanorocks_ros.recordings.bag.reader import BagMessage, BagReader
 
-NS = 1_000_000_000
-# How far back the last message of a topic is looked for at first; then four times as far.
+# Length of the first time range searched for latched messages; each further one is four times
+# as long.
 _LOOK_BACK_NS = NS
 
 
-def played_part(reader: BagReader, start: float, duration: float) -> tuple[int, int]:
-    """First and last log time of what is played.
+def played_range(reader: BagReader, start: float, duration: float) -> tuple[int, int]:
+    """First and last log time of the part that is played.
 
     Parameters
     ----------
@@ -25,7 +26,7 @@ def played_part(reader: BagReader, start: float, duration: float) -> tuple[int, 
     start : float, [s], >= 0
         Since the first message.
     duration : float, [s], >= 0
-        0: to the end.
+        0: to the end of the recording.
 
     Returns
     -------
@@ -34,42 +35,46 @@ def played_part(reader: BagReader, start: float, duration: float) -> tuple[int, 
     Raises
     ------
     ConfigurationError
-        When the recording is over before `start`.
+        If the recording ends before `start`.
     """
     start_ns = reader.start_ns + round(start * NS)
     if start_ns > reader.end_ns:
         length = (reader.end_ns - reader.start_ns) / NS
         raise ConfigurationError(
-            'parameter start', f'{start:g} s, but {reader.path} has {length:.3f} s', 'give less'
+            'parameter start',
+            f'{start:g} s, but {reader.path} has {length:.3f} s',
+            'give a smaller value',
         )
     if duration <= 0.0:
         return start_ns, reader.end_ns
     return start_ns, min(reader.end_ns, start_ns + round(duration * NS) - 1)
 
 
-def latest(reader: BagReader, topics: Collection[str], stamp_ns: int) -> list[BagMessage]:
-    """The last message of each topic before a time: what a latched topic would hold then.
+def latched_messages(
+    reader: BagReader, topics: Collection[str], stamp_ns: int
+) -> list[BagMessage]:
+    """Last message of each topic before a log time, as a latched topic would send it.
 
     Parameters
     ----------
     reader : BagReader
     topics : collection of str
     stamp_ns : int, [ns]
-        Log time; messages of this very time do not count.
+        Log time; messages at exactly this time are not included.
 
     Returns
     -------
     list of BagMessage
-        In order of log time; topics without a message before are left out.
+        In order of log time; topics without an earlier message are omitted.
     """
     messages: dict[str, BagMessage] = {}
-    wanted = set(topics)
+    missing = set(topics)
     end_ns, step_ns = stamp_ns - 1, _LOOK_BACK_NS
-    while wanted and end_ns >= reader.start_ns:
+    while missing and end_ns >= reader.start_ns:
         start_ns = max(end_ns - step_ns, reader.start_ns)
         messages.update(
-            {message.topic: message for message in reader.messages(wanted, start_ns, end_ns)}
+            {message.topic: message for message in reader.messages(missing, start_ns, end_ns)}
         )
-        wanted -= messages.keys()
+        missing -= messages.keys()
         end_ns, step_ns = start_ns - 1, 4 * step_ns
-    return sorted(messages.values(), key=lambda one: one.log_time_ns)
+    return sorted(messages.values(), key=lambda message: message.log_time_ns)

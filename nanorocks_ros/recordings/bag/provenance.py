@@ -1,4 +1,4 @@
-"""Where a recording came from: what is kept of its source, and whether all of it is there."""
+"""Provenance of a recording: checksum of its source, and whether an import or salvage finished."""
 
 from __future__ import annotations
 
@@ -12,56 +12,60 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _BLOCK_BYTES = 1 << 20
-# What an import and a salvage remark under their names at the start, and at the end.
+# Metadata keys of an import and of a salvage, and their values at the start and at the end.
 IMPORT, SALVAGE = 'import', 'salvage'
 UNFINISHED, COMPLETE = 'unfinished', 'complete'
 
 
-class Unfinished(NamedTuple):
-    """What a recording lacks since its making was interrupted, and what to do about it."""
+class Interruption(NamedTuple):
+    """An interrupted import or salvage: its consequence and the remedy."""
 
     what: str
     remedy: str
 
 
 _INTERRUPTED = {
-    IMPORT: Unfinished(
-        'holds only part of the film, since its import was interrupted', 'import it again'
+    IMPORT: Interruption(
+        'holds only part of the film because its import was interrupted', 'import it again'
     ),
-    SALVAGE: Unfinished(
-        'holds only part of what was salvaged, since that was interrupted',
+    SALVAGE: Interruption(
+        'holds only part of the readable messages because its salvage was interrupted',
         'salvage the damaged bag again',
     ),
 }
 
 
-def unfinished(metadata: Mapping[str, str]) -> tuple[Unfinished, ...]:
-    """What was interrupted of the making of a recording.
+def interruptions(metadata: Mapping[str, str]) -> tuple[Interruption, ...]:
+    """Interrupted steps (import, salvage) in the making of a recording.
 
     Parameters
     ----------
     metadata : mapping of str to str
-        Its provenance.
+        Provenance of the recording.
     """
-    return tuple(one for key, one in _INTERRUPTED.items() if metadata.get(key) == UNFINISHED)
+    return tuple(
+        interruption
+        for key, interruption in _INTERRUPTED.items()
+        if metadata.get(key) == UNFINISHED
+    )
 
 
 def checksum(files: Iterable[Path]) -> str:
-    """SHA-256 of the contents of files, one after another.
+    """SHA-256 of the concatenated contents of files.
 
     Raises
     ------
     RecordingError
-        When one cannot be read.
+        If a file cannot be read.
     """
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for file in files:
         try:
             with file.open('rb') as stream:
                 while block := stream.read(_BLOCK_BYTES):
-                    found.update(block)
+                    digest.update(block)
         except OSError as error:
             raise RecordingError(
                 str(file), f'cannot be read ({error.strerror})', 'check its permissions'
             ) from error
-    return found.hexdigest()
+    return digest.hexdigest()

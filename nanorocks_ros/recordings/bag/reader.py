@@ -1,4 +1,4 @@
-"""Reading recordings: whole, cut short or damaged, in order of time and in bounded memory."""
+"""Read recordings, also truncated and damaged ones, in order of time, in bounded memory."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import TypesysError
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.recordings.bag.bag_folder import Contents, contents
-from nanorocks_ros.recordings.bag.provenance import Unfinished, unfinished
-from nanorocks_ros.recordings.messages.message_types import register, standard_types
+from nanorocks_ros.recordings.bag.bag_folder import BagContents, open_contents
+from nanorocks_ros.recordings.bag.provenance import Interruption, interruptions
+from nanorocks_ros.recordings.messages.message_types import register_type, standard_types
 from nanorocks_ros.recordings.storage import BagMessage, StorageFile, TopicInfo
 
 if TYPE_CHECKING:
@@ -24,8 +24,15 @@ if TYPE_CHECKING:
 
 __all__ = ['BagMessage', 'BagReader', 'TopicInfo', 'open_bag']
 
-_NOT_CDR = (SerdeError, struct.error, ValueError, LookupError, AssertionError, MemoryError)
-# One message is unpacked at a time; the largest, an uncompressed 4K frame, has 25 MB.
+_DESERIALIZE_ERRORS = (
+    SerdeError,
+    struct.error,
+    ValueError,
+    LookupError,
+    AssertionError,
+    MemoryError,
+)
+# Largest size of a decompressed message, [bytes]; an uncompressed 4K frame has 25 MB.
 _MESSAGE_LIMIT = 2**30
 
 
@@ -37,7 +44,7 @@ def open_bag(path: str | Path, *, salvaging: bool = False) -> BagReader:
     path : str or Path
         A rosbag2 folder (MCAP or SQLite storage) or a storage file.
     salvaging : bool
-        Read MCAP files whose first bytes are damaged, too, which otherwise are none.
+        Read MCAP files whose first bytes are damaged, too.
 
     Returns
     -------
@@ -46,7 +53,7 @@ def open_bag(path: str | Path, *, salvaging: bool = False) -> BagReader:
     Raises
     ------
     RecordingError
-        When there is nothing at the path, or no recording.
+        If nothing exists at the path, or it is not a recording.
     """
     return BagReader(Path(path), salvaging=salvaging)
 
@@ -54,9 +61,9 @@ def open_bag(path: str | Path, *, salvaging: bool = False) -> BagReader:
 class BagReader:
     """A recording.
 
-    A whole MCAP file is opened by its index; one cut short is gone through once, to know what
-    there is. Damage inside a chunk shows only when the chunk is read: `complete`, `notices` and
-    `messages_lost` are final after `messages` has come to its end.
+    An intact MCAP file is opened by its index; a truncated one is scanned once to build the index.
+    Damage inside a chunk is found only when the chunk is read: `complete`, `notices` and
+    `messages_lost` are final after `messages` has been exhausted.
 
     Parameters
     ----------
@@ -73,56 +80,63 @@ class BagReader:
     metadata : dict of str to str
         Provenance, as given to `BagWriter`.
     expected : int or None
-        Messages that the recorder counted in all; None where it does not say.
+        Number of messages according to the recorder; None if it is not stated.
     """
 
     def __init__(self, path: Path, *, salvaging: bool = False) -> None:
         self.path = path
-        self._contents: Contents = contents(path, salvaging=salvaging)
+        self._contents: BagContents = open_contents(path, salvaging=salvaging)
         self.metadata = self._contents.metadata
         self.expected = self._contents.expected
         self.topics = _merged_topics(self._contents.files)
         used = [file for file in self._contents.files if _count(file)]
         self.start_ns = min((file.start_ns for file in used), default=0)
         self.end_ns = max((file.end_ns for file in used), default=0)
-        self._undone = 0
+        self._undecompressed = 0
         self._store: Typestore | None = None
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The storage files that it consists of."""
+        """The storage files of the recording."""
         return tuple(file.path for file in self._contents.files)
 
     @property
     def complete(self) -> bool:
-        """Nothing is known to be missing, so far."""
-        whole = all(file.complete for file in self._contents.files)
-        return whole and self._contents.complete and not self._undone and not self.unfinished
+        """Whether no data loss has been found so far."""
+        return (
+            all(file.complete for file in self._contents.files)
+            and self._contents.complete
+            and not self._undecompressed
+            and not self.interruptions
+        )
 
     @property
-    def unfinished(self) -> tuple[Unfinished, ...]:
-        """What was interrupted when it was made of a film or of another recording."""
-        return unfinished(self.metadata)
+    def interruptions(self) -> tuple[Interruption, ...]:
+        """Interrupted import or salvage by which the recording was made."""
+        return interruptions(self.metadata)
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What was never written, what was salvaged and what is lost, so far."""
-        return (*(f'{self.path}: {one.what}' for one in self.unfinished), *self.damage)
+        """Interruptions, damage and recovery found so far, in sentences."""
+        interrupted = (f'{self.path}: {interruption.what}' for interruption in self.interruptions)
+        return (*interrupted, *self.damage)
 
     @property
     def damage(self) -> tuple[str, ...]:
-        """What was salvaged and what is lost, so far."""
+        """Damage and recovery found so far, in sentences."""
         notices = [*self._contents.notices]
         for file in self._contents.files:
             notices += file.notices
-        if self._undone:
-            notices.append(f'{self.path}: {self._undone} messages could not be decompressed')
+        if self._undecompressed:
+            notices.append(
+                f'{self.path}: {self._undecompressed} messages could not be decompressed'
+            )
         return tuple(notices)
 
     @property
     def messages_lost(self) -> int:
-        """Messages known to be lost, so far; how many lie beyond a cut is not known."""
-        return self._undone + sum(file.messages_lost for file in self._contents.files)
+        """Number of lost messages found so far; those behind a truncation are not known."""
+        return self._undecompressed + sum(file.messages_lost for file in self._contents.files)
 
     def messages(
         self,
@@ -130,13 +144,13 @@ class BagReader:
         start_ns: int | None = None,
         end_ns: int | None = None,
     ) -> Iterator[BagMessage]:
-        """The messages of some topics, or all, in order of log time.
+        """Messages of the given topics, or all, in order of log time.
 
         Parameters
         ----------
         topics : collection of str, optional
         start_ns, end_ns : int, optional, [ns]
-            Log times of the first and last message wanted; what lies wholly outside is not read.
+            First and last log time; chunks outside this range are not read.
 
         Yields
         ------
@@ -144,23 +158,23 @@ class BagReader:
         """
         files = self._contents.files
         streams = [file.messages(topics, start_ns, end_ns) for file in files]
-        messages = _in_turn(files, streams)
+        messages = _merged_by_time(files, streams)
         return self._decompressed(messages) if self._contents.compressed_messages else messages
 
     def _decompressed(self, messages: Iterator[BagMessage]) -> Iterator[BagMessage]:
-        self._undone = 0
+        self._undecompressed = 0
         for message in messages:
             try:
                 cdr = zstandard.decompress(message.cdr, max_output_size=_MESSAGE_LIMIT)
             except (zstandard.ZstdError, MemoryError):
-                self._undone += 1
+                self._undecompressed += 1
                 continue
             yield BagMessage(
                 topic=message.topic, type=message.type, log_time_ns=message.log_time_ns, cdr=cdr
             )
 
     def deserialize(self, message: BagMessage) -> Any:
-        """The message as an object with the attributes of its type.
+        """Deserialize a message to an object with the attributes of its type.
 
         Parameters
         ----------
@@ -169,20 +183,20 @@ class BagReader:
         Raises
         ------
         RecordingError
-            When its type is not known or its bytes do not fit its type.
+            If its type is unknown or its bytes do not fit its type.
         """
-        store = self._types_with(message)
+        store = self._typestore_for(message)
         try:
             return store.deserialize_cdr(message.cdr, message.type)
-        except _NOT_CDR as error:
+        except _DESERIALIZE_ERRORS as error:
             raise RecordingError(
                 f'{self.path}: {message.topic}',
-                f'the message at {message.log_time_ns} ns is no {message.type} '
-                f'({_in_one_line(error)})',
+                f'the message at {message.log_time_ns} ns is not a valid {message.type} '
+                f'({_single_line(error)})',
                 'record it again or pass another bag',
             ) from error
 
-    def _types_with(self, message: BagMessage) -> Typestore:
+    def _typestore_for(self, message: BagMessage) -> Typestore:
         if self._store is None:
             self._store = standard_types()
         info = self.topics.get(message.topic)
@@ -196,22 +210,22 @@ class BagReader:
         try:
             if info is None or not info.definition:
                 raise TypesysError('the bag holds no definition')
-            register(self._store, message.type, info.definition, info.definition_format)
+            register_type(self._store, message.type, info.definition, info.definition_format)
         except (TypesysError, ValueError, LookupError) as error:
             raise RecordingError(
                 where,
-                f"type '{message.type}' is not known ({_in_one_line(error)})",
-                'leave this topic out, or record it with its definition (MCAP storage)',
+                f"type '{message.type}' is unknown ({_single_line(error)})",
+                'omit this topic, or record it with its definition (MCAP storage)',
             ) from error
         return self._store
 
     def require_topic(self, candidates: Sequence[str]) -> str:
-        """The first of some topics that the recording holds.
+        """The first of several topics that has messages in the recording.
 
         Parameters
         ----------
         candidates : sequence of str, at least one
-            Best first.
+            In order of preference.
 
         Returns
         -------
@@ -220,25 +234,25 @@ class BagReader:
         Raises
         ------
         RecordingError
-            When none of them has a message.
+            If none of them has a message.
         """
-        held = [info for info in self.topics.values() if info.count]
-        if not held:
+        present = [info for info in self.topics.values() if info.count]
+        if not present:
             raise RecordingError(
                 str(self.path), 'holds no messages', 'record it again or pass another bag'
             )
-        names = {info.name for info in held}
+        names = {info.name for info in present}
         for name in candidates:
             if name in names:
                 return name
         missing = ' or '.join(f"'{name}'" for name in candidates)
-        found = ', '.join(f"'{info.name}' [{info.type}]" for info in held)
+        available = ', '.join(f"'{info.name}' [{info.type}]" for info in present)
         raise RecordingError(
-            str(self.path), f'no topic {missing} (found {found})', 'pass --image-topic'
+            str(self.path), f'no topic {missing} (found {available})', 'pass --image-topic'
         )
 
 
-def _in_one_line(error: Exception) -> str:
+def _single_line(error: Exception) -> str:
     return ' '.join(str(error).split())
 
 
@@ -264,10 +278,10 @@ def _merged_topics(files: Sequence[StorageFile]) -> dict[str, TopicInfo]:
     return merged
 
 
-def _in_turn(
+def _merged_by_time(
     files: Sequence[StorageFile], streams: Sequence[Iterator[BagMessage]]
 ) -> Iterator[BagMessage]:
-    """Messages of all files in order; a file is opened when its first message is due."""
+    """Merge the messages of all files by log time; a file is opened at its first message."""
     queue: list[tuple[int, int, BagMessage | None]] = [
         (file.start_ns, number, None) for number, file in enumerate(files) if _count(file)
     ]

@@ -1,8 +1,8 @@
-"""A recording that is written in a thread of its own, so that no disk holds up who records.
+"""Recorder that writes a bag in its own thread, so that a slow disk does not block the caller.
 
-How much can be lost: once a second what was taken goes to the disk (`BagWriter.sync`), so a kill
-or a power cut costs little more than the last second. When the disk does not keep up, pictures
-are left out and counted; small messages, the results, never are.
+Data is synced to the disk once a second (`BagWriter.sync`), so a kill or a power cut loses little
+more than the last second. If the disk is too slow, images are dropped and counted; small messages
+(results) are never dropped.
 """
 
 from __future__ import annotations
@@ -19,18 +19,20 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
-    from nanorocks_ros.recordings.bag.writer import OfferedTopic
+    from nanorocks_ros.recordings.bag.offered_topics import OfferedTopic
 
 _SYNC_S = 1.0
-# Pictures that may wait: 20 uncompressed ones of 1080p, ten seconds of compressed ones.
-_MOST_BYTES = 128 * 2**20
-# A picture that is later than the one before by less is late, not part of another turn.
+# Largest total size of queued images: 20 uncompressed 1080p images, or 10 s of compressed ones.
+_MAX_QUEUED_BYTES = 128 * 2**20
+# Stamps that step back by less than this belong to late images; a larger step back is a loop or
+# a seek.
 _LATE_NS = 1_000_000_000
+# Topic, log time, function that makes the message, size of an image.
 _Job = tuple[str, int, 'Callable[[], bytes | object]', int]
 
 
 class Recorder:
-    """Takes messages, and writes them when the disk has time.
+    """Queue messages and write them in a thread.
 
     Parameters
     ----------
@@ -40,22 +42,22 @@ class Recorder:
         By absolute name.
     metadata : mapping of str to str
         Provenance.
-    most_bytes : int, [bytes]
-        Of pictures that may wait.
+    max_queued_bytes : int, [bytes]
+        Largest total size of queued images.
 
     Attributes
     ----------
     dropped : int
-        Pictures that were left out.
+        Number of dropped images.
     written : int
-        Messages written.
+        Number of written messages.
     problem : Exception or None
-        Why nothing more is written.
+        The error that ended the recording.
 
     Raises
     ------
     RecordingError
-        When the path exists or cannot be created.
+        If the path exists or cannot be created.
     """
 
     def __init__(
@@ -64,17 +66,17 @@ class Recorder:
         topics: Mapping[str, OfferedTopic],
         *,
         metadata: Mapping[str, str],
-        most_bytes: int = _MOST_BYTES,
+        max_queued_bytes: int = _MAX_QUEUED_BYTES,
     ) -> None:
         self._writer = BagWriter(path, topics, metadata=metadata)
         self._writer.__enter__()
-        self._most_bytes = most_bytes
+        self._max_queued_bytes = max_queued_bytes
         self._jobs: deque[_Job] = deque()
         self._bytes = 0
         self._ending = False
         self._changed = threading.Condition()
         self._last_ns: int | None = None
-        self._early: list[tuple[str, Callable[[], bytes | object]]] = []
+        self._unstamped: list[tuple[str, Callable[[], bytes | object]]] = []
         self._shift_ns = 0
         self.dropped = 0
         self.written = 0
@@ -83,10 +85,10 @@ class Recorder:
         self._thread.start()
 
     def advance(self, stamp_ns: int) -> None:
-        """Tell what time it is in the recording: the stamp of the latest picture.
+        """Set the current time of the recording: the stamp of the latest image.
 
-        Log times never go back: after a loop or a seek they go on from where they were, so that
-        who reads the recording meets the pictures in the order they came.
+        Log times never step back: after a loop or a seek they continue from the latest log time,
+        so that a reader gets the images in the order of their arrival.
 
         Parameters
         ----------
@@ -97,8 +99,8 @@ class Recorder:
         if behind_ns > _LATE_NS:
             self._shift_ns += behind_ns
         self._last_ns = max(last_ns, stamp_ns + self._shift_ns)
-        early, self._early = self._early, []
-        for topic, make in early:
+        unstamped, self._unstamped = self._unstamped, []
+        for topic, make in unstamped:
             self.put(topic, make)
 
     def put(
@@ -109,26 +111,26 @@ class Recorder:
         size: int = 0,
         wait: bool = False,
     ) -> bool:
-        """Leave a message to the thread; before the first `advance` it waits for that.
+        """Queue a message; messages before the first `advance` get the time of that call.
 
         Parameters
         ----------
         topic : str
-            One of the topics given at the start.
+            One of the topics given to the constructor.
         make : callable
-            Called in the thread: the message, as an object or as CDR.
+            Called in the thread; returns the message as an object or as CDR.
         size : int, [bytes]
-            Of a picture; 0 for what is never left out.
+            Size of an image; 0 for messages that are never dropped.
         wait : bool
-            Until there is room, rather than leave the picture out.
+            Wait for room in the queue instead of dropping the image.
 
         Returns
         -------
         bool
-            Whether it was taken.
+            Whether the message was queued.
         """
         if self._last_ns is None:
-            self._early.append((topic, make))
+            self._unstamped.append((topic, make))
             return True
         with self._changed:
             if wait:
@@ -144,10 +146,10 @@ class Recorder:
             return True
 
     def _has_room(self, size: int) -> bool:
-        return not size or not self._bytes or self._bytes + size <= self._most_bytes
+        return not size or not self._bytes or self._bytes + size <= self._max_queued_bytes
 
     def close(self) -> None:
-        """Write what waits, and the index; after a problem there is nothing left to do."""
+        """Write all queued messages and the index; after an error nothing is written."""
         with self._changed:
             self._ending = True
             self._changed.notify_all()
@@ -158,27 +160,27 @@ class Recorder:
             self._write_all()
             self._writer.sync()
             self._writer.__exit__(None, None, None)
-        # Said, or raised again, by whoever records.
+        # The caller reads `problem` and reports or raises it.
         except Exception as error:
-            self._writer.abandon()
+            self._writer.abort()
             with self._changed:
                 self.problem = error
                 self._jobs.clear()
                 self._changed.notify_all()
 
     def _write_all(self) -> None:
-        due = time.monotonic() + _SYNC_S
-        while (job := self._next(due)) is not None or not self._ending:
+        sync_time = time.monotonic() + _SYNC_S
+        while (job := self._next_job(sync_time)) is not None or not self._ending:
             if job is not None:
                 self._write(job)
-            if time.monotonic() >= due:
+            if time.monotonic() >= sync_time:
                 self._writer.sync()
-                due = time.monotonic() + _SYNC_S
+                sync_time = time.monotonic() + _SYNC_S
 
-    def _next(self, due: float) -> _Job | None:
+    def _next_job(self, sync_time: float) -> _Job | None:
         with self._changed:
-            left = max(0.0, due - time.monotonic())
-            self._changed.wait_for(lambda: bool(self._jobs) or self._ending, left)
+            timeout = max(0.0, sync_time - time.monotonic())
+            self._changed.wait_for(lambda: bool(self._jobs) or self._ending, timeout)
             return self._jobs.popleft() if self._jobs else None
 
     def _write(self, job: _Job) -> None:

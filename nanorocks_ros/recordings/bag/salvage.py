@@ -1,4 +1,4 @@
-"""A whole recording from what can be read of a damaged one."""
+"""Copy the readable messages of a damaged recording into a new one."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.recordings.bag.offered_topics import OfferedTopic
 from nanorocks_ros.recordings.bag.provenance import COMPLETE, SALVAGE, UNFINISHED
 from nanorocks_ros.recordings.bag.reader import open_bag
-from nanorocks_ros.recordings.bag.writer import BagWriter, OfferedTopic
+from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.offered_qos import OfferedQos
 
 if TYPE_CHECKING:
@@ -18,19 +19,20 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Salvage:
-    """What was salvaged.
+class SalvageResult:
+    """Result of a salvage.
 
     Parameters
     ----------
     bag : Path
+        The new recording.
     recovered : int
-        Messages in the new recording.
+        Number of messages in the new recording.
     lost : int
-        Messages known to be lost; how many lie beyond a cut is known only where the recorder
-        counted them.
+        Number of messages known to be lost; those behind a truncation are included only if the
+        recorder counted them.
     notices : tuple of str
-        What was wrong.
+        Damage of the source, in sentences.
     """
 
     bag: Path
@@ -39,40 +41,41 @@ class Salvage:
     notices: tuple[str, ...]
 
 
-def salvage(source: Path, target: Path, progress: Callable[[int, int], None]) -> Salvage:
-    """Copy every message that can be read into a new recording; the old one is only read.
+def salvage(source: Path, target: Path, progress: Callable[[int, int], None]) -> SalvageResult:
+    """Copy every readable message into a new recording; the source is not changed.
 
-    When it is interrupted, the new one holds what was written until then, and says so.
+    If the copy is interrupted, the new recording contains the messages written until then and is
+    marked as unfinished.
 
     Parameters
     ----------
     source : Path
-        Damaged, cut short, or without ``metadata.yaml``; MCAP or SQLite.
+        Damaged, truncated, or without ``metadata.yaml``; MCAP or SQLite.
     target : Path
         Must not exist.
     progress : callable
-        Called with the messages done and those there may be.
+        Called with the number of copied messages and the expected total.
 
     Returns
     -------
-    Salvage
+    SalvageResult
 
     Raises
     ------
     RecordingError
-        When there is nothing to salvage, or the new recording cannot be written.
+        If there is nothing to salvage, or the new recording cannot be written.
     """
     if os.path.lexists(target):
         raise RecordingError(
             str(target), 'exists already and is not overwritten', 'pass another path'
         )
     reader = open_bag(source, salvaging=True)
-    held = sum(info.count for info in reader.topics.values())
-    if not held:
+    total = sum(info.count for info in reader.topics.values())
+    if not total:
         raise RecordingError(
             str(source), 'holds no message that can be recovered', 'look for another copy of it'
         )
-    table = {
+    topics = {
         name: OfferedTopic(
             msgtype=info.type,
             qos=info.qos or OfferedQos(),
@@ -84,20 +87,20 @@ def salvage(source: Path, target: Path, progress: Callable[[int, int], None]) ->
         for name, info in reader.topics.items()
     }
     recovered = 0
-    begun = {**reader.metadata, SALVAGE: UNFINISHED}
-    with BagWriter(target, table, metadata=begun) as bag:
+    metadata = {**reader.metadata, SALVAGE: UNFINISHED}
+    with BagWriter(target, topics, metadata=metadata) as bag:
         for message in reader.messages():
-            if message.topic not in table:
+            if message.topic not in topics:
                 continue
             bag.write_raw(message.topic, message.log_time_ns, message.cdr)
             recovered += 1
-            progress(min(recovered, held), held)
-        lost = max(reader.messages_lost, (reader.expected or 0) - recovered, held - recovered)
-        # What was lost to an earlier interruption does not come back.
-        in_part = reader.metadata.get(SALVAGE) == UNFINISHED
-        bag.remark(SALVAGE, UNFINISHED if in_part else COMPLETE)
-        bag.remark('salvaged_from', source.name)
-        bag.remark('salvage_lost', str(lost))
+            progress(min(recovered, total), total)
+        lost = max(reader.messages_lost, (reader.expected or 0) - recovered, total - recovered)
+        # A copy of an unfinished salvage is unfinished, too.
+        source_unfinished = reader.metadata.get(SALVAGE) == UNFINISHED
+        bag.set_metadata(SALVAGE, UNFINISHED if source_unfinished else COMPLETE)
+        bag.set_metadata('salvaged_from', source.name)
+        bag.set_metadata('salvage_lost', str(lost))
         for number, notice in enumerate(reader.notices):
-            bag.remark(f'salvage_notice_{number}', notice)
-    return Salvage(bag=target, recovered=recovered, lost=lost, notices=reader.notices)
+            bag.set_metadata(f'salvage_notice_{number}', notice)
+    return SalvageResult(bag=target, recovered=recovered, lost=lost, notices=reader.notices)

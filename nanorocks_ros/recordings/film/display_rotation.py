@@ -1,4 +1,4 @@
-"""Pictures as they were seen, from those of a camera that was held another way."""
+"""Rotation of video frames by the display matrix of the file."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-Turn = tuple[int, int, int, int]
-"""a, b, c, d of a display: ``x' = a x + c y``, ``y' = b x + d y``, y pointing down."""
+Rotation = tuple[int, int, int, int]
+"""Display matrix a, b, c, d: ``x' = a x + c y``, ``y' = b x + d y``, y pointing down."""
 
-UPRIGHT: Turn = (1, 0, 0, 1)
+UNROTATED: Rotation = (1, 0, 0, 1)
 
 
-def turned(image: NDArray[np.uint8], turn: Turn) -> NDArray[np.uint8]:
-    """The picture as a display would show it.
+def rotated(image: NDArray[np.uint8], rotation: Rotation) -> NDArray[np.uint8]:
+    """Apply a display matrix to an image.
 
     Parameters
     ----------
     image : ndarray, (height, width[, 3])
-    turn : tuple of int
-        a, b, c, d of the display: ``x' = a x + c y``, ``y' = b x + d y``, y pointing down.
+    rotation : tuple of int
+        Display matrix, as `Rotation`.
     """
-    a, b, c, d = turn
+    a, b, c, d = rotation
     if a == 0:
         image, a, d = cv2.transpose(image).astype(np.uint8, copy=False), c, b
     if a < 0:
@@ -34,21 +34,21 @@ def turned(image: NDArray[np.uint8], turn: Turn) -> NDArray[np.uint8]:
     return np.ascontiguousarray(image[::-1] if d < 0 else image)
 
 
-def turn_of(frame: Any) -> Turn:
-    """How a frame of PyAV asks to be turned."""
-    for one in frame.side_data:
-        if getattr(one.type, 'name', one.type) != 'DISPLAYMATRIX':
+def rotation_of(frame: Any) -> Rotation:
+    """Display matrix of a frame of PyAV; `UNROTATED` if it has none."""
+    for entry in frame.side_data:
+        if getattr(entry.type, 'name', entry.type) != 'DISPLAYMATRIX':
             continue
-        matrix = np.frombuffer(one, np.int32).astype(float)
+        matrix = np.frombuffer(entry, np.int32).astype(float)
         a, b, c, d = matrix[0], matrix[1], matrix[3], matrix[4]
         if abs(b) > abs(a):
             return 0, int(np.sign(b)), int(np.sign(c)), 0
         return int(np.sign(a)) or 1, 0, 0, int(np.sign(d)) or 1
-    return UPRIGHT
+    return UNROTATED
 
 
-def words_of(turn: Turn) -> str:
-    """What is done to a picture, for people."""
-    a, b, c, d = turn
+def rotation_text(rotation: Rotation) -> str:
+    """Description of a rotation for notices."""
+    a, b, c, d = rotation
     mirrored = ' and mirrored' if a * d - b * c < 0 else ''
-    return f'turned by {round(math.degrees(math.atan2(b, a))) % 360} degrees clockwise{mirrored}'
+    return f'rotated by {round(math.degrees(math.atan2(b, a))) % 360} degrees clockwise{mirrored}'

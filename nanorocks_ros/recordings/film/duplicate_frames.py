@@ -1,6 +1,6 @@
-"""Pictures that a film holds twice: to the last bit, or but for what compression changed.
+"""Removal of duplicate frames: identical ones, and those that differ only by compression noise.
 
-Drawn pictures are compared by their brightness alone.
+Decoded frames are compared by their brightness.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
 
-from nanorocks_ros.recordings.film.film_source import NS, StoredPicture
+from nanorocks_ros.recordings.film.film_source import EncodedImage
+from nanorocks_ros.recordings.storage import NS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -18,112 +19,115 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from nanorocks_ros.recordings.film.film_source import DrawnPicture, Shot
+    from nanorocks_ros.recordings.film.film_source import DecodedImage, FilmFrame
     from nanorocks_ros.recordings.film.timestamp_repair import Stamped
 
-# A picture that stays the same for so long is kept once in that time: it may stand still.
+# Of identical frames, one is kept in each such time: the picture may stand still.
 _STILL_NS = NS
-# Repeats in a row that are known as such although compression changed them a little.
+# Largest number of consecutive duplicates that differ by compression noise.
 _LONGEST_RUN = 7
-# Compressed anew, a repeat differs from what it repeats by less than such shares of what pictures
-# around it differ by, which is so many levels at least where they differ most: on average, where
-# it differs most, and the product of both. Of 5 codecs at usual qualities it reaches 0.13.
-_SHARE, _PRODUCT, _MOST = 0.5, 0.15, 6.0
-# JPEGs are compared by more than their bytes in the beginning, and on if there were repeats.
-_DECODED = 64
+# A recompressed duplicate differs from its original less than neighbouring frames differ from each
+# other: the ratios of the mean and of the largest difference are at most _MAX_RATIO, their product
+# at most _MAX_PRODUCT. Neighbouring frames must differ by at least _MIN_CHANGE gray levels.
+# With 5 codecs at usual qualities the product reaches 0.13.
+_MAX_RATIO, _MAX_PRODUCT, _MIN_CHANGE = 0.5, 0.15, 6.0
+# Stored images are decoded for the comparison only among the first frames, and later only if there
+# were duplicates among those.
+_DECODED_FRAMES = 64
 _BLOCK_PX = 8
-# Where something swings, pictures at its turning points repeat each other as well. Those around
-# them do, too: they differ by less than this share of what they differ from these by.
-_TURNED = 0.8
+# At the turning points of an oscillation frames are alike, and so are the frames around them: they
+# differ by less than this ratio of their difference to the frames at the turning point.
+_TURNING_RATIO = 0.8
 
 
 class _Change(NamedTuple):
-    """How a picture differs from the one before it: on average, and most, [gray levels]."""
+    """Difference of a frame from the previous one: mean and maximum, [gray levels]."""
 
     mean: float
-    most: float
+    maximum: float
 
     def is_small_beside(self, other: _Change) -> bool:
-        if other.most < _MOST:
+        if other.maximum < _MIN_CHANGE:
             return False
-        mean, most = self.mean / other.mean, self.most / other.most
-        return max(mean, most) <= _SHARE and mean * most <= _PRODUCT
+        mean, maximum = self.mean / other.mean, self.maximum / other.maximum
+        return max(mean, maximum) <= _MAX_RATIO and mean * maximum <= _MAX_PRODUCT
 
 
 _NONE = _Change(0.0, 0.0)
 
 
-class Repeats:
-    """Leaves out pictures that the film holds twice.
+class DuplicateFilter:
+    """Remove duplicate frames.
 
     Attributes
     ----------
     dropped : int
-        Pictures left out, so far.
+        Number of removed frames so far.
     still_ns : int, [ns]
-        The longest time over which the picture stayed the same, to the last bit.
+        Longest time over which the frames were identical.
     """
 
     def __init__(self) -> None:
         self.dropped = 0
         self.still_ns = 0
-        self._run: list[tuple[Stamped[Shot], _Change]] = []
+        # Candidates for duplicates, which wait for a larger change.
+        self._run: list[tuple[Stamped[FilmFrame], _Change]] = []
         self._before: _Change | None = None
         self._any_run = False
         self._compared = 0
-        # Runs between pictures that are alike, and between others.
-        self._turned = self._straight = 0
-        # Of the last pictures, and of that before the one that a run repeats.
+        # Number of runs at turning points of an oscillation, and of other runs.
+        self._turning_runs = self._other_runs = 0
+        # Brightness of the last frames, and of the frame before the original of a run.
         self._grays: deque[NDArray[np.uint8]] = deque(maxlen=3)
         self._gray_ahead: NDArray[np.uint8] | None = None
 
-    def without(self, shots: Iterable[Stamped[Shot]]) -> Iterator[Stamped[Shot]]:
-        """The pictures that are held once, as soon as those behind them are known.
+    def filter(self, frames: Iterable[Stamped[FilmFrame]]) -> Iterator[Stamped[FilmFrame]]:
+        """Yield each distinct frame as soon as the frames behind it are known.
 
         Parameters
         ----------
-        shots : iterable of Stamped
+        frames : iterable of Stamped
             Stamps rise.
 
         Yields
         ------
         Stamped
         """
-        previous: Stamped[Shot] | None = None
+        previous: Stamped[FilmFrame] | None = None
         since_ns = kept_ns = 0
-        for shot in shots:
+        for frame in frames:
             change = (
                 None
                 if previous is None
-                else self._change(previous.item.picture, shot.item.picture)
+                else self._change(previous.item.picture, frame.item.picture)
             )
             if change == _NONE:
-                self.still_ns = max(self.still_ns, shot.stamp_ns - since_ns)
-                if shot.stamp_ns - kept_ns < _STILL_NS:
+                self.still_ns = max(self.still_ns, frame.stamp_ns - since_ns)
+                if frame.stamp_ns - kept_ns < _STILL_NS:
                     self.dropped += 1
                     continue
                 yield from self._release()
-                yield shot
+                yield frame
             elif change is None:
                 yield from self._release()
-                yield shot
+                yield frame
             else:
-                since_ns = shot.stamp_ns
-                yield from self._judged(shot, change)
-            kept_ns = shot.stamp_ns
+                since_ns = frame.stamp_ns
+                yield from self._judged(frame, change)
+            kept_ns = frame.stamp_ns
             if previous is None:
-                since_ns = shot.stamp_ns
-            previous = shot
+                since_ns = frame.stamp_ns
+            previous = frame
         yield from self._end()
 
     def _change(
-        self, before: StoredPicture | DrawnPicture, now: StoredPicture | DrawnPicture
+        self, before: EncodedImage | DecodedImage, now: EncodedImage | DecodedImage
     ) -> _Change | None:
-        """How two pictures differ; None when they do and it is not known by how much."""
-        if isinstance(now, StoredPicture):
+        """Difference of two images; None if they differ by an unknown amount."""
+        if isinstance(now, EncodedImage):
             if before == now:
                 return _NONE
-            if self._compared >= _DECODED and not self._any_run:
+            if self._compared >= _DECODED_FRAMES and not self._any_run:
                 self._grays.clear()
                 return None
         self._compared += 1
@@ -132,65 +136,66 @@ class Repeats:
         self._grays.append(now.gray())
         return _difference(self._grays[-2], self._grays[-1])
 
-    def _judged(self, shot: Stamped[Shot], change: _Change) -> Iterator[Stamped[Shot]]:
-        """Pictures that differ little wait for one that differs more, as the one before did."""
+    def _judged(self, frame: Stamped[FilmFrame], change: _Change) -> Iterator[Stamped[FilmFrame]]:
+        """Hold back frames with a small change until a larger change follows."""
         if self._run:
-            if all(own.is_small_beside(change) for _, own in self._run):
-                if self._may_have_turned(change):
+            if all(small.is_small_beside(change) for _, small in self._run):
+                if self._is_turning_point(change):
                     yield from self._release()
                 else:
                     self._drop()
                 self._before = change
-                yield shot
+                yield frame
                 return
             if self._is_candidate(change) and len(self._run) < _LONGEST_RUN:
-                self._run.append((shot, change))
+                self._run.append((frame, change))
                 return
             yield from self._release()
         if self._before is None or self._is_candidate(change):
-            self._run.append((shot, change))
+            self._run.append((frame, change))
             self._gray_ahead = self._grays[0] if len(self._grays) == 3 else None
             return
         self._before = change
-        yield shot
+        yield frame
 
     def _is_candidate(self, change: _Change) -> bool:
         return self._before is not None and change.is_small_beside(self._before)
 
-    def _may_have_turned(self, after: _Change) -> bool:
-        """Whether the pictures around a run are alike, as around most runs so far."""
+    def _is_turning_point(self, after: _Change) -> bool:
+        """Whether the frames around a run are alike, as around most runs so far."""
         if self._gray_ahead is None or self._before is None:
             return False
         around = _difference(self._gray_ahead, self._grays[-1])
-        least = min(self._before.mean, after.mean)
-        turned = around is not None and around.mean < _TURNED * least
-        self._turned += turned
-        self._straight += not turned
-        return turned and self._turned > 2 * self._straight
+        smallest = min(self._before.mean, after.mean)
+        turning = around is not None and around.mean < _TURNING_RATIO * smallest
+        self._turning_runs += turning
+        self._other_runs += not turning
+        return turning and self._turning_runs > 2 * self._other_runs
 
     def _drop(self) -> None:
         self.dropped += len(self._run)
-        # Of the first pictures nothing tells whether they turned.
+        # A run at the first frames may be a turning point; it is no evidence of duplicates.
         self._any_run = self._any_run or self._before is not None
         self._run.clear()
 
-    def _release(self) -> Iterator[Stamped[Shot]]:
+    def _release(self) -> Iterator[Stamped[FilmFrame]]:
         if self._run:
             self._before = self._run[-1][1]
-        yield from [one for one, _ in self._run]
+        yield from [frame for frame, _ in self._run]
         self._run.clear()
 
-    def _end(self) -> Iterator[Stamped[Shot]]:
-        """At the end nothing follows that differs more; what held before holds there."""
+    def _end(self) -> Iterator[Stamped[FilmFrame]]:
+        """Drop the last run if there were duplicates before, else yield it."""
         if self._any_run and self._run and self._before is not None:
             self._drop()
         yield from self._release()
 
 
-def _difference(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> _Change | None:
-    if one.shape != other.shape or not one.size:
+def _difference(before: NDArray[np.uint8], now: NDArray[np.uint8]) -> _Change | None:
+    """Difference of two gray images; None if their sizes differ or they are empty."""
+    if before.shape != now.shape or not before.size:
         return None
-    difference = cv2.absdiff(one, other)
+    difference = cv2.absdiff(before, now)
     total = cv2.norm(difference, cv2.NORM_L1)
     if not total:
         return _NONE

@@ -1,4 +1,4 @@
-"""What every film offers, be it a video or a folder of images: its pictures and their times."""
+"""The interface of films (videos and folders of images): frames, their times, and metadata."""
 
 from __future__ import annotations
 
@@ -14,12 +14,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-NS = 1_000_000_000
 _GRAY, _COLOUR = 'mono8', 'bgr8'
 
 
-def form_of(kind: str, channels: int) -> str:
-    """What stands in the ``format`` of a compressed image message.
+def image_format(kind: str, channels: int) -> str:
+    """The ``format`` field of a compressed image message.
 
     Parameters
     ----------
@@ -32,96 +31,96 @@ def form_of(kind: str, channels: int) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class StoredPicture:
-    """A picture whose bytes go into the bag as they are.
+class EncodedImage:
+    """An image file whose bytes are written to the bag without recompression.
 
     Parameters
     ----------
-    form : str
-        As `form_of` makes it.
+    format : str
+        As returned by `image_format`.
     content : bytes
     """
 
-    form: str
+    format: str
     content: bytes
 
     def gray(self) -> NDArray[np.uint8]:
-        """Its brightness, to compare it with others; empty when it cannot be decoded."""
+        """Brightness, (height, width); empty if the image cannot be decoded."""
         return decoded_gray(self.content)
 
 
-class DrawnPicture(Protocol):
-    """A picture that has to be compressed."""
+class DecodedImage(Protocol):
+    """An image that has to be compressed."""
 
     def gray(self) -> NDArray[np.uint8]:
-        """Its brightness, to compare it with others, (height, width)."""
+        """Brightness, (height, width)."""
 
     def pixels(self) -> NDArray[np.uint8]:
-        """Its pixels, upright: bgr, or gray with two axes."""
+        """Pixels, upright: (height, width, 3), bgr, or (height, width), gray."""
 
 
-def stored(picture: StoredPicture | DrawnPicture, quality: int) -> StoredPicture:
-    """The picture as a bag holds it: as JPEG, unless its bytes go in as they are.
+def encoded(picture: EncodedImage | DecodedImage, quality: int) -> EncodedImage:
+    """Compress an image to JPEG; an `EncodedImage` is returned unchanged.
 
     Parameters
     ----------
-    picture : StoredPicture or DrawnPicture
+    picture : EncodedImage or DecodedImage
     quality : int
         Of the JPEG, 1 to 100.
 
     Raises
     ------
     FrameError
-        When it cannot be compressed.
+        If the image cannot be compressed.
     """
-    if isinstance(picture, StoredPicture):
+    if isinstance(picture, EncodedImage):
         return picture
     pixels = picture.pixels()
-    return StoredPicture(form_of('jpeg', pixels.ndim), encode_jpeg(pixels, quality))
+    return EncodedImage(image_format('jpeg', pixels.ndim), encode_jpeg(pixels, quality))
 
 
-class Shot(NamedTuple):
-    """A picture, when it was taken, and where it stands in the film.
+class FilmFrame(NamedTuple):
+    """A frame of a film.
 
     Parameters
     ----------
     time_ns : int or None, [ns]
-        By the clock of the film; None where the film does not say.
-    picture : StoredPicture or DrawnPicture
+        Time by the clock of the film; None if the film does not state it.
+    picture : EncodedImage or DecodedImage
     done : float
-        Share of the film read until here.
+        Fraction of the film that has been read, 0 to 1.
     """
 
     time_ns: int | None
-    picture: StoredPicture | DrawnPicture
+    picture: EncodedImage | DecodedImage
     done: float
 
 
 @dataclass(slots=True, kw_only=True)
 class FilmInfo:
-    """What a film says of itself.
+    """Metadata of a film.
 
     Parameters
     ----------
     path : Path
     files : tuple of Path
-        What it consists of.
+        Files of the film.
     codec : str
         ``h264``, ``mjpeg``, ``png``.
     width, height : int, [px]
-        Of the pictures in the bag: upright.
+        Size of the frames in the bag, upright.
     step_ns : int, [ns]
-        Usual time between two pictures; 0 when unknown.
+        Usual time between two frames; 0 if unknown.
     start_ns : int or None, [ns]
-        When it was taken, since 1970.
+        Time of recording, since 1970; None if unknown.
     as_stored : bool
-        Its pictures go into the bag as they are stored.
+        Whether its frames are written to the bag without recompression.
     expected : int
-        Pictures that it says it holds; 0 when it doesn't.
+        Number of frames according to the file; 0 if it is not stated.
     remarks : tuple of str
-        What the user should know of it.
+        Notices for the user.
     tags : dict of str to str
-        What the camera wrote into it.
+        Metadata written by the camera.
     """
 
     path: Path
@@ -138,17 +137,17 @@ class FilmInfo:
 
 
 class Film(Protocol):
-    """A film, opened.
+    """An open film.
 
     Attributes
     ----------
     info : FilmInfo
-    broken : int
-        Pictures that could not be used, so far.
+    damaged : int
+        Number of unusable frames so far.
     """
 
     info: FilmInfo
-    broken: int
+    damaged: int
 
-    def shots(self) -> Iterator[Shot]:
-        """The pictures that can be used, in the order of the film."""
+    def frames(self) -> Iterator[FilmFrame]:
+        """Usable frames in the order of the film."""

@@ -1,4 +1,4 @@
-"""An image file as a picture of 8 bits, of whichever of its bits the camera filled."""
+"""Decoding of image files to 8 bits, including 16-bit files of cameras with 8 to 14 bits."""
 
 from __future__ import annotations
 
@@ -14,55 +14,55 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# What sensors have; files know 8 and 16 alone, and cameras that fill the lower ones do not say.
-_SENSORS = (8, 10, 12, 14)
-FULL = 16
-"""Bits of images that have more than 8."""
+# Bits of sensors. Files have 8 or 16 bits and do not state how many of them the camera uses.
+_SENSOR_BITS = (8, 10, 12, 14)
+FULL_BITS = 16
+"""Bits per channel of images with more than 8 bits."""
 
-_OF_8 = -1
+_EIGHT_BIT = -1
 
 
-def opened(file: Path, bits: int = FULL) -> NDArray[np.uint8] | None:
-    """Its pixels, upright, gray or bgr; None when it cannot be decoded.
+def read_image(file: Path, bits: int = FULL_BITS) -> NDArray[np.uint8] | None:
+    """Decode an image file, upright, gray or bgr; None if it cannot be decoded.
 
     Parameters
     ----------
     file : Path
     bits : int
-        Of those in images of 16 bits, the lower ones that are filled, 8 to 16.
+        Number of the lower bits that the camera uses in 16-bit images, 8 to 16.
     """
     image = _decoded(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
     if image is not None and image.dtype == np.uint16:
         image = np.minimum(image >> (bits - 8), 255)
     elif image is not None and image.dtype != np.uint8:
-        # Of what is neither, OpenCV knows how bright it is.
+        # OpenCV converts other types (float) to 8 bits.
         image = _decoded(file, cv2.IMREAD_ANYCOLOR)
     return None if image is None else image.astype(np.uint8, copy=False)
 
 
 def bits_used(files: Sequence[Path]) -> int:
-    """How many of their 16 bits images fill; 16 also where the first has not so many.
+    """Number of bits that 16-bit images use; 16 also if the first image has 8 bits.
 
     Parameters
     ----------
     files : sequence of Path
-        All are looked at, where the first leaves the highest bit empty.
+        All are read if the highest bit of the first image is not used.
     """
-    first = next((most for most in map(_most, files) if most is not None), None)
-    if first is None or first == _OF_8 or first >> (FULL - 1):
-        return FULL
+    first = next((value for value in map(_max_value, files) if value is not None), None)
+    if first is None or first == _EIGHT_BIT or first >> (FULL_BITS - 1):
+        return FULL_BITS
     with ThreadPoolExecutor() as pool:
-        found = [one for one in pool.map(_most, files) if one is not None and one != _OF_8]
-    most = max(found)
-    return next((bits for bits in _SENSORS if not most >> bits), FULL)
+        values = [value for value in pool.map(_max_value, files) if value is not None]
+    largest = max(value for value in values if value != _EIGHT_BIT)
+    return next((bits for bits in _SENSOR_BITS if not largest >> bits), FULL_BITS)
 
 
-def _most(file: Path) -> int | None:
-    """The largest number in an image of 16 bits; `_OF_8` of one of fewer; None of no image."""
+def _max_value(file: Path) -> int | None:
+    """Largest value of a 16-bit image; `_EIGHT_BIT` if it has 8 bits; None if not decodable."""
     image = _decoded(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
     if image is None:
         return None
-    return int(image.max()) if image.dtype == np.uint16 else _OF_8
+    return int(image.max()) if image.dtype == np.uint16 else _EIGHT_BIT
 
 
 def _decoded(file: Path, flags: int) -> NDArray[Any] | None:

@@ -1,4 +1,4 @@
-"""Names of files, in the order that people expect."""
+"""Natural sorting of file names, and the running number in them."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-OF_THE_DISK = frozenset({'lost+found', 'System Volume Information', '$RECYCLE.BIN'})
-"""Folders that a system keeps on a disk for itself."""
+SYSTEM_FOLDERS = frozenset({'lost+found', 'System Volume Information', '$RECYCLE.BIN'})
+"""Folders of the operating system on a disk."""
 
 
-def natural(name: str) -> list[tuple[int, str]]:
-    """A key that sorts `run_10.mcap` behind `run_9.mcap`."""
+def natural_key(name: str) -> list[tuple[int, str]]:
+    """Sort key that sorts ``run_10.mcap`` after ``run_9.mcap``."""
     parts = re.split(r'(\d+)', name)
     return [(int(part), '') if part.isdecimal() else (-1, part) for part in parts]
 
 
-def numbers_of(names: Sequence[str]) -> list[int] | None:
-    """The numbers in which alone names differ; None where they differ in more, or in none.
+def varying_numbers(names: Sequence[str]) -> list[int] | None:
+    """The number in each name, if the names differ in exactly one number; else None.
 
     Parameters
     ----------

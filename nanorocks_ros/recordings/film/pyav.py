@@ -1,4 +1,4 @@
-"""PyAV, which decodes and encodes videos, where it is installed."""
+"""Import of PyAV, an optional library that decodes and encodes videos."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from typing import Any
 from nanorocks_ros.errors import ConfigurationError
 
 
-def pyav(what: str, otherwise: str = '') -> Any:
-    """The library ``av``.
+def pyav(where: str, alternative: str = '') -> Any:
+    """The module ``av``.
 
     Parameters
     ----------
-    what : str
-        Needs it: a file or a setting.
-    otherwise : str
-        What would do without it, for the remedy.
+    where : str
+        The file or setting that needs it, for the error message.
+    alternative : str
+        An action that does not need it, for the error message.
 
     Raises
     ------
     ConfigurationError
-        When it is not installed.
+        If it is not installed.
     """
     try:
         return import_module('av')
     except ImportError as error:
-        remedy = f'{otherwise}, or run' if otherwise else 'run'
+        remedy = f'{alternative}, or run' if alternative else 'run'
         raise ConfigurationError(
-            what,
+            where,
             'needs PyAV, which is not installed',
             f"{remedy}: pip install 'nanorocks_ros[video]'",
         ) from error

@@ -1,4 +1,4 @@
-"""Stamps that rise from picture to picture, from what a film says of its times."""
+"""Repair of the time stamps of a film: missing, out of order, wrong, or set back."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ if TYPE_CHECKING:
 
 Item = TypeVar('Item')
 
-# Pictures that are looked ahead of, to tell one wrong time from a clock that was set back.
-_AHEAD = 8
+# Number of following frames that distinguish a single wrong time from a clock that was set back.
+_LOOKAHEAD = 8
+# Number of steps whose median is the usual step.
 _HISTORY = 32
-# Steps by which a time has to jump to be taken for a wrong one.
-_JUMP = 4
+# A jump by more usual steps than this may be a wrong time.
+_MAX_JUMP = 4
 
 
 class Stamped(NamedTuple, Generic[Item]):
@@ -26,19 +27,19 @@ class Stamped(NamedTuple, Generic[Item]):
 
 
 @dataclass(slots=True)
-class Repairs:
-    """What had to be done to the times of a film.
+class RepairCounts:
+    """Number of repairs to the times of a film.
 
     Parameters
     ----------
     missing : int
-        Pictures without a time.
+        Frames without a time.
     reordered : int
-        Pictures that came too early, and were put in their place.
+        Frames that were out of order and were moved.
     replaced : int
-        Pictures whose time was that of another, or far from those around it.
+        Frames whose time was a duplicate or far from those of the neighbouring frames.
     set_back : int
-        How often the clock was set back and goes on from there.
+        Steps back of the clock; the stamps continue from the time before the step.
     """
 
     missing: int = 0
@@ -48,26 +49,26 @@ class Repairs:
 
 
 @dataclass(slots=True)
-class Steady(Generic[Item]):
-    """Makes times rise. Those that rise are left alone.
+class TimestampRepair(Generic[Item]):
+    """Make time stamps rise strictly. Stamps that rise already are not changed.
 
     Parameters
     ----------
     step_ns : int, [ns], > 0
-        Usual time between two pictures, until the pictures tell.
-    repairs : Repairs
+        Usual time between two frames, used until the frames show it.
+    repairs : RepairCounts
     last_ns : int or None, [ns]
-        Stamp given last.
+        Last stamp that was returned.
     """
 
     step_ns: int
-    repairs: Repairs = field(default_factory=Repairs)
+    repairs: RepairCounts = field(default_factory=RepairCounts)
     last_ns: int | None = None
     _shift_ns: int = 0
     _steps: deque[int] = field(default_factory=lambda: deque(maxlen=_HISTORY))
 
-    def stamps(self, timed: Iterable[tuple[int | None, Item]]) -> Iterator[Stamped[Item]]:
-        """Each item with its stamp, as soon as those behind it are known.
+    def repaired(self, timed: Iterable[tuple[int | None, Item]]) -> Iterator[Stamped[Item]]:
+        """Yield each item with its stamp as soon as the items behind it are known.
 
         Parameters
         ----------
@@ -79,17 +80,17 @@ class Steady(Generic[Item]):
             Stamps rise strictly.
         """
         waiting: deque[tuple[int | None, Item]] = deque()
-        for one in timed:
-            waiting.append(one)
-            if len(waiting) > _AHEAD:
+        for pair in timed:
+            waiting.append(pair)
+            if len(waiting) > _LOOKAHEAD:
                 yield self._next(waiting)
         while waiting:
             yield self._next(waiting)
 
     def _next(self, waiting: deque[tuple[int | None, Item]]) -> Stamped[Item]:
-        place = self._place(waiting)
-        time_ns, item = waiting[place]
-        del waiting[place]
+        index = self._next_index(waiting)
+        time_ns, item = waiting[index]
+        del waiting[index]
         if self.last_ns is None:
             stamp_ns = self._first_stamp(time_ns, waiting)
         else:
@@ -100,59 +101,60 @@ class Steady(Generic[Item]):
         return Stamped(stamp_ns, item)
 
     def _later(self, waiting: deque[tuple[int | None, Item]]) -> list[int]:
-        return [one + self._shift_ns for one, _ in waiting if one is not None]
+        return [time + self._shift_ns for time, _ in waiting if time is not None]
 
     def usual_ns(self) -> int:
-        """The time between two pictures that is usual of late, [ns]."""
+        """Median time between two of the last frames, [ns]."""
         if not self._steps:
             return self.step_ns
         return sorted(self._steps)[len(self._steps) // 2]
 
-    def _place(self, waiting: deque[tuple[int | None, Item]]) -> int:
-        """Which of those that wait is next: the first, unless others belong before it."""
+    def _next_index(self, waiting: deque[tuple[int | None, Item]]) -> int:
+        """Index of the next item: the first, unless others belong before it."""
         first = waiting[0][0]
         if first is None or len(waiting) < 2:
             return 0
         if self.last_ns is None:
-            return self._place_of_first(first, waiting)
+            return self._first_index(first, waiting)
         lower, upper = self.last_ns - self._shift_ns, first
         before = [
-            place
-            for place, (time, _) in enumerate(waiting)
+            index
+            for index, (time, _) in enumerate(waiting)
             if time is not None and lower < time < upper
         ]
-        # Were it wrong, most of the others would lie before it.
-        if not before or self._is_far(first + self._shift_ns, waiting, len(before)):
+        # If the first time is wrong, most of the others are before it.
+        if not before or self._is_jump(first + self._shift_ns, waiting, len(before)):
             return 0
         self.repairs.reordered += 1
-        return min(before, key=lambda place: waiting[place][0] or 0)
+        return min(before, key=lambda index: waiting[index][0] or 0)
 
-    def _place_of_first(self, first: int, waiting: deque[tuple[int | None, Item]]) -> int:
-        """Which is the first of all, where nothing before them tells whose time is wrong."""
+    def _first_index(self, first: int, waiting: deque[tuple[int | None, Item]]) -> int:
+        """Index of the first item of the film, for which there is no earlier stamp."""
         times = [time for time, _ in waiting if time is not None]
-        # A clock that was set back shows times once more, or lies far behind.
-        again = len(set(times)) < len(times)
-        if again or not 0 < first - min(times) <= _JUMP * self.usual_ns():
+        # A clock that was set back repeats times, or lies far behind.
+        repeated = len(set(times)) < len(times)
+        if repeated or not 0 < first - min(times) <= _MAX_JUMP * self.usual_ns():
             return 0
         self.repairs.reordered += 1
-        return min(range(len(waiting)), key=lambda place: _or_later(waiting[place][0], first))
+        return min(range(len(waiting)), key=lambda index: _or_later(waiting[index][0], first))
 
-    def _is_far(self, time_ns: int, waiting: deque[tuple[int | None, Item]], before: int) -> bool:
+    def _is_jump(self, time_ns: int, waiting: deque[tuple[int | None, Item]], before: int) -> bool:
+        """Whether a time is far ahead of the last stamp and most of the others are before it."""
         assert self.last_ns is not None
-        jump = time_ns - self.last_ns > _JUMP * self.usual_ns()
+        jump = time_ns - self.last_ns > _MAX_JUMP * self.usual_ns()
         return jump and 2 * before >= len(waiting) - 1
 
     def _first_stamp(self, time_ns: int | None, waiting: deque[tuple[int | None, Item]]) -> int:
-        """Without a time of its own, so many steps before those that have one."""
+        """Stamp of the first item; if it has no time, extrapolated from the next items."""
         if time_ns is not None:
             return time_ns
         self.repairs.missing += 1
-        known = [(time, place) for place, (time, _) in enumerate(waiting) if time is not None]
+        known = [(time, index) for index, (time, _) in enumerate(waiting) if time is not None]
         if not known:
             return 0
-        first, place = known[0]
-        near = (time for time, _ in known if time >= first - _JUMP * self.usual_ns())
-        return min(near) - (place + 1) * self.usual_ns()
+        first, index = known[0]
+        near = (time for time, _ in known if time >= first - _MAX_JUMP * self.usual_ns())
+        return min(near) - (index + 1) * self.usual_ns()
 
     def _stamp(self, time_ns: int | None, later: list[int]) -> int:
         assert self.last_ns is not None
@@ -161,10 +163,9 @@ class Steady(Generic[Item]):
             self.repairs.missing += 1
             return self._between(later, usual)
         time_ns += self._shift_ns
-        ahead = [one for one in later if one > self.last_ns]
+        ahead = [time for time in later if time > self.last_ns]
         if time_ns > self.last_ns:
-            wrong = [one for one in ahead if one < time_ns]
-            if not wrong:
+            if not any(time < time_ns for time in ahead):
                 return time_ns
         elif len(ahead) * 2 < len(later):
             self.repairs.set_back += 1
@@ -174,9 +175,9 @@ class Steady(Generic[Item]):
         return self._between(later, usual)
 
     def _between(self, later: list[int], usual: int) -> int:
-        """A stamp behind the last one and before the next."""
+        """A stamp between the last one and the next."""
         assert self.last_ns is not None
-        following = min((one for one in later if one > self.last_ns), default=None)
+        following = min((time for time in later if time > self.last_ns), default=None)
         if following is None:
             return self.last_ns + usual
         return self.last_ns + max(1, min(usual, (following - self.last_ns) // 2))

@@ -1,4 +1,4 @@
-"""A video: its pictures, turned upright, and when they were taken by its own clock."""
+"""Video files: their frames, upright and with square pixels, and their time stamps."""
 
 from __future__ import annotations
 
@@ -7,26 +7,32 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.recordings.film.display_rotation import UPRIGHT, turn_of, words_of
-from nanorocks_ros.recordings.film.film_source import NS, FilmInfo, Shot, StoredPicture, form_of
+from nanorocks_ros.recordings.film.display_rotation import UNROTATED, rotation_of, rotation_text
+from nanorocks_ros.recordings.film.film_source import (
+    EncodedImage,
+    FilmFrame,
+    FilmInfo,
+    image_format,
+)
 from nanorocks_ros.recordings.film.pyav import pyav
 from nanorocks_ros.recordings.film.video_picture import VideoPicture
 from nanorocks_ros.recordings.film.video_streams import (
     FORMATS,
-    film_among,
-    rate_told,
+    creation_time_ns,
+    declared_rate,
+    frame_interval_ns,
+    select_stream,
     square_size,
-    start_ns,
-    step_ns,
 )
 from nanorocks_ros.recordings.jpeg_header import is_whole_jpeg, jpeg_head, with_huffman_tables
 from nanorocks_ros.recordings.messages.image_messages import is_decodable
+from nanorocks_ros.recordings.storage import NS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-# Nothing is fetched because a playlist says so.
+# A playlist must not make FFmpeg fetch anything from the network.
 _ONLY_FILES = {'protocol_whitelist': 'file,crypto,data'}
 _CAMERA_TAGS = ('make', 'model', 'comment', 'encoder', 'location')
 
@@ -38,59 +44,59 @@ class Video:
     ----------
     path : Path
     rate : Fraction or None, [1/s]
-        Of the camera; None: as the video says.
+        Frame rate of the camera; None: the time stamps or the rate in the video.
     threads : int
-        That decode it; 0: as many as there are cores.
+        Number of decoder threads; 0: one per core.
 
     Attributes
     ----------
     info : FilmInfo
-    broken : int
-        Pictures that could not be used, so far.
+    damaged : int
+        Number of unusable frames so far.
 
     Raises
     ------
     ConfigurationError
-        When PyAV is not installed, or nothing says when the pictures were taken.
+        If PyAV is not installed, or the video has neither time stamps nor a frame rate.
     RecordingError
-        When it is no video.
+        If it is not a readable video.
     """
 
     def __init__(self, path: Path, rate: Fraction | None = None, threads: int = 0) -> None:
-        self.broken = 0
+        self.damaged = 0
         self._threads = threads
         self._av = pyav(str(path))
         self._bytes = path.stat().st_size
-        self._turn = UPRIGHT
+        self._rotation = UNROTATED
         self._sides = self._square = (0, 0)
         with self._opened(path) as container:
-            self._place, remarks = film_among(path, container)
-        # Again from its beginning.
+            self._stream_index, remarks = select_stream(path, container)
+        # Opened again because the selection may have read packets.
         with self._opened(path) as container:
-            stream = container.streams.video[self._place]
-            told = None if rate else rate_told(path, container, stream)
-            self._rate = rate or told
-            self.info = self._described(path, container, stream)
-        if told is not None:
-            said = f'has no times; its stream says {float(told):.6g} pictures per second'
-            remarks += (f'{path}: {said}',)
+            stream = container.streams.video[self._stream_index]
+            declared = None if rate else declared_rate(path, container, stream)
+            self._rate = rate or declared
+            self.info = self._film_info(path, container, stream)
+        if declared is not None:
+            notice = f'has no time stamps; its frame rate of {float(declared):.6g} Hz is used'
+            remarks += (f'{path}: {notice}',)
         self.info.remarks = remarks + self.info.remarks
 
     def _opened(self, path: Path) -> Any:
         try:
-            # Notes of old cameras need not be UTF-8.
+            # Metadata of old cameras may not be UTF-8.
             container = self._av.open(
                 f'file:{path.resolve()}',
-                # Not `options`: those are for streams, too, and where streams show up only after
-                # the head of a file, as in FLV, PyAV writes beyond what it has room for.
+                # Not `options`: they apply to streams, too, and PyAV overruns a buffer if streams
+                # appear only after the file header, as in FLV.
                 container_options=dict(_ONLY_FILES),
                 metadata_errors='backslashreplace',
             )
         except (self._av.FFmpegError, OSError) as error:
             raise RecordingError(
                 str(path),
-                f'is no video that can be read ({_reason(error)})',
-                'check that it was copied whole, or pass another',
+                f'is not a readable video ({_reason(error)})',
+                'check that it was copied completely, or pass another video',
             ) from error
         streams = container.streams.video
         if not streams or container.format.name not in FORMATS:
@@ -98,28 +104,29 @@ class Video:
             raise RecordingError(str(path), 'holds no film', 'pass a video')
         return container
 
-    def _described(self, path: Path, container: Any, stream: Any) -> FilmInfo:
-        first, packet = self._first(path, container, stream)
-        self._turn = turn_of(first)
+    def _film_info(self, path: Path, container: Any, stream: Any) -> FilmInfo:
+        first, packet = self._first_frame(path, container, stream)
+        self._rotation = rotation_of(first)
         self._sides = first.width, first.height
         width, height = self._square = square_size(path, stream, self._sides)
         info = FilmInfo(
             path=path,
             files=(path,),
             codec=stream.codec_context.name,
-            width=height if self._turn[0] == 0 else width,
-            height=width if self._turn[0] == 0 else height,
-            step_ns=round(NS / self._rate) if self._rate else step_ns(stream),
-            start_ns=start_ns({**stream.metadata, **container.metadata}),
+            width=height if self._rotation[0] == 0 else width,
+            height=width if self._rotation[0] == 0 else height,
+            step_ns=round(NS / self._rate) if self._rate else frame_interval_ns(stream),
+            start_ns=creation_time_ns({**stream.metadata, **container.metadata}),
             expected=max(0, stream.frames),
             tags={k: v for k, v in container.metadata.items() if k.lower() in _CAMERA_TAGS},
         )
-        as_they_are = self._turn == UPRIGHT and self._square == self._sides
-        info.as_stored = as_they_are and self._is_jpeg(packet, info)
+        unchanged = self._rotation == UNROTATED and self._square == self._sides
+        info.as_stored = unchanged and self._is_jpeg(packet, info)
         info.remarks = self._remarks(info)
         return info
 
-    def _first(self, path: Path, container: Any, stream: Any) -> tuple[Any, bytes]:
+    def _first_frame(self, path: Path, container: Any, stream: Any) -> tuple[Any, bytes]:
+        """The first frame that can be decoded, and the packet that completed it."""
         packets = container.demux(stream)
         while True:
             try:
@@ -132,68 +139,70 @@ class Video:
             if frames:
                 return frames[0], bytes(packet)
         raise RecordingError(
-            str(path), 'holds no picture that can be decoded', 'check that it was copied whole'
+            str(path),
+            'holds no frame that can be decoded',
+            'check that it was copied completely',
         )
 
     def _is_jpeg(self, content: bytes, info: FilmInfo) -> bool:
-        """Whether its packets are pictures that others can show; two fields in one are not."""
+        """Whether a packet is a complete JPEG of the frame size; two fields in one are not."""
         head = jpeg_head(content) if info.codec == 'mjpeg' else None
         if head is None or (head.width, head.height) != (info.width, info.height):
             return False
         return is_decodable(with_huffman_tables(content, head))
 
     def _remarks(self, info: FilmInfo) -> tuple[str, ...]:
-        again = '; its JPEGs are compressed anew for that' if info.codec == 'mjpeg' else ''
-        said = []
+        recompressed = '; its JPEGs are recompressed for this' if info.codec == 'mjpeg' else ''
+        changes = []
         if self._square != self._sides:
             stored, square = (
                 f'{width}x{height} px' for width, height in (self._sides, self._square)
             )
-            said.append(f'its pixels are not square; stretched from {stored} to {square}')
-        if self._turn != UPRIGHT:
-            said.append(f'{words_of(self._turn)}, as its rotation flag says')
-        return tuple(f'{info.path}: {one}{again}' for one in said)
+            changes.append(f'its pixels are not square; stretched from {stored} to {square}')
+        if self._rotation != UNROTATED:
+            changes.append(f'{rotation_text(self._rotation)} according to its rotation flag')
+        return tuple(f'{info.path}: {change}{recompressed}' for change in changes)
 
-    def shots(self) -> Iterator[Shot]:
-        """The pictures that can be used, in the order of the film.
+    def frames(self) -> Iterator[FilmFrame]:
+        """Usable frames in the order of the film.
 
         Yields
         ------
-        Shot
+        FilmFrame
         """
         with self._opened(self.info.path) as container:
-            stream = container.streams.video[self._place]
-            for number, shot in enumerate(self._stored_or_decoded(container, stream)):
+            stream = container.streams.video[self._stream_index]
+            for number, frame in enumerate(self._stored_or_decoded_frames(container, stream)):
                 if self._rate is None:
-                    yield shot
+                    yield frame
                     continue
-                # With those that were lost: the camera took them.
-                yield shot._replace(time_ns=round((number + self.broken) * NS / self._rate))
+                # Damaged frames count, because the camera took them.
+                yield frame._replace(time_ns=round((number + self.damaged) * NS / self._rate))
 
-    def _stored_or_decoded(self, container: Any, stream: Any) -> Iterator[Shot]:
+    def _stored_or_decoded_frames(self, container: Any, stream: Any) -> Iterator[FilmFrame]:
         if self.info.as_stored:
-            return self._packets(container, stream)
+            return self._stored_frames(container, stream)
         stream.thread_type = 'AUTO'
         stream.codec_context.thread_count = self._threads
-        return self._frames(container, stream)
+        return self._decoded_frames(container, stream)
 
-    def _packets(self, container: Any, stream: Any) -> Iterator[Shot]:
+    def _stored_frames(self, container: Any, stream: Any) -> Iterator[FilmFrame]:
         for packet, done in self._read(container, stream):
             if not packet.size or packet.is_discard:
                 continue
             content = bytes(packet)
             head = jpeg_head(content)
             if head is None or not (self._fits(head) and is_whole_jpeg(content)):
-                self.broken += 1
+                self.damaged += 1
                 continue
-            picture = StoredPicture(
-                form_of('jpeg', head.channels), with_huffman_tables(content, head)
+            picture = EncodedImage(
+                image_format('jpeg', head.channels), with_huffman_tables(content, head)
             )
-            yield Shot(_shown_ns(packet, stream), picture, done)
+            yield FilmFrame(_shown_ns(packet, stream), picture, done)
 
-    def _frames(self, container: Any, stream: Any) -> Iterator[Shot]:
-        # An AVI knows when pictures are decoded, not when they are shown, which is in the same
-        # order of time but in another order of pictures.
+    def _decoded_frames(self, container: Any, stream: Any) -> Iterator[FilmFrame]:
+        # An AVI has decoding times only. Presentation times are the same values, but in the order
+        # in which the decoder returns the frames.
         decoded: deque[int | None] | None = deque() if container.format.name == 'avi' else None
         for packet, done in self._read(container, stream):
             if decoded is not None and packet.size:
@@ -201,27 +210,28 @@ class Video:
             try:
                 frames = packet.decode()
             except (self._av.FFmpegError, EOFError):
-                self.broken += 1
+                self.damaged += 1
                 continue
             for frame in frames:
                 time_ns = decoded.popleft() if decoded else _shown_ns(frame, stream)
                 if frame.is_corrupt or not self._fits(frame):
-                    self.broken += 1
+                    self.damaged += 1
                     continue
-                yield Shot(time_ns, VideoPicture(frame, self._square, self._turn), done)
+                yield FilmFrame(time_ns, VideoPicture(frame, self._square, self._rotation), done)
 
     def _fits(self, picture: Any) -> bool:
-        """Whether it has the size that the film began with."""
+        """Whether a frame has the size of the first one."""
         return bool((picture.width, picture.height) == self._sides)
 
     def _read(self, container: Any, stream: Any) -> Iterator[tuple[Any, float]]:
+        """Packets of a stream, each with the fraction of the file read so far."""
         packets = container.demux(stream)
         done = 0.0
         while True:
             try:
                 packet = next(packets, None)
             except (self._av.FFmpegError, EOFError):
-                self.broken += 1
+                self.damaged += 1
                 return
             if packet is None:
                 return
@@ -235,7 +245,7 @@ def _reason(error: Exception) -> str:
 
 
 def _shown_ns(source: Any, stream: Any) -> int | None:
-    """When a packet or frame is to be shown; where it is not said, when it is to be decoded."""
+    """Presentation time of a packet or frame; if it has none, its decoding time."""
     time = source.pts if source.pts is not None else source.dts
     return _nanoseconds(time, source, stream)
 
@@ -244,5 +254,5 @@ def _nanoseconds(time: int | None, source: Any, stream: Any) -> int | None:
     time_base = source.time_base or stream.time_base
     if time is None or not time_base:
         return None
-    found: int = round(time * Fraction(time_base) * NS)
-    return found
+    time_ns: int = round(time * Fraction(time_base) * NS)
+    return time_ns

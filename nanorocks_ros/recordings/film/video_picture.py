@@ -1,4 +1,4 @@
-"""A picture of a video: decoded, with square pixels, upright."""
+"""A decoded frame of a video, with square pixels and upright."""
 
 from __future__ import annotations
 
@@ -8,34 +8,34 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from nanorocks_ros.recordings.film.display_rotation import Turn, turned
+from nanorocks_ros.recordings.film.display_rotation import Rotation, rotated
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
 class VideoPicture:
-    """A decoded frame; its colours are worked out when they are asked for.
+    """A decoded frame; colours are converted on demand.
 
     Parameters
     ----------
     frame : object of PyAV
     square : tuple of int, [px]
-        Width and height with which its pixels are square, before it is turned.
-    turn : tuple of int
-        As `turn_of` finds it.
+        Width and height with square pixels, before the rotation.
+    rotation : tuple of int
+        As returned by `rotation_of`.
     """
 
-    def __init__(self, frame: Any, square: tuple[int, int], turn: Turn) -> None:
+    def __init__(self, frame: Any, square: tuple[int, int], rotation: Rotation) -> None:
         self._frame = frame
         self._square = square
-        self._turn = turn
+        self._rotation = rotation
         self._gray: NDArray[np.uint8] | None = None
-        # Two threads that convert one frame at a time wait for each other for ever.
+        # Two threads that convert the same frame deadlock in PyAV.
         self._converting = Lock()
 
     def gray(self) -> NDArray[np.uint8]:
-        """Its brightness, to compare it with others, (height, width), as it is stored."""
+        """Brightness, (height, width), neither stretched nor rotated."""
         with self._converting:
             if self._gray is None:
                 self._gray = self._brightness()
@@ -50,10 +50,10 @@ class VideoPicture:
         return np.asarray(self._frame.to_ndarray(format='gray'))
 
     def pixels(self) -> NDArray[np.uint8]:
-        """Its pixels, square and upright: bgr, or gray with two axes."""
-        form = 'gray' if self._frame.format.name.startswith('gray') else 'bgr24'
+        """Pixels, square and upright: (height, width, 3), bgr, or (height, width), gray."""
+        pixel_format = 'gray' if self._frame.format.name.startswith('gray') else 'bgr24'
         with self._converting:
-            pixels = np.asarray(self._frame.to_ndarray(format=form))
+            pixels = np.asarray(self._frame.to_ndarray(format=pixel_format))
         if pixels.shape[1::-1] != self._square:
             pixels = cv2.resize(pixels, self._square, interpolation=cv2.INTER_CUBIC)
-        return turned(np.asarray(pixels, dtype=np.uint8), self._turn)
+        return rotated(np.asarray(pixels, dtype=np.uint8), self._rotation)

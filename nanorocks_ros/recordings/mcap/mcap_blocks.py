@@ -1,7 +1,7 @@
-"""The inside of an MCAP file: records, chunks, and blocks that are read in one go.
+"""Records, chunks and blocks of an MCAP file.
 
-Records are cut out here by their length, checked against what there is, because a recording
-that lost its power ends in the middle of one; the `mcap` library takes them apart.
+Records are split here by their lengths, which are checked against the size of the data, because a
+recording that lost its power ends inside a record. The `mcap` library parses the records.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ _MESSAGE = struct.Struct('<HIQQ')
 _INDEX_OF_CHANNEL = struct.Struct('<HI')
 _INDEX_ENTRY_BYTES = 16
 _FRAME_STARTS = {'zstd': b'\x28\xb5\x2f\xfd', 'lz4': b'\x04\x22\x4d\x18'}
-# Names stand at the front of a chunk. What is damaged is decompressed piece by piece.
-_NAMES_BYTES, _PIECE_BYTES, _CHECKSUM_BYTES = 1 << 21, 1 << 12, 4
-# A flipped bit in a length must not ask for all memory; common writers stay below 16 MB.
+# Channels and schemas are at the front of a chunk. Damaged data is decompressed in pieces.
+_CATALOGUE_BYTES, _PIECE_BYTES, _CHECKSUM_BYTES = 1 << 21, 1 << 12, 4
+# Largest size of a decompressed chunk, [bytes], in case a bit of the size is flipped; common
+# writers stay below 16 MB.
 _CHUNK_LIMIT = 2**31
 
 UNREADABLE = (
@@ -44,15 +45,23 @@ UNREADABLE = (
     zstandard.ZstdError,
     MemoryError,
 )
-"""What the `mcap` library and the decompressors raise over bytes that make no sense."""
+"""Exceptions of the `mcap` library and the decompressors for damaged data."""
 
 
 class DamagedError(ValueError):
-    """A stretch of a file that cannot be read."""
+    """A part of a file cannot be read."""
 
 
 class StoredMessage(NamedTuple):
-    """A message record: channel, log time in ns, content."""
+    """A message record.
+
+    Parameters
+    ----------
+    channel : int
+    log_time_ns : int, [ns]
+    data : memoryview
+        Content of the message.
+    """
 
     channel: int
     log_time_ns: int
@@ -60,7 +69,7 @@ class StoredMessage(NamedTuple):
 
 
 class Catalogue:
-    """Channels and schemas met so far, by their numbers.
+    """Channels and schemas read so far, by their ids.
 
     Attributes
     ----------
@@ -72,32 +81,33 @@ class Catalogue:
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
 
-    def note(self, opcode: int, content: memoryview) -> None:
-        """Keep a record if it is a channel or a schema."""
+    def add(self, opcode: int, content: memoryview) -> None:
+        """Add a record if it is a channel or a schema."""
         if opcode == Opcode.SCHEMA:
-            schema = Schema.read(stream_of(content))
+            schema = Schema.read(data_stream(content))
             self.schemas.setdefault(schema.id, schema)
         elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(stream_of(content))
+            channel = Channel.read(data_stream(content))
             self.channels.setdefault(channel.id, channel)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
-    """A stretch of whole records that is read in one go: a chunk, or messages outside chunks.
+    """Consecutive complete records that are read together: a chunk, or messages outside chunks.
 
     Parameters
     ----------
     offset, length : int
-        Of the records in the file, [bytes].
+        Position of the records in the file, [bytes].
     start_ns, end_ns : int, [ns]
-        No message in it is earlier or later.
+        Smallest and largest log time of its messages.
     channels : frozenset of int, or None
-        The channels that have messages in it; None when that is not known.
+        Channels of its messages; None if they are not known.
     indexed_bytes : int
-        Length of the message indexes that follow it, [bytes].
+        Length of the message indexes behind it, [bytes].
     cut : bool
-        A chunk at the end of a file cut short: what there is of it is used.
+        Whether it is an incomplete chunk at the end of a truncated file; its readable part is
+        used.
     """
 
     offset: int
@@ -109,24 +119,24 @@ class Block:
     cut: bool = False
 
 
-def stream_of(content: memoryview | bytes) -> ReadDataStream:
-    """The content of one record, for the `mcap` library; bounded by the record's length."""
+def data_stream(content: memoryview | bytes) -> ReadDataStream:
+    """Content of one record as a stream for the `mcap` library."""
     return ReadDataStream(BytesIO(content))
 
 
-def walk(data: memoryview, *, cut: bool = False) -> Iterator[tuple[int, memoryview]]:
-    """Opcode and content of each record.
+def iterate_records(data: memoryview, *, cut: bool = False) -> Iterator[tuple[int, memoryview]]:
+    """Iterate over the opcode and content of each record.
 
     Parameters
     ----------
     data : memoryview
     cut : bool
-        The last record may be incomplete; it is left out.
+        The last record may be incomplete; it is skipped.
 
     Raises
     ------
     DamagedError
-        When the lengths of the records do not add up.
+        If the lengths of the records do not add up to the length of the data.
     """
     position = 0
     while len(data) - position >= RECORD.size:
@@ -146,42 +156,42 @@ def _decompressed(chunk: Chunk) -> bytes:
     if chunk.compression == 'zstd':
         size = zstandard.get_frame_parameters(chunk.data).content_size
         if size not in (chunk.uncompressed_size, zstandard.CONTENTSIZE_UNKNOWN):
-            raise DamagedError('chunk of another size than declared')
+            raise DamagedError('size of a chunk differs from its header')
         return zstandard.decompress(chunk.data, max_output_size=chunk.uncompressed_size)
     if chunk.compression == 'lz4':
         return bytes(lz4.frame.decompress(chunk.data))
     if chunk.compression:
-        raise DamagedError(f'compression {chunk.compression!r} is not known')
+        raise DamagedError(f'unknown compression {chunk.compression!r}')
     return chunk.data
 
 
-def _decompressed_so_far(data: bytes, compression: str) -> bytes:
-    """As much as can be decompressed, whether it breaks off or is damaged further on."""
+def _decompressed_prefix(data: bytes, compression: str) -> bytes:
+    """Decompress truncated or damaged data as far as possible."""
     if not compression:
         return data
-    work = (
+    decompressor = (
         zstandard.ZstdDecompressor().decompressobj()
         if compression == 'zstd'
         else lz4.frame.LZ4FrameDecompressor()
     )
-    found = bytearray()
-    # The checksum by itself: where it is wrong, what comes before it is given all the same.
-    places = [*range(0, len(data) - _CHECKSUM_BYTES, _PIECE_BYTES), len(data) - _CHECKSUM_BYTES]
+    content = bytearray()
+    # The checksum is a separate piece: if it is wrong, the data before it is still returned.
+    starts = [*range(0, len(data) - _CHECKSUM_BYTES, _PIECE_BYTES), len(data) - _CHECKSUM_BYTES]
     try:
-        for start, end in pairwise([*places, len(data)]):
-            found += work.decompress(data[max(0, start) : end])
+        for start, end in pairwise([*starts, len(data)]):
+            content += decompressor.decompress(data[max(0, start) : end])
     except (*UNREADABLE, EOFError):
         pass
-    return bytes(found)
+    return bytes(content)
 
 
-def _inside(content: memoryview) -> memoryview:
-    chunk = Chunk.read(stream_of(content))
+def _chunk_records(content: memoryview) -> memoryview:
+    chunk = Chunk.read(data_stream(content))
     data = _decompressed(chunk)
     if len(data) != chunk.uncompressed_size:
-        raise DamagedError('chunk of another size than declared')
+        raise DamagedError('size of a chunk differs from its header')
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-        raise DamagedError('chunk with a wrong checksum')
+        raise DamagedError('checksum of a chunk is wrong')
     return memoryview(data)
 
 
@@ -190,27 +200,28 @@ def _message(content: memoryview) -> StoredMessage:
     return StoredMessage(channel, log_time_ns, content[_MESSAGE.size :])
 
 
-def _gather(
-    data: memoryview, catalogue: Catalogue, found: list[StoredMessage], *, cut: bool
+def _collect(
+    data: memoryview, catalogue: Catalogue, messages: list[StoredMessage], *, cut: bool
 ) -> None:
-    for opcode, content in walk(data, cut=cut):
+    """Append the messages in the data to a list, and add channels and schemas to a catalogue."""
+    for opcode, content in iterate_records(data, cut=cut):
         if opcode == Opcode.MESSAGE:
-            found.append(_message(content))
+            messages.append(_message(content))
         elif opcode == Opcode.CHUNK:
-            _gather(_inside(content), catalogue, found, cut=False)
+            _collect(_chunk_records(content), catalogue, messages, cut=False)
         else:
-            catalogue.note(opcode, content)
+            catalogue.add(opcode, content)
 
 
 def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMessage]:
-    """The messages of a block, all or none.
+    """Load all messages of a block.
 
     Parameters
     ----------
     stream : binary file
     block : Block
     catalogue : Catalogue
-        Gains the channels and schemas of the block.
+        The channels and schemas of the block are added to it.
 
     Returns
     -------
@@ -220,62 +231,65 @@ def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMes
     Raises
     ------
     DamagedError
-        When the block is not what was written.
+        If any part of the block is damaged.
     """
     stream.seek(block.offset)
     raw = memoryview(stream.read(block.length))
     messages: list[StoredMessage] = []
     try:
         if block.cut:
-            chunk = Chunk.read(stream_of(raw[RECORD.size :]))
-            data = _decompressed_so_far(chunk.data, chunk.compression)
-            _gather(memoryview(data), catalogue, messages, cut=True)
+            chunk = Chunk.read(data_stream(raw[RECORD.size :]))
+            data = _decompressed_prefix(chunk.data, chunk.compression)
+            _collect(memoryview(data), catalogue, messages, cut=True)
         else:
-            _gather(raw, catalogue, messages, cut=False)
+            _collect(raw, catalogue, messages, cut=False)
     except UNREADABLE as error:
-        _gather_names(bytes(raw), catalogue)
+        _recover_catalogue(bytes(raw), catalogue)
         raise DamagedError(str(error)) from error
     return messages
 
 
-def gather_names(stream: BinaryIO, start: int, end: int, catalogue: Catalogue) -> None:
-    """Note the channels and schemas at the front of a damaged stretch, which others rely on.
+def recover_catalogue(stream: BinaryIO, start: int, end: int, catalogue: Catalogue) -> None:
+    """Recover channels and schemas from a damaged part of a file; later chunks may need them.
 
     Parameters
     ----------
     stream : binary file
     start, end : int
-        Of the stretch, [bytes].
+        Offsets of the damaged part, [bytes].
     catalogue : Catalogue
+        The channels and schemas are added to it.
     """
     stream.seek(start)
-    _gather_names(stream.read(min(end - start, _NAMES_BYTES)), catalogue)
+    _recover_catalogue(stream.read(min(end - start, _CATALOGUE_BYTES)), catalogue)
 
 
-def _gather_names(raw: bytes, catalogue: Catalogue) -> None:
+def _recover_catalogue(raw: bytes, catalogue: Catalogue) -> None:
     for compression, magic in _FRAME_STARTS.items():
-        place = raw.find(magic)
-        if place < 0:
+        offset = raw.find(magic)
+        if offset < 0:
             continue
-        data = _decompressed_so_far(raw[place : place + _NAMES_BYTES], compression)
+        data = _decompressed_prefix(raw[offset : offset + _CATALOGUE_BYTES], compression)
         try:
-            for opcode, content in walk(memoryview(data), cut=True):
-                catalogue.note(opcode, content)
+            for opcode, content in iterate_records(memoryview(data), cut=True):
+                catalogue.add(opcode, content)
         except UNREADABLE:
             return
 
 
 def indexed_messages(content: memoryview) -> int:
-    """How many messages a message index lists."""
+    """Number of messages that a message index lists."""
     _, length = _INDEX_OF_CHANNEL.unpack_from(content)
     return int(length) // _INDEX_ENTRY_BYTES
 
 
-def indexed_after(stream: BinaryIO, block: Block) -> int:
-    """How many messages the indexes that follow a block list; 0 when they cannot be read."""
+def indexed_count_after(stream: BinaryIO, block: Block) -> int:
+    """Number of messages in the message indexes behind a block; 0 if they cannot be read."""
     stream.seek(block.offset + block.length)
     raw = memoryview(stream.read(block.indexed_bytes))
     try:
-        return sum(indexed_messages(c) for op, c in walk(raw) if op == Opcode.MESSAGE_INDEX)
+        return sum(
+            indexed_messages(c) for op, c in iterate_records(raw) if op == Opcode.MESSAGE_INDEX
+        )
     except UNREADABLE:
         return 0

@@ -1,4 +1,4 @@
-"""Where the messages of an MCAP file lie, from the index at its end."""
+"""Index of the messages in an MCAP file, read from the summary at its end."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from nanorocks_ros.recordings.mcap.mcap_blocks import (
     Block,
     Catalogue,
     StoredMessage,
-    stream_of,
-    walk,
+    data_stream,
+    iterate_records,
 )
 from nanorocks_ros.recordings.storage import LAST_NS
 
@@ -31,26 +31,26 @@ _FOOTER_BYTES = RECORD.size + 20
 
 @dataclass(slots=True, kw_only=True)
 class McapIndex:
-    """Where the messages of a file lie.
+    """Positions and counts of the messages in a file.
 
     Attributes
     ----------
     blocks : list of Block
     catalogue : Catalogue
     counts : Counter of int
-        Messages by channel.
+        Number of messages by channel.
     start_ns, end_ns : int or None, [ns]
         Log times of the first and last message.
     lost : dict of int to int
-        Messages lost in each damaged block, by its offset.
-    untimely : dict of int to int
-        Messages with a time that cannot be, by the offset of their block; they are left out.
+        Number of lost messages in each damaged block, by its offset.
+    invalid_times : dict of int to int
+        Number of skipped messages with impossible time stamps, by the offset of their block.
     ended : bool
-        The file has the end that it was meant to have.
+        Whether the file has its footer.
     bytes_unread : int
-        At the end of a file cut short, holding no whole message.
+        Number of bytes at the end of a truncated file that contain no complete record.
     metadata_at : list of (int, int)
-        Offset and length of what rosbag2 says of the recording, [bytes].
+        Offset and length of the metadata records of rosbag2, [bytes].
     """
 
     blocks: list[Block] = field(default_factory=list)
@@ -59,20 +59,20 @@ class McapIndex:
     start_ns: int | None = None
     end_ns: int | None = None
     lost: dict[int, int] = field(default_factory=dict)
-    untimely: dict[int, int] = field(default_factory=dict)
+    invalid_times: dict[int, int] = field(default_factory=dict)
     ended: bool = False
     bytes_unread: int = 0
     metadata_at: list[tuple[int, int]] = field(default_factory=list)
 
-    def timely(self, block: int, messages: list[StoredMessage]) -> list[StoredMessage]:
-        """Those with a time that can be; the others of a block are counted as lost."""
-        found = [message for message in messages if message.log_time_ns <= LAST_NS]
-        if len(found) < len(messages):
-            self.untimely[block] = len(messages) - len(found)
-        return found
+    def with_valid_times(self, block: int, messages: list[StoredMessage]) -> list[StoredMessage]:
+        """Messages of a block with possible time stamps; the others are counted as lost."""
+        valid = [message for message in messages if message.log_time_ns <= LAST_NS]
+        if len(valid) < len(messages):
+            self.invalid_times[block] = len(messages) - len(valid)
+        return valid
 
     def count(self, messages: list[StoredMessage]) -> None:
-        """Take messages into account."""
+        """Add messages to the counts and to the time range."""
         for message in messages:
             self.counts[message.channel] += 1
         times = [message.log_time_ns for message in messages]
@@ -81,7 +81,7 @@ class McapIndex:
 
 
 def read_index(stream: BinaryIO, size: int) -> McapIndex | None:
-    """The index that a whole file carries at its end.
+    """Read the index at the end of an intact file.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def read_index(stream: BinaryIO, size: int) -> McapIndex | None:
     Returns
     -------
     McapIndex or None
-        None when there is none, or none that can be relied upon.
+        None if there is none or it is inconsistent.
     """
     try:
         return _read_index(stream, size)
@@ -105,14 +105,14 @@ def _read_index(stream: BinaryIO, size: int) -> McapIndex | None:
         return None
     stream.seek(footer_at)
     end = stream.read()
-    footer = Footer.read(stream_of(end[RECORD.size :]))
-    known = end[0] == Opcode.FOOTER and end.endswith(MAGIC)
-    if not known or not len(MAGIC) <= footer.summary_start < footer_at:
+    footer = Footer.read(data_stream(end[RECORD.size :]))
+    has_footer = end[0] == Opcode.FOOTER and end.endswith(MAGIC)
+    if not has_footer or not len(MAGIC) <= footer.summary_start < footer_at:
         return None
     stream.seek(footer.summary_start)
     summary = stream.read(footer_at - footer.summary_start)
-    checked = summary + end[: RECORD.size + 16]
-    if footer.summary_crc and zlib.crc32(checked) != footer.summary_crc:
+    checksummed = summary + end[: RECORD.size + 16]
+    if footer.summary_crc and zlib.crc32(checksummed) != footer.summary_crc:
         return None
     return _from_summary(memoryview(summary), size)
 
@@ -120,28 +120,28 @@ def _read_index(stream: BinaryIO, size: int) -> McapIndex | None:
 def _from_summary(summary: memoryview, size: int) -> McapIndex | None:
     index = McapIndex(ended=True)
     statistics: Statistics | None = None
-    for opcode, content in walk(summary):
+    for opcode, content in iterate_records(summary):
         if opcode == Opcode.CHUNK_INDEX:
-            index.blocks.append(_block_of(ChunkIndex.read(stream_of(content))))
+            index.blocks.append(_chunk_block(ChunkIndex.read(data_stream(content))))
         elif opcode == Opcode.METADATA_INDEX:
-            place = MetadataIndex.read(stream_of(content))
-            if place.name == _ROSBAG2:
-                index.metadata_at.append((place.offset, place.length))
+            entry = MetadataIndex.read(data_stream(content))
+            if entry.name == _ROSBAG2:
+                index.metadata_at.append((entry.offset, entry.length))
         elif opcode == Opcode.STATISTICS:
-            statistics = Statistics.read(stream_of(content))
+            statistics = Statistics.read(data_stream(content))
         else:
-            index.catalogue.note(opcode, content)
+            index.catalogue.add(opcode, content)
     if statistics is None or statistics.chunk_count != len(index.blocks):
         return None
     index.counts = Counter(statistics.channel_message_counts)
-    reliable = (
+    consistent = (
         index.counts.total() == statistics.message_count
         and set(index.counts) <= set(index.catalogue.channels)
         and all(b.offset >= len(MAGIC) and b.offset + b.length <= size for b in index.blocks)
         and (index.blocks or not statistics.message_count)
         and statistics.message_end_time <= LAST_NS
     )
-    if not reliable:
+    if not consistent:
         return None
     if statistics.message_count:
         index.start_ns = statistics.message_start_time
@@ -150,29 +150,29 @@ def _from_summary(summary: memoryview, size: int) -> McapIndex | None:
 
 
 def recorder_notes(stream: BinaryIO, index: McapIndex) -> str:
-    """What rosbag2 keeps in a whole file: a copy of its ``metadata.yaml``; empty without one."""
+    """Copy of ``metadata.yaml`` that rosbag2 stores in the file; empty if there is none."""
     size = stream.seek(0, 2)
     for offset, length in index.metadata_at:
         if offset + length > size:
             continue
         stream.seek(offset)
         try:
-            for opcode, content in walk(memoryview(stream.read(length))):
+            for opcode, content in iterate_records(memoryview(stream.read(length))):
                 if opcode == Opcode.METADATA:
-                    notes = Metadata.read(stream_of(content)).metadata
+                    notes = Metadata.read(data_stream(content)).metadata
                     return str(notes.get('serialized_metadata', ''))
         except UNREADABLE:
             continue
     return ''
 
 
-def _block_of(entry: ChunkIndex) -> Block:
+def _chunk_block(entry: ChunkIndex) -> Block:
     return Block(
         offset=entry.chunk_start_offset,
         length=entry.chunk_length,
         start_ns=entry.message_start_time,
         end_ns=entry.message_end_time,
-        # Writers may leave the message indexes out: then any channel may be inside.
+        # Writers may omit the message indexes; then the chunk may contain any channel.
         channels=frozenset(entry.message_index_offsets) or None,
         indexed_bytes=entry.message_index_length,
     )

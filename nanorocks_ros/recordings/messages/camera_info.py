@@ -1,4 +1,4 @@
-"""camera_info messages to views; works on messages of rosbags and of rclpy alike."""
+"""Conversion of camera_info messages, of rosbags and of rclpy, to calibrations and views."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
-from nanorocks_ros.experiment.calibration import CameraInfo, view_of
+from nanorocks_ros.experiment.calibration import CameraInfo, rectified_view
 from nanorocks_ros.recordings.messages.message_builders import camera_info_message
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def info_from_message(message: Any) -> CameraInfo:
-    """The numbers in a sensor_msgs/CameraInfo."""
+    """Calibration in a sensor_msgs/CameraInfo."""
     return CameraInfo(
         width=int(message.width),
         height=int(message.height),
@@ -31,7 +31,7 @@ def info_from_message(message: Any) -> CameraInfo:
 
 
 def info_message(info: CameraInfo, stamp_ns: int, frame_id: str) -> Any:
-    """The sensor_msgs/CameraInfo that says these numbers.
+    """A sensor_msgs/CameraInfo of a calibration.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ def info_message(info: CameraInfo, stamp_ns: int, frame_id: str) -> Any:
         np.array(info.k),
         (info.distortion_model, info.d),
     )
-    turned = replace(message, r=np.array(info.r, dtype=np.float64))
-    return replace(turned, p=np.array(info.p, dtype=np.float64)) if info.p else turned
+    rectified = replace(message, r=np.array(info.r, dtype=np.float64))
+    return replace(rectified, p=np.array(info.p, dtype=np.float64)) if info.p else rectified
 
 
 def view_from_message(message: Any, where: str) -> View:
@@ -57,22 +57,22 @@ def view_from_message(message: Any, where: str) -> View:
     ----------
     message : sensor_msgs/CameraInfo
     where : str
-        The topic, for errors.
+        The topic, for error messages.
 
     Raises
     ------
     FrameError
-        For a model that is not known, numbers that no camera has, or pictures that were binned
-        or cut.
+        If the distortion model is unknown, the parameters are impossible, or the images are
+        binned or cropped.
     """
     roi = message.roi
     binned = max(int(message.binning_x), int(message.binning_y)) > 1
     if binned or roi.x_offset or roi.y_offset:
         raise FrameError(
-            where, 'is of a binned or cut picture', 'record the whole picture at full size'
+            where, 'is for binned or cropped images', 'record whole images at full resolution'
         )
     try:
-        return view_of(info_from_message(message), where)
+        return rectified_view(info_from_message(message), where)
     except ConfigurationError as error:
         remedy = f'{error.do}, or set preprocess.calibration'
         raise FrameError(error.where, error.what, remedy) from error

@@ -1,4 +1,4 @@
-"""Camera messages to frames; works on messages of rosbags and of rclpy alike."""
+"""Conversion of image messages, of rosbags and of rclpy, to frames; JPEG compression."""
 
 from __future__ import annotations
 
@@ -8,20 +8,33 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.errors import FrameError
+from nanorocks_ros.recordings.jpeg_header import START as JPEG_START
 from nanorocks_ros.recordings.jpeg_header import is_whole_jpeg
+from nanorocks_ros.recordings.storage import NS
 from nanorocks_ros.records import Frame
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-NS = 1_000_000_000
 _CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
-_JPEG_START = b'\xff\xd8'
 _READ = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
+# Video codecs and the first bytes of image formats.
+_VIDEO_CODECS = frozenset({'h264', 'h265', 'hevc', 'vp9', 'av1'})
+_STARTS = {
+    JPEG_START: 'jpeg',
+    b'\x89PNG': 'png',
+    b'BM': 'bmp',
+    b'RIFF': 'webp',
+    b'II*\x00': 'tiff',
+    b'MM\x00*': 'tiff',
+    # Start codes of H.264 and H.265, which are not distinguished here.
+    b'\x00\x00\x00\x01': 'h264',
+    b'\x00\x00\x01': 'h264',
+}
 
 
 def stamp_ns_of(message: Any) -> int:
-    """The stamp in the header of a message, [ns].
+    """Time stamp in the header of a message, [ns].
 
     Parameters
     ----------
@@ -31,47 +44,51 @@ def stamp_ns_of(message: Any) -> int:
     return int(stamp.sec) * NS + int(stamp.nanosec)
 
 
-def usable_stamp_ns(message: Any, where: str) -> int:
-    """The same where a frame can be put in order by it.
+def valid_stamp_ns(message: Any, where: str) -> int:
+    """Time stamp in the header of a message, checked to be after 1970, [ns].
 
     Raises
     ------
     FrameError
-        For the stamp 0 of drivers that give none, and for times before 1970.
+        If the stamp is 0, as from drivers that do not stamp, or before 1970.
     """
     stamp_ns = stamp_ns_of(message)
     if stamp_ns > 0:
         return stamp_ns
-    what = f'a frame of {stamp_ns / NS:g} s since 1970' if stamp_ns else 'a frame without a stamp'
-    raise FrameError(where, what, 'let the driver of the camera stamp its frames')
+    problem = (
+        f'a frame has the time stamp {stamp_ns / NS:g} s, before 1970'
+        if stamp_ns
+        else 'a frame has no time stamp'
+    )
+    raise FrameError(where, problem, 'configure the camera driver to stamp its frames')
 
 
 def _bytes_of(data: Any) -> NDArray[np.uint8]:
-    # Neither numpy arrays (rosbags) nor array.array (rclpy) are copied.
+    """View of the data of a message; numpy arrays (rosbags) and array.array (rclpy) alike."""
     return np.frombuffer(data, dtype=np.uint8) if len(data) else np.empty(0, dtype=np.uint8)
 
 
 def _channels(encoding: str, where: str) -> int:
     channels = _CHANNELS.get(encoding)
     if channels is None:
-        known = ', '.join(_CHANNELS)
+        supported = ', '.join(_CHANNELS)
         raise FrameError(
             where,
-            f"encoding '{encoding}' is not supported ({known})",
-            'let the camera publish one of these',
+            f"encoding '{encoding}' is not supported ({supported})",
+            'configure the camera to publish one of these',
         )
     return channels
 
 
 def frame_from_image(message: Any, where: str) -> Frame:
-    """A frame that looks at the pixels of an image message, without copying them.
+    """Convert an image message to a frame; the pixels are a view of the message.
 
     Parameters
     ----------
     message : sensor_msgs/Image
         Rows may be padded.
     where : str
-        The topic, for errors.
+        The topic, for error messages.
 
     Returns
     -------
@@ -80,8 +97,8 @@ def frame_from_image(message: Any, where: str) -> Frame:
     Raises
     ------
     FrameError
-        For other encodings than bgr8, rgb8 and mono8, for sizes that do not fit the data, and
-        without a stamp.
+        If the encoding is not bgr8, rgb8 or mono8, the size does not fit the data, or there is
+        no time stamp.
     """
     encoding = str(message.encoding)
     channels = _channels(encoding, where)
@@ -91,52 +108,54 @@ def frame_from_image(message: Any, where: str) -> Frame:
     if height < 1 or width < 1 or step < row or data.size != height * step:
         raise FrameError(
             where,
-            f'{data.size} bytes in rows of {step} are no {width} x {height} {encoding} image '
-            f'(expected {height * max(step, row)} bytes, rows of {row} or more)',
-            'check the driver of the camera',
+            f'{data.size} bytes in rows of {step} do not fit a {width} x {height} {encoding} '
+            f'image (expected {height * max(step, row)} bytes, rows of {row} or more)',
+            'check the camera driver',
         )
     rows = data.reshape(height, step)[:, :row]
     image = rows.reshape(height, width, channels) if channels > 1 else rows
-    return Frame(stamp_ns=usable_stamp_ns(message, where), encoding=encoding, image=image)
+    return Frame(stamp_ns=valid_stamp_ns(message, where), encoding=encoding, image=image)
 
 
 def frame_from_compressed(message: Any, where: str) -> Frame:
-    """A frame decoded from a compressed image message.
+    """Decode a compressed image message to a frame.
 
     Parameters
     ----------
     message : sensor_msgs/CompressedImage
         JPEG, PNG or another 8-bit format that OpenCV reads.
     where : str
-        The topic, for errors.
+        The topic, for error messages.
 
     Returns
     -------
     Frame
-        ``bgr8``, or ``mono8`` when the picture is gray.
+        ``bgr8``, or ``mono8`` if the image is gray.
 
     Raises
     ------
     FrameError
-        When the picture cannot be decoded, ends too early or has no stamp.
+        If the image cannot be decoded, is truncated or has no time stamp.
     """
     data = _bytes_of(message.data)
-    stamp_ns = usable_stamp_ns(message, where)
-    # A JPEG that lost its end is decoded by OpenCV all the same, with gray where the rest was.
-    whole = data[:2].tobytes() != _JPEG_START or is_whole_jpeg(data.data)
-    image = _decoded(data) if whole else None
+    stamp_ns = valid_stamp_ns(message, where)
+    # OpenCV decodes a truncated JPEG without an error and fills the missing part with gray.
+    complete = data[:2].tobytes() != JPEG_START or is_whole_jpeg(data.data)
+    image = _decoded(data) if complete else None
     if image is None:
-        what = 'cannot be decoded' if whole else 'ends too early'
-        if picture_kind(message) in _FILMS:
+        kind = image_kind(message)
+        if kind in _VIDEO_CODECS:
             raise FrameError(
                 where,
-                f"holds '{picture_kind(message)}', a film whose pictures need each other",
-                'record JPEG or PNG, or write a video of it and run nanorocks import',
+                f"holds '{kind}', a video whose frames depend on each other",
+                'record JPEG or PNG, or write it to a video file and run nanorocks import',
             )
+        problem = 'cannot be decoded' if complete else 'is truncated'
+        size = f"{data.size} bytes, format '{message.format}'"
         raise FrameError(
             where,
-            f"the picture at {stamp_ns} ns ({data.size} bytes, format '{message.format}') {what}",
-            'leave this frame out, or record it again',
+            f'the image at {stamp_ns} ns ({size}) {problem}',
+            'omit this frame, or record it again',
         )
     return Frame(stamp_ns=stamp_ns, encoding='mono8' if image.ndim == 2 else 'bgr8', image=image)
 
@@ -150,7 +169,7 @@ def _decoded(data: NDArray[np.uint8], flags: int = _READ) -> NDArray[np.uint8] |
 
 
 def encode_jpeg(image: NDArray[np.uint8], quality: int) -> bytes:
-    """A picture as JPEG.
+    """Compress an image to JPEG.
 
     Parameters
     ----------
@@ -160,27 +179,27 @@ def encode_jpeg(image: NDArray[np.uint8], quality: int) -> bytes:
     Raises
     ------
     FrameError
-        When the array is no picture or the quality is out of range.
+        If the array is not an image or the quality is out of range.
     """
     if not 1 <= quality <= 100:
         raise FrameError('JPEG quality', f'{quality}', 'give a number from 1 to 100')
-    pictured = image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)
-    if image.dtype != np.uint8 or not image.size or not pictured:
+    has_image_shape = image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)
+    if image.dtype != np.uint8 or not image.size or not has_image_shape:
         raise FrameError(
             'JPEG',
-            f'array of {image.dtype} with shape {image.shape} is no picture',
+            f'array of {image.dtype} with shape {image.shape} is not an image',
             'give uint8, (height, width) or (height, width, 3)',
         )
-    done, content = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, quality])
-    if not done:
+    encoded, content = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    if not encoded:
         raise FrameError(
-            'JPEG', f'picture of shape {image.shape} cannot be encoded', 'give a smaller one'
+            'JPEG', f'image of shape {image.shape} cannot be encoded', 'give a smaller image'
         )
     return content.tobytes()
 
 
-def jpeg_of(frame: Frame, quality: int) -> bytes:
-    """A frame as JPEG, whatever its encoding.
+def frame_to_jpeg(frame: Frame, quality: int) -> bytes:
+    """Compress a frame of any encoding to JPEG.
 
     Raises
     ------
@@ -194,32 +213,18 @@ def jpeg_of(frame: Frame, quality: int) -> bytes:
 
 
 def is_decodable(content: bytes) -> bool:
-    """Whether OpenCV makes a picture of it."""
+    """Whether OpenCV can decode a compressed image."""
     return _decoded(_bytes_of(content)) is not None
 
 
 def decoded_gray(content: bytes) -> NDArray[np.uint8]:
-    """The brightness of a compressed picture, (height, width); empty when it is none."""
+    """Brightness of a compressed image, (height, width); empty if it cannot be decoded."""
     image = _decoded(_bytes_of(content), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
     return np.empty((0, 0), dtype=np.uint8) if image is None else image
 
 
-_FILMS = frozenset({'h264', 'h265', 'hevc', 'vp9', 'av1'})
-_STARTS = {
-    _JPEG_START: 'jpeg',
-    b'\x89PNG': 'png',
-    b'BM': 'bmp',
-    b'RIFF': 'webp',
-    b'II*\x00': 'tiff',
-    b'MM\x00*': 'tiff',
-    # Units of H.264 and H.265 follow a start code; the first is told by what it holds.
-    b'\x00\x00\x00\x01': 'h264',
-    b'\x00\x00\x01': 'h264',
-}
-
-
-def picture_kind(message: Any) -> str:
-    """How a camera message holds its picture: ``jpeg``, ``h264``, ``bgr8``.
+def image_kind(message: Any) -> str:
+    """Image format, video codec or encoding of a camera message: ``jpeg``, ``h264``, ``bgr8``.
 
     Parameters
     ----------
@@ -228,7 +233,7 @@ def picture_kind(message: Any) -> str:
     if not hasattr(message, 'format'):
         return str(message.encoding)
     start = _bytes_of(message.data)[:4].tobytes()
-    for mark, kind in _STARTS.items():
-        if start.startswith(mark):
+    for magic, kind in _STARTS.items():
+        if start.startswith(magic):
             return kind
     return str(message.format)

@@ -1,4 +1,4 @@
-"""Messages made from arrays, stamps and strings, ready to be recorded."""
+"""ROS messages built from arrays, time stamps and strings, for recording."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 from rosbags.typesys.stores import ros2_jazzy as jazzy
 
 from nanorocks_ros.errors import FrameError, RecordingError
+from nanorocks_ros.recordings.storage import NS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-NS = 1_000_000_000
-# Type and channels of a pixel; a single channel has no third axis.
+# Type and channels of a pixel; an image with one channel has no third axis.
 _PIXELS = {
     'bgr8': (np.dtype(np.uint8), 3),
     'rgb8': (np.dtype(np.uint8), 3),
@@ -41,16 +41,16 @@ def _header(stamp_ns: int, frame_id: str) -> jazzy.std_msgs__msg__Header:
 
 def _channels(frame_id: str, encoding: str, image: NDArray[np.uint8] | NDArray[np.float32]) -> int:
     if encoding not in _PIXELS:
-        known = ', '.join(_PIXELS)
+        supported = ', '.join(_PIXELS)
         raise FrameError(
-            frame_id, f"encoding '{encoding}' is not supported ({known})", 'convert the image'
+            frame_id, f"encoding '{encoding}' is not supported ({supported})", 'convert the image'
         )
     dtype, channels = _PIXELS[encoding]
     fits = image.shape[2:] == ((channels,) if channels > 1 else ())
     if image.dtype != dtype or image.ndim < 2 or not fits:
         raise FrameError(
             frame_id,
-            f'array of {image.dtype} with shape {image.shape} is no {encoding}',
+            f'array of {image.dtype} with shape {image.shape} does not fit {encoding}',
             f'give {dtype} with {channels} channel{"s" if channels > 1 else ""}',
         )
     return channels
@@ -59,12 +59,12 @@ def _channels(frame_id: str, encoding: str, image: NDArray[np.uint8] | NDArray[n
 def image_message(
     stamp_ns: int, frame_id: str, encoding: str, image: NDArray[np.uint8] | NDArray[np.float32]
 ) -> jazzy.sensor_msgs__msg__Image:
-    """sensor_msgs/Image; the pixels are not copied where they lie in one piece.
+    """sensor_msgs/Image; contiguous pixels are not copied.
 
     Parameters
     ----------
     stamp_ns : int, [ns]
-        Instant of exposure.
+        Time of exposure.
     frame_id : str
     encoding : str
         ``bgr8``, ``rgb8``, ``mono8`` or ``32FC1``.
@@ -73,7 +73,7 @@ def image_message(
     Raises
     ------
     FrameError
-        When the array does not fit the encoding.
+        If the array does not fit the encoding.
     """
     channels = _channels(frame_id, encoding, image)
     height, width = image.shape[:2]
@@ -96,7 +96,7 @@ def compressed_image_message(
     Parameters
     ----------
     stamp_ns : int, [ns]
-        Instant of exposure.
+        Time of exposure.
     frame_id : str
     form : str
         The message's ``format``: ``jpeg``, ``png``, ``bgr8; jpeg compressed bgr8``.
@@ -112,25 +112,25 @@ def compressed_image_message(
 def float_array_message(
     labels: Sequence[str], values: ArrayLike
 ) -> jazzy.std_msgs__msg__Float32MultiArray:
-    """std_msgs/Float32MultiArray that says what its elements are.
+    """std_msgs/Float32MultiArray with the names of its elements.
 
     Parameters
     ----------
     labels : sequence of str
-        Names of the elements; joined by commas they are the label of the one dimension.
+        Names of the elements; joined by commas they are the label of the only dimension.
     values : array of float, (n_labels,)
 
     Raises
     ------
     RecordingError
-        When there are not as many values as labels.
+        If the numbers of values and labels differ.
     """
     data = np.asarray(values, dtype=np.float32)
     label = ','.join(labels)
     count = len(labels)
     if data.shape != (count,):
         raise RecordingError(
-            label, f'values of shape {data.shape} for {count} labels', 'give one for each'
+            label, f'values of shape {data.shape} for {count} labels', 'give one value per label'
         )
     dimension = jazzy.std_msgs__msg__MultiArrayDimension(label=label, size=count, stride=count)
     return jazzy.std_msgs__msg__Float32MultiArray(

@@ -1,4 +1,4 @@
-"""Message definitions: those of ROS 2 Jazzy, and others that a recording brings along."""
+"""Message types: those of ROS 2 Jazzy, and others that are defined in a recording."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def standard_types() -> Typestore:
     return get_typestore(Stores.ROS2_JAZZY)
 
 
-def register(store: Typestore, name: str, definition: str, form: str) -> None:
-    """Add a type, and what it is made of, unless the store knows them.
+def register_type(store: Typestore, name: str, definition: str, form: str) -> None:
+    """Add a type and its component types, unless the store contains them.
 
     Parameters
     ----------
@@ -24,14 +24,14 @@ def register(store: Typestore, name: str, definition: str, form: str) -> None:
     name : str
         For example ``my_msgs/msg/Thing``.
     definition : str
-        Text, with the definitions of the types it is made of, as recordings keep it.
+        Text of the definition, with those of its component types, as stored in recordings.
     form : str
         ``ros2msg`` or ``ros2idl``.
 
     Raises
     ------
     rosbags.typesys.TypesysError
-        When the text cannot be understood.
+        If the text cannot be parsed.
     """
     if name in store.fielddefs:
         return

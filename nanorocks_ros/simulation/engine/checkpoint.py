@@ -1,4 +1,4 @@
-"""A gas in a file: all of it, so that it goes on bit by bit as it would have."""
+"""Checkpoint file of a gas: its whole state, so that a run continues bit by bit."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ import numpy as np
 
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.outputs.npz_archive import write_archive
-from nanorocks_ros.simulation.engine.collision_rules import Rules
 from nanorocks_ros.simulation.engine.gas_state import State
+from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-# Raised with every change of what a state holds.
-_FORM = 1
+# Incremented with every change of the fields of a state.
+_FORM = 2
 _DIGEST = 'sha256'
 
 
 def _digest(arrays: dict[str, NDArray[Any]]) -> NDArray[np.uint8]:
     """Fingerprint of the names, types, shapes and values."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for name in sorted(arrays):
         array = arrays[name]
-        found.update(f'{name} {array.dtype.str} {array.shape} '.encode())
-        found.update(np.ascontiguousarray(array).tobytes())
-    return np.frombuffer(found.digest(), dtype=np.uint8)
+        digest.update(f'{name} {array.dtype.str} {array.shape} '.encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return np.frombuffer(digest.digest(), dtype=np.uint8)
 
 
 def save(path: Path, state: State, rules: Rules, n_species: int) -> None:
-    """Write a gas to a file, whole or not at all.
+    """Write a checkpoint, atomically.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def save(path: Path, state: State, rules: Rules, n_species: int) -> None:
 
 
 def load(path: Path) -> tuple[State, Rules, int]:
-    """Read a gas from a file.
+    """Read a checkpoint.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def load(path: Path) -> tuple[State, Rules, int]:
     """
     try:
         with zipfile.ZipFile(path):
-            # Not a single array, nor a pickle: an archive, as it must be.
+            # Refuses a single array or a pickle: only an archive is a checkpoint.
             pass
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
@@ -73,19 +73,19 @@ def load(path: Path) -> tuple[State, Rules, int]:
     if not np.array_equal(digest, _digest(arrays)):
         raise SimulationError(str(path), 'is damaged', 'use another saved state')
     form, n_species = arrays['form'].tolist()
-    wanted = {f'state.{name}' for name in State._fields} | {
+    required = {f'state.{name}' for name in State._fields} | {
         f'rules.{name}' for name in Rules._fields
     }
-    if form != _FORM or not wanted <= set(arrays):
+    if form != _FORM or not required <= set(arrays):
         raise SimulationError(
-            str(path), 'was saved by another release', 'go on with that one, or start again'
+            str(path), 'was saved by another release', 'use that release, or start again'
         )
     state = State(*(arrays[f'state.{name}'] for name in State._fields))
     return state, Rules(*(_rule(arrays[f'rules.{name}']) for name in Rules._fields)), n_species
 
 
 def _rule(value: NDArray[Any]) -> Any:
-    """A rule as compiled code takes it: a table, a tuple, or one value."""
+    """A rule in the type that compiled code takes: table, tuple or value."""
     if value.ndim == 2:
         return value
     if value.ndim == 1:

@@ -1,4 +1,4 @@
-"""The loop over events."""
+"""The event loop: execute the earliest event, predict the next ones, write frames."""
 
 from __future__ import annotations
 
@@ -31,29 +31,29 @@ from nanorocks_ros.simulation.engine.gas_state import (
     TOO_MANY_EVENTS,
     State,
 )
-from nanorocks_ros.simulation.engine.integer_width import whole
+from nanorocks_ros.simulation.engine.integer_width import as_int64
 from nanorocks_ros.simulation.engine.neighbours.neighbour_lists import renew
-from nanorocks_ros.simulation.engine.observables import observe, take_frame
+from nanorocks_ros.simulation.engine.observables import write_frame, write_observation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 # Places in Output.done.
 FRAMES, OBSERVATIONS, EVENTS, TAKEN = range(4)
 
 # Every bead is marked.
 ALL = -2
-# A list of neighbours or a cell has no room left.
+# A neighbour list or a cell is full.
 FULL = -1
 
 # Columns of Output.events.
 WHEN, KIND, FIRST, SECOND, SPEED, IMPULSE = range(6)
 
 
-class Output(NamedTuple):
-    """What is written down while a gas is followed.
+class RunOutput(NamedTuple):
+    """Arrays that a run writes: frames, observations, events.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Output(NamedTuple):
         Time [s], kind, bead, bead or wall, normal relative speed [m/s], impulse [kg m/s]; no
         room: not wanted.
     done : ndarray of int64, (4,)
-        Frames, observations and events written; events taken, of whatever kind.
+        Frames, observations and events written; events of any kind taken.
     """
 
     frame_times: NDArray[np.float64]
@@ -83,15 +83,15 @@ class Output(NamedTuple):
 
 
 @inlined
-def handle(state: State, rules: Rules, i: int, now: float) -> int:
-    """Take the pending event of a bead and execute it if it still holds.
+def execute_event(state: State, rules: Rules, i: int, now: float) -> int:
+    """Execute the pending event of a bead, unless it is stale.
 
     Returns
     -------
     int
-        Beads marked, whose next event must be found; ``FULL`` when a list is.
+        Number of marked beads, whose next event must be predicted; ``FULL`` when a list is.
     """
-    partner = whole(state.links[i, PARTNER])
+    partner = as_int64(state.links[i, PARTNER])
     state.last[0] = 0.0
     if partner == RENEW:
         if state.references.shape[0] and not renew(state, rules, i, now):
@@ -111,8 +111,8 @@ def handle(state: State, rules: Rules, i: int, now: float) -> int:
 
 
 @inlined
-def write_event(state: State, i: int, partner: int, now: float, output: Output) -> None:
-    """Enter the event just executed, if there was one, in the log."""
+def write_event(state: State, i: int, partner: int, now: float, output: RunOutput) -> None:
+    """Append the executed event, if any, to the log."""
     if state.last[0] == 0.0:
         return
     row = output.done[EVENTS]
@@ -120,10 +120,10 @@ def write_event(state: State, i: int, partner: int, now: float, output: Output) 
     events = output.events
     events[row, WHEN] = state.clock[EPOCH] + now
     events[row, KIND] = state.last[0]
-    first = whole(state.links[i, ORIGINAL])
-    second = whole(-1 - partner)
+    first = as_int64(state.links[i, ORIGINAL])
+    second = as_int64(-1 - partner)
     if partner >= 0:
-        second = whole(state.links[partner, ORIGINAL])
+        second = as_int64(state.links[partner, ORIGINAL])
         first, second = min(first, second), max(first, second)
     events[row, FIRST] = first
     events[row, SECOND] = second
@@ -132,8 +132,8 @@ def write_event(state: State, i: int, partner: int, now: float, output: Output) 
 
 
 @inlined
-def count_time_anew(state: State) -> None:
-    """Bring all beads to one instant and count time from there: no digits are lost.
+def advance_epoch(state: State) -> None:
+    """Move the epoch forward by one quantum, so that times keep their precision.
 
     The quantum is a power of two and every pending time a later one, so the subtraction is
     exact.
@@ -150,13 +150,13 @@ def count_time_anew(state: State) -> None:
 
 
 @inlined
-def write_down(state: State, rules: Rules, output: Output, until: float) -> None:
-    """Take the frames and observations that are due before a time (absolute)."""
+def write_due(state: State, rules: Rules, output: RunOutput, until: float) -> None:
+    """Write the frames and observations that are due before an absolute time."""
     done = output.done
     epoch = state.clock[EPOCH]
     while done[FRAMES] < output.frame_times.size and output.frame_times[done[FRAMES]] < until:
         k = done[FRAMES]
-        take_frame(
+        write_frame(
             state,
             rules,
             output.frame_times[k] - epoch,
@@ -169,25 +169,25 @@ def write_down(state: State, rules: Rules, output: Output, until: float) -> None
     times = output.observation_times
     while done[OBSERVATIONS] < times.size and times[done[OBSERVATIONS]] < until:
         k = done[OBSERVATIONS]
-        observe(state, rules, output.observations[k])
+        write_observation(state, rules, output.observations[k])
         done[OBSERVATIONS] = k + 1
 
 
 @inlined
-def look_ahead(state: State, rules: Rules, marked: int) -> None:
-    """Find the next event of the beads that are marked, or of all."""
+def predict_marked(state: State, rules: Rules, marked: int) -> None:
+    """Predict the next event of the marked beads, or of all."""
     for k in range(state.rows.shape[0] if marked == ALL else marked):
-        i = k if marked == ALL else whole(state.dirty[k])
+        i = k if marked == ALL else as_int64(state.dirty[k])
         predict(state, rules, i, state.clock[NOW])
 
 
 @kernel
-def run_until(state: State, rules: Rules, end: float, most_events: int, output: Output) -> int:
-    """Follow the gas to a time, and write down what is wanted on the way.
+def run_until(state: State, rules: Rules, end: float, most_events: int, output: RunOutput) -> int:
+    """Follow the gas to a time; write frames, observations and events on the way.
 
-    Events at the very time of a frame belong to it. Neither frames nor the end touch the
-    beads, so the course of the gas does not depend on them. After any return the gas can be
-    followed further.
+    An event at the time of a frame comes before the frame. Frames and the end of a run do not
+    change the beads, so the trajectories do not depend on them. After any return the run can be
+    continued.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def run_until(state: State, rules: Rules, end: float, most_events: int, output: 
     rules : Rules
     end : float, [s]
     most_events : int
-        Events to have taken, of whatever kind, with this output before giving up.
+        Largest number of events of any kind with this output.
     output : Output
         Times rising, none after `end`; changed.
 
@@ -212,10 +212,10 @@ def run_until(state: State, rules: Rules, end: float, most_events: int, output: 
     marked = 0 if state.clock[PREDICTED] else ALL
     state.clock[PREDICTED] = 1.0
     while True:
-        look_ahead(state, rules, marked)
-        i = whole(earliest(times, state.levels))
+        predict_marked(state, rules, marked)
+        i = as_int64(earliest(times, state.levels))
         absolute = state.clock[EPOCH] + times[i]
-        write_down(state, rules, output, absolute)
+        write_due(state, rules, output, absolute)
         if not absolute <= end:
             break
         marked = 0
@@ -224,11 +224,11 @@ def run_until(state: State, rules: Rules, end: float, most_events: int, output: 
         if room and done[EVENTS] == room:
             return LOG_FULL
         if times[i] >= state.clock[QUANTUM]:
-            count_time_anew(state)
+            advance_epoch(state)
         done[TAKEN] += 1
         state.clock[NOW] = times[i]
-        partner = whole(state.links[i, PARTNER])
-        marked = handle(state, rules, i, times[i])
+        partner = as_int64(state.links[i, PARTNER])
+        marked = execute_event(state, rules, i, times[i])
         if marked == FULL:
             return LISTS_FULL
         if room:
@@ -245,7 +245,7 @@ def snapshot(
     velocities: NDArray[np.float64],
     spins: NDArray[np.float64],
 ) -> None:
-    """Write down the beads as they are now, by original number.
+    """Write the present positions and velocities, by original number.
 
     Parameters
     ----------
@@ -257,4 +257,4 @@ def snapshot(
         Written.
     """
     nothing = state.links[:0, 0]
-    take_frame(state, rules, state.clock[NOW], positions, velocities, spins, nothing)
+    write_frame(state, rules, state.clock[NOW], positions, velocities, spins, nothing)

@@ -1,4 +1,4 @@
-"""When the next event of a bead happens, and with what."""
+"""Prediction of the next event of a bead: its time and its partner."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import inlined
-from nanorocks_ros.simulation.engine.collision.wall_collisions import next_wall
+from nanorocks_ros.simulation.engine.collision.wall_collisions import next_wall_event
 from nanorocks_ros.simulation.engine.event_queue import schedule
 from nanorocks_ros.simulation.engine.gas_state import (
     COUNTER,
@@ -28,19 +28,19 @@ from nanorocks_ros.simulation.engine.gas_state import (
     Y,
     Z,
 )
-from nanorocks_ros.simulation.engine.integer_width import unsigned, whole
+from nanorocks_ros.simulation.engine.integer_width import as_index, as_int64
 from nanorocks_ros.simulation.engine.pair_times import speed_square, wait_for_contact
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.collision.conservation_ledger import Vector
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 _ALL = 63
 
 
 @inlined
-def place_at(state: State, i: int, now: float) -> Vector:
-    """Where a bead is at a time, [m]."""
+def position_at(state: State, i: int, now: float) -> Vector:
+    """Position of a bead at a time, [m]."""
     rows = state.rows
     since = now - rows[i, TIME]
     return (
@@ -52,7 +52,7 @@ def place_at(state: State, i: int, now: float) -> Vector:
 
 @inlined
 def set_pending(state: State, i: int, time: float, partner: int) -> None:
-    """Make an event the pending one of a bead."""
+    """Set the pending event of a bead."""
     state.links[i, PARTNER] = partner
     if partner >= 0:
         state.links[i, PARTNER_COUNTER] = state.links[partner, COUNTER]
@@ -61,7 +61,7 @@ def set_pending(state: State, i: int, time: float, partner: int) -> None:
 
 @inlined
 def image_horizon(state: State, rules: Rules, i: int, now: float) -> float:
-    """Until when the nearest image of every other bead is the one that can be met first."""
+    """Time until which only the nearest images of the other beads can collide, [s]."""
     best = np.inf
     for axis in range(3):
         speed = abs(state.rows[i, VX + axis])
@@ -74,17 +74,17 @@ def image_horizon(state: State, rules: Rules, i: int, now: float) -> float:
 
 @inlined
 def predict_among_all(state: State, rules: Rules, i: int, now: float, folded: bool) -> None:
-    """Find the earliest event of a bead from now on, asking every other bead and wall.
+    """Predict the next event of a bead by a scan of all beads and walls.
 
-    Walls come before beads and beads by index when times are equal.
+    At equal times walls come before beads, and beads by index.
     """
-    best, partner = next_wall(state, rules, i, now, _ALL)
+    best, partner = next_wall_event(state, rules, i, now, _ALL)
     if folded:
         horizon = image_horizon(state, rules, i, now)
         if horizon < best:
             best = horizon
             partner = RENEW
-    place = place_at(state, i, now)
+    place = position_at(state, i, now)
     for j in range(state.rows.shape[0]):
         if j != i:
             when = now + wait_for_contact(state, rules, i, place, j, now, folded)
@@ -96,29 +96,29 @@ def predict_among_all(state: State, rules: Rules, i: int, now: float, folded: bo
 
 @inlined
 def predict_among_neighbours(state: State, rules: Rules, i: int, now: float) -> None:
-    """Find the earliest event of a bead from now on, asking its neighbours and near walls."""
-    place = place_at(state, i, now)
+    """Predict the next event of a bead from its neighbour list and the near walls."""
+    place = position_at(state, i, now)
     near = state.links[i, FLAGS] & NEAR
     partner = RENEW
     best = shell_exit(state, i, now, place)
     if near:
-        wall_time, wall = next_wall(state, rules, i, now, near)
+        wall_time, wall = next_wall_event(state, rules, i, now, near)
         if wall_time < best:
             best = wall_time
             partner = wall
     neighbours = state.neighbours
     for k in range(1, neighbours[i, 0] + 1):
-        j = unsigned(neighbours[i, k])
+        j = as_index(neighbours[i, k])
         when = now + wait_for_contact(state, rules, i, place, j, now, near != 0)
         if when < best:
             best = when
-            partner = whole(j)
+            partner = as_int64(j)
     set_pending(state, i, best, partner)
 
 
 @inlined
 def shell_exit(state: State, i: int, now: float, place: Vector) -> float:
-    """When a bead leaves the shell in which its list of neighbours holds good."""
+    """Time at which a bead leaves the shell in which its neighbour list is valid."""
     rows = state.rows
     a = speed_square(rows, i)
     if a == 0.0:
@@ -136,7 +136,7 @@ def shell_exit(state: State, i: int, now: float, place: Vector) -> float:
 
 @inlined
 def predict(state: State, rules: Rules, i: int, now: float) -> None:
-    """Find the earliest event of a bead from now on and make it pending."""
+    """Predict the next event of a bead and make it pending."""
     if state.references.shape[0]:
         predict_among_neighbours(state, rules, i, now)
     elif rules.periodic[0] or rules.periodic[1] or rules.periodic[2]:

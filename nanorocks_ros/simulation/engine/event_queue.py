@@ -48,7 +48,7 @@ def new_queue(n: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
 @inlined
 def smallest(times: NDArray[np.float64], start: int) -> float:
-    """The smallest of the eight times from a place on."""
+    """Smallest of the eight times from an index on."""
     a = times[start] if times[start] < times[start + 1] else times[start + 1]
     b = times[start + 2] if times[start + 2] < times[start + 3] else times[start + 3]
     c = times[start + 4] if times[start + 4] < times[start + 5] else times[start + 5]
@@ -59,8 +59,8 @@ def smallest(times: NDArray[np.float64], start: int) -> float:
 
 
 @inlined
-def place_of(times: NDArray[np.float64], start: int, value: float) -> int:
-    """Place of the first of eight times that equals a value."""
+def index_of(times: NDArray[np.float64], start: int, value: float) -> int:
+    """Index of the first of eight times that equals a value."""
     for k in range(7):
         if times[start + k] == value:
             return start + k
@@ -69,7 +69,7 @@ def place_of(times: NDArray[np.float64], start: int, value: float) -> int:
 
 @inlined
 def schedule(times: NDArray[np.float64], levels: NDArray[np.int64], i: int, time: float) -> None:
-    """Make a time the pending one of a bead."""
+    """Set the pending time of a bead and update the tree."""
     times[i] = time
     node = i
     for level in range(1, levels.size - 1):
@@ -83,11 +83,11 @@ def schedule(times: NDArray[np.float64], levels: NDArray[np.int64], i: int, time
 
 @inlined
 def earliest(times: NDArray[np.float64], levels: NDArray[np.int64]) -> int:
-    """The bead with the earliest event, the first of equals."""
+    """The bead with the earliest event; the lowest index at equal times."""
     top = levels.size - 2
     start = levels[top]
-    node = place_of(times, start, smallest(times, start)) - start
+    node = index_of(times, start, smallest(times, start)) - start
     for level in range(top - 1, -1, -1):
         value = times[levels[level + 1] + node]
-        node = place_of(times, levels[level] + 8 * node, value) - levels[level]
+        node = index_of(times, levels[level] + 8 * node, value) - levels[level]
     return node

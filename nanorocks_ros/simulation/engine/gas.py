@@ -1,45 +1,26 @@
-"""A granular gas of hard spheres in a box: followed from event to event, exactly."""
+"""Event-driven molecular dynamics of a granular gas of hard spheres in a box."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.simulation.engine import checkpoint
-from nanorocks_ros.simulation.engine.collision_rules import (
-    CONTACT_DURATION,
-    CollisionRules,
-    for_species,
-)
-from nanorocks_ros.simulation.engine.event_loop import TAKEN, run_until, snapshot
+from nanorocks_ros.simulation.engine.beads import Beads
+from nanorocks_ros.simulation.engine.event_loop import TAKEN, run_until
 from nanorocks_ros.simulation.engine.gas_state import (
-    BODY,
     COUNTER,
     DONE,
-    ELASTIC_PAIR,
-    ELASTIC_WALL,
-    EPOCH,
-    FIX,
-    FLAGS,
     LISTS_FULL,
     LOG_FULL,
-    MERGE,
-    MISSED,
-    NOW,
     ORIGINAL,
-    PAIR,
     PREDICTED,
     QUANTUM,
-    RENEWED,
-    SPECIES,
-    STALE,
-    WALL,
-    new_state,
 )
+from nanorocks_ros.simulation.engine.gas_view import GasView
 from nanorocks_ros.simulation.engine.input_checks import (
     check_beads,
     check_species,
@@ -48,14 +29,16 @@ from nanorocks_ros.simulation.engine.input_checks import (
     overlapping_pair,
     refuse_overlap,
 )
+from nanorocks_ros.simulation.engine.kernel_choice import Kernel, arranged_state
 from nanorocks_ros.simulation.engine.neighbours.huge_pages import in_large_pages
 from nanorocks_ros.simulation.engine.neighbours.list_tuning import (
-    built,
-    in_space_order,
-    skin_for,
-    with_lists,
+    rebuilt_lists,
 )
-from nanorocks_ros.simulation.engine.run_record import Course, Recorder
+from nanorocks_ros.simulation.engine.rules.collision_rules import (
+    CollisionRules,
+    restitution_table,
+)
+from nanorocks_ros.simulation.engine.run_record import RunRecord, RunRecorder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -63,93 +46,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
-    from nanorocks_ros.simulation.engine.gas_state import State
 
-__all__ = ['CONTACT_DURATION', 'Beads', 'CollisionRules', 'EventCounts', 'HardSphereGas', 'Kernel']
-
-# From so many beads on lists are faster (`python -m benchmarks engine`).
-MOST_FOR_SCAN = 32
-
-# Events between two looks at the keyboard and the watchdog: some tenths of a second.
+# Events between two checks for interrupts and stalls: some tenths of a second.
 _SLICE = 200_000
-# The gas is stuck when this many slices move time by less than this part of the time in which
-# beads cross the box some dozens of times.
+# The run has stalled when each of this many slices advances time by less than this fraction of
+# the time quantum.
 _STUCK_SLICES = 10
 _STUCK = 1e-9
 
 
-class Kernel(IntEnum):
-    """How the next event of a bead is found."""
-
-    AUTOMATIC = 0
-    SCAN = 1
-    LISTS = 2
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Beads:
-    """Beads at one instant.
-
-    Parameters
-    ----------
-    radii, masses : ndarray (n,), [m], [kg], > 0
-    positions, velocities : ndarray (n, 3), [m], [m/s]
-    spins : ndarray (n, 3) or None, [rad/s]
-        Angular velocities; None: no rotation.
-    species : ndarray of int, (n,), or None
-        From 0; None: all alike.
-    """
-
-    radii: NDArray[np.float64]
-    masses: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    spins: NDArray[np.float64] | None = None
-    species: NDArray[np.int32] | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EventCounts:
-    """How many events of each kind there were.
-
-    Parameters
-    ----------
-    pair, wall, merge, fix : int
-        Collisions of two beads, and of a bead with a wall; bodies that merged, and that stuck
-        to a wall.
-    elastic_pair, elastic_wall : int
-        Collisions made elastic by the contact duration.
-    stale, missed, renewed : int
-        Events taken but void: the partner had moved on, or a graze rounded to a miss; lists
-        renewed.
-    """
-
-    pair: int
-    wall: int
-    merge: int
-    fix: int
-    elastic_pair: int
-    elastic_wall: int
-    stale: int
-    missed: int
-    renewed: int
-
-
-_PLACES = {
-    'pair': PAIR,
-    'wall': WALL,
-    'merge': MERGE,
-    'fix': FIX,
-    'elastic_pair': ELASTIC_PAIR,
-    'elastic_wall': ELASTIC_WALL,
-    'stale': STALE,
-    'missed': MISSED,
-    'renewed': RENEWED,
-}
-
-
-class HardSphereGas:
+class HardSphereGas(GasView):
     """Inelastic hard spheres in a box.
 
     Parameters
@@ -158,17 +64,15 @@ class HardSphereGas:
         At time 0; inside the box, not overlapping.
     rules : CollisionRules
     kernel : Kernel
-        Both give the same gas; automatic takes the faster.
+        Both give the same trajectories; automatic takes the faster one.
 
     Raises
     ------
     SimulationError
-        For beads that cannot be: NaN, no radius or mass, overlapping, larger than the box, of
-        an unknown species; or lists asked for in a periodic box too small for them.
+        For invalid beads: NaN, no radius or mass, overlapping, larger than the box, of
+        an unknown species; or neighbour lists in a periodic box too small for them.
     """
 
-    _state: State
-    _rules: Rules
     _known_species: int
     _n_species: int
 
@@ -181,12 +85,12 @@ class HardSphereGas:
 
     @classmethod
     def load(cls, path: Path) -> HardSphereGas:
-        """A gas as it was saved; it goes on bit by bit as it would have.
+        """The gas of a checkpoint; it continues bit by bit.
 
         Raises
         ------
         SimulationError
-            For a file that is damaged, or not a saved gas.
+            For a file that is damaged, or no checkpoint.
         """
         gas = cls.__new__(cls)
         state, gas._rules, gas._n_species = checkpoint.load(path)
@@ -195,7 +99,7 @@ class HardSphereGas:
         return gas
 
     def save(self, path: Path) -> None:
-        """Write the whole state to a file, which is replaced when it exists.
+        """Write a checkpoint; an existing file is replaced.
 
         Raises
         ------
@@ -203,68 +107,6 @@ class HardSphereGas:
             When it cannot be written.
         """
         checkpoint.save(path, self._state, self._rules, self._n_species)
-
-    @property
-    def now(self) -> float:
-        """How far the gas has been followed, [s]."""
-        return float(self._state.clock[EPOCH] + self._state.clock[NOW])
-
-    @property
-    def radii(self) -> NDArray[np.float64]:
-        """Radius of each bead, (n,), [m]."""
-        return self._by_number(self._state.rows[:, 7])
-
-    @property
-    def masses(self) -> NDArray[np.float64]:
-        """Mass of each bead, (n,), [kg]."""
-        return self._by_number(self._state.masses[:, 0])
-
-    @property
-    def bodies(self) -> NDArray[np.int32]:
-        """The smallest number of a bead in the body of each bead, (n,)."""
-        if not self._rules.sticky:
-            return np.arange(self._state.rows.shape[0], dtype=np.int32)
-        return self._by_number(self._state.bodies[:, BODY])
-
-    @property
-    def stuck(self) -> NDArray[np.bool_]:
-        """Whether each bead is stuck to a wall, by itself or in a body, (n,)."""
-        if not self._rules.sticky:
-            return np.zeros(self._state.rows.shape[0], dtype=np.bool_)
-        stuck: NDArray[np.bool_] = np.isinf(self._state.masses[self.bodies, 1])
-        return stuck
-
-    @property
-    def kernel(self) -> Kernel:
-        """The kernel at work."""
-        return Kernel.LISTS if self._state.references.shape[0] else Kernel.SCAN
-
-    @property
-    def counts(self) -> EventCounts:
-        """Events so far."""
-        counts = self._state.counts.tolist()
-        return EventCounts(**{name: counts[place] for name, place in _PLACES.items()})
-
-    @property
-    def books(self) -> NDArray[np.float64]:
-        """Energy, momentum and angular momentum that left the beads, (18,), SI.
-
-        Energy lost in pair collisions, at walls (gained from moving walls: negative) and in
-        merges; normal momentum given to each of the six walls; momentum and angular momentum
-        about the origin given to walls and to what sticks to them; angular momentum taken by
-        aggregates, which cannot turn. Angular momentum is booked for rough and sticky beads.
-        """
-        return self._state.books.copy()
-
-    @property
-    def bytes_per_bead(self) -> float:
-        """Memory in use for each bead."""
-        return sum(array.nbytes for array in self._state) / self._state.rows.shape[0]
-
-    def _by_number(self, values: NDArray[Any]) -> NDArray[Any]:
-        ordered = np.empty_like(values)
-        ordered[self._state.links[:, ORIGINAL]] = values
-        return ordered
 
     def follow(
         self,
@@ -275,27 +117,27 @@ class HardSphereGas:
         log: bool = False,
         most_events: int | None = None,
         progress: Callable[[float], None] | None = None,
-    ) -> Course:
-        """Follow the gas to a time, and write down what is wanted on the way.
+    ) -> RunRecord:
+        """Follow the gas to a time; write frames, observations and events on the way.
 
         Parameters
         ----------
         end : float, [s]
             Not before `now`.
         frame_times, observation_times : array_like, [s]
-            Rising, from `now` to `end`; an event at the very time of a frame belongs to it.
+            Rising, from `now` to `end`; an event at the time of a frame comes before the frame.
         log : bool
             Whether to keep every event.
         most_events : int or None
-            Events of any kind before giving up.
+            Largest number of events of any kind.
         progress : callable or None
             Called with the time reached, a few times a second.
 
         Raises
         ------
         SimulationError
-            When times go backwards, after too many events, or when events follow one another
-            so fast that time stands still. The gas can then still be followed further.
+            When times go backwards, after too many events, or when time stalls (inelastic
+            collapse). The run can then still be continued.
         """
         recorder = self._record(
             end,
@@ -305,7 +147,7 @@ class HardSphereGas:
             most_events=most_events,
             progress=progress,
         )
-        return recorder.course()
+        return recorder.record()
 
     def _record(
         self,
@@ -316,11 +158,11 @@ class HardSphereGas:
         log: bool = False,
         most_events: int | None = None,
         progress: Callable[[float], None] | None = None,
-    ) -> Recorder:
+    ) -> RunRecorder:
         now = self.now
         frames = check_times(now, end, frame_times)
         observed = check_times(now, end, observation_times, 'observation_times')
-        recorder = Recorder(self._state, self._rules, frames, observed, self._n_species, log)
+        recorder = RunRecorder(self._state, self._rules, frames, observed, self._n_species, log)
         slow = 0
         while True:
             before = self.now
@@ -330,7 +172,7 @@ class HardSphereGas:
             if status == DONE:
                 return recorder
             if status == LISTS_FULL:
-                self._state = built(self._state, self._rules)
+                self._state = rebuilt_lists(self._state, self._rules)
                 self._state.clock[PREDICTED] = 0.0
                 continue
             if status == LOG_FULL:
@@ -348,7 +190,7 @@ class HardSphereGas:
                 progress(self.now)
 
     def observe(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rows of sums over the beads at some times, as `observables` has them.
+        """Sums over the beads at some times, with the columns of `observables`.
 
         Parameters
         ----------
@@ -389,28 +231,13 @@ class HardSphereGas:
         SimulationError
             As `follow`.
         """
-        course = self.follow(end, frame_times, most_events=most_events)
-        return course.positions, course.velocities
+        record = self.follow(end, frame_times, most_events=most_events)
+        return record.positions, record.velocities
 
-    def beads(self) -> Beads:
-        """The beads as they are now."""
-        n = self._state.rows.shape[0]
-        positions, velocities = np.empty((2, n, 3))
-        spins = np.empty((n if self._rules.rough else 0, 3))
-        snapshot(self._state, self._rules, positions, velocities, spins)
-        return Beads(
-            radii=self.radii,
-            masses=self.masses,
-            positions=positions,
-            velocities=velocities,
-            spins=spins if self._rules.rough else None,
-            species=self._by_number(self._state.links[:, FLAGS] >> SPECIES),
-        )
+    def restart(self, beads: Beads) -> None:
+        """Restart at time 0 with new positions, velocities and spins.
 
-    def set_going(self, beads: Beads) -> None:
-        """Go on with the same beads elsewhere or otherwise; time counts from 0 again.
-
-        Bodies come apart. Events are counted on, and the random restitutions go on.
+        Bodies are separated. Event counts, ledger and random restitutions continue.
 
         Parameters
         ----------
@@ -420,7 +247,7 @@ class HardSphereGas:
         Raises
         ------
         SimulationError
-            For another number of beads, or beads that cannot be.
+            For another number of beads, or invalid beads.
         """
         before = self._state
         n = before.rows.shape[0]
@@ -430,10 +257,10 @@ class HardSphereGas:
         self._set(beads, self.kernel)
         self._state.links[:, COUNTER] = changes[self._state.links[:, ORIGINAL]]
         self._state.counts[:] = before.counts
-        self._state.books[:] = before.books
+        self._state.ledger[:] = before.ledger
 
     def kick(self, velocities: NDArray[np.float64]) -> None:
-        """Give every bead a new velocity where it is; time counts from 0 again.
+        """Give every bead a new velocity at its position, and restart at time 0.
 
         Parameters
         ----------
@@ -444,7 +271,7 @@ class HardSphereGas:
         SimulationError
             For velocities of another shape, or not finite.
         """
-        self.set_going(replace(self.beads(), velocities=velocities, spins=None))
+        self.restart(replace(self.beads(), velocities=velocities, spins=None))
 
     def _set(self, beads: Beads, kernel: Kernel) -> None:
         checked = check_beads(
@@ -454,39 +281,9 @@ class HardSphereGas:
         species = check_species(beads.species, n, self._known_species)
         spins = check_spins(beads.spins, n, self._rules.rough)
         n_species = max(int(species.max()) + 1, self._known_species)
-        rules = self._rules._replace(restitution=for_species(self._rules.restitution, n_species))
-        state = _arranged(checked, species, spins, rules, kernel)
+        rules = self._rules._replace(
+            restitution=restitution_table(self._rules.restitution, n_species)
+        )
+        state = arranged_state(checked, species, spins, rules, kernel)
         refuse_overlap(*overlapping_pair(state, rules))
         self._state, self._rules, self._n_species = state, rules, n_species
-
-
-def _arranged(
-    checked: tuple[NDArray[np.float64], ...],
-    species: NDArray[np.int32],
-    spins: NDArray[np.float64],
-    rules: Rules,
-    kernel: Kernel,
-) -> State:
-    """The state for a kernel, beads in the order that suits it."""
-    radii, masses, positions, velocities = checked
-    skin = skin_for(radii, rules)
-    if kernel == Kernel.LISTS and not skin:
-        raise SimulationError(
-            'kernel', 'the periodic box is too small for lists', 'use the scan, or a larger box'
-        )
-    listed = kernel == Kernel.LISTS or (
-        kernel == Kernel.AUTOMATIC and radii.size > MOST_FOR_SCAN and skin > 0.0
-    )
-    order = np.arange(radii.size)
-    if listed:
-        order = in_space_order(positions, 2.0 * float(radii.max()) + skin)
-    state = new_state(
-        positions[order], velocities[order], radii[order], masses[order], species[order], rules
-    )
-    state.links[:, ORIGINAL] = order
-    if spins.shape[0]:
-        state.spins[:] = spins[order]
-    if rules.sticky:
-        state.masses[:, 1] = masses
-        state.bodies[:, BODY] = order
-    return with_lists(state, rules, skin) if listed else state

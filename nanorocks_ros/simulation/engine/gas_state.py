@@ -1,4 +1,4 @@
-"""The gas in memory: one row per bead, one pending event per bead."""
+"""State of a gas in memory: one row and one pending event per bead."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled, inlined
 from nanorocks_ros.simulation.engine.event_queue import new_queue
-from nanorocks_ros.simulation.engine.recent_contacts import new_contacts
+from nanorocks_ros.simulation.engine.recent_contacts import new_contact_table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 # Columns of State.rows: 64 bytes, one cache line, per bead.
 X, Y, Z, VX, VY, VZ, TIME, RADIUS = range(8)
@@ -40,12 +40,12 @@ RENEW = -1 - WALLS
 PAIR, WALL, MERGE, FIX, ELASTIC_PAIR, ELASTIC_WALL, STALE, MISSED, RENEWED = range(9)
 COUNTS = 9
 
-# Places in State.books: energy lost; normal momentum given to each wall; momentum and angular
+# Places in State.ledger: energy lost; normal momentum given to each wall; momentum and angular
 # momentum given to walls and to what sticks to them; angular momentum taken by aggregates,
 # which cannot turn.
 PAIR_LOSS, WALL_LOSS, MERGE_LOSS, WALL_IMPULSE = 0, 1, 2, 3
 MOMENTUM, SPIN, AGGREGATE_SPIN = 9, 12, 15
-BOOKS = 18
+LEDGER_SIZE = 18
 
 # Places in State.clock.
 NOW, EPOCH, QUANTUM, PREDICTED = range(4)
@@ -57,10 +57,10 @@ KIND, SPEED, IMPULSE = range(3)
 LARGEST_RADIUS, HALF_SKIN, PER_CELL, CELLS, AHEAD = 0, 1, 2, 5, 8
 REACHES = 9
 
-# Time is counted anew after this many crossings of the box.
+# An epoch lasts about this many crossings of the box.
 _CROSSINGS = 64.0
 
-# What following a gas can end with.
+# Outcomes of a run.
 DONE, TOO_MANY_EVENTS, LISTS_FULL, LOG_FULL = range(4)
 
 
@@ -103,7 +103,7 @@ class State(NamedTuple):
         Largest radius and half the skin [m], cells per length [1/m], cells along each axis, how
         far ahead of a bead its new reference lies, as a fraction of half the skin.
     dirty : ndarray of int32, (as many as can be marked at once + 8,)
-        Beads whose next event must be found anew.
+        Marked beads: their next event must be predicted again.
     clock : ndarray (4,), [s]
         How far the gas has been followed, since the epoch; the epoch; when to set a new one;
         0 until the first events are predicted.
@@ -112,7 +112,7 @@ class State(NamedTuple):
         and impulse [kg m/s].
     counts : ndarray of int64, (9,)
         Events by type.
-    books : ndarray (18,)
+    ledger : ndarray (18,)
         Energy [J], momentum [kg m/s] and angular momentum [kg m^2/s] that left the beads.
     """
 
@@ -133,7 +133,7 @@ class State(NamedTuple):
     clock: NDArray[np.float64]
     last: NDArray[np.float64]
     counts: NDArray[np.int64]
-    books: NDArray[np.float64]
+    ledger: NDArray[np.float64]
 
 
 @compiled
@@ -145,7 +145,7 @@ def new_state(
     species: NDArray[np.int32],
     rules: Rules,
 ) -> State:
-    """State at time 0, with no lists and no event predicted.
+    """State at time 0, without lists and without predicted events.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def new_state(
         weights,
         np.zeros((n if rules.rough else 0, 3)),
         np.zeros((n if periodic else 0, 3), dtype=np.int32),
-        new_contacts(n, rules.contact_duration),
+        new_contact_table(n, rules.contact_duration),
         np.zeros((0, 4), dtype=np.float32),
         np.zeros((0, 1), dtype=np.int32),
         np.zeros((0, 1), dtype=np.int32),
@@ -195,13 +195,13 @@ def new_state(
         np.array((0.0, 0.0, time_quantum(velocities, rules), 0.0)),
         np.zeros(3),
         np.zeros(COUNTS, dtype=np.int64),
-        np.zeros(BOOKS),
+        np.zeros(LEDGER_SIZE),
     )
 
 
 @compiled
 def time_quantum(velocities: NDArray[np.float64], rules: Rules) -> float:
-    """A power of two, some dozens of crossings of the box, after which time is counted anew."""
+    """Length of an epoch, [s]: a power of two, some dozens of crossings of the box."""
     total = 0.0
     for i in range(velocities.shape[0]):
         square = 0.0
@@ -211,17 +211,17 @@ def time_quantum(velocities: NDArray[np.float64], rules: Rules) -> float:
     mean = total / velocities.shape[0]
     quantum = 1024.0
     if mean > 0.0:
-        wanted = _CROSSINGS * max(rules.sides[0], rules.sides[1], rules.sides[2]) / mean
-        while quantum < wanted:
+        minimum = _CROSSINGS * max(rules.sides[0], rules.sides[1], rules.sides[2]) / mean
+        while quantum < minimum:
             quantum *= 2.0
-        while quantum > 2.0 * wanted:
+        while quantum > 2.0 * minimum:
             quantum *= 0.5
     return quantum
 
 
 @inlined
-def remember(state: State, kind: int, speed: float, impulse: float) -> None:
-    """Keep the last collision for whoever writes a log."""
+def record_collision(state: State, kind: int, speed: float, impulse: float) -> None:
+    """Store the last collision for the event log."""
     state.last[KIND] = kind + 1
     state.last[SPEED] = speed
     state.last[IMPULSE] = impulse

@@ -1,4 +1,4 @@
-"""What the engine refuses at its door, with the value at fault."""
+"""Checks of the input of the engine; every error names the value."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.numerics.compiled import kernel
 from nanorocks_ros.simulation.engine.gas_state import ORIGINAL, RADIUS, State, X, Y, Z
-from nanorocks_ros.simulation.engine.integer_width import whole
-from nanorocks_ros.simulation.engine.pair_times import nearest
+from nanorocks_ros.simulation.engine.integer_width import as_int64
+from nanorocks_ros.simulation.engine.pair_times import minimum_image
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 # Certainly too full; whether fewer find room, their placement tells.
 _FULL = 1.0
@@ -34,7 +34,7 @@ def check_beads(
     velocities: ArrayLike,
     rules: Rules,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Copies of the arrays, refused when no gas can be made of them, but for overlap."""
+    """Copies of the arrays, refused when invalid; overlap is checked elsewhere."""
     r = _finite('radii', radii, (None,))
     n = r.size
     if not 1 <= n <= _MOST_BEADS:
@@ -54,7 +54,7 @@ def check_beads(
 
 
 def check_species(species: ArrayLike | None, n: int, known: int) -> NDArray[np.int32]:
-    """Species of each bead, refused when the restitution says nothing about one.
+    """Species of each bead, refused when the restitution has no entry for one.
 
     Parameters
     ----------
@@ -66,39 +66,39 @@ def check_species(species: ArrayLike | None, n: int, known: int) -> NDArray[np.i
     """
     if species is None:
         return np.zeros(n, dtype=np.int32)
-    given = np.asarray(species)
-    if given.shape != (n,) or given.dtype.kind not in 'iu':
+    numbers = np.asarray(species)
+    if numbers.shape != (n,) or numbers.dtype.kind not in 'iu':
         raise SimulationError(
             'species',
-            f'shape {given.shape} of {given.dtype}',
+            f'shape {numbers.shape} of {numbers.dtype}',
             'give one whole number for each bead',
         )
-    most = known if known > 1 else _MOST_SPECIES
-    wrong = (given < 0) | (given >= most)
+    n_species = known if known > 1 else _MOST_SPECIES
+    wrong = (numbers < 0) | (numbers >= n_species)
     if wrong.any():
         worst = int(wrong.argmax())
         raise SimulationError(
             'species',
-            f'bead {worst} is of the unknown species {int(given[worst])}',
-            f'give numbers from 0 to {most - 1}, or a restitution for it',
+            f'bead {worst} is of the unknown species {int(numbers[worst])}',
+            f'give numbers from 0 to {n_species - 1}, or a restitution for it',
         )
-    return given.astype(np.int32)
+    return numbers.astype(np.int32)
 
 
 def check_spins(spins: ArrayLike | None, n: int, rough: bool) -> NDArray[np.float64]:
-    """Spins of each bead, refused when beads cannot spin."""
+    """Spins of each bead, refused for smooth beads."""
     if spins is None:
         return np.zeros((n if rough else 0, 3))
-    given = _finite('spins', spins, (n, 3))
+    numbers = _finite('spins', spins, (n, 3))
     if not rough:
         raise SimulationError(
             'spins', 'given for smooth beads', 'give a tangential_restitution, or no spins'
         )
-    return given
+    return numbers
 
 
 def check_room(radii: NDArray[np.float64], rules: Rules) -> None:
-    """Refuse beads larger than the box, or more of them than it holds.
+    """Refuse beads that are larger than the box or fill more than its volume.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def check_room(radii: NDArray[np.float64], rules: Rules) -> None:
 def check_times(
     now: float, end: float, times: ArrayLike, name: str = 'frame_times'
 ) -> NDArray[np.float64]:
-    """Times as an array, refused when time would go backwards."""
+    """Times as an array, refused when they do not rise from `now` to `end`."""
     checked = _finite(name, times, (None,))
     if not (math.isfinite(end) and end >= now):
         raise SimulationError('end', f'{end!r} s, already at {now!r} s', 'give a later time')
@@ -159,9 +159,9 @@ def _finite(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> NDAr
             name, f'shape {array.shape}, expected {shape}', 'one row for each bead'
         )
     if not np.isfinite(array).all():
-        where = np.argwhere(~np.isfinite(array))[0].tolist()
+        first_bad = np.argwhere(~np.isfinite(array))[0].tolist()
         raise SimulationError(
-            name, f'{float(array[tuple(where)])!r} at {where}', 'give finite values'
+            name, f'{float(array[tuple(first_bad)])!r} at {first_bad}', 'give finite values'
         )
     return array
 
@@ -180,7 +180,7 @@ def _check_inside(radii: NDArray[np.float64], x: NDArray[np.float64], rules: Rul
 
 
 def refuse_overlap(i: int, j: int) -> None:
-    """Say which two beads overlap, if any (-1: none)."""
+    """Refuse a pair of beads that overlaps (-1: none)."""
     if i >= 0:
         i, j = min(i, j), max(i, j)
         raise SimulationError('positions', f'beads {i} and {j} overlap', 'place them apart')
@@ -188,17 +188,17 @@ def refuse_overlap(i: int, j: int) -> None:
 
 @kernel
 def overlapping_pair(state: State, rules: Rules) -> tuple[int, int]:
-    """Two beads that overlap by more than rounding, by original number, or (-1, -1)."""
+    """First pair of beads that overlaps by more than rounding, by original number, or (-1, -1)."""
     rows = state.rows
     listed = state.references.shape[0] > 0
     for i in range(rows.shape[0]):
-        others = whole(state.neighbours[i, 0]) if listed else rows.shape[0] - i - 1
-        for k in range(others):
-            j = whole(state.neighbours[i, k + 1]) if listed else i + 1 + k
-            dx = nearest(rules, 0, rows[j, X] - rows[i, X])
-            dy = nearest(rules, 1, rows[j, Y] - rows[i, Y])
-            dz = nearest(rules, 2, rows[j, Z] - rows[i, Z])
+        n_partners = as_int64(state.neighbours[i, 0]) if listed else rows.shape[0] - i - 1
+        for k in range(n_partners):
+            j = as_int64(state.neighbours[i, k + 1]) if listed else i + 1 + k
+            dx = minimum_image(rules, 0, rows[j, X] - rows[i, X])
+            dy = minimum_image(rules, 1, rows[j, Y] - rows[i, Y])
+            dz = minimum_image(rules, 2, rows[j, Z] - rows[i, Z])
             reach = (rows[i, RADIUS] + rows[j, RADIUS]) * (1.0 - OVERLAP)
             if dx * dx + dy * dy + dz * dz < reach * reach:
-                return whole(state.links[i, ORIGINAL]), whole(state.links[j, ORIGINAL])
+                return as_int64(state.links[i, ORIGINAL]), as_int64(state.links[j, ORIGINAL])
     return -1, -1

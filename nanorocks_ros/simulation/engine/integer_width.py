@@ -1,4 +1,4 @@
-"""Whole numbers in compiled code: one width, so that nothing is compiled for two."""
+"""Integer conversions for compiled code, so that it is compiled for one width only."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 
 
 @inlined
-def whole(value: Any) -> int:
-    """A number with 64 bits."""
+def as_int64(value: Any) -> int:
+    """A signed integer of 64 bits."""
     return np.int64(value)  # type: ignore[return-value]
 
 
 @inlined
-def unsigned(value: Any) -> int:
-    """A number that is never negative, as a place in an array: nothing is counted from its end."""
+def as_index(value: Any) -> int:
+    """An unsigned integer as an array index, which needs no check for negative values."""
     return np.uint32(value)  # type: ignore[return-value]

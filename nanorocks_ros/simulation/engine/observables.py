@@ -1,4 +1,4 @@
-"""What can be read off a gas: frames of all beads, and sums over them."""
+"""Observables of a gas: frames of all beads, and sums over the beads."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from nanorocks_ros.numerics.compiled import compiled, inlined
 from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
-    BOOKS,
     COUNTS,
     FLAGS,
+    LEDGER_SIZE,
     ORIGINAL,
     SPECIES,
     TIME,
@@ -22,23 +22,23 @@ from nanorocks_ros.simulation.engine.gas_state import (
     State,
     X,
 )
-from nanorocks_ros.simulation.engine.integer_width import whole
+from nanorocks_ros.simulation.engine.integer_width import as_int64
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 # Columns of a row of observations; then for each species how many beads it has and their mean
 # squares of velocity along x, y and z.
 MEAN_SPEED, MEAN_PROJECTED_SPEED, BODIES, FIRST_COUNT = range(4)
-FIRST_BOOK = FIRST_COUNT + COUNTS
-FIRST_SPECIES = FIRST_BOOK + BOOKS
+FIRST_LEDGER = FIRST_COUNT + COUNTS
+FIRST_SPECIES = FIRST_LEDGER + LEDGER_SIZE
 PER_SPECIES = 4
 
 
 @inlined
-def take_frame(
+def write_frame(
     state: State,
     rules: Rules,
     time: float,
@@ -47,7 +47,7 @@ def take_frame(
     spins: NDArray[np.float64],
     bodies: NDArray[np.int32],
 ) -> None:
-    """Write down where the beads are at a time, x + v (t - t_i), and leave them untouched.
+    """Write the positions at a time, x + v (t - t_i), without a change of the state.
 
     Parameters
     ----------
@@ -62,13 +62,13 @@ def take_frame(
     """
     rows = state.rows
     for i in range(rows.shape[0]):
-        number = whole(state.links[i, ORIGINAL])
+        number = as_int64(state.links[i, ORIGINAL])
         since = time - rows[i, TIME]
         for axis in range(3):
-            at = rows[i, X + axis] + rows[i, VX + axis] * since
+            position = rows[i, X + axis] + rows[i, VX + axis] * since
             if state.images.shape[0]:
-                at += state.images[i, axis] * rules.sides[axis]
-            positions[number, axis] = at
+                position += state.images[i, axis] * rules.sides[axis]
+            positions[number, axis] = position
             velocities[number, axis] = rows[i, VX + axis]
         if spins.shape[0]:
             for axis in range(3):
@@ -78,8 +78,8 @@ def take_frame(
 
 
 @inlined
-def observe(state: State, rules: Rules, row: NDArray[np.float64]) -> None:
-    """Write down sums over the beads, between two events.
+def write_observation(state: State, rules: Rules, row: NDArray[np.float64]) -> None:
+    """Write sums over the beads.
 
     Parameters
     ----------
@@ -101,8 +101,8 @@ def observe(state: State, rules: Rules, row: NDArray[np.float64]) -> None:
         speed += math.sqrt(in_plane + vz * vz)
         projected += math.sqrt(in_plane)
         if state.bodies.shape[0]:
-            bodies += whole(state.bodies[i, BODY] == state.links[i, ORIGINAL])
-        first = FIRST_SPECIES + PER_SPECIES * whole(state.links[i, FLAGS] >> SPECIES)
+            bodies += as_int64(state.bodies[i, BODY] == state.links[i, ORIGINAL])
+        first = FIRST_SPECIES + PER_SPECIES * as_int64(state.links[i, FLAGS] >> SPECIES)
         row[first] += 1.0
         row[first + 1] += vx * vx
         row[first + 2] += vy * vy
@@ -112,8 +112,8 @@ def observe(state: State, rules: Rules, row: NDArray[np.float64]) -> None:
     row[BODIES] = bodies
     for k in range(COUNTS):
         row[FIRST_COUNT + k] = state.counts[k]
-    for k in range(BOOKS):
-        row[FIRST_BOOK + k] = state.books[k]
+    for k in range(LEDGER_SIZE):
+        row[FIRST_LEDGER + k] = state.ledger[k]
     for first in range(FIRST_SPECIES, row.size, PER_SPECIES):
         if row[first] > 0.0:
             for axis in range(1, PER_SPECIES):
@@ -122,5 +122,5 @@ def observe(state: State, rules: Rules, row: NDArray[np.float64]) -> None:
 
 @compiled
 def columns(n_species: int) -> int:
-    """Columns of a row of observations."""
+    """Number of columns of a row of observations."""
     return FIRST_SPECIES + PER_SPECIES * n_species

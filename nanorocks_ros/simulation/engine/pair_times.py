@@ -1,4 +1,4 @@
-"""When two beads touch."""
+"""Contact times of two beads."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from nanorocks_ros.simulation.engine.gas_state import BODY, RADIUS, TIME, VX, VY
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
     from nanorocks_ros.simulation.engine.gas_state import State
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 # Squares of the approach, relative to the speeds, that is rounding; and of the gap, relative to
 # the distance, of beads that touch.
@@ -23,8 +23,8 @@ _TOUCHING = 1e-9
 
 
 @inlined
-def nearest(rules: Rules, axis: int, difference: float) -> float:
-    """A difference of coordinates to the nearest image of the other, [m]."""
+def minimum_image(rules: Rules, axis: int, difference: float) -> float:
+    """Difference of coordinates to the nearest periodic image, [m]."""
     if rules.periodic[axis]:
         return difference - rules.sides[axis] * np.rint(difference * rules.per_side[axis])
     return difference
@@ -41,7 +41,7 @@ def speed_square(rows: NDArray[np.float64], i: int) -> float:
 def is_rounding(
     approach: float, distance_square: float, speed_square_1: float, speed_square_2: float
 ) -> bool:
-    """Whether two beads approach so slowly that only rounding makes it differ from rest.
+    """Whether the approach of two beads is no larger than rounding errors.
 
     After a contact of restitution 0 the normal velocity is rounding alone; taken at its word,
     such pairs collide again and again at one instant. What is ignored here adds up to an
@@ -94,9 +94,9 @@ def wait_for_contact(
     dy = rows[j, Y] + rows[j, VY] * since - place[1]
     dz = rows[j, Z] + rows[j, VZ] * since - place[2]
     if folded:
-        dx = nearest(rules, 0, dx)
-        dy = nearest(rules, 1, dy)
-        dz = nearest(rules, 2, dz)
+        dx = minimum_image(rules, 0, dx)
+        dy = minimum_image(rules, 1, dy)
+        dz = minimum_image(rules, 2, dz)
     approach = dx * ux + dy * uy + dz * uz
     if approach >= 0.0 or (rules.sticky and state.bodies[i, BODY] == state.bodies[j, BODY]):
         return np.inf

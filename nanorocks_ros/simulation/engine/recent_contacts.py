@@ -1,4 +1,4 @@
-"""The latest contacts of each pair: what the contact duration needs to know, and no more.
+"""Table of the latest contacts, for the contact duration.
 
 A table with room for as many contacts as can matter: one older than the contact duration has
 no effect, and its place is free.
@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled, inlined
-from nanorocks_ros.simulation.engine.integer_width import whole
+from nanorocks_ros.simulation.engine.integer_width import as_int64
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Places looked at for one pair; with the oldest overwritten when none is free, a contact can
-# only be forgotten when this many others in the same row of places are as recent.
+# Slots checked for a pair. The oldest is overwritten when none is free, so a contact is lost only
+# when this many others in the same slots are more recent.
 _PLACES = 16
 
 _SCRAMBLE = np.uint64(0x9E3779B97F4A7C15)
@@ -25,7 +25,7 @@ _TOP = np.uint64(32)
 
 
 @compiled
-def new_contacts(n: int, duration: float) -> NDArray[np.float64]:
+def new_contact_table(n: int, duration: float) -> NDArray[np.float64]:
     """A table for n beads; without a contact duration an empty one.
 
     Returns
@@ -46,7 +46,7 @@ def new_contacts(n: int, duration: float) -> NDArray[np.float64]:
 def is_repeated(
     contacts: NDArray[np.float64], i: int, j: int, now: float, duration: float
 ) -> bool:
-    """Whether a pair touched less than the duration ago; remembers that it touches now.
+    """Whether a pair touched less than the duration ago; stores the present contact.
 
     Parameters
     ----------
@@ -58,9 +58,9 @@ def is_repeated(
     room = contacts.shape[0]
     if room == 0:
         return False
-    pair = (whole(i) << whole(32)) | whole(j)
+    pair = (as_int64(i) << as_int64(32)) | as_int64(j)
     rows = np.uint64(room - _PLACES - 1)
-    first = whole(((np.uint64(pair) * _SCRAMBLE) >> _TOP) & rows)
+    first = as_int64(((np.uint64(pair) * _SCRAMBLE) >> _TOP) & rows)
     place = first
     oldest = np.inf
     for k in range(first, first + _PLACES):

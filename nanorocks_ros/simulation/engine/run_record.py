@@ -1,4 +1,4 @@
-"""What was written down while a gas was followed."""
+"""Record of a run: frames, observations and events."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from nanorocks_ros.simulation.engine.event_loop import (
     SECOND,
     SPEED,
     WHEN,
-    Output,
+    RunOutput,
 )
 from nanorocks_ros.simulation.engine.gas_state import (
-    BOOKS,
     COUNTS,
     FIX,
+    LEDGER_SIZE,
     MERGE,
     PAIR,
     WALL,
@@ -32,8 +32,8 @@ from nanorocks_ros.simulation.engine.gas_state import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
     from nanorocks_ros.simulation.engine.gas_state import State
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 _FIRST_ROOM = 4096
 
@@ -85,7 +85,7 @@ class Observations:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Course:
+class RunRecord:
     """Frames, observations and events of a gas.
 
     Parameters
@@ -113,8 +113,8 @@ class Course:
     events: NDArray[np.void]
 
 
-class Recorder:
-    """Room for what is to be written down, and its form when it is."""
+class RunRecorder:
+    """Arrays for the output of a run, and their conversion to a `RunRecord`."""
 
     def __init__(
         self,
@@ -128,7 +128,7 @@ class Recorder:
         n = state.rows.shape[0]
         frames = frame_times.size
         self._rough, self._sticky = rules.rough, rules.sticky
-        self.output = Output(
+        self.output = RunOutput(
             frame_times=frame_times,
             positions=np.empty((frames, n, 3)),
             velocities=np.empty((frames, n, 3)),
@@ -145,10 +145,10 @@ class Recorder:
         events = self.output.events
         self.output = self.output._replace(events=np.concatenate((events, np.empty_like(events))))
 
-    def course(self) -> Course:
-        """What was written down."""
+    def record(self) -> RunRecord:
+        """The record of the run."""
         output = self.output
-        return Course(
+        return RunRecord(
             times=output.frame_times,
             positions=output.positions,
             velocities=output.velocities,
@@ -161,7 +161,7 @@ class Recorder:
 
 def _observations(times: NDArray[np.float64], rows: NDArray[np.float64]) -> Observations:
     counts = rows[:, columns.FIRST_COUNT : columns.FIRST_COUNT + COUNTS].astype(np.int64)
-    books = rows[:, columns.FIRST_BOOK : columns.FIRST_BOOK + BOOKS]
+    ledger = rows[:, columns.FIRST_LEDGER : columns.FIRST_LEDGER + LEDGER_SIZE]
     n_species = (rows.shape[1] - columns.FIRST_SPECIES) // columns.PER_SPECIES
     shape = len(rows), n_species, columns.PER_SPECIES
     species = rows[:, columns.FIRST_SPECIES :].reshape(shape)
@@ -176,8 +176,8 @@ def _observations(times: NDArray[np.float64], rows: NDArray[np.float64]) -> Obse
         wall_collisions=counts[:, WALL],
         merges=counts[:, MERGE],
         fixings=counts[:, FIX],
-        energy_lost=books[:, :3].copy(),
-        wall_impulse=books[:, WALL_IMPULSE : WALL_IMPULSE + WALLS].copy(),
+        energy_lost=ledger[:, :3].copy(),
+        wall_impulse=ledger[:, WALL_IMPULSE : WALL_IMPULSE + WALLS].copy(),
     )
 
 

@@ -1,11 +1,10 @@
-"""Beads in a box, and cells of space that say which of them may overlap one.
+"""Cell lists for beads of many sizes in a box.
 
-There are as many grids of cells as there are sizes. A bead belongs to the grid of its size: the
-radii of a grid differ by less than a factor of two, and its cells are at least as wide as its
-largest bead. So a grain of dust among marbles looks at few cells, and a marble is in few of
-those of the dust.
+There is one grid of cells for each factor of two in radius. The cells of a grid are at least as
+wide as its largest bead. So a small bead checks few cells for large neighbours, and a large bead
+few cells per grid.
 
-What is found does not depend on the cells: they only spare looking at beads that are far away.
+Results do not depend on the cells; they only avoid tests of distant beads.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ _MARGIN = 1e-9
 
 
 class Packing(NamedTuple):
-    """Beads in a box, as large as they are so far.
+    """Beads in a box with their present sizes.
 
     Parameters
     ----------
@@ -89,7 +88,7 @@ def new_packing(
     periodic: NDArray[np.bool_],
     order: NDArray[np.int64],
 ) -> Packing:
-    """Beads of full size, none of which is in the box yet.
+    """An empty box, with beads of full size to be inserted.
 
     Parameters
     ----------
@@ -159,14 +158,14 @@ def _grids(
 def _divide(
     sides: NDArray[np.float64], width: float, beads: int, counts: NDArray[np.int64]
 ) -> None:
-    """Divide a box into cells of some width or more, and no more cells than are worth it."""
-    most = _FEWEST_CELLS + _CELLS_PER_BEAD * beads
+    """Divide a box into cells of at least a width, with a limit on their number."""
+    max_cells = _FEWEST_CELLS + _CELLS_PER_BEAD * beads
     while True:
         product = 1.0
         for axis in range(3):
-            counts[axis] = np.int64(min(max(sides[axis] / width, 1.0), 2.0 * most))
+            counts[axis] = np.int64(min(max(sides[axis] / width, 1.0), 2.0 * max_cells))
             product *= counts[axis]
-        if product <= most:
+        if product <= max_cells:
             return
         width *= _WIDEN
 
@@ -188,15 +187,15 @@ def cell_of(packing: Packing, i: int) -> int:
 
 
 @inlined
-def enter(packing: Packing, cell: int, i: int) -> None:
-    """Put a bead into a cell."""
+def enter_cell(packing: Packing, cell: int, i: int) -> None:
+    """Add a bead to a cell."""
     packing.links[i] = packing.heads[cell]
     packing.heads[cell] = i
 
 
 @inlined
-def leave(packing: Packing, cell: int, i: int) -> None:
-    """Take a bead out of the cell that holds it."""
+def leave_cell(packing: Packing, cell: int, i: int) -> None:
+    """Remove a bead from its cell."""
     heads, links = packing.heads, packing.links
     k = heads[cell]
     if k == i:
@@ -209,7 +208,7 @@ def leave(packing: Packing, cell: int, i: int) -> None:
 
 @kernel
 def is_free(packing: Packing, i: int) -> bool:
-    """Whether a bead, where it is and as large as it is, overlaps none of those in the cells."""
+    """Whether a bead overlaps no bead in the cells, at its present position and size."""
     for grid in range(GRIDS):
         if packing.largest[grid] > 0.0 and not _is_free_in(packing, i, grid):
             return False
@@ -220,16 +219,16 @@ def is_free(packing: Packing, i: int) -> bool:
 def _is_free_in(packing: Packing, i: int, grid: int) -> bool:
     """The same for the cells of one grid."""
     reach = packing.sizes[i] + packing.largest[grid]
-    x, below_x, span_x = _cells_about(packing, grid, 0, packing.positions[i, 0], reach)
-    y, below_y, span_y = _cells_about(packing, grid, 1, packing.positions[i, 1], reach)
-    z, below_z, span_z = _cells_about(packing, grid, 2, packing.positions[i, 2], reach)
+    x, below_x, span_x = _cells_in_reach(packing, grid, 0, packing.positions[i, 0], reach)
+    y, below_y, span_y = _cells_in_reach(packing, grid, 1, packing.positions[i, 1], reach)
+    z, below_z, span_z = _cells_in_reach(packing, grid, 2, packing.positions[i, 2], reach)
     count_x, count_y, count_z, first = packing.counts[grid]
     for kx in range(span_x):
-        plane = first + _stepped(x, kx, below_x, span_x, count_x) * count_y * count_z
+        plane = first + _visited_cell(x, kx, below_x, span_x, count_x) * count_y * count_z
         for ky in range(span_y):
-            row = plane + _stepped(y, ky, below_y, span_y, count_y) * count_z
+            row = plane + _visited_cell(y, ky, below_y, span_y, count_y) * count_z
             for kz in range(span_z):
-                j = packing.heads[row + _stepped(z, kz, below_z, span_z, count_z)]
+                j = packing.heads[row + _visited_cell(z, kz, below_z, span_z, count_z)]
                 while j >= 0:
                     if j != i and _overlap(packing, i, j):
                         return False
@@ -238,10 +237,10 @@ def _is_free_in(packing: Packing, i: int, grid: int) -> bool:
 
 
 @inlined
-def _cells_about(
+def _cells_in_reach(
     packing: Packing, grid: int, axis: int, coordinate: float, reach: float
 ) -> tuple[int, int, int]:
-    """Cell of a coordinate, how many below it are in reach, and how many in all."""
+    """Cell of a coordinate, number of cells in reach below it, and in total."""
     count = packing.counts[grid, axis]
     per_length = packing.per_length[grid, axis]
     cell = _cell_along(packing, grid, axis, coordinate)
@@ -256,20 +255,20 @@ def _cells_about(
 
 
 @inlined
-def _stepped(cell: int, k: int, below: int, span: int, count: int) -> int:
-    """The k-th cell to look at: upwards from a bead's own, then those below it.
+def _visited_cell(cell: int, k: int, below: int, span: int, count: int) -> int:
+    """The k-th cell to visit: from a bead's own upwards, then those below it.
 
-    Most places are refused by a bead of the own cell: this order saves 40 % of the time.
+    Most trials fail in the own cell, so this order saves 40 % of the time.
     """
-    at = cell + (k if k < span - below else k - span)
-    if at < 0:
-        return at + count
-    return at - count if at >= count else at
+    index = cell + (k if k < span - below else k - span)
+    if index < 0:
+        return index + count
+    return index - count if index >= count else index
 
 
 @inlined
 def _overlap(packing: Packing, i: int, j: int) -> bool:
-    """Whether two beads are nearer than they may be."""
+    """Whether two beads overlap."""
     square = 0.0
     for axis in range(3):
         d = packing.positions[j, axis] - packing.positions[i, axis]

@@ -1,14 +1,12 @@
-"""Beads that find no room one after the other: they enter small, and grow while all move.
+"""Dense packings: beads enter small and grow during Monte Carlo moves.
 
-Random places one after the other jam where a third of a wide box is filled, long before the
-beads themselves would. Here those left over enter at a part of their radius, so that each finds
-a place. Then all are moved at random, one by one, and a bead that is not yet of full size takes
-of the room its neighbours leave. At no time do two overlap, so nothing has to be repaired at
-the end; and moves at full size are those of the Metropolis method, which end in a fluid of hard
-spheres in equilibrium, not in the pattern of the squeeze.
+Random sequential insertion jams at a filling factor of about one third. Here the beads that do
+not fit enter at a fraction of their radius. Then all beads make random moves, and each bead that
+is not yet of full size grows as far as its neighbours allow. Beads never overlap. Further
+Metropolis moves at full size lead to the equilibrium of a hard-sphere fluid.
 
-Where a few beads in a tight box have locked one another, a new attempt begins: all enter small,
-and grow more slowly than before.
+When beads lock each other in a tight box, a new attempt begins: all enter small, and grow more
+slowly than before.
 """
 
 from __future__ import annotations
@@ -20,37 +18,43 @@ import numpy as np
 from nanorocks_ros.numerics.compiled import compiled, kernel
 from nanorocks_ros.numerics.counter_rng import hashed
 from nanorocks_ros.simulation.packing.cell_list import Packing, is_free
-from nanorocks_ros.simulation.packing.monte_carlo import adapt, first_steps, insert, move_all, stir
+from nanorocks_ros.simulation.packing.monte_carlo import (
+    adapt_steps,
+    equilibrate,
+    initial_steps,
+    insert_at_random,
+    metropolis_sweep,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Squares of distances keep this clear: more than rounding, so that all gaps are positive.
+# Factor on the least squared distance: more than rounding, so that all gaps are positive.
 _APART = 1.0 + 1e-12
 
 # Tries of one size before a bead shrinks, and how often it may: 0.8^40 is 1/7500.
 _TRIES = 100
 _SHRINKS = 40
 
-# Sweeps (tries to move each bead) at full size, and more where they cost little. At a filling
-# of 0.45 they take a bead 0.6 of its diameter from where it was, and neighbours then touch as
-# often as after three times as many; waves of density longer than some 20 diameters take more.
+# Sweeps at full size, and additional moves for few beads. At a filling of 0.45 they displace a
+# bead by 0.6 of its diameter, and the contact value is that of three times as many sweeps; waves
+# of density longer than some 20 diameters would take more.
 _LAST_SWEEPS = 300
 _LAST_MOVES = 30_000
 
-# A bead that cannot grow as much as it should is offered 1/2, 1/4, ... 1/2^8 of that, sweep by
-# sweep: a marble among grains finds no more room than that.
+# A bead that cannot grow by the full step tries 1/2, 1/4, ... 1/2^8 of it, sweep by sweep: a
+# large bead among small ones has no more room.
 _PARTS = 8
 
-# Size at which beads enter a new attempt, and what they may grow in a sweep of the first of
-# them; then half of that, and so on: the slower, the better they arrange themselves.
+# Size at which beads enter a new attempt, and largest growth per sweep in the first attempt; it
+# is halved in each further one, since slower growth packs better.
 _SMALL = 0.5
 _PACE = 0.01
 
-# No new attempt after so many moves: some seconds.
+# No new attempt after this many moves: some seconds.
 _MOST_MOVES = 6_000_000
-# An attempt ends after so many sweeps, and more where they cost little; or earlier, when the
-# beads lack more than this part of what they lacked at half the time.
+# An attempt ends after this many sweeps (more for few beads), or earlier, when the missing size
+# is more than this fraction of that at half the time.
 _MOST_SWEEPS = 2000
 _LITTLE_PROGRESS = 0.8
 _FIRST_CHECK = 250
@@ -58,15 +62,15 @@ _FIRST_CHECK_MOVES = 20_000
 
 
 @compiled
-def grown(packing: Packing, placed: int, key: np.uint64) -> bool:
-    """Find places for beads that fill a box too densely to be put there one after the other.
+def grow_while_moving(packing: Packing, placed: int, key: np.uint64) -> bool:
+    """Find positions for beads that are too dense for random sequential insertion.
 
     Parameters
     ----------
     packing : Packing
     placed : int
-        How many are in the box: the last ones of the order. Without success, they will be
-        where they are now.
+        Beads in the box: the last ones of the order. On failure their positions are
+        restored.
     key : uint64
 
     Returns
@@ -83,25 +87,25 @@ def grown(packing: Packing, placed: int, key: np.uint64) -> bool:
     inside = placed
     while moves < _MOST_MOVES:
         enter_key, grow_key = hashed(key, 3 * attempt), hashed(key, 3 * attempt + 1)
-        if insert(packing, inside, enter_key, _TRIES, _SHRINKS) < n:
+        if insert_at_random(packing, inside, enter_key, _TRIES, _SHRINKS) < n:
             break
-        # The first attempt goes on from what is there, as fast as it can.
+        # The first attempt continues from the present state, at the fastest pace.
         sweeps, lack = _grow(packing, 1.0 if attempt == 0 else pace, grow_key)
         if lack == 0.0:
-            stir(packing, hashed(key, 3 * attempt + 2), _LAST_SWEEPS + _LAST_MOVES // n)
+            equilibrate(packing, hashed(key, 3 * attempt + 2), _LAST_SWEEPS + _LAST_MOVES // n)
             return _are_apart(packing)
         moves += sweeps * n
         pace *= 0.5
         attempt += 1
-        _take_out(packing)
+        _empty_box(packing)
         inside = 0
-    _put_back(packing, before)
+    _restore_positions(packing, before)
     return False
 
 
 @compiled
 def _grow(packing: Packing, pace: float, key: np.uint64) -> tuple[int, float]:
-    """Move all beads and let them grow, until they are full or do not get on.
+    """Move all beads and let them grow, until all have full size or growth stalls.
 
     Parameters
     ----------
@@ -117,14 +121,14 @@ def _grow(packing: Packing, pace: float, key: np.uint64) -> tuple[int, float]:
         What all beads lack of full size, in radii.
     """
     n = packing.radii.size
-    steps, tallies = first_steps(packing)
-    most = _MOST_SWEEPS + _MOST_MOVES // n
+    steps, tallies = initial_steps(packing)
+    max_sweeps = _MOST_SWEEPS + _MOST_MOVES // n
     check = _FIRST_CHECK + _FIRST_CHECK_MOVES // n + np.int64(1.0 / pace)
     lacked = np.inf
     lack = np.inf
-    for sweep in range(1, most + 1):
-        move_all(packing, steps, tallies, hashed(key, sweep))
-        adapt(packing, steps, tallies)
+    for sweep in range(1, max_sweeps + 1):
+        metropolis_sweep(packing, steps, tallies, hashed(key, sweep))
+        adapt_steps(packing, steps, tallies)
         lack = _grow_all(packing, pace, 1.0 / (1 << (1 + sweep % _PARTS)))
         if lack == 0.0:
             return sweep, lack
@@ -133,12 +137,12 @@ def _grow(packing: Packing, pace: float, key: np.uint64) -> tuple[int, float]:
                 return sweep, lack
             lacked = lack
             check *= 2
-    return most, lack
+    return max_sweeps, lack
 
 
 @kernel
 def _grow_all(packing: Packing, pace: float, part: float) -> float:
-    """Let beads grow where there is room; returns what all lack of full size, in radii.
+    """Let beads grow where there is room; returns the missing size of all beads, in radii.
 
     Parameters
     ----------
@@ -177,8 +181,8 @@ def _are_apart(packing: Packing) -> bool:
 
 
 @kernel
-def _take_out(packing: Packing) -> None:
-    """Empty the box, and make all beads small."""
+def _empty_box(packing: Packing) -> None:
+    """Empty the box and reset all beads to the small size."""
     for cell in range(packing.heads.size):
         packing.heads[cell] = -1
     for i in range(packing.radii.size):
@@ -186,8 +190,8 @@ def _take_out(packing: Packing) -> None:
 
 
 @kernel
-def _put_back(packing: Packing, positions: NDArray[np.float64]) -> None:
-    """Put beads where they were."""
+def _restore_positions(packing: Packing, positions: NDArray[np.float64]) -> None:
+    """Restore stored positions."""
     for i in range(packing.radii.size):
         for axis in range(3):
             packing.positions[i, axis] = positions[i, axis]

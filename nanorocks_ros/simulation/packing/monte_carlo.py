@@ -1,4 +1,4 @@
-"""What beads in a box can do one by one: enter at random places, and move at random.
+"""Random sequential insertion of beads in a box, and Metropolis moves.
 
 References
 ----------
@@ -18,9 +18,9 @@ from nanorocks_ros.simulation.packing.cell_list import (
     GRIDS,
     Packing,
     cell_of,
-    enter,
+    enter_cell,
     is_free,
-    leave,
+    leave_cell,
 )
 
 if TYPE_CHECKING:
@@ -40,8 +40,10 @@ _ONE_IN = 5
 
 
 @kernel
-def insert(packing: Packing, placed: int, key: np.uint64, tries: int, shrinks: int) -> int:
-    """Put beads at random places, the largest first, each clear of those before.
+def insert_at_random(
+    packing: Packing, placed: int, key: np.uint64, tries: int, shrinks: int
+) -> int:
+    """Insert beads at random positions, the largest first, without overlap.
 
     Parameters
     ----------
@@ -76,51 +78,51 @@ def insert(packing: Packing, placed: int, key: np.uint64, tries: int, shrinks: i
             counter += 3
             if is_free(packing, i):
                 break
-        enter(packing, cell_of(packing, i), i)
+        enter_cell(packing, cell_of(packing, i), i)
     return n
 
 
 @kernel
 def _draw_place(packing: Packing, i: int, key: np.uint64, counter: int) -> None:
-    """Put a bead anywhere in the box where it is clear of the walls."""
+    """Draw a random position of a bead, clear of the walls."""
     radius = packing.radii[i]
     for axis in range(3):
         if packing.periodic[axis]:
-            at = packing.sides[axis] * uniform(key, counter + axis)
+            coordinate = packing.sides[axis] * uniform(key, counter + axis)
         else:
             free = packing.sides[axis] - 2.0 * radius
-            at = radius + free * uniform(key, counter + axis)
-        packing.positions[i, axis] = at
+            coordinate = radius + free * uniform(key, counter + axis)
+        packing.positions[i, axis] = coordinate
 
 
 @compiled
-def stir(packing: Packing, key: np.uint64, sweeps: int) -> None:
-    """Move the beads at random as they are, each so many times.
+def equilibrate(packing: Packing, key: np.uint64, sweeps: int) -> None:
+    """Equilibrate the beads by sweeps of random moves.
 
     The steps are adapted during the first half alone: with steps that do not depend on what
     happens, every arrangement of the beads becomes as likely as any other.
     """
-    steps, tallies = first_steps(packing)
+    steps, tallies = initial_steps(packing)
     for sweep in range(sweeps):
-        move_all(packing, steps, tallies, hashed(key, sweep))
+        metropolis_sweep(packing, steps, tallies, hashed(key, sweep))
         if 2 * sweep < sweeps:
-            adapt(packing, steps, tallies)
+            adapt_steps(packing, steps, tallies)
 
 
 @compiled
-def first_steps(packing: Packing) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Longest steps to begin with, and empty tallies: see `move_all`."""
+def initial_steps(packing: Packing) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Initial longest steps and empty tallies, see `metropolis_sweep`."""
     return _FIRST_STEP * packing.largest, np.zeros((GRIDS, 2), dtype=np.int64)
 
 
 @kernel
-def move_all(
+def metropolis_sweep(
     packing: Packing,
     steps: NDArray[np.float64],
     tallies: NDArray[np.int64],
     key: np.uint64,
 ) -> None:
-    """Try to move each bead once.
+    """Attempt one random move of each bead.
 
     Parameters
     ----------
@@ -141,37 +143,37 @@ def move_all(
             tallies[grid, 1] += 1
             after = cell_of(packing, i)
             if after != before:
-                leave(packing, before, i)
-                enter(packing, after, i)
+                leave_cell(packing, before, i)
+                enter_cell(packing, after, i)
         else:
             positions[i, 0], positions[i, 1], positions[i, 2] = x, y, z
 
 
 @kernel
 def _step(packing: Packing, i: int, longest: float, key: np.uint64) -> bool:
-    """Displace a bead at random; False when a wall is in the way."""
+    """Displace a bead at random; False when it would cross a wall."""
     radius = packing.radii[i]
     for axis in range(3):
         side = packing.sides[axis]
         part = 2.0 * uniform(key, 3 * i + axis) - 1.0
-        at = packing.positions[i, axis]
+        coordinate = packing.positions[i, axis]
         if packing.periodic[axis]:
-            at += part * min(longest, 0.5 * side)
-            if at < 0.0:
-                at += side
-            if at >= side:
-                at -= side
+            coordinate += part * min(longest, 0.5 * side)
+            if coordinate < 0.0:
+                coordinate += side
+            if coordinate >= side:
+                coordinate -= side
         else:
-            at += part * min(longest, 0.5 * side - radius)
-            if at < radius or at > side - radius:
+            coordinate += part * min(longest, 0.5 * side - radius)
+            if coordinate < radius or coordinate > side - radius:
                 return False
-        packing.positions[i, axis] = at
+        packing.positions[i, axis] = coordinate
     return True
 
 
 @kernel
-def adapt(packing: Packing, steps: NDArray[np.float64], tallies: NDArray[np.int64]) -> None:
-    """Lengthen the steps of a grid of which enough moves are done, or shorten them."""
+def adapt_steps(packing: Packing, steps: NDArray[np.float64], tallies: NDArray[np.int64]) -> None:
+    """Adapt the steps of each grid to its acceptance rate."""
     longest = max(packing.sides[0], packing.sides[1], packing.sides[2])
     for grid in range(GRIDS):
         tried, done = tallies[grid, 0], tallies[grid, 1]

@@ -1,4 +1,4 @@
-"""Beads at random places in a box, none overlapping another."""
+"""Random non-overlapping positions of beads in a box."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.counter_rng import hashed
 from nanorocks_ros.numerics.stable_sort import stable_argsort
 from nanorocks_ros.simulation.packing.cell_list import Packing, new_packing
-from nanorocks_ros.simulation.packing.grow_while_moving import grown
-from nanorocks_ros.simulation.packing.monte_carlo import insert
+from nanorocks_ros.simulation.packing.grow_while_moving import grow_while_moving
+from nanorocks_ros.simulation.packing.monte_carlo import insert_at_random
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,14 +30,14 @@ _GROWTH = 1 << 62
 _SPHERE = 4.0 / 3.0 * math.pi
 
 
-def placed_at_random(
+def random_positions(
     radii: ArrayLike,
     sides: Sequence[float],
     *,
     periodic: bool | Sequence[bool] = False,
     key: np.uint64,
 ) -> NDArray[np.float64]:
-    """Random places for beads in a box: see `place`.
+    """Random positions of beads in a box, see `pack_beads`.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def placed_at_random(
     periodic : bool or sequence of 3 bools
         Axes along which the box repeats itself, in place of walls.
     key : uint64
-        Of `randomness.key_for`.
+        Of `counter_rng.key_for`.
 
     Returns
     -------
@@ -56,13 +56,13 @@ def placed_at_random(
     Raises
     ------
     SimulationError
-        When a radius or a side cannot be, or no room is found for all beads.
+        For an invalid radius or side, or when the beads do not fit.
     """
     sizes = _positive('radii', radii, None)
     box = _positive('box', sides, 3)
     around = _three_flags(periodic)
     _check_room(sizes, box)
-    positions, placed = place(sizes, box, around, key, MOST_TRIES)
+    positions, placed = pack_beads(sizes, box, around, key, MOST_TRIES)
     if placed < sizes.size:
         raise SimulationError(
             'beads',
@@ -74,7 +74,7 @@ def placed_at_random(
 
 
 def _positive(name: str, values: ArrayLike, size: int | None) -> NDArray[np.float64]:
-    """A copy of some numbers, refused when they are no lengths."""
+    """A copy of an array of lengths; refused unless finite and positive."""
     try:
         array = np.array(values, dtype=np.float64, order='C')
     except (TypeError, ValueError) as error:
@@ -120,17 +120,17 @@ def _filling(radii: NDArray[np.float64], box: NDArray[np.float64]) -> float:
 
 
 @compiled
-def place(
+def pack_beads(
     radii: NDArray[np.float64],
     sides: NDArray[np.float64],
     periodic: tuple[bool, bool, bool] | NDArray[np.bool_],
     key: np.uint64,
     most_tries: int,
 ) -> tuple[NDArray[np.float64], int]:
-    """Put beads at random places in a box, none overlapping another.
+    """Place beads at random in a box, without overlap.
 
     One after the other, the largest first, each at the first random place that is clear of
-    those before. When one finds none, they are made to fit by `placement_growth`.
+    those before. When one fails, `grow_while_moving` packs them.
 
     Parameters
     ----------
@@ -141,14 +141,14 @@ def place(
         nearest images; elsewhere, beads are clear of both walls.
     key : uint64
     most_tries : int
-        For one bead, before it is made to fit.
+        For one bead, before `grow_while_moving`.
 
     Returns
     -------
     positions : ndarray (n, 3), [m]
     placed : int
-        Beads for which there was room. When it is less than n, these are the largest, equals
-        from the last; the others have no valid position.
+        Beads that were placed. When fewer than n, these are the largest, equal ones from the
+        last; the others have no valid position.
     """
     n = radii.size
     for i in range(n):
@@ -156,8 +156,8 @@ def place(
             if not (radii[i] > 0.0 and 2.0 * radii[i] < sides[axis]):
                 return np.zeros((n, 3)), 0
     packing = _packing(radii, sides, periodic)
-    placed = insert(packing, 0, key, most_tries, 0)
-    if placed < n and grown(packing, placed, hashed(key, _GROWTH)):
+    placed = insert_at_random(packing, 0, key, most_tries, 0)
+    if placed < n and grow_while_moving(packing, placed, hashed(key, _GROWTH)):
         placed = n
     return packing.positions, placed
 
@@ -168,7 +168,7 @@ def _packing(
     sides: NDArray[np.float64],
     periodic: tuple[bool, bool, bool] | NDArray[np.bool_],
 ) -> Packing:
-    """Copies of what is given, so that beads of arrays and of tuples are compiled once."""
+    """A packing of copies in fixed types, so that it is compiled once."""
     box = np.empty(3)
     around = np.empty(3, dtype=np.bool_)
     for axis in range(3):

@@ -1,1 +1,1 @@
-"""The whole plate with its eight trays, as the flight camera sees it."""
+"""Simulated pictures of the whole plate with its eight trays."""

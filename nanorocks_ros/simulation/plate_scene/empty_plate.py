@@ -1,6 +1,6 @@
-"""The empty scene: the aluminium plate with its cells, in its housing, as the lens shows it.
+"""The empty scene: the aluminium plate with its cells and housing, through the lens.
 
-Painted once, in the rectified picture at twice the scale, then seen through the lens.
+Painted once in the rectified picture at twice the scale, then remapped through the lens.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def empty_scene(
     chalk : dict of int to float
         Dust in each tray, 0 to 2.
     seed : int
-        Of all that is random in it.
+        Of all random parts.
 
     Returns
     -------
@@ -67,19 +67,19 @@ def empty_scene(
     corner = np.array([left - margin, top - margin])
     painting = _Painting(geometry, margin, rng)
     for number, region in geometry.regions.items():
-        # Of its own random numbers: dust in one cell changes nothing in another.
+        # Each cell has its own random numbers: dust in one changes nothing in another.
         dice = np.random.default_rng([seed, number])
         painting.cell(region, corner, chalk.get(number, 0.0), dice)
     painted, opaque = painting.finished(np.hypot(_PIXEL_BLUR, defocus) * _FINE)
     rows, columns = geometry.shape
     grid = np.mgrid[0:rows, 0:columns][::-1].transpose(1, 2, 0) + 0.5
     source = ((geometry.camera.rectified(grid) - corner) * _FINE - 0.5).astype(np.float32)
-    seen, share = (
-        cv2.remap(one, source[..., 0], source[..., 1], cv2.INTER_LINEAR, borderValue=0)
-        for one in (painted, opaque)
+    colour, opacity = (
+        cv2.remap(layer, source[..., 0], source[..., 1], cv2.INTER_LINEAR, borderValue=0)
+        for layer in (painted, opaque)
     )
     around = _housing(geometry.shape, rng)
-    scene = around + share[..., np.newaxis] * (seen - around)
+    scene = around + opacity[..., np.newaxis] * (colour - around)
     levels = np.asarray(np.clip(scene, 0.0, 255.0) * LEVEL + 0.5, dtype=np.uint16)
     return np.ascontiguousarray(levels.transpose(2, 0, 1))
 
@@ -87,19 +87,19 @@ def empty_scene(
 def streaks(
     shape: tuple[int, int], rng: np.random.Generator, along: float, across: float
 ) -> Picture:
-    """Noise of standard deviation 1 that holds over some pixels along rows and across them."""
-    # Smooth noise is made small and enlarged.
+    """Noise of standard deviation 1 with given correlation lengths along and across rows, [px]."""
+    # Smooth noise is computed on a coarse grid and enlarged.
     steps = max(int(across / _SMOOTH), 1), max(int(along / _SMOOTH), 1)
     small = shape[0] // steps[0] + 2, shape[1] // steps[1] + 2
     raw = rng.standard_normal(small, dtype=np.float32)
     smooth = cv2.GaussianBlur(raw, (0, 0), sigmaX=along / steps[1], sigmaY=across / steps[0])
-    whole = small[1] * steps[1], small[0] * steps[0]
-    large = cv2.resize(smooth / smooth.std(), whole, interpolation=cv2.INTER_CUBIC)
+    size = small[1] * steps[1], small[0] * steps[0]
+    large = cv2.resize(smooth / smooth.std(), size, interpolation=cv2.INTER_CUBIC)
     return np.asarray(large[: shape[0], : shape[1]], dtype=np.float32)
 
 
 class _Painting:
-    """The plate in the rectified picture, finer than that."""
+    """Painting of the plate in the rectified picture, at `_FINE` times its scale."""
 
     def __init__(self, geometry: SceneGeometry, margin: int, rng: np.random.Generator) -> None:
         self._metre = geometry.scale * _FINE
@@ -125,12 +125,12 @@ class _Painting:
         chalk: float,
         rng: np.random.Generator,
     ) -> None:
-        """Mill a cell into the plate: a chamfer around, a floor, the shadow of its walls."""
+        """Paint a cell: a chamfer, a floor, the shadow of its walls."""
         left, top = (
             (place - c) * _FINE for place, c in zip((region.x, region.y), corner, strict=True)
         )
         right, bottom = left + region.width * _FINE, top + region.height * _FINE
-        # Those that face the lamp, at the upper left, are the far ones of a hole.
+        # In a hole, the faces away from the lamp (upper left) are the lit ones.
         self._bevel(left, top, right, bottom, _CHAMFER, (0.50, 0.44, 1.42, 1.55))
         rows = slice(round(top), round(bottom))
         columns = slice(round(left), round(right))
@@ -145,11 +145,11 @@ class _Painting:
         self._image[rows, columns] = floor
 
     def finished(self, blur: float) -> tuple[Picture, Picture]:
-        """The painting and where it is opaque, both blurred by so many of its pixels."""
-        # What is around the plate takes its colour, so that its edge stays its own when blurred.
+        """The painting and its opacity, both blurred."""
+        # The margin has the colour of the plate, so that blur does not change that of its edge.
         image, opaque = (
-            np.asarray(cv2.GaussianBlur(one, (0, 0), blur), dtype=np.float32)
-            for one in (self._image, self._opaque)
+            np.asarray(cv2.GaussianBlur(layer, (0, 0), blur), dtype=np.float32)
+            for layer in (self._image, self._opaque)
         )
         return image, opaque
 
@@ -162,7 +162,7 @@ class _Painting:
         width: float,
         light: tuple[float, float, float, float],
     ) -> None:
-        """Light on four slanted faces: left, top, right, bottom; outside, or inside if below 0."""
+        """Light on four slanted faces: left, top, right, bottom; inside if `width` is negative."""
         reach = width * self._metre
         image, depths = self._around(left, top, right, bottom, max(reach, 0.0))
         outside, face = depths.max(axis=0), depths.argmax(axis=0)
@@ -173,7 +173,7 @@ class _Painting:
     def _around(
         self, left: float, top: float, right: float, bottom: float, reach: float
     ) -> tuple[Picture, Picture]:
-        """The painting about a rectangle, and how far outside of each of its sides that is."""
+        """The painting around a rectangle, and the distance outside each of its sides."""
         low, high = max(int(left - reach) - 1, 0), max(int(top - reach) - 1, 0)
         columns = slice(low, int(right + reach) + 2)
         rows = slice(high, int(bottom + reach) + 2)
@@ -183,7 +183,7 @@ class _Painting:
         return image, np.asarray(depths, dtype=np.float32)
 
     def _mill_marks(self, shape: tuple[int, int], rng: np.random.Generator) -> Picture:
-        """Arcs of a cutter that went along the cell."""
+        """Arcs of a milling cutter along the cell."""
         y, x = np.ogrid[0.5 : shape[0], 0.5 : shape[1]]
         spacing, radius = 0.0011 * self._metre, 0.006 * self._metre
         bow = np.sqrt(np.maximum(radius**2 - (y - 0.5 * shape[0]) ** 2, 0.0))
@@ -191,7 +191,7 @@ class _Painting:
         return np.asarray(marks * (0.6 + 0.4 * streaks(shape, rng, 30, 30)), np.float32)
 
     def _wall_shadow(self, shape: tuple[int, int]) -> Picture:
-        """Light that reaches the floor past the walls: less at those near the lamp."""
+        """Light on the floor between the walls: less near the walls at the lamp."""
         y, x = np.ogrid[0.5 : shape[0], 0.5 : shape[1]]
         x, y = x / self._metre, y / self._metre
         width, height = shape[1] / self._metre, shape[0] / self._metre
@@ -208,13 +208,13 @@ class _Painting:
         chalk: float,
         rng: np.random.Generator,
     ) -> None:
-        """Chalk on the walls and what was spilt beside the cell."""
+        """Chalk on the walls and beside the cell."""
         fall = 0.0006 * self._metre
         image, depths = self._around(left, top, right, bottom, 6.0 * fall)
-        share = 0.45 * chalk * np.exp(-np.maximum(depths.max(axis=0), 0.0) / fall)
-        patches = 0.5 + 0.5 * streaks((share.shape[0], share.shape[1]), rng, 9.0, 9.0)
-        share = np.clip(share * patches, 0.0, 0.8)[..., np.newaxis]
-        image += share * (np.array([214.0, 217.0, 219.0], np.float32) - image)
+        opacity = 0.45 * chalk * np.exp(-np.maximum(depths.max(axis=0), 0.0) / fall)
+        patches = 0.5 + 0.5 * streaks((opacity.shape[0], opacity.shape[1]), rng, 9.0, 9.0)
+        opacity = np.clip(opacity * patches, 0.0, 0.8)[..., np.newaxis]
+        image += opacity * (np.array([214.0, 217.0, 219.0], np.float32) - image)
 
     def _screw(self, x: float, y: float) -> None:
         radius = _SCREW * self._metre
@@ -236,7 +236,7 @@ class _Painting:
 
 
 def _housing(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
-    """What is behind the plate: dark, out of focus, with the three springs that hold it."""
+    """Background of the plate: dark, out of focus, with the three springs."""
     small = shape[0] // 4 + 1, shape[1] // 4 + 1
     uneven = 1.0 + 0.16 * streaks(small, rng, 40.0, 40.0) + 0.03 * streaks(small, rng, 1.0, 1.0)
     image = np.asarray(uneven[..., np.newaxis] * _HOUSING, dtype=np.float32)

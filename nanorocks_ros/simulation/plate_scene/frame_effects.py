@@ -1,4 +1,4 @@
-"""Passes over the pixels of a frame: the shifted plate, added glare, light, noise, gray levels."""
+"""Effects on the pixels of a frame: shift, glare, light, noise, gray levels."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 BLOCK = 16
 """Side of the squares that the shift of a picture is given for, [px]."""
 
-# Light and noise are whole numbers: parts of 2^13, and of 2^19 gray levels.
+# Fixed point: light in units of 2^-13, noise in 2^-19 gray levels.
 _LIGHT_BITS = 13
 _LEVEL_BITS = 6 + _LIGHT_BITS
 ONE = 1 << _LIGHT_BITS
@@ -34,7 +34,7 @@ def shift_blocks(
     left: int,
     top: int,
 ) -> None:
-    """Copy a part of a still picture from places between its pixels (bilinear).
+    """Copy part of a still picture with a local shift (bilinear).
 
     Parameters
     ----------
@@ -42,14 +42,14 @@ def shift_blocks(
         Written, in the part only.
     still : ndarray of uint16, (3, rows, columns)
     shifts : ndarray (m, n, 2), [px]
-        How far, along columns and rows, what is seen in each square of the part has moved;
-        along rows the shift goes evenly from the middle of a square to that of the next.
+        Shift of each square along columns and rows; along rows it is interpolated linearly
+        between the centres of squares.
     left, top : int, [px]
         Corner of the first square. All must lie so far inside that no source is outside.
     """
     columns = BLOCK * shifts.shape[1]
     share = np.empty((2, columns), dtype=np.float32)
-    whole = np.empty((2, columns), dtype=np.int64)
+    offset = np.empty((2, columns), dtype=np.int64)
     for a in range(shifts.shape[0]):
         for k in range(columns):
             place = min(max((k + 0.5) / BLOCK - 0.5, 0.0), shifts.shape[1] - 1.0)
@@ -58,9 +58,9 @@ def shift_blocks(
             for axis in range(2):
                 before, change = shifts[a, b, axis], shifts[a, after, axis] - shifts[a, b, axis]
                 source = -(before + (place - b) * change)
-                whole[axis, k] = math.floor(source)
-                share[axis, k] = source - whole[axis, k]
-        _shift_rows(picture, still, share, whole, left, top + BLOCK * a)
+                offset[axis, k] = math.floor(source)
+                share[axis, k] = source - offset[axis, k]
+        _shift_rows(picture, still, share, offset, left, top + BLOCK * a)
 
 
 @kernel
@@ -68,16 +68,16 @@ def _shift_rows(
     picture: NDArray[np.uint16],
     still: NDArray[np.uint16],
     share: NDArray[np.float32],
-    whole: NDArray[np.int64],
+    offset: NDArray[np.int64],
     left: int,
     top: int,
 ) -> None:
-    """Some rows, in pieces that come from the same whole number of pixels away."""
+    """Shift some rows, in pieces of equal integer offset."""
     start = 0
-    while start < whole.shape[1]:
-        across, down = whole[0, start], whole[1, start]
+    while start < offset.shape[1]:
+        across, down = offset[0, start], offset[1, start]
         end = start + 1
-        while end < whole.shape[1] and whole[0, end] == across and whole[1, end] == down:
+        while end < offset.shape[1] and offset[0, end] == across and offset[1, end] == down:
             end += 1
         first, last = left + start + across, left + end + across
         for line in range(top, top + BLOCK):
@@ -100,7 +100,7 @@ def _blend(
     across: NDArray[np.float32],
     down: NDArray[np.float32],
 ) -> None:
-    """A row of pixels between four others each."""
+    """Bilinear interpolation of a row of pixels."""
     for j in range(target.size):
         x, y = across[j], down[j]
         high = np.float32(upper[j]) + x * (np.float32(upper[j + 1]) - np.float32(upper[j]))
@@ -110,7 +110,7 @@ def _blend(
 
 @kernel
 def add_light(canvas: NDArray[np.uint16], glare: NDArray[np.uint16], left: int, top: int) -> None:
-    """Add light to a part of a canvas; what is brighter than white stays white.
+    """Add light to part of a canvas, limited to white.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def _add_row(line: NDArray[np.uint16], light: NDArray[np.uint16]) -> None:
 
 @compiled
 def noise_strip(columns: int, noise: float, key: np.uint64) -> NDArray[np.int32]:
-    """Sensor noise for rows to start in at any place, [gray levels / 2^19].
+    """Strip of sensor noise from which each row takes a random piece, [gray levels / 2^19].
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def expose(
     key: np.uint64,
     picture: NDArray[np.uint8],
 ) -> None:
-    """Turn a canvas into gray levels under uneven light, with noise.
+    """Convert a canvas to gray levels under uneven light, with noise.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The LEDs, mirrored in the window over trays 2 and 4.
+"""Glare: mirror images of the LEDs in the window over trays 2 and 4.
 
 A flat window that moves within its own plane shows its mirror images where they were: the glare
 stays while the plate swings.

@@ -1,4 +1,4 @@
-"""How brightly the picture is lit: darker towards its edges, with bands that roll over it."""
+"""Illumination of the picture: vignetting, gradient and rolling bands."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _BANDS = 1.4
 
 
 class Illumination:
-    """Light over the picture as a product of two factors, 1 in the middle.
+    """Illumination as a product of two factors, along columns and rows, 1 in the middle.
 
     Parameters
     ----------
@@ -37,10 +37,10 @@ class Illumination:
         self._across = np.exp(-lost * x * x) * (1.0 - tilt * x)
         self._down = np.exp(-lost * y * y) * (1.0 - 0.5 * tilt * y * columns / rows)
         self._phase = 2.0 * math.pi * _BANDS * np.arange(rows) / rows
-        self.across: NDArray[np.uint32] = _parts(self._across)
+        self.column_factors: NDArray[np.uint32] = _parts(self._across)
 
-    def down(self, time: float) -> NDArray[np.uint32]:
-        """Light along a column at a time [s], (rows,), in parts of 2^13."""
+    def row_factors(self, time: float) -> NDArray[np.uint32]:
+        """Illumination of each row at a time [s], (rows,), in units of 2^-13."""
         angle = 2.0 * math.pi * time / self._period - self._phase
         return _parts(self._down * (1.0 + self._flicker * np.sin(angle)))
 

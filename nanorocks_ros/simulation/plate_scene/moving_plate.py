@@ -1,4 +1,4 @@
-"""The empty plate where its springs have taken it."""
+"""The empty plate, displaced on its springs."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.plate import Region
     from nanorocks_ros.simulation.plate_scene.scene_geometry import SceneGeometry
 
-# Around the plate the shift falls to nothing within so many squares.
+# Around the plate the shift falls to 0 within this many squares.
 _FADE = 2
 
 FURTHEST_PX = BLOCK - 1
-"""A plate that is displaced by so much, or more, cannot be drawn, [px]."""
+"""Limit of the displacement of the plate, [px]."""
 
 
 class MovingPlate:
-    """A canvas that holds the empty scene, and is drawn anew only where it must be.
+    """A canvas with the empty scene, redrawn only where it has changed.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class MovingPlate:
     still : ndarray of uint16, (3, rows, columns)
         The scene with the plate in its place.
     drawn_on : sequence of Region, [px]
-        Where the canvas is drawn on, besides on the trays.
+        Regions that are drawn on, besides the trays.
     """
 
     def __init__(
@@ -61,8 +61,8 @@ class MovingPlate:
         ]
         self._drawn_on = list(drawn_on)
 
-    def moved_to(self, displacement: tuple[float, float]) -> NDArray[np.uint16]:
-        """The canvas with the plate that far from its place [m]; to be drawn on.
+    def displaced(self, displacement: tuple[float, float]) -> NDArray[np.uint16]:
+        """The canvas with the plate displaced, [m]; the caller draws on it.
 
         Raises
         ------
@@ -95,7 +95,7 @@ class MovingPlate:
     def _local_shifts(
         self, geometry: SceneGeometry, down: int, across: int
     ) -> NDArray[np.float64]:
-        """What a shift of one pixel of the rectified picture makes of each square."""
+        """Shift of each square for a shift of one pixel of the rectified picture."""
         middle = BLOCK * (np.mgrid[0:down, 0:across][::-1].transpose(1, 2, 0) + 0.5)
         points = geometry.camera.rectified(middle + np.array([self._left, self._top]))
         lens = geometry.local_scales(points.reshape(-1, 2)).reshape(down, across, 2, 2)

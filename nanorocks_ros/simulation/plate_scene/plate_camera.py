@@ -1,4 +1,4 @@
-"""The camera over the plate: from the places of all beads to the picture of the scene."""
+"""The camera over the plate: from bead positions to the picture of the scene."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class SceneCamera:
     Raises
     ------
     ConfigurationError
-        For a lens that cannot be, or a plate that does not fit into the picture.
+        For an invalid lens, or a plate that does not fit into the picture.
     SimulationError
-        For beads that the trays do not hold.
+        For radii that do not match the beads of the trays.
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class SceneCamera:
         SimulationError
             For positions of another shape, or not finite.
         """
-        canvas = self._plate.moved_to(motion.displacement)
+        canvas = self._plate.displaced(motion.displacement)
         self._painter.paint(canvas, positions, motion.displacement, turned)
         if self._glare is not None:
             x, y, _, _ = self._glare.region
@@ -119,8 +119,8 @@ class SceneCamera:
         picture = np.empty((rows, columns, 3), dtype=np.uint8)
         expose(
             canvas,
-            self._light.across,
-            self._light.down(time),
+            self._light.column_factors,
+            self._light.row_factors(time),
             self._strip,
             np.uint64(hashed(self._noise_key, number)),
             picture.reshape(rows, 3 * columns),

@@ -1,4 +1,4 @@
-"""All trays of the plate, shaken together and filmed, with the truth about every bead."""
+"""Film of all trays of the plate, shaken together, with the true state of every bead."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from nanorocks_ros.errors import ConfigurationError, SimulationError
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.records import BeadsTruth, Frame, GroundTruth
 from nanorocks_ros.settings import problem, rows, with_values
-from nanorocks_ros.simulation.initial_state import stock
-from nanorocks_ros.simulation.plate_scene.drawing.bead_appearance import turned_since
+from nanorocks_ros.simulation.initial_state import inventory
+from nanorocks_ros.simulation.plate_scene.drawing.bead_appearance import turned_angle
 from nanorocks_ros.simulation.plate_scene.moving_plate import FURTHEST_PX
 from nanorocks_ros.simulation.plate_scene.plate_camera import SceneCamera
 from nanorocks_ros.simulation.plate_scene.plate_oscillation import plate_motion, wall_motion_of
@@ -46,23 +46,23 @@ _EFFECTS: tuple[str, ...] = (
 
 
 def without_effects(scene: SceneSettings) -> SceneSettings:
-    """The same plate through a perfect camera, at rest, in even light; clean, round beads.
+    """The settings without effects: perfect camera, plate at rest, even light, clean round beads.
 
-    They are shaded all the same, as in a film of a single tray.
+    Beads are still shaded, as in a film of a single tray.
     """
     return with_values(scene, dict.fromkeys(_EFFECTS, 0.0), 'no effects')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneMoment:
-    """One frame of the scene and what is true of it.
+    """One frame of the scene and its ground truth.
 
     Parameters
     ----------
     frame : Frame
         ``bgr8``.
     trays : tuple of GroundTruth
-        Of each tray as a whole; speeds past the camera.
+        Of each tray; speeds relative to the camera.
     beads : tuple of BeadsTruth
         Of each tray; relative to its floor.
     """
@@ -73,7 +73,7 @@ class SceneMoment:
 
 
 class SceneFilm:
-    """A film of the plate; frames are made when they are asked for.
+    """A film of the plate; each frame is computed on demand.
 
     Parameters
     ----------
@@ -84,12 +84,12 @@ class SceneFilm:
     trays : mapping of int to Tray, optional
         All cells of the plate; by default those that were flown.
     gases : mapping of int to SimulationSettings, optional
-        Of trays whose gas differs; seed, shaking events and camera are common to all.
+        Settings of trays that differ; seed, shaking events and camera are shared.
 
     Raises
     ------
     ConfigurationError
-        For a setting outside its range, or trays that cannot be filmed together.
+        For a setting outside its range, or trays that do not fit together.
     SimulationError
         When beads do not fit into their tray.
     """
@@ -101,32 +101,32 @@ class SceneFilm:
         trays: Mapping[int, Tray] | None = None,
         gases: Mapping[int, SimulationSettings] | None = None,
     ) -> None:
-        own = {
-            number: _in_common(simulation, (gases or {}).get(number, simulation))
+        gas_settings = {
+            number: _with_shared_settings(simulation, (gases or {}).get(number, simulation))
             for number in scene.trays
         }
         check_scene(scene)
-        for one in (simulation, *own.values()):
-            check_settings(one)
-            _check_swing(one, scene)
+        for checked in (simulation, *gas_settings.values()):
+            check_settings(checked)
+            _check_swing(checked, scene)
         self._simulation = simulation
         cells = dict(trays or load_trays())
         self._swing = wall_motion_of(simulation, scene)
         self._gases = {
-            number: _gas(own[number], scene, tray_by_number(cells, number))
+            number: _shaken_tray(gas_settings[number], scene, tray_by_number(cells, number))
             for number in sorted(scene.trays)
         }
-        self._species = {number: stock(cells[number]).species for number in self._gases}
+        self._species = {number: inventory(cells[number]).species for number in self._gases}
         radii = {number: gas.radii for number, gas in self._gases.items()}
         self.camera = SceneCamera(simulation, scene, cells, radii)
 
     def moments(self, frames: int | None = None, start_stamp_ns: int = 0) -> Iterator[SceneMoment]:
-        """Go from frame to frame; meant to be called once.
+        """Iterate over the frames; to be called once.
 
         Parameters
         ----------
         frames : int or None, >= 0
-            How many; None goes on for ever.
+            How many; None for an endless film.
         start_stamp_ns : int, [ns]
             Stamp of the first frame.
 
@@ -156,14 +156,14 @@ class SceneFilm:
         states = {tray: gas.at(time) for tray, gas in self._gases.items()}
         events = self._events(time)
         since = time - events[-1] if events else None
-        # A frame within rounding of the shake belongs to the shake.
+        # A frame at the time of the event, within rounding, shows the tray after it.
         motion = plate_motion(self._swing, None if since is None else max(since, 0.0))
         image = self.camera.picture(
             {tray: positions for tray, (positions, _) in states.items()},
             number,
             time=time,
             motion=motion,
-            turned=turned_since(time, events),
+            turned=turned_angle(time, events),
         )
         return SceneMoment(
             frame=Frame(stamp_ns=stamp_ns, encoding='bgr8', image=image),
@@ -201,21 +201,23 @@ class SceneFilm:
         )
 
 
-def _in_common(simulation: SimulationSettings, own: SimulationSettings) -> SimulationSettings:
-    """The gas of one tray, with what all trays of a film share."""
+def _with_shared_settings(
+    simulation: SimulationSettings, gas_settings: SimulationSettings
+) -> SimulationSettings:
+    """Settings of one tray, with the values that all trays of a film share."""
     names = ('seed', 'first_shake', 'shake_period', 'frame_rate', 'width_px', 'height_px')
-    return replace(own, **{name: getattr(simulation, name) for name in names})
+    return replace(gas_settings, **{name: getattr(simulation, name) for name in names})
 
 
-def _gas(simulation: SimulationSettings, scene: SceneSettings, tray: Tray) -> ShakenTray:
-    # Trays with the same beads must not do the same: the number of the tray is its run.
+def _shaken_tray(simulation: SimulationSettings, scene: SceneSettings, tray: Tray) -> ShakenTray:
+    # The number of the tray is its run, so that trays with the same beads differ.
     swing = wall_motion_of(simulation, scene) if scene.swing_knocks else None
-    one = replace(simulation, tray=tray.number)
-    return ShakenTray(one, tray, run=tray.number, swing=swing)
+    settings = replace(simulation, tray=tray.number)
+    return ShakenTray(settings, tray, run=tray.number, swing=swing)
 
 
 def _check_swing(simulation: SimulationSettings, scene: SceneSettings) -> None:
-    """Refuse a swing that would end the film at the first shaking event."""
+    """Refuse an oscillation that cannot be drawn or simulated."""
     furthest = FURTHEST_PX / scene.pixels_per_metre
     if scene.swing >= furthest:
         raise ConfigurationError(
@@ -239,10 +241,10 @@ def check_scene(scene: SceneSettings) -> None:
     ConfigurationError
         Naming every setting at fault.
     """
-    found = ((row.name, problem(row, row.default)) for row in rows(scene))
-    wrong = [f'{name}: {text}' for name, text in found if text]
+    problems = ((row.name, problem(row, row.default)) for row in rows(scene))
+    wrong = [f'{name}: {text}' for name, text in problems if text]
     if not scene.trays or len(set(scene.trays)) != len(scene.trays):
-        wrong.append(f'trays: {scene.trays} name none, or one twice')
+        wrong.append(f'trays: {scene.trays} is empty or has duplicates')
     if wrong:
         raise ConfigurationError(
             'scene', '; '.join(wrong), 'see docs/reference/parameters.md for names and ranges'

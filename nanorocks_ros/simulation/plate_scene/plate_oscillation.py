@@ -1,18 +1,18 @@
-"""The plate on its springs: a blow sets it swinging, and the swing dies away."""
+"""Damped oscillation of the plate on its springs after a shaking event."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from nanorocks_ros.simulation.engine.collision_rules import WallMotion
+from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 
 if TYPE_CHECKING:
     from nanorocks_ros.settings import SceneSettings, SimulationSettings
 
 
 class PlateMotion(NamedTuple):
-    """Where the plate is and how fast it moves, along columns and rows of the picture.
+    """Displacement and velocity of the plate, along columns and rows of the picture.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ AT_REST = PlateMotion((0.0, 0.0), (0.0, 0.0))
 
 
 def wall_motion_of(simulation: SimulationSettings, scene: SceneSettings) -> WallMotion | None:
-    """The swing after each shaking event, as the gas takes it; None for a plate at rest.
+    """Wall motion after each shaking event, for the gas; None for a plate at rest.
 
-    It ends after a whole number of periods, so that the plate is in its place at the next one.
+    It ends after a whole number of periods, so that the displacement is 0 at the next event.
     """
     periods = math.floor(simulation.shake_period * scene.swing_frequency)
     if scene.swing == 0.0 or periods < 1:
@@ -47,7 +47,7 @@ def wall_motion_of(simulation: SimulationSettings, scene: SceneSettings) -> Wall
 
 
 def plate_motion(motion: WallMotion | None, since: float | None) -> PlateMotion:
-    """Where the plate is some time after a shaking event.
+    """Motion of the plate some time after a shaking event.
 
     Parameters
     ----------

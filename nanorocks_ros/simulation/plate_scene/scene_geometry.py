@@ -1,4 +1,4 @@
-"""Where the plate, its trays and their beads are in the picture of the scene."""
+"""Geometry of the scene: plate, trays and beads in the picture."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import SceneSettings, SimulationSettings
 
-# Focal length of a lens that bends nothing by more than a thousandth of a pixel, [px].
+# Focal length at which the distortion stays below a thousandth of a pixel, [px].
 _STRAIGHT = 1e6
 _STEP_PX = 0.5
 
 
 def scene_camera(simulation: SimulationSettings, scene: SceneSettings) -> Camera:
-    """The camera that the scene is filmed with.
+    """The camera of the scene.
 
     Raises
     ------
     ConfigurationError
-        For a list of numbers that is too short or too long, or a lens that cannot be.
+        For a list of the wrong length, or an invalid lens.
     """
     if len(scene.lens_distortion) != 4 or len(scene.lens_offset_px) != 2:
         raise ConfigurationError(
@@ -63,7 +63,7 @@ def _camera(
 
 
 class SceneGeometry:
-    """Places on the plate and in the trays, in pixels of the picture that the lens makes.
+    """Positions on the plate and in the trays, in pixels of the distorted picture.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class SceneGeometry:
     Raises
     ------
     ConfigurationError
-        For a lens that cannot be, or a tray that has no place in the picture.
+        For an invalid lens, or a tray outside the picture.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class SceneGeometry:
         return column - across, row - down, column + across, row + down
 
     def rectified(self, tray: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points of a tray are in the rectified picture, while the plate is in its place.
+        """Positions of points of a tray in the rectified picture, with the plate at rest.
 
         Parameters
         ----------
@@ -113,7 +113,7 @@ class SceneGeometry:
         return np.asarray(places)[:, :2] * self.scale + corner
 
     def local_scales(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What the lens makes of a small step at points of the rectified picture.
+        """Jacobian of the distortion at points of the rectified picture.
 
         Parameters
         ----------
@@ -124,23 +124,23 @@ class SceneGeometry:
         ndarray (n, 2, 2)
             Change of (column, row) in the picture, for a step along columns and along rows.
         """
-        found = np.empty((len(points), 2, 2))
+        scales = np.empty((len(points), 2, 2))
         for axis in range(2):
             step = np.zeros(2)
             step[axis] = _STEP_PX
             ahead = self.camera.distorted(points + step)
             behind = self.camera.distorted(points - step)
-            found[:, :, axis] = (ahead - behind) / (2.0 * _STEP_PX)
-        return found
+            scales[:, :, axis] = (ahead - behind) / (2.0 * _STEP_PX)
+        return scales
 
     def bounds(self, left: float, top: float, right: float, bottom: float) -> Region:
-        """The smallest region of the picture that holds a rectangle of the rectified one, [px]."""
+        """Bounding region in the picture of a rectangle of the rectified picture, [px]."""
         sides = np.linspace(0.0, 1.0, 33)
         columns, rows = left + (right - left) * sides, top + (bottom - top) * sides
         edges = [np.column_stack([columns, np.full(33, row)]) for row in (top, bottom)]
         edges += [np.column_stack([np.full(33, column), rows]) for column in (left, right)]
-        seen = self.camera.distorted(np.concatenate(edges))
-        low = np.maximum(np.floor(seen.min(axis=0)), 0.0).astype(int)
-        high = np.minimum(np.ceil(seen.max(axis=0)), self.shape[::-1]).astype(int)
+        outline = self.camera.distorted(np.concatenate(edges))
+        low = np.maximum(np.floor(outline.min(axis=0)), 0.0).astype(int)
+        high = np.minimum(np.ceil(outline.max(axis=0)), self.shape[::-1]).astype(int)
         width, height = np.maximum(high - low, 0)
         return Region(int(low[0]), int(low[1]), int(width), int(height))

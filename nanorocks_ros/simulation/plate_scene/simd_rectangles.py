@@ -1,7 +1,7 @@
-"""Rectangles of pixels that are worked out in lanes: many at once, in single precision.
+"""Rectangles of pixels for SIMD loops in single precision.
 
-The pixels of a body go through one long loop, as loops over its short rows would not run in
-lanes; the rows of the rectangle are filled up to a multiple of 8, so that drawing them does.
+The pixels of a body go through one long loop, since loops over its short rows would not be
+vectorised. The rows of the rectangle are padded to a multiple of 8, so that drawing them is.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ COLUMN, ROW, HALF_WIDTH, HALF_HEIGHT, RADIUS, MATRIX = range(6)
 COSINE, SINE, DUST = range(9, 12)
 PLACE = 12
 
-# Columns of a look, as the fields of materials.Look; the first three are blue, green and red.
+# Columns of a look, as the fields of experiment.materials.Look; 0 to 2 are blue, green and red.
 AMBIENT, DIFFUSE, DARKENING, GLOW, SHEEN, HIGHLIGHT = range(3, 9)
 
 # Rows of the buffer: place of a pixel, share of it that is covered, levels; of beads further how
@@ -36,24 +36,24 @@ LANES = 8
 EIGHT = np.uint64(LANES)
 
 
-def short(value: float) -> float:
-    """A number of single precision.
+def float32(value: float) -> float:
+    """A number in single precision.
 
     Twice as many fit into a lane, and a literal among them would make them long again.
     """
     return cast('float', np.float32(value))
 
 
-ZERO, HALF, ONE, TWO, THREE = (short(value) for value in (0.0, 0.5, 1.0, 2.0, 3.0))
-STEPS = short(LEVEL)
+ZERO, HALF, ONE, TWO, THREE = (float32(value) for value in (0.0, 0.5, 1.0, 2.0, 3.0))
+STEPS = float32(LEVEL)
 
 # Unit vector to the lamp; x right, y down, z up. (As in `drawing`.)
-LAMP_X, LAMP_Y, LAMP_Z = short(-0.36), short(-0.48), short(0.80)
+LAMP_X, LAMP_Y, LAMP_Z = float32(-0.36), float32(-0.48), float32(0.80)
 
 
 @inlined
-def covered(beyond: float, width: float) -> float:
-    """Share of a pixel that is covered, from its distance beyond an outline so wide, [px].
+def coverage(beyond: float, width: float) -> float:
+    """Fraction of a pixel that is covered, from its distance beyond an outline, [px].
 
     The step of `drawing.coverage`, without branches.
     """
@@ -63,14 +63,16 @@ def covered(beyond: float, width: float) -> float:
 
 @inlined
 def span(size: int, middle: float, reach: float) -> tuple[int, int]:
-    """First pixel that a body can cover and the one after the last, on a canvas so large."""
+    """First pixel that a body can cover and the one after the last."""
     first = max(math.floor(middle - reach), 0)
     return first, min(math.floor(middle + reach) + 1, size)
 
 
 @kernel
-def lay_out(out: NDArray[np.float32], rows: int, columns: int, across: float, down: float) -> int:
-    """Fill in the places of the pixels of a rectangle; how many there are.
+def fill_coordinates(
+    out: NDArray[np.float32], rows: int, columns: int, across: float, down: float
+) -> int:
+    """Write the coordinates of the pixels of a rectangle; returns how many.
 
     Parameters
     ----------
@@ -92,10 +94,10 @@ def lay_out(out: NDArray[np.float32], rows: int, columns: int, across: float, do
 
 
 @inlined
-def box(
+def drawn_rectangle(
     canvas: NDArray[np.uint16], place: NDArray[np.float32], width: float
 ) -> tuple[int, int, int, int]:
-    """First column and row of the rectangle that a body is drawn in, its columns and rows."""
+    """Rectangle in which a body is drawn: first column, first row, columns, rows."""
     top, bottom = span(canvas.shape[1], place[ROW], place[HALF_HEIGHT] + 0.5 * width)
     left, right = span(canvas.shape[2], place[COLUMN], place[HALF_WIDTH] + 0.5 * width)
     columns = max(right - left + LANES - 1, 0) // LANES * LANES
@@ -105,7 +107,7 @@ def box(
 
 
 @kernel
-def compose(
+def blend_body(
     canvas: NDArray[np.uint16],
     out: NDArray[np.float32],
     left: int,
@@ -113,7 +115,7 @@ def compose(
     columns: int,
     rows: int,
 ) -> None:
-    """Let the shares and levels of a buffer cover a rectangle of a canvas."""
+    """Blend the levels of a buffer into a rectangle of a canvas by their coverage."""
     for channel in range(3):
         k = np.uint64(0)
         for i in range(top, top + rows):

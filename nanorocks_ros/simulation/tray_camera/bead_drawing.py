@@ -1,4 +1,4 @@
-"""Beads as the camera sees them: shaded spheres with smooth outlines, and sensor noise."""
+"""Drawing of shaded spheres with smooth outlines, and sensor noise."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nanorocks_ros.numerics.stable_sort import stable_argsort
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Columns of a look, as the fields of materials.Look.
+# Columns of a look, as the fields of experiment.materials.Look.
 _BLUE, _GREEN, _RED, _AMBIENT, _DIFFUSE, _DARKENING, _GLOW, _SHEEN, _HIGHLIGHT = range(9)
 
 # Unit vector to the lamp, upper left of the picture and above it; x right, y down, z up.
@@ -47,7 +47,7 @@ def shade(look: NDArray[np.float64], x: float, y: float) -> tuple[float, float, 
 
 @compiled
 def coverage(distance: float, radius: float, width: float) -> float:
-    """Share of a pixel that a disc covers, from the distance to its centre, all in [px].
+    """Fraction of a pixel that a disc covers, from the distance to its centre, all in [px].
 
     The outline is a smooth step of the given width, symmetric about the true radius, so
     that neither the area nor the centroid of the disc is moved by it.
@@ -64,7 +64,7 @@ def coverage(distance: float, radius: float, width: float) -> float:
 def draw_bead(
     canvas: NDArray[np.float32], disc: NDArray[np.float64], look: NDArray[np.float64], width: float
 ) -> None:
-    """Draw one sphere over what is there.
+    """Draw one sphere over the canvas.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def draw_beads(
 
 @compiled
 def to_levels(value: float) -> int:
-    """Gray level that the sensor gives: rounded and limited to 0 to 255."""
+    """Gray level of the sensor: rounded and limited to 0 to 255."""
     return int(min(max(value, 0.0), 255.0) + 0.5)
 
 
@@ -132,7 +132,7 @@ def to_levels(value: float) -> int:
 def expose(
     canvas: NDArray[np.float32], picture: NDArray[np.uint8], noise: float, key: np.uint64
 ) -> None:
-    """Turn a drawing into gray levels, with noise of its own for every pixel and channel.
+    """Convert a drawing to gray levels, with independent noise for every pixel and channel.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def expose(
 
 @compiled
 def copy_surface(picture: NDArray[np.uint8], tile: NDArray[np.uint8], key: np.uint64) -> None:
-    """Fill a picture with pieces of a noisy strip, each row from a place of its own.
+    """Fill a picture with pieces of a noisy strip, each row from a random place.
 
     Parameters
     ----------

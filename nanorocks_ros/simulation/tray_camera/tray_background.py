@@ -81,7 +81,7 @@ def empty_tray(
 
 @compiled
 def noisy_strip(length: int, noise: float, key: np.uint64) -> NDArray[np.uint8]:
-    """Strip of the plate as the sensor sees it, (length, 3), [gray levels]."""
+    """Noisy strip of the plate around the tray, (length, 3), [gray levels]."""
     strip = np.empty((length, 3), dtype=np.uint8)
     for i in range(length):
         for channel in range(3):

@@ -1,4 +1,4 @@
-"""A simulated tray as the camera films it, with the truth about every frame."""
+"""Film of a simulated tray, with the ground truth of every frame."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def film(
     *,
     start_stamp_ns: int = 0,
 ) -> Iterator[tuple[Frame, GroundTruth]]:
-    """Film a simulated tray; each frame is made when it is asked for.
+    """Film a simulated tray; each frame is computed on demand.
 
     Parameters
     ----------
     settings : SimulationSettings
     tray : Tray
     frames : int or None, >= 0
-        How many; None goes on for ever.
+        How many; None for an endless film.
     start_stamp_ns : int, [ns]
         Stamp of the first frame.
 

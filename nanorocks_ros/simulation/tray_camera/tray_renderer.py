@@ -1,4 +1,4 @@
-"""The camera over the tray: from the places of the beads to the picture of the whole scene."""
+"""The camera over one tray: from bead positions to the picture."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.experiment.materials import known_materials
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.numerics.counter_rng import Purpose, hashed, key_for
-from nanorocks_ros.simulation.tray_camera.bead_colours import looks_of
 from nanorocks_ros.simulation.tray_camera.bead_drawing import copy_surface, draw_beads, expose
+from nanorocks_ros.simulation.tray_camera.bead_looks import look_rows
 from nanorocks_ros.simulation.tray_camera.tray_background import empty_tray, noisy_strip
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class TrayCamera:
     tray : Tray
     radii : ndarray (n,), [m]
     materials : tuple of n str
-        Looks of the beads, see `materials.LOOKS`; unknown ones are gray.
+        Names of the materials of the beads: of the tray, or of `materials.yaml`.
     edge_width_px : float, [px], > 0
         Width of the outline of a bead.
 
@@ -68,7 +69,15 @@ class TrayCamera:
         self._radii_px = np.asarray(radii, dtype=np.float64) * self._scale
         self._region = _centred(tray, settings)
         self._check(materials)
-        self._looks = looks_of(materials)
+        known = known_materials() | tray.materials
+        unknown = sorted(set(materials) - set(known))
+        if unknown:
+            raise SimulationError(
+                f'material {unknown[0]!r}',
+                f'is not described (known: {", ".join(sorted(known))})',
+                'name one that is, or describe it in the file of trays',
+            )
+        self._looks = look_rows([known[name] for name in materials])
         self._noise_key = key_for(settings.seed, 0, Purpose.NOISE)
         self._margin = self._fitting_margin()
         texture_key = key_for(settings.seed, 0, Purpose.TEXTURE)
@@ -80,7 +89,7 @@ class TrayCamera:
 
     @property
     def region(self) -> Region:
-        """Where the floor of the tray is in the picture."""
+        """Region of the floor of the tray in the picture."""
         return self._region
 
     def picture(self, positions: NDArray[np.float64], number: int) -> NDArray[np.uint8]:
@@ -127,8 +136,8 @@ class TrayCamera:
         region = self._region
         right = width - region.x - region.width
         below = height - region.y - region.height
-        wanted = math.ceil(RIM * self._scale) + math.ceil(self._width) + 1
-        return min(wanted, region.x, region.y, right, below)
+        full_margin = math.ceil(RIM * self._scale) + math.ceil(self._width) + 1
+        return min(full_margin, region.x, region.y, right, below)
 
     def _check(self, materials: tuple[str, ...]) -> None:
         if self._radii_px.ndim != 1 or len(materials) != self._radii_px.size:

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.records import Tracks
 
-# Angular grains: the change of velocity in a collision does not follow the line of centres.
-_ANGULAR_MATERIALS = ('JSC-1',)
 # Relative error of a measured radius from the shape of the outline, beside the stated error.
 _OUTLINE_ERROR = 0.02
 _INITIAL_SLOTS = 64
@@ -75,7 +73,8 @@ class FlightSegments:
 
     def __init__(self, tray: Tray) -> None:
         species = tray.species
-        self._is_round = np.array([kind.material not in _ANGULAR_MATERIALS for kind in species])
+        # When angular grains collide, the change of velocity does not follow the line of centres.
+        self._is_round = np.array([kind.properties.shape != 'grain' for kind in species])
         equal_sizes = [kind.diameter_low == kind.diameter_high for kind in species]
         self._known_radii = np.array(
             [0.5 * kind.diameter if equal_size else math.nan

@@ -10,7 +10,7 @@ import numpy as np
 from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.experiment.calibration_file import calibrated, load_calibration
 from nanorocks_ros.experiment.plate import Region, regions_on_plate
-from nanorocks_ros.experiment.view import Straight, View
+from nanorocks_ros.experiment.view import IdentityLens, View
 from nanorocks_ros.numerics.quantiles import median
 from nanorocks_ros.records import Frame, Notice, Quality, TrayImage
 from nanorocks_ros.stages.preprocess.frame_checks import FrameChecks
@@ -122,7 +122,7 @@ class Preprocessor:
         """Forget everything but the regions of the trays."""
         speed = self._pipeline.speed
         height, width = (self._shape or (1, 1))[:2]
-        self._straight = View(camera=Straight(width=width, height=height))
+        self._straight = View(camera=IdentityLens(width=width, height=height))
         view = self._view or self._straight
         self._frames = 0
         self._suspects: frozenset[int] = frozenset()

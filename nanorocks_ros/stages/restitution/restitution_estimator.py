@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.experiment.colours import hue_of
 from nanorocks_ros.records import (
     CorEstimate,
     CorStatus,
@@ -76,7 +75,7 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
         self._tray = tray
         method = DecayLibraryMethod if self._settings.relation == 'library' else PaperMethod
         self._make_method = partial(method, settings, tray)
-        self._grains = any(hue_of(species.material) == 0 for species in tray.species)
+        self._grains = any(species.properties.hue == 0 for species in tray.species)
         self._contacts = CycleContacts(self._settings)
         self.reset()
 

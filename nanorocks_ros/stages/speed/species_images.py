@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.experiment.colours import COLOURS, hue_of
 from nanorocks_ros.numerics.compiled import compiled
 
 if TYPE_CHECKING:
@@ -50,7 +49,7 @@ class SpeciesImages:
     """
 
     def __init__(self, tray: Tray, pixels_per_metre: float) -> None:
-        self._materials = tuple(species.material for species in tray.species)
+        self._materials = tuple(species.properties for species in tray.species)
         self._areas = np.array(
             [
                 0.25 * np.pi * species.count * species.diameter**2 * pixels_per_metre**2
@@ -61,10 +60,9 @@ class SpeciesImages:
 
     @property
     def possible(self) -> bool:
-        """Whether there are several species, all of known colours."""
-        known = all(material in COLOURS for material in self._materials)
-        grays = sum(hue_of(material) == 0 for material in self._materials)
-        return known and len(self._materials) > 1 and grays < 2
+        """Whether there are several species, at most one of them gray."""
+        grays = sum(material.hue == 0 for material in self._materials)
+        return len(self._materials) > 1 and grays < 2
 
     @property
     def learnt(self) -> bool:
@@ -82,9 +80,9 @@ class SpeciesImages:
         floor = self._floor(pixels)
         tints = _tint(pixels - floor)
         tints = tints[np.linalg.norm(tints, axis=1) > _COLOURED]
-        coloured = [k for k, name in enumerate(self._materials) if hue_of(name)]
+        coloured = [k for k, material in enumerate(self._materials) if material.hue]
         hues = _unit(
-            np.array([_tint(np.array(COLOURS[self._materials[k]]) - floor) for k in coloured])
+            np.array([_tint(np.array(self._materials[k].color) - floor) for k in coloured])
         )
         for _ in range(_ROUNDS):
             nearest = (tints @ hues.T).argmax(axis=1)

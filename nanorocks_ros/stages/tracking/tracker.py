@@ -20,19 +20,16 @@ from nanorocks_ros.stages.tracking.linking.track_snapshot import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from nanorocks_ros.experiment.materials import Material
     from nanorocks_ros.experiment.trays import Species, Tray
     from nanorocks_ros.settings import PipelineSettings
 
 _NS = 1e9
 # Visible share of a species below which speeds and counts are unreliable.
 _MIN_VISIBLE_SHARE = 0.85
-# Systematic error of a position from light, shadow and an uneven outline, [px]. It is the same in
-# successive frames and does not affect velocities. Measured with all effects of the simulated
-# camera; under chalk; and among grains that are not tracked.
-_SYSTEMATIC_PX = {'acrylic': 0.09, 'glass': 0.09, 'copper': 0.2, 'JSC-1': 0.3}
-_CHALKY_PX = {'acrylic': 0.5, 'glass': 0.6, 'copper': 1.3}
+# Systematic error of a position in a tray with grains too crowded to track, [px]. It is the same
+# in successive frames and does not affect velocities.
 _CROWDED_PX = 0.6
-_UNKNOWN_PX = 0.3
 
 
 class Tracker:
@@ -114,15 +111,13 @@ class Tracker:
             self._settings.max_speed * self._scale,
             self._settings.memory,
             self._settings.window,
-            self._systematic_error(species.material),
+            self._systematic_error(species.properties),
         )
 
-    def _systematic_error(self, material: str) -> float:
+    def _systematic_error(self, material: Material) -> float:
         if self._tray.chalk:
-            return _CHALKY_PX.get(material, _CROWDED_PX)
-        if self._detector.crowded:
-            return _CROWDED_PX
-        return _SYSTEMATIC_PX.get(material, _UNKNOWN_PX)
+            return material.chalk_position_error_px
+        return _CROWDED_PX if self._detector.crowded else material.position_error_px
 
     def _tracks(self, image: TrayImage, time: float, displacement: NDArray[np.float64]) -> Tracks:
         shift = displacement * self._scale

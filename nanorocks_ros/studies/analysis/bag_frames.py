@@ -11,7 +11,7 @@ from nanorocks_ros.recordings.messages.camera_info import view_from_message
 from nanorocks_ros.recordings.messages.image_messages import (
     frame_from_compressed,
     frame_from_image,
-    usable_stamp_ns,
+    valid_stamp_ns,
 )
 from nanorocks_ros.records import Frame, GroundTruth
 from nanorocks_ros.wire import topics
@@ -83,7 +83,7 @@ class BagFrames:
         refusal = None
         for message in self._first(self.topic):
             try:
-                return usable_stamp_ns(self.reader.deserialize(message), self.where)
+                return valid_stamp_ns(self.reader.deserialize(message), self.where)
             except (FrameError, RecordingError) as error:
                 refusal = refusal or error
         if refusal is not None:

@@ -19,7 +19,7 @@ from nanorocks_ros.errors import RecordingError, UnwritableError
 from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.outputs.parquet import Column, write_parquet
 from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import float_array_message, time_message
 from nanorocks_ros.settings import rows
@@ -177,12 +177,12 @@ def _provenance(source: Path, settings: PipelineSettings) -> dict[str, str]:
 
 def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> None:
     epoch_topic = topics.EPOCH.absolute()
-    table = {epoch_topic: offered(topics.EPOCH)}
+    table = {epoch_topic: offered_topic(topics.EPOCH)}
     streams: list[Iterator[tuple[str, ArrayRecord]]] = []
     for number, results in analysis.trays.items():
         for product in MEASURED:
             name = product.topic.absolute(number)
-            table[name] = offered(product.topic)
+            table[name] = offered_topic(product.topic)
             streams.append(zip(itertools.repeat(name), _in_order(results.of(product.record))))
     with BagWriter(path, table, metadata=provenance) as bag:
         bag.write(epoch_topic, analysis.epoch_ns, time_message(analysis.epoch_ns))

@@ -11,7 +11,7 @@ from nanorocks_ros.jobs.tasks import as_completed_isolated
 from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.pipeline.composition import Pipeline
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
-from nanorocks_ros.recordings.film.natural_sort import natural
+from nanorocks_ros.recordings.film.natural_sort import natural_key
 from nanorocks_ros.studies.batch.batch_store import BatchStore, Entry
 from nanorocks_ros.studies.batch.batch_task import (
     DONE,
@@ -234,7 +234,7 @@ def _gathered(plan: BatchPlan, store: BatchStore) -> Batch:
     batch = Batch()
     for text, error in plan.bags.missing.items():
         batch.failed.append(Failure(name=printable(text), reason=printable(str(error))))
-    entries = sorted(store.entries.values(), key=lambda entry: natural(str(entry.path)))
+    entries = sorted(store.entries.values(), key=lambda entry: natural_key(str(entry.path)))
     analysed: list[tuple[Entry, BagSummary]] = []
     for entry in entries:
         outcome = entry.outcome

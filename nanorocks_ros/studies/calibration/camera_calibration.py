@@ -9,7 +9,7 @@ import numpy as np
 
 from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.experiment.plate import Region
-from nanorocks_ros.experiment.view import Straight, View
+from nanorocks_ros.experiment.view import IdentityLens, View
 from nanorocks_ros.stages.preprocess.plate_search import guess_plate
 from nanorocks_ros.stages.preprocess.rectify import nodes_of, resample_color
 from nanorocks_ros.studies.calibration.plate_fit import PlateFit, fit_plate
@@ -193,7 +193,7 @@ def max_distortion_px(calibration: Calibration) -> float:
         for b in (0, 1)
     ]
     straight = View(
-        camera=Straight(width=calibration.info.width, height=calibration.info.height),
+        camera=IdentityLens(width=calibration.info.width, height=calibration.info.height),
         homography=calibration.view.homography,
     )
     points = np.array(corners, dtype=np.float64)

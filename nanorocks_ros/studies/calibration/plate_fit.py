@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
-from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, view_of
+from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, rectified_view
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.stages.preprocess.plate_search import PlateGuess, plate_places
 from nanorocks_ros.stages.preprocess.tray_edges import find_edges
@@ -286,7 +286,7 @@ def _calibration(model: PlateModel, residual: float) -> Calibration:
         x, y = (round(float(value)) for value in corner)
         regions[tray.number] = Region(x, y, round(float(end[0])) - x, round(float(end[1])) - y)
     return Calibration(
-        view=view_of(info, 'calibration'),
+        view=rectified_view(info, 'calibration'),
         pixels_per_metre=scale,
         regions=regions,
         residual_px=residual,

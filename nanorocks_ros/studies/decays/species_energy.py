@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import FitError, RecordingError
-from nanorocks_ros.experiment.colours import COLOURS
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
 from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.physics.haff_law import granular_energy, haff_speed
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
 
 _NANOJOULE, _MM = 1e9, 1e3
 _MAX_GRAY = 255.0
-_DEFAULT_COLOUR = (90.0, 90.0, 90.0)
 # Brightness of a line relative to its points.
 _LINE_BRIGHTNESS = 0.7
 
@@ -155,7 +153,7 @@ def draw_species(axes: Axes, energies: Sequence[SpeciesEnergy], origin: float = 
     for energy, line in zip(energies, ('-', '--'), strict=False):
         curve, fit, name = energy.curve, energy.fit, energy.species.material
         scale = relative_energy(1.0, energy.species.bead_mass) * _NANOJOULE
-        colour = np.array(COLOURS.get(name, _DEFAULT_COLOUR))[::-1] / _MAX_GRAY
+        colour = np.array(energy.species.properties.color)[::-1] / _MAX_GRAY
         axes.errorbar(
             curve.times,
             scale * curve.speed**2,

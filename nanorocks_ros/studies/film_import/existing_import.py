@@ -1,4 +1,4 @@
-"""Whether a bag that is there already is the one that an import would make."""
+"""Check that an existing bag is the one that an import would make."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from nanorocks_ros.recordings.bag.provenance import checksum
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.film.image_folder import images_in
 from nanorocks_ros.recordings.messages.camera_info import info_from_message, info_message
-from nanorocks_ros.studies.film_import.import_film import FRAME_ID, picture_words
+from nanorocks_ros.studies.film_import.import_film import FRAME_ID
 from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:
@@ -19,26 +19,27 @@ if TYPE_CHECKING:
     from nanorocks_ros.recordings.bag.reader import BagReader
     from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
 
-_NEW, _NOT = 'delete it, or pass another folder', 'not given'
+_REMEDY, _NOT_GIVEN = 'delete it, or pass another folder', 'not given'
 
 
 def check_same_source(bag: Path, film: Path) -> None:
-    """Refuse to take the bag of another film for that of this one.
+    """Check that a bag was made from this film.
 
     Parameters
     ----------
     bag : Path
     film : Path
-        Is read as a whole, where name and size are those of the bag's.
+        Its checksum is computed if name and size agree.
 
     Raises
     ------
     RecordingError
+        If the bag is incomplete or was made from another film.
     """
-    kept = open_bag(bag).metadata
-    if kept.get('import') != 'complete' or kept.get('source') != film.name:
-        what = f'is there already, but not as the bag of {film.name}'
-        raise RecordingError(str(bag), what, _NEW)
+    metadata = open_bag(bag).metadata
+    if metadata.get('import') != 'complete' or metadata.get('source') != film.name:
+        problem = f'exists already, but is not a complete import of {film.name}'
+        raise RecordingError(str(bag), problem, _REMEDY)
     files = images_in(film) if film.is_dir() else [film]
     try:
         size = sum(file.stat().st_size for file in files)
@@ -46,53 +47,54 @@ def check_same_source(bag: Path, film: Path) -> None:
         raise RecordingError(
             str(film), f'cannot be read ({error.strerror})', 'pass another film'
         ) from error
-    if kept.get('source_bytes') != str(size):
-        sizes = f'{kept.get("source_bytes")} bytes, not {size}'
-        raise RecordingError(str(bag), f'was made of another {film.name} ({sizes})', _NEW)
-    # Cameras that do not compress make films of one size, and number them anew each day.
-    if kept.get('source_sha256') != checksum(files):
-        what = f'was made of another {film.name} (of the same size, with other contents)'
-        raise RecordingError(str(bag), what, _NEW)
+    if metadata.get('source_bytes') != str(size):
+        sizes = f'{metadata.get("source_bytes")} bytes, not {size}'
+        raise RecordingError(str(bag), f'was made from another {film.name} ({sizes})', _REMEDY)
+    # Cameras without compression make films of equal size and may reuse names every day.
+    if metadata.get('source_sha256') != checksum(files):
+        problem = f'was made from another {film.name} (same size, different content)'
+        raise RecordingError(str(bag), problem, _REMEDY)
 
 
 def check_same_settings(bag: Path, settings: ImportSettings) -> None:
-    """Refuse to take a bag for that of other settings.
+    """Check that a bag was imported with these settings.
 
     Raises
     ------
     RecordingError
-        Names each that differs, as it was and as it is to be.
+        If a setting differs; the message names each with both values.
     """
     reader = open_bag(bag)
-    kept, given = reader.metadata, settings.given()
-    differing = []
+    metadata, given = reader.metadata, settings.as_metadata()
+    differences = []
     for name in ('rate', 'start'):
-        was, now = kept.get(f'import.{name}') or _NOT, given[name] or _NOT
-        if was != now:
-            differing.append(f'--{name} was {was}, is {now}')
+        before = metadata.get(f'import.{name}') or _NOT_GIVEN
+        now = given[name] or _NOT_GIVEN
+        if before != now:
+            differences.append(f'--{name} was {before}, is {now}')
     if _lens_in(reader) != _lens_of(settings):
-        names = kept.get('import.calibration'), given['calibration']
-        was, now = (name or _NOT for name in names)
-        now = now if now != was else 'one of that name with other contents'
-        differing.append(f'--calibration was {was}, is {now}')
-    pictures = kept.get('pictures', '')
-    # Of JPEGs that went in as they are, the quality is that of the camera.
-    if pictures.startswith('JPEG of') and pictures != picture_words(settings):
-        differing.append(f'--quality was {pictures.split()[-1]}, is {settings.quality}')
-    if differing:
-        what = f'was imported with other settings ({" and ".join(differing)})'
-        raise RecordingError(str(bag), what, _NEW)
+        names = metadata.get('import.calibration'), given['calibration']
+        before, now = (name or _NOT_GIVEN for name in names)
+        now = now if now != before else 'a file of the same name with different content'
+        differences.append(f'--calibration was {before}, is {now}')
+    pictures = metadata.get('pictures', '')
+    # The quality does not matter for JPEGs that were not recompressed.
+    if pictures.startswith('JPEG of') and pictures != settings.compression():
+        differences.append(f'--quality was {pictures.split()[-1]}, is {settings.quality}')
+    if differences:
+        problem = f'was imported with other settings ({" and ".join(differences)})'
+        raise RecordingError(str(bag), problem, _REMEDY)
 
 
 def _lens_in(reader: BagReader) -> CameraInfo | None:
-    """The lens that a bag describes."""
+    """Lens calibration in a bag."""
     name = topics.CAMERA_INFO.absolute()
     first = next(iter(reader.messages([name])), None) if name in reader.topics else None
     return None if first is None else info_from_message(reader.deserialize(first))
 
 
 def _lens_of(settings: ImportSettings) -> CameraInfo | None:
-    """The lens that the calibration describes, as a bag would say it."""
+    """Lens calibration of the settings, rounded as in a bag."""
     if settings.calibration is None:
         return None
     return info_from_message(info_message(settings.calibration.info, 0, FRAME_ID))

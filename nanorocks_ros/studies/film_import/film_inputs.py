@@ -1,4 +1,4 @@
-"""Films that are to be imported: how, and whether they go together."""
+"""Settings of an import, opening of films, and checks that the parts of a film fit together."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
-from nanorocks_ros.recordings.film.film_source import NS
 from nanorocks_ros.recordings.film.image_folder import ImageFolder, images_in
 from nanorocks_ros.recordings.film.video import Video
-from nanorocks_ros.recordings.messages.iso8601 import instant_text
-from nanorocks_ros.studies.film_import.find_films import look_into
+from nanorocks_ros.recordings.messages.iso8601 import format_iso8601
+from nanorocks_ros.recordings.storage import NS
+from nanorocks_ros.studies.film_import.find_films import films_in_folder
 from nanorocks_ros.studies.synthetic.film_bag import check_quality
 
 if TYPE_CHECKING:
@@ -23,28 +23,28 @@ if TYPE_CHECKING:
     from nanorocks_ros.recordings.film.film_source import Film
 
 _LAST_NS = 2**31 * 10**9
-# Clocks of containers count whole seconds.
-_UNSURE_NS = 3 * NS // 2
+# Uncertainty of the time of recording: containers count whole seconds.
+_TIME_ERROR_NS = 3 * NS // 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportSettings:
-    """How films are imported.
+    """Settings of an import.
 
     Parameters
     ----------
     quality : int
-        Of the JPEGs, 1 to 100, where pictures have to be compressed.
+        JPEG quality of frames that have to be compressed, 1 to 100.
     start_ns : int or None, [ns]
-        When the first picture was taken; None: as the film says.
+        Time of the first frame; None: as stated in the film.
     rate : Fraction or None, [1/s]
-        Of the camera; None: as the film says.
+        Frame rate of the camera; None: as stated in the film.
     calibration : Calibration or None
-        Of the camera.
+        Calibration of the camera.
     calibration_name : str
-        Of the file it came from.
+        Name of the calibration file.
     threads : int
-        That decode and compress; 0: as many as there are cores.
+        Number of threads for decoding and compression; 0: one per core.
     """
 
     quality: int = 95
@@ -57,21 +57,25 @@ class ImportSettings:
     def __post_init__(self) -> None:
         check_quality(self.quality)
         if self.rate is not None and self.rate <= 0:
-            raise ConfigurationError('--rate', f'{self.rate}', 'give pictures per second, above 0')
+            raise ConfigurationError('--rate', f'{self.rate}', 'give frames per second, above 0')
         if self.start_ns is not None and not 0 <= self.start_ns < _LAST_NS:
             raise ConfigurationError(
                 '--start',
-                'lies before 1970 or after 2038, when stamps of messages end',
-                'give another instant',
+                'is before 1970 or after 2038, where the time stamps of ROS end',
+                'give another time',
             )
 
-    def given(self) -> dict[str, str]:
-        """Those that change times and lens, by their flags, as a bag keeps them; or empty."""
+    def as_metadata(self) -> dict[str, str]:
+        """Settings of times and lens by the names of their flags, as stored in the bag."""
         return {
             'rate': str(self.rate) if self.rate else '',
             'calibration': self.calibration_name,
-            'start': '' if self.start_ns is None else instant_text(self.start_ns),
+            'start': '' if self.start_ns is None else format_iso8601(self.start_ns),
         }
+
+    def compression(self) -> str:
+        """Description of the compression, as stored in the bag."""
+        return f'JPEG of quality {self.quality}'
 
 
 def open_film(path: Path, settings: ImportSettings) -> Film:
@@ -80,9 +84,9 @@ def open_film(path: Path, settings: ImportSettings) -> Film:
     Raises
     ------
     ConfigurationError
-        When nothing says when pictures were taken, or the library for videos is missing.
+        If the film has neither time stamps nor a rate, or PyAV is not installed.
     RecordingError
-        When it is neither.
+        If it is neither a video nor a folder of images.
     """
     try:
         if not path.exists():
@@ -91,38 +95,38 @@ def open_film(path: Path, settings: ImportSettings) -> Film:
             return Video(path, settings.rate, settings.threads)
         if images_in(path):
             return ImageFolder(path, settings.rate)
-        held = look_into(path).films
+        films = films_in_folder(path).films
     except OSError as error:
         raise RecordingError(
             str(path), f'cannot be read ({error.strerror})', 'check its permissions'
         ) from error
-    if held:
+    if films:
         raise RecordingError(
             str(path),
-            f'is a folder of {len(held)} videos',
-            'name the parts of one recording, or add --each to make a bag of each',
+            f'is a folder of {len(films)} videos',
+            'name the parts of one recording, or add --each to make a bag of each video',
         )
     raise RecordingError(str(path), 'holds no video and no image', 'pass another folder')
 
 
 def check_sizes(films: Sequence[Film], settings: ImportSettings) -> None:
-    """Refuse films that do not go together.
+    """Check that all parts of a film have the same frame size, which fits the calibration.
 
     Raises
     ------
     ConfigurationError
-        When the calibration is for another size.
+        If the calibration is for another size.
     RecordingError
-        When the parts of a film differ in size.
+        If the parts of a film differ in size.
     """
     first = films[0].info
     for film in films[1:]:
         if (film.info.width, film.info.height) != (first.width, first.height):
             raise RecordingError(
                 str(film.info.path),
-                f'has pictures of {film.info.width}x{film.info.height} px, '
+                f'has frames of {film.info.width}x{film.info.height} px, '
                 f'{first.path} of {first.width}x{first.height} px',
-                'import them into bags of their own',
+                'import them into separate bags',
             )
     lens = settings.calibration.info if settings.calibration else None
     if lens and (lens.width, lens.height) != (first.width, first.height):
@@ -135,13 +139,15 @@ def check_sizes(films: Sequence[Film], settings: ImportSettings) -> None:
 
 
 def check_order(films: Sequence[Film], settings: ImportSettings) -> None:
-    """Refuse parts of a film of which one was taken before the one that it is to follow.
+    """Check that the parts of a film are in order of time.
 
-    Times of creation are those of the beginning or of the end, as the camera likes it; both rise.
+    Depending on the camera, the creation time is that of the first or of the last frame; both
+    rise from part to part.
 
     Raises
     ------
     RecordingError
+        If a part was recorded before the previous one.
     """
     if settings.start_ns is not None:
         return
@@ -149,10 +155,10 @@ def check_order(films: Sequence[Film], settings: ImportSettings) -> None:
         (film.info.path, film.info.start_ns) for film in films if film.info.start_ns is not None
     ]
     for (before, before_ns), (path, start_ns) in itertools.pairwise(known):
-        if start_ns < before_ns - _UNSURE_NS:
+        if start_ns < before_ns - _TIME_ERROR_NS:
             raise RecordingError(
                 str(path),
-                f'was taken at {instant_text(start_ns)}, before {before} at '
-                f'{instant_text(before_ns)}, which it is to follow',
-                'pass the parts in order of time, or --start, by which each follows the other',
+                f'was recorded at {format_iso8601(start_ns)}, before the previous part {before} '
+                f'at {format_iso8601(before_ns)}',
+                'pass the parts in order of time, or pass --start to join them without gaps',
             )

@@ -1,4 +1,4 @@
-"""The films that folders hold: videos, and folders of images."""
+"""Find films by paths: videos, and folders of videos or images."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.recordings.film.image_folder import IMAGES, images_in
-from nanorocks_ros.recordings.film.natural_sort import OF_THE_DISK, natural
-from nanorocks_ros.recordings.film.video_streams import VIDEOS, looks_like_film
+from nanorocks_ros.recordings.film.image_folder import IMAGE_SUFFIXES, images_in
+from nanorocks_ros.recordings.film.natural_sort import SYSTEM_FOLDERS, natural_key
+from nanorocks_ros.recordings.film.video_streams import VIDEO_SUFFIXES, looks_like_film
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class FoundFilms:
-    """What paths stand for.
+    """Films found by `find_films`.
 
     Parameters
     ----------
     films : list of Path
         Videos and folders of images.
     left_out : list of Path
-        Files in folders that look like films or pictures, and are not among them.
+        Skipped files in folders that may be videos or images.
     failed : dict of Path to NanorocksError
-        What is in folders and cannot be read.
+        Paths that cannot be read or contain no film.
     """
 
     films: list[Path] = field(default_factory=list)
@@ -36,64 +36,64 @@ class FoundFilms:
     failed: dict[Path, NanorocksError] = field(default_factory=dict)
 
 
-def films_of(paths: Sequence[Path]) -> FoundFilms:
-    """The films that paths stand for: a folder of videos for those in it, sorted naturally.
+def find_films(paths: Sequence[Path]) -> FoundFilms:
+    """Find films; the videos in a folder are sorted naturally.
 
-    Images beside videos make no film.
+    Images in the same folder as videos are not a film.
 
     Raises
     ------
     RecordingError
-        When there are none.
+        If there are no films.
     """
-    found = FoundFilms()
+    result = FoundFilms()
     for path in paths:
         try:
-            held = _stand_for(path)
+            films = _films_at(path)
         except OSError as error:
-            found.failed[path] = _unreadable(path, error)
+            result.failed[path] = _unreadable(path, error)
             continue
-        if not held.films and not held.failed:
-            found.failed[path] = RecordingError(
+        if not films.films and not films.failed:
+            result.failed[path] = RecordingError(
                 str(path), 'holds no video and no image', 'pass another folder'
             )
-        found.films += held.films
-        found.left_out += held.left_out
-        found.failed |= held.failed
-    if not found.films:
-        raise next(iter(found.failed.values()))
-    return found
+        result.films += films.films
+        result.left_out += films.left_out
+        result.failed |= films.failed
+    if not result.films:
+        raise next(iter(result.failed.values()))
+    return result
 
 
-def _stand_for(path: Path) -> FoundFilms:
+def _films_at(path: Path) -> FoundFilms:
     if not path.is_dir():
         return FoundFilms([path])
-    held = look_into(path)
-    if images_in(path) and not any(film.is_file() for film in held.films):
+    inside = films_in_folder(path)
+    if images_in(path) and not any(film.is_file() for film in inside.films):
         return FoundFilms([path])
-    return held
+    return inside
 
 
-def look_into(folder: Path) -> FoundFilms:
-    """The videos in a folder, and the folders of images in it, sorted naturally.
+def films_in_folder(folder: Path) -> FoundFilms:
+    """Videos and folders of images in a folder, sorted naturally.
 
     Raises
     ------
     OSError
-        When it cannot be read.
+        If the folder cannot be read.
     """
-    found = FoundFilms()
-    for path in sorted(folder.iterdir(), key=lambda one: natural(one.name)):
-        if path.name.startswith('.') or path.name in OF_THE_DISK:
+    result = FoundFilms()
+    for path in sorted(folder.iterdir(), key=lambda entry: natural_key(entry.name)):
+        if path.name.startswith('.') or path.name in SYSTEM_FOLDERS:
             continue
         try:
-            if bool(images_in(path)) if path.is_dir() else path.suffix.lower() in VIDEOS:
-                found.films.append(path)
-            elif path.suffix.lower() in IMAGES or looks_like_film(path):
-                found.left_out.append(path)
+            if bool(images_in(path)) if path.is_dir() else path.suffix.lower() in VIDEO_SUFFIXES:
+                result.films.append(path)
+            elif path.suffix.lower() in IMAGE_SUFFIXES or looks_like_film(path):
+                result.left_out.append(path)
         except OSError as error:
-            found.failed[path] = _unreadable(path, error)
-    return found
+            result.failed[path] = _unreadable(path, error)
+    return result
 
 
 def _unreadable(path: Path, error: OSError) -> RecordingError:

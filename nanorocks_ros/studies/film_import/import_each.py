@@ -1,4 +1,4 @@
-"""A bag of each video of a campaign: what is done is left, what fails is told at the end."""
+"""Import of many films, each into its own bag; existing bags are skipped, errors collected."""
 
 from __future__ import annotations
 
@@ -13,34 +13,36 @@ from nanorocks_ros.studies.film_import.existing_import import (
     check_same_settings,
     check_same_source,
 )
-from nanorocks_ros.studies.film_import.import_film import Imported, import_films
+from nanorocks_ros.studies.film_import.import_film import import_films
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
+    from nanorocks_ros.studies.film_import.import_result import ImportResult
 
-# Bags get their name when they are complete.
+# Folder of incomplete bags; a complete bag is moved out of it.
 _UNFINISHED = '.unfinished'
 
 
 @dataclass(slots=True, kw_only=True)
-class ImportedEach:
-    """What became of each of many films.
+class ImportBatch:
+    """Result of an import of many films.
 
     Parameters
     ----------
     folder : Path
-    imported : list of Imported
+        Folder of the bags.
+    imported : list of ImportResult
     skipped : list of Path
         Bags that were complete before.
     failed : dict of Path to NanorocksError
-        By film.
+        Error of each film that could not be imported.
     """
 
     folder: Path
-    imported: list[Imported] = field(default_factory=list)
+    imported: list[ImportResult] = field(default_factory=list)
     skipped: list[Path] = field(default_factory=list)
     failed: dict[Path, NanorocksError] = field(default_factory=dict)
 
@@ -50,31 +52,31 @@ def import_each(
     folder: Path,
     settings: ImportSettings,
     progress: Callable[[float, str], None],
-) -> ImportedEach:
-    """Make a bag of each film; what cannot be imported does not keep the others from it.
+) -> ImportBatch:
+    """Import each film into its own bag; an error does not stop the others.
 
     Parameters
     ----------
     films : sequence of Path
     folder : Path
-        Of the bags; may exist. Complete bags in it are left as they are.
+        Folder of the bags; may exist. Complete bags in it are not changed.
     settings : ImportSettings
     progress : callable
-        Called with the share that is done, and the film in hand.
+        Called with the fraction that is done, and the name of the current film.
 
     Returns
     -------
-    ImportedEach
+    ImportBatch
 
     Raises
     ------
     ConfigurationError
-        When the settings fit no film, whatever it is.
+        If two films would get the same bag.
     RecordingError
-        When the folder cannot be written.
+        If the folder cannot be written.
     """
-    found = ImportedEach(folder=folder)
-    names = _names(films)
+    batch = ImportBatch(folder=folder)
+    names = _bag_names(films)
     unfinished = folder / _UNFINISHED
     try:
         unfinished.mkdir(parents=True, exist_ok=True)
@@ -84,21 +86,21 @@ def import_each(
         ) from error
     for number, film in enumerate(films):
 
-        def tell(share: float, number: int = number, film: Path = film) -> None:
-            progress((number + share) / len(films), film.name)
+        def film_progress(done: float, number: int = number, film: Path = film) -> None:
+            progress((number + done) / len(films), film.name)
 
         try:
-            _import_one(film, names[film], settings, found, tell)
+            _import_film(film, names[film], settings, batch, film_progress)
         except NanorocksError as error:
-            found.failed[film] = error
-        tell(1.0)
+            batch.failed[film] = error
+        film_progress(1.0)
     with suppress(OSError):
         unfinished.rmdir()
-    return found
+    return batch
 
 
-def _names(films: Sequence[Path]) -> dict[Path, str]:
-    """The bag's name for each film: with the ending, too, where two would have the same."""
+def _bag_names(films: Sequence[Path]) -> dict[Path, str]:
+    """Name of the bag of each film; it includes the file extension if names would be equal."""
     stems = Counter(film.stem for film in films)
     names = {
         film: film.stem if stems[film.stem] == 1 else film.name.replace('.', '_') for film in films
@@ -106,33 +108,35 @@ def _names(films: Sequence[Path]) -> dict[Path, str]:
     for name, count in Counter(names.values()).items():
         if count > 1:
             raise ConfigurationError(
-                '--each', f'{count} films would become {name}', 'import them into two folders'
+                '--each',
+                f'{count} films would become bag {name}',
+                'import them into separate folders',
             )
     return names
 
 
-def _import_one(
+def _import_film(
     film: Path,
     name: str,
     settings: ImportSettings,
-    found: ImportedEach,
-    tell: Callable[[float], None],
+    batch: ImportBatch,
+    progress: Callable[[float], None],
 ) -> None:
-    bag = found.folder / name
+    bag = batch.folder / name
     if bag.exists():
         check_same_source(bag, film)
         check_same_settings(bag, settings)
-        found.skipped.append(bag)
+        batch.skipped.append(bag)
         return
-    part = found.folder / _UNFINISHED / name
+    unfinished = batch.folder / _UNFINISHED / name
     try:
-        # Begun earlier, and never completed.
-        shutil.rmtree(part, ignore_errors=True)
-        imported = import_films([film], part, settings, tell)
-        part.rename(bag)
+        # Left by an interrupted import.
+        shutil.rmtree(unfinished, ignore_errors=True)
+        imported = import_films([film], unfinished, settings, progress)
+        unfinished.rename(bag)
     except OSError as error:
         raise RecordingError(
             str(bag), f'cannot be written ({error.strerror})', 'make room, or pass another folder'
         ) from error
     imported.bag = bag
-    found.imported.append(imported)
+    batch.imported.append(imported)

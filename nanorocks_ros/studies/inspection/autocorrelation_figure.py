@@ -1,4 +1,4 @@
-"""The picture of growing clusters: images, their autocorrelations, and the sizes these give."""
+"""Figure of growing clusters: tray images, autocorrelations, and cluster sizes over time."""
 
 from __future__ import annotations
 
@@ -31,50 +31,51 @@ _MM = 1e3
 _WIDTH, _HEIGHT, _DPI = 12.0, 4.2, 100
 
 
-def autocorrelation_figure(path: Path, found: BagClusters, pixels_per_metre: float) -> None:
-    """Draw one cycle: for each tray the images soon after shaking and at the end, and the sizes.
+def autocorrelation_figure(path: Path, clusters: BagClusters, pixels_per_metre: float) -> None:
+    """Draw one cycle: for each tray the images after shaking and at the end, and the sizes.
 
     Parameters
     ----------
     path : Path
-    found : BagClusters
+    clusters : BagClusters
     pixels_per_metre : float
-        Of the tray images.
+        Scale of the tray images.
 
     Raises
     ------
     RecordingError
-        When the picture cannot be written.
+        If the file cannot be written.
 
     References
     ----------
     After [B19] fig. 8.
     """
-    figure = Figure(figsize=(_WIDTH, _HEIGHT * len(found.trays)), layout='constrained')
-    parts = figure.subfigures(len(found.trays), 1, squeeze=False)[:, 0]
-    for part, (number, tray) in zip(parts, found.trays.items(), strict=True):
+    figure = Figure(figsize=(_WIDTH, _HEIGHT * len(clusters.trays)), layout='constrained')
+    parts = figure.subfigures(len(clusters.trays), 1, squeeze=False)[:, 0]
+    for part, (number, tray) in zip(parts, clusters.trays.items(), strict=True):
         left, right = part.subfigures(1, 2, width_ratios=(5, 6))
         pairs = left.subplots(2, 2, squeeze=False)
-        for row, shot in zip(pairs, (tray.snapshots[0], tray.snapshots[-1]), strict=True):
-            _draw_snapshot(row, shot, pixels_per_metre)
+        ends = tray.snapshots[0], tray.snapshots[-1]
+        for row, snapshot in zip(pairs, ends, strict=True):
+            _draw_snapshot(row, snapshot, pixels_per_metre)
         _draw_sizes(right.subplots(), tray)
-        part.suptitle(f'tray {number}, cycle {found.cycle}', x=0.01, ha='left', fontsize=11)
+        part.suptitle(f'tray {number}, cycle {clusters.cycle}', x=0.01, ha='left', fontsize=11)
     with atomic_file(path) as file:
         figure.savefig(file, dpi=_DPI)
 
 
-def _draw_snapshot(row: NDArray[np.object_], shot: Snapshot, scale: float) -> None:
-    height, width = shot.gray.shape
+def _draw_snapshot(row: NDArray[np.object_], snapshot: Snapshot, scale: float) -> None:
+    height, width = snapshot.gray.shape
     half = 0.5 * _MM * width / scale, 0.5 * _MM * height / scale
-    row[0].imshow(shot.gray, cmap='gray', extent=(0, 2 * half[0], 2 * half[1], 0))
-    row[0].set_title(f'{shot.since:.1f} s after shaking', fontsize=9, loc='left')
+    row[0].imshow(snapshot.gray, cmap='gray', extent=(0, 2 * half[0], 2 * half[1], 0))
+    row[0].set_title(f'{snapshot.since:.1f} s after shaking', fontsize=9, loc='left')
     row[0].set_ylabel('[mm]')
-    rows, columns = shot.values.shape
+    rows, columns = snapshot.values.shape
     step = 2 * half[0] / columns, 2 * half[1] / rows
     x = (np.arange(columns) - columns // 2) * step[0]
     y = (np.arange(rows) - rows // 2) * step[1]
-    row[1].contour(x, y, shot.values, levels=_LEVELS, cmap='viridis', linewidths=0.9)
-    row[1].contour(x, y, shot.values, levels=[0.5], colors=[_PAPER], linewidths=1.6)
+    row[1].contour(x, y, snapshot.values, levels=_LEVELS, cmap='viridis', linewidths=0.9)
+    row[1].contour(x, y, snapshot.values, levels=[0.5], colors=[_PAPER], linewidths=1.6)
     row[1].set_aspect('equal')
     reach = min(*half, 5.0)
     row[1].set_xlim(-reach, reach)
@@ -90,8 +91,8 @@ def _draw_sizes(axes: Axes, tray: CycleClusters) -> None:
     )
     if len(tray.truth):
         axes.plot(*tray.truth[:, :2].T, color=_TRUTH, lw=3.5, alpha=0.7, label='true')
-    known = np.isfinite(lower).tolist()
-    axes.fill_between(times, lower, upper, where=known, color=_OURS, alpha=0.2, lw=0)
+    finite = np.isfinite(lower).tolist()
+    axes.fill_between(times, lower, upper, where=finite, color=_OURS, alpha=0.2, lw=0)
     label = 'calibrated by simulated clusters, band 68 %'
     axes.plot(times, size, '.-', ms=3, lw=0.8, color=_OURS, label=label)
     paper = tray.paper_sizes()

@@ -1,4 +1,4 @@
-"""The autocorrelations of one cycle of a bag, the cluster sizes they give, and the true ones."""
+"""Autocorrelations of one cycle of a bag, the cluster sizes from them, and the true sizes."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import PipelineSettings
 
-# Of a cycle, for the mean area that the paper takes for that of its clusters, [s].
+# Time at the end of a cycle over which the paper averages the area of its clusters, [s].
 _END = 2.0
-# After the shaking event, [s]: the beads fly, and nothing sticks yet.
+# Time after the shaking event at which the beads fly and none sticks yet, [s].
 _FLYING = 0.5
 _COLUMNS = {
     'tray': '1',
@@ -57,7 +57,16 @@ _COLUMNS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
-    """A tray image and its autocorrelation."""
+    """A tray image and its autocorrelation.
+
+    Parameters
+    ----------
+    since : float, [s]
+        Time since the shaking event.
+    gray : ndarray of uint8, (rows, columns)
+    values : ndarray of float32, (rows, columns)
+        Autocorrelation, centred.
+    """
 
     since: float
     gray: NDArray[np.uint8]
@@ -66,19 +75,19 @@ class Snapshot:
 
 @dataclass(slots=True, kw_only=True)
 class CycleClusters:
-    """What the autocorrelations of one tray show over one cycle.
+    """Clusters of one tray over one cycle.
 
     Parameters
     ----------
     tray : Tray
-    start_ns : int
-        The shaking event; without one the first picture.
+    start_ns : int, [ns]
+        Stamp of the shaking event; without one, of the first image.
     estimates : list of ClusterEstimate
     snapshots : list of Snapshot
-        Soon after the shaking event, and the last.
-    truth : ndarray (n, 3)
+        Soon after the shaking event, and at the end.
+    truth : ndarray, (n, 3)
         Time since the start [s], weight-averaged size, and beads per cluster of two or more (NaN
-        without any); empty where bodies are not known.
+        if there is none); empty if the true bodies are not known.
     """
 
     tray: Tray
@@ -89,7 +98,7 @@ class CycleClusters:
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """Of the estimates, since the start, (n,), [s]."""
+        """Times of the estimates since the start, (n,), [s]."""
         return np.array([(estimate.stamp_ns - self.start_ns) / NS for estimate in self.estimates])
 
     def column(self, name: str) -> NDArray[np.float64]:
@@ -97,23 +106,23 @@ class CycleClusters:
         return np.array([float(flat_value(estimate, name)) for estimate in self.estimates])
 
     def true_sizes(self) -> NDArray[np.float64]:
-        """The true weight-averaged size at each estimate, (n,); NaN where not known."""
+        """The true weight-averaged size at each estimate, (n,); NaN if it is not known."""
         if not len(self.truth):
             return np.full(len(self.estimates), np.nan)
-        found: NDArray[np.float64] = np.interp(self.times, self.truth[:, 0], self.truth[:, 1])
-        return found
+        sizes: NDArray[np.float64] = np.interp(self.times, self.truth[:, 0], self.truth[:, 1])
+        return sizes
 
     def counted(self) -> float:
-        """Beads per cluster at the end, as the paper counts by hand: the truth, or table 3."""
+        """Beads per cluster at the end: the truth, or the manual count of the paper (table 3)."""
         if len(self.truth) and math.isfinite(self.truth[-1, 2]):
             return float(self.truth[-1, 2])
         row = PAPER_TABLE_3.get(self.tray.number)
         return math.nan if row is None else row.beads_per_cluster
 
     def paper_sizes(self) -> NDArray[np.float64]:
-        """Sizes by the paper's straight line through the end of this cycle, (n,).
+        """Sizes by the paper's linear calibration at the end of this cycle, (n,).
 
-        NaN where nothing was seen, or nothing is known that could have been counted.
+        NaN if there are no areas or the number of beads per cluster is not known.
         """
         areas, times = self.column('level_area'), self.times
         try:
@@ -123,21 +132,30 @@ class CycleClusters:
         return line.size(areas)
 
     def paper_onset(self) -> float:
-        """Onset of clustering by the paper's rule, since the start, [s]; NaN without one."""
+        """Onset of clustering by the paper's rule, since the start, [s]; NaN if there is none."""
         try:
             return paper_onset(self.times, self.column('level_area'))
         except FitError:
             return math.nan
 
     def true_onset(self) -> float:
-        """When the first beads stuck, since the start, [s]; NaN where none did or unknown."""
+        """Time of the first sticking, since the start, [s]; NaN if there is none or unknown."""
         stuck = self.truth[(self.truth[:, 0] >= 0.0) & (self.truth[:, 1] > 1.0), 0]
         return float(stuck[0]) if stuck.size else math.nan
 
 
 @dataclass(slots=True, kw_only=True)
 class BagClusters:
-    """Of each tray of a bag, one cycle."""
+    """Clusters of one cycle of a bag.
+
+    Parameters
+    ----------
+    epoch_ns : int, [ns]
+        Origin of the times in the table.
+    cycle : int
+    trays : dict of int to CycleClusters
+    notices : list of str
+    """
 
     epoch_ns: int
     cycle: int
@@ -153,30 +171,33 @@ def cycle_clusters(
     image_topic: str = '',
     progress: Callable[[int, int], None] | None = None,
 ) -> BagClusters:
-    """Follow the autocorrelations of one cycle of a bag.
+    """Compute the autocorrelations of one cycle of a bag.
 
     Parameters
     ----------
     path : Path
     settings : PipelineSettings
     cycle : int
-        Shaking events so far; 0 before the first.
+        Number of shaking events before it; 0 before the first.
     image_topic : str, optional
     progress : callable, optional
-        Called with the frames done and the frames there are.
+        Called with the number of frames done and the total.
 
     Raises
     ------
     RecordingError
-        When the bag cannot be read, holds no camera, or not that cycle.
+        If the bag cannot be read, or has no camera or not that cycle.
     ConfigurationError
-        When the settings cannot be used.
+        If the settings are invalid.
     FrameError
-        When no frame can be used.
+        If no frame can be used.
     """
     images = BagImages(path, settings, image_topic)
-    stages = {n: ClusterAutocorrelator(images.settings, one) for n, one in images.trays.items()}
-    found: dict[int, CycleClusters] = {}
+    stages = {
+        number: ClusterAutocorrelator(images.settings, tray)
+        for number, tray in images.trays.items()
+    }
+    clusters: dict[int, CycleClusters] = {}
     notices = []
     cycles: set[int] = set()
     for shot in images.shots(progress):
@@ -190,69 +211,73 @@ def cycle_clusters(
                 continue
             start = image.stamp_ns if image.cycle_start_ns is None else image.cycle_start_ns
             tray = images.trays[image.tray]
-            one = found.setdefault(image.tray, CycleClusters(tray=tray, start_ns=start))
-            _keep(one, image.gray, records)
-    if not found:
+            tray_clusters = clusters.setdefault(
+                image.tray, CycleClusters(tray=tray, start_ns=start)
+            )
+            _add_records(tray_clusters, image.gray, records)
+    if not clusters:
         raise RecordingError(
             images.bag.where,
             f'holds no cycle {cycle}',
-            f'name another with --cycle: {", ".join(str(one) for one in sorted(cycles))} '
+            f'name another with --cycle: {", ".join(str(number) for number in sorted(cycles))} '
             '(0: before the first shaking event)',
         )
-    for number, one in found.items():
-        one.truth = _truth(images, number, cycle, one.start_ns)
+    for number, tray_clusters in clusters.items():
+        tray_clusters.truth = _truth(images, number, cycle, tray_clusters.start_ns)
     return BagClusters(
-        epoch_ns=images.epoch_ns, cycle=cycle, trays=found, notices=[*images.notices, *notices]
+        epoch_ns=images.epoch_ns, cycle=cycle, trays=clusters, notices=[*images.notices, *notices]
     )
 
 
-def _keep(found: CycleClusters, gray: NDArray[np.uint8], records: tuple[object, ...]) -> None:
+def _add_records(
+    clusters: CycleClusters, gray: NDArray[np.uint8], records: tuple[object, ...]
+) -> None:
     for record in records:
         if isinstance(record, ClusterEstimate):
-            found.estimates.append(record)
+            clusters.estimates.append(record)
         elif isinstance(record, Autocorrelation):
-            since = (record.stamp_ns - found.start_ns) / NS
-            shot = Snapshot(since=since, gray=gray, values=record.values)
-            # The first, until the beads fly; then the last there is.
-            if not found.snapshots or found.snapshots[0].since < _FLYING:
-                found.snapshots = [shot]
+            since = (record.stamp_ns - clusters.start_ns) / NS
+            snapshot = Snapshot(since=since, gray=gray, values=record.values)
+            # Keep the first snapshot of flying beads, and the last one.
+            if not clusters.snapshots or clusters.snapshots[0].since < _FLYING:
+                clusters.snapshots = [snapshot]
             else:
-                found.snapshots = [found.snapshots[0], shot]
+                clusters.snapshots = [clusters.snapshots[0], snapshot]
 
 
 def _truth(images: BagImages, tray: int, cycle: int, start_ns: int) -> NDArray[np.float64]:
-    """Sizes by the bodies that the simulator of the scene knows, as `CycleClusters.truth`."""
+    """True sizes from the bodies in the bag, as `CycleClusters.truth`."""
     reader, name = images.bag.reader, topics.BEADS.absolute(tray)
     rows = []
     for message in reader.messages([name]) if name in reader.topics else ():
         values = reader.deserialize(message).data
-        one = beads_from_array(values, tray=tray, epoch_ns=images.epoch_ns, where=name)
-        if one.cycle == cycle:
-            sizes = np.unique(one.bodies, return_counts=True)[1]
-            many = sizes[sizes > 1]
+        beads = beads_from_array(values, tray=tray, epoch_ns=images.epoch_ns, where=name)
+        if beads.cycle == cycle:
+            sizes = np.unique(beads.bodies, return_counts=True)[1]
+            clusters = sizes[sizes > 1]
             rows.append(
                 (
-                    (one.stamp_ns - start_ns) / NS,
-                    cluster_sizes(one.bodies)[0],
-                    float(many.mean()) if many.size else math.nan,
+                    (beads.stamp_ns - start_ns) / NS,
+                    cluster_sizes(beads.bodies)[0],
+                    float(clusters.mean()) if clusters.size else math.nan,
                 )
             )
     return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
-def write_clusters(path: Path, found: BagClusters) -> None:
-    """Write every estimate as a table, CSV, with the paper's size and the true one.
+def write_clusters(path: Path, clusters: BagClusters) -> None:
+    """Write all estimates as CSV, with the size by the paper's method and the true size.
 
     Raises
     ------
     RecordingError
-        When the file cannot be written.
+        If the file cannot be written.
     """
-    write_csv(path, list(_COLUMNS), list(_COLUMNS.values()), _rows(found))
+    write_csv(path, list(_COLUMNS), list(_COLUMNS.values()), _rows(clusters))
 
 
-def _rows(found: BagClusters) -> Iterator[tuple[object, ...]]:
-    for number, tray in found.trays.items():
+def _rows(clusters: BagClusters) -> Iterator[tuple[object, ...]]:
+    for number, tray in clusters.trays.items():
         paper = tray.paper_sizes().tolist()
         times, truth = tray.times.tolist(), tray.true_sizes().tolist()
         for since, by_paper, true, estimate in zip(
@@ -260,7 +285,7 @@ def _rows(found: BagClusters) -> Iterator[tuple[object, ...]]:
         ):
             yield (
                 number,
-                (estimate.stamp_ns - found.epoch_ns) / NS,
+                (estimate.stamp_ns - clusters.epoch_ns) / NS,
                 since,
                 estimate.level_area,
                 estimate.breadth,

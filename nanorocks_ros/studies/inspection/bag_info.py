@@ -1,4 +1,4 @@
-"""What a recording holds, and whether it is well."""
+"""Contents of a recording and its problems: topics, gaps, camera, calibration, damage."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import numpy as np
 from nanorocks_ros.errors import ConfigurationError, FrameError, NanorocksError
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.messages.camera_info import info_from_message, view_from_message
-from nanorocks_ros.recordings.messages.image_messages import picture_kind
+from nanorocks_ros.recordings.messages.image_messages import image_kind
+from nanorocks_ros.recordings.storage import NS
 from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:
@@ -24,15 +25,15 @@ if TYPE_CHECKING:
     from nanorocks_ros.recordings.bag.reader import BagMessage, BagReader
     from nanorocks_ros.recordings.storage import TopicInfo
 
-NS = 1_000_000_000
-# A gap of more than this many usual intervals means that messages are missing.
-_GAP = 1.5
+# A step between messages of more than this many median steps is a gap.
+_MIN_GAP = 1.5
 # Topics with fewer messages have no rate.
-_FEWEST = 3
+_MIN_MESSAGES = 3
+_SUPPORTED_IMAGES = frozenset({'jpeg', 'png', 'bgr8', 'rgb8', 'mono8', 'bmp', 'webp', 'tiff'})
 
 
-class Ailment(NamedTuple):
-    """What is wrong with a recording, and what to do about it."""
+class Problem(NamedTuple):
+    """A problem of a recording and its remedy."""
 
     what: str
     remedy: str
@@ -40,7 +41,7 @@ class Ailment(NamedTuple):
 
 @dataclass(slots=True, kw_only=True)
 class TopicReport:
-    """What was found on a topic.
+    """Messages of a topic.
 
     Parameters
     ----------
@@ -54,18 +55,18 @@ class TopicReport:
 
     @property
     def rate(self) -> float | None:
-        """Messages per second, by the usual interval."""
-        usual = self._usual_ns()
-        return NS / usual if usual else None
+        """Messages per second, from the median step; None for fewer than three messages."""
+        median_ns = self._median_step_ns()
+        return NS / median_ns if median_ns else None
 
     @property
     def gaps(self) -> int:
-        """How often messages are missing between two."""
+        """Number of gaps, where messages are missing."""
         return self._gaps().size
 
     @property
     def longest_gap(self) -> float:
-        """The longest of them, [s]; 0 without one."""
+        """Longest gap, [s]; 0 if there is none."""
         gaps = self._gaps()
         return float(gaps.max()) / NS if gaps.size else 0.0
 
@@ -73,19 +74,19 @@ class TopicReport:
         stamps = np.array(self.stamps_ns, dtype=np.int64)
         return stamps[1:] - stamps[:-1]
 
-    def _usual_ns(self) -> float:
+    def _median_step_ns(self) -> float:
         steps = self._steps()
         steps = steps[steps > 0]
-        return float(np.median(steps)) if steps.size + 1 >= _FEWEST else 0.0
+        return float(np.median(steps)) if steps.size + 1 >= _MIN_MESSAGES else 0.0
 
     def _gaps(self) -> NDArray[np.int64]:
-        steps, usual = self._steps(), self._usual_ns()
-        return steps[steps > _GAP * usual] if usual else steps[:0]
+        steps, median_ns = self._steps(), self._median_step_ns()
+        return steps[steps > _MIN_GAP * median_ns] if median_ns else steps[:0]
 
 
 @dataclass(slots=True, kw_only=True)
 class BagInfo:
-    """What a recording holds.
+    """Contents of a recording and its problems.
 
     Parameters
     ----------
@@ -98,13 +99,13 @@ class BagInfo:
     complete : bool
     messages_lost : int
     trays : list of int
-        That it holds results or truth of.
+        Trays with results or ground truth.
     calibration : CameraInfo or None
     camera : str
-        Its topic; empty without one.
+        Topic of the camera; empty if there is none.
     pictures : str
-        How they are stored: ``jpeg``, ``png``, ``h264``, ``bgr8``.
-    health : list of Ailment
+        Format of the images: ``jpeg``, ``png``, ``h264``, ``bgr8``.
+    health : list of Problem
     """
 
     path: Path
@@ -119,129 +120,128 @@ class BagInfo:
     calibration: CameraInfo | None = None
     camera: str = ''
     pictures: str = ''
-    health: list[Ailment] = field(default_factory=list)
+    health: list[Problem] = field(default_factory=list)
 
     @property
     def duration(self) -> float:
-        """From the first message to the last, [s]."""
+        """Time between the first and the last message, [s]."""
         return (self.end_ns - self.start_ns) / NS
 
 
 def bag_info(path: Path, progress: Callable[[int, int], None]) -> BagInfo:
-    """Go through a recording, once.
+    """Read a recording once and summarise it.
 
     Parameters
     ----------
     path : Path
     progress : callable
-        Called with the messages read and those there may be.
+        Called with the number of messages read and the expected total.
 
     Raises
     ------
     RecordingError
-        When it is no recording.
+        If it is not a recording.
     """
     reader = open_bag(path)
-    found = BagInfo(
+    info = BagInfo(
         path=path,
-        topics={name: TopicReport(info=info) for name, info in sorted(reader.topics.items())},
+        topics={name: TopicReport(info=topic) for name, topic in sorted(reader.topics.items())},
         start_ns=reader.start_ns,
         end_ns=reader.end_ns,
         size=sum(file.stat().st_size for file in reader.files),
         metadata=reader.metadata,
         trays=sorted({tray for name in reader.topics if (tray := topics.tray_of(name))}),
     )
-    held = sum(info.count for info in reader.topics.values())
-    found.camera = _camera(reader)
+    total = sum(topic.count for topic in reader.topics.values())
+    info.camera = _camera(reader)
     for number, message in enumerate(reader.messages(), start=1):
-        report = found.topics.get(message.topic)
+        report = info.topics.get(message.topic)
         if report is not None:
             report.stamps_ns.append(message.log_time_ns)
             if len(report.stamps_ns) == 1:
-                _look(found, reader, message)
-        progress(min(number, held), held)
-    found.complete = reader.complete
-    read = sum(len(one.stamps_ns) for one in found.topics.values())
-    found.messages_lost = max(reader.messages_lost, (reader.expected or 0) - read)
-    found.health = _health(found, reader)
-    return found
+                _inspect_first_message(info, reader, message)
+        progress(min(number, total), total)
+    info.complete = reader.complete
+    read = sum(len(report.stamps_ns) for report in info.topics.values())
+    info.messages_lost = max(reader.messages_lost, (reader.expected or 0) - read)
+    info.health = _health(info, reader)
+    return info
 
 
 def _camera(reader: BagReader) -> str:
-    """The camera of the graph, or any other."""
-    ours = [topics.RAW_COMPRESSED.absolute(), topics.RAW.absolute()]
-    kinds = (topics.COMPRESSED, topics.IMAGE)
-    others = [name for name, info in sorted(reader.topics.items()) if info.type in kinds]
-    return next((one for one in [*ours, *others] if one in reader.topics), '')
+    """Topic of the camera: that of nanorocks if present, else the first image topic."""
+    nanorocks_topics = [topics.RAW_COMPRESSED.absolute(), topics.RAW.absolute()]
+    types = (topics.COMPRESSED, topics.IMAGE)
+    others = [name for name, topic in sorted(reader.topics.items()) if topic.type in types]
+    return next((name for name in [*nanorocks_topics, *others] if name in reader.topics), '')
 
 
-def _look(found: BagInfo, reader: BagReader, message: BagMessage) -> None:
-    """Take a closer look at the first message of a topic."""
+def _inspect_first_message(info: BagInfo, reader: BagReader, message: BagMessage) -> None:
+    """Read the image format or the calibration from the first message of a topic."""
     try:
-        if message.topic == found.camera:
-            found.pictures = picture_kind(reader.deserialize(message))
-        elif message.type == topics.INFO and found.calibration is None:
+        if message.topic == info.camera:
+            info.pictures = image_kind(reader.deserialize(message))
+        elif message.type == topics.INFO and info.calibration is None:
             content = reader.deserialize(message)
-            where = f'{found.path}: {message.topic}'
-            found.calibration = info_from_message(content)
+            where = f'{info.path}: {message.topic}'
+            info.calibration = info_from_message(content)
             view_from_message(content, where)
     except (ConfigurationError, FrameError) as error:
-        found.calibration = None
-        found.health.append(Ailment(f'{error.where}: {error.what}', error.do))
+        info.calibration = None
+        info.health.append(Problem(f'{error.where}: {error.what}', error.do))
     except NanorocksError as error:
-        found.health.append(Ailment(f'{error.where}: {error.what}', error.do))
+        info.health.append(Problem(f'{error.where}: {error.what}', error.do))
 
 
-def _health(found: BagInfo, reader: BagReader) -> list[Ailment]:
-    again = f'nanorocks salvage {shlex.quote(str(found.path))} -o NEW copies what can be read'
-    ailments = [Ailment(notice, again) for notice in reader.damage]
-    if found.messages_lost and not reader.damage:
-        ailments.append(Ailment(f'{found.messages_lost} messages are missing', again))
-    ailments += [Ailment(f'it {one.what}', one.remedy) for one in reader.unfinished]
-    ailments += found.health
-    return ailments + _camera_ailments(found)
+def _health(info: BagInfo, reader: BagReader) -> list[Problem]:
+    """Problems with the files, the making of the recording, and its camera."""
+    remedy = f'nanorocks salvage {shlex.quote(str(info.path))} -o NEW copies readable messages'
+    problems = [Problem(notice, remedy) for notice in reader.damage]
+    if info.messages_lost and not reader.damage:
+        problems.append(Problem(f'{info.messages_lost} messages are missing', remedy))
+    problems += [
+        Problem(f'it {interruption.what}', interruption.remedy)
+        for interruption in reader.interruptions
+    ]
+    problems += info.health
+    return problems + _camera_problems(info)
 
 
-def _camera_ailments(found: BagInfo) -> list[Ailment]:
-    if not found.topics:
-        return [Ailment('it holds no messages', 'record it again')]
-    if not found.camera:
-        if any(name.startswith(topics.NAMESPACE) for name in found.topics):
+def _camera_problems(info: BagInfo) -> list[Problem]:
+    if not info.topics:
+        return [Problem('it holds no messages', 'record it again')]
+    if not info.camera:
+        if any(name.startswith(topics.NAMESPACE) for name in info.topics):
             return []
-        return [Ailment('it holds no camera', 'record sensor_msgs Image or CompressedImage')]
-    ailments = []
-    ours = (topics.RAW_COMPRESSED.absolute(), topics.RAW.absolute())
-    if found.camera not in ours:
-        ailments.append(
-            Ailment(
-                f"the camera's topic is '{found.camera}'", f'pass --image-topic {found.camera}'
+        return [Problem('it holds no camera', 'record sensor_msgs Image or CompressedImage')]
+    problems = []
+    nanorocks_topics = (topics.RAW_COMPRESSED.absolute(), topics.RAW.absolute())
+    if info.camera not in nanorocks_topics:
+        problems.append(
+            Problem(f"the camera's topic is '{info.camera}'", f'pass --image-topic {info.camera}')
+        )
+    if info.pictures and info.pictures not in _SUPPORTED_IMAGES:
+        problems.append(
+            Problem(
+                f"its images are '{info.pictures}', which is not supported",
+                'record JPEG or PNG, or write them to a video file and run nanorocks import',
             )
         )
-    if found.pictures and found.pictures not in _READ:
-        ailments.append(
-            Ailment(
-                f"its pictures are '{found.pictures}', which is not supported",
-                'record JPEG or PNG, or write a video of them and run nanorocks import',
-            )
-        )
-    if found.calibration is None and not any(
-        'camera_info' in ailment.what for ailment in found.health
+    if info.calibration is None and not any(
+        'camera_info' in problem.what for problem in info.health
     ):
-        ailments.append(
-            Ailment(
-                'it has no camera_info: pictures are taken as straight',
-                'nanorocks calibrate, then pass its file as preprocess.calibration',
+        problems.append(
+            Problem(
+                'it has no camera_info: images are assumed to be free of distortion',
+                'run nanorocks calibrate and pass its file as preprocess.calibration',
             )
         )
-    report = found.topics[found.camera]
+    report = info.topics[info.camera]
     if report.gaps:
-        ailments.append(
-            Ailment(
+        problems.append(
+            Problem(
                 f'frames are missing at {report.gaps} places, {report.longest_gap:.2f} s at most',
-                'nothing, if the camera was paused; speeds across the gaps are left out',
+                'none needed if the camera was paused; speeds across gaps are not computed',
             )
         )
-    return ailments
-
-
-_READ = frozenset({'jpeg', 'png', 'bgr8', 'rgb8', 'mono8', 'bmp', 'webp', 'tiff'})
+    return problems

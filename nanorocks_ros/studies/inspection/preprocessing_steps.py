@@ -1,4 +1,4 @@
-"""What each step of the preprocessing makes of one frame, as in [B19] fig. 4."""
+"""Intermediate images of the preprocessing of one frame, as in [B19] fig. 4."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
-from nanorocks_ros.experiment.view import Straight, View
+from nanorocks_ros.experiment.view import IdentityLens, View
 from nanorocks_ros.stages.preprocess.rectify import (
     mix_weights,
     nodes_of,
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.analysis.bag_images import Shot
 
-# Of the frame, shown around the floor of a tray.
+# Margin of the raw image around the floor of a tray.
 _MARGIN_PX = 12
-# Points along each side of a floor, so that a side that the lens bends looks bent.
+# Points along each side of a floor, so that lens distortion is visible.
 _SIDE_POINTS = 16
 
 
@@ -48,19 +48,20 @@ class TraySteps:
     ----------
     tray : Tray
     raw : ndarray of uint8, (h, w, 3), bgr, or (h, w)
-        Part of the frame as the camera gave it.
+        Part of the camera frame.
     outline : ndarray (n, 2), [px]
-        Edge of the floor in `raw`, where the settings say it is at rest.
+        Edge of the floor in `raw`, for the tray at rest.
     straight : ndarray of uint8, (rows, columns, 3), bgr, or (rows, columns)
-        Cut out through lens and pose of the plate alone.
+        Rectified by the lens and the pose of the plate only.
     image : TrayImage
-        The same with the motion of the tray taken out.
+        The same with the motion of the tray removed.
     darkness : ndarray of uint8, (rows, columns), or None
-        Where the tracker looks for beads; None for a gray camera.
+        Input of the bead detection; None for a gray camera.
     difference : ndarray (rows, columns), or None, [gray levels]
-        Of the averages that the binarised area compares; None while there are too few frames.
+        Difference of the averages that the binarised area compares; None while there are too
+        few frames.
     mask : ndarray of uint8, (rows, columns), or None
-        255 where that is motion.
+        255 where the difference is motion.
     tracks : Tracks or None
     pixels_per_metre : float, [px/m]
     """
@@ -78,7 +79,7 @@ class TraySteps:
 
     @property
     def moving_area(self) -> float | None:
-        """Area in which something moves, [m^2]; None while there are too few frames."""
+        """Area with motion, [m^2]; None while there are too few frames."""
         if self.mask is None:
             return None
         return float(np.count_nonzero(self.mask)) / self.pixels_per_metre**2
@@ -91,9 +92,9 @@ class FrameSteps:
     Parameters
     ----------
     number : int
-        Of the frame in the bag, counted from 0.
+        Number of the frame in the bag, counted from 0.
     time : float, [s]
-        Since the first frame that could be used.
+        Time since the first usable frame.
     trays : dict of int to TraySteps
     notices : list of str
     """
@@ -113,65 +114,67 @@ def steps_of_bag(
     image_topic: str = '',
     progress: Callable[[int, int], None] | None = None,
 ) -> FrameSteps:
-    """Follow a bag up to one frame, and keep every step of that one.
+    """Process a bag up to one frame, and return every step of that frame.
 
-    All frames before it are gone through as in an analysis, since what is made of a frame depends
-    on them: where the tray was at first, how the floor looks, how strong the noise is.
+    All earlier frames are processed as in an analysis, because the steps depend on them: on the
+    first position of the tray, the background, and the noise.
 
     Parameters
     ----------
     path : Path
     settings : PipelineSettings
     number : int, optional
-        Of the frame, counted from 0; by default the one in the middle.
+        Number of the frame, counted from 0; by default the one in the middle.
     time : float, optional, [s]
-        In place of the number: the first frame so long after the first.
+        Instead of the number: the first frame at least this long after the first one.
     image_topic : str, optional
     progress : callable, optional
 
     Raises
     ------
     RecordingError
-        When the bag cannot be read.
+        If the bag cannot be read.
     ConfigurationError
-        When the settings cannot be used, or the bag ends before that frame.
+        If the settings are invalid, or the bag ends before that frame.
     FrameError
-        When that frame cannot be used.
+        If that frame cannot be used.
     """
     images = BagImages(path, settings, image_topic)
-    wanted = images.bag.count // 2 if number is None else number
-    followers = {key: _Follower(images.settings, tray) for key, tray in images.trays.items()}
+    target = images.bag.count // 2 if number is None else number
+    stages = {key: _TrayStages(images.settings, tray) for key, tray in images.trays.items()}
     first_ns: int | None = None
     for shot in images.shots(progress):
         first_ns = shot.frame.stamp_ns if first_ns is None else first_ns
         elapsed = (shot.frame.stamp_ns - first_ns) / NS
         for image in shot.images:
-            followers[image.tray].push(image)
-        if (shot.number < wanted) if time is None else (elapsed < time):
+            stages[image.tray].push(image)
+        if (shot.number < target) if time is None else (elapsed < time):
             continue
-        if not shot.images or (time is None and shot.number > wanted):
+        if not shot.images or (time is None and shot.number > target):
             break
         return FrameSteps(
             number=shot.number,
             time=elapsed,
-            trays=_steps(shot, images, followers),
+            trays=_steps(shot, images, stages),
             notices=images.notices,
         )
     else:
-        flag, asked = ('--frame', str(wanted)) if time is None else ('--at', f'{time:g} s')
+        flag, value = ('--frame', str(target)) if time is None else ('--at', f'{time:g} s')
         raise ConfigurationError(
-            flag, f'{asked}, and the recording has {images.frames} frames', 'choose an earlier one'
+            flag,
+            f'{value}, but the recording has {images.frames} frames',
+            'choose an earlier frame',
         )
     reason = f' ({images.refused.what})' if images.refused else ''
     raise FrameError(
-        f'{images.bag.where}: frame {wanted if time is None else shot.number}',
+        f'{images.bag.where}: frame {target if time is None else shot.number}',
         f'cannot be used{reason}',
-        'choose another',
+        'choose another frame',
     )
 
 
-class _Follower:
-    """What the stages behind a tray image know of it."""
+class _TrayStages:
+    """The stages that process the images of one tray."""
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._shakes = CycleFollower(settings.speed.shake_ratio, settings.speed.min_cycle_duration)
@@ -198,47 +201,47 @@ class _Follower:
         return self._masker.mask(self._shakes.noise_power) if self._masker.full else None
 
 
-def _steps(shot: Shot, images: BagImages, followers: dict[int, _Follower]) -> dict[int, TraySteps]:
+def _steps(shot: Shot, images: BagImages, stages: dict[int, _TrayStages]) -> dict[int, TraySteps]:
     height, width = shot.frame.image.shape[:2]
-    view = images.view or View(camera=Straight(width=width, height=height))
-    found = {}
+    view = images.view or View(camera=IdentityLens(width=width, height=height))
+    steps = {}
     for image in shot.images:
         region = images.stage.regions[image.tray]
-        raw, outline = _as_filmed(shot.frame, region, view)
-        follower = followers[image.tray]
-        found[image.tray] = TraySteps(
+        raw, outline = _raw_view(shot.frame, region, view)
+        stage = stages[image.tray]
+        steps[image.tray] = TraySteps(
             tray=images.trays[image.tray],
             raw=raw,
             outline=outline,
             straight=_straight(shot.frame, region, view),
             image=image,
-            darkness=follower.darkness,
-            difference=follower.difference,
-            mask=follower.mask,
-            tracks=follower.tracks,
+            darkness=stage.darkness,
+            difference=stage.difference,
+            mask=stage.mask,
+            tracks=stage.tracks,
             pixels_per_metre=images.settings.preprocess.pixels_per_metre,
         )
-    return found
+    return steps
 
 
-def _as_filmed(
+def _raw_view(
     frame: Frame, region: Region, view: View
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
     """The part of the frame that shows a tray, and the edge of its floor there."""
     along = np.linspace(0.0, 1.0, _SIDE_POINTS, endpoint=False)
-    none, full = np.zeros(_SIDE_POINTS), np.ones(_SIDE_POINTS)
-    sides = [(along, none), (full, along), (1.0 - along, full), (none, 1.0 - along)]
+    zeros, ones = np.zeros(_SIDE_POINTS), np.ones(_SIDE_POINTS)
+    sides = [(along, zeros), (ones, along), (1.0 - along, ones), (zeros, 1.0 - along)]
     edge = np.concatenate([np.stack(side, axis=-1) for side in sides])
-    places = view.source((region.x, region.y) + edge * (region.width, region.height))
+    outline = view.source((region.x, region.y) + edge * (region.width, region.height))
     size = frame.image.shape[1::-1]
-    low = np.clip(np.floor(places.min(axis=0)) - _MARGIN_PX, 0, size).astype(int)
-    high = np.clip(np.ceil(places.max(axis=0)) + _MARGIN_PX, 0, size).astype(int)
+    low = np.clip(np.floor(outline.min(axis=0)) - _MARGIN_PX, 0, size).astype(int)
+    high = np.clip(np.ceil(outline.max(axis=0)) + _MARGIN_PX, 0, size).astype(int)
     part = _as_bgr(frame.image, frame.encoding)[low[1] : high[1], low[0] : high[0]]
-    return part, places - low
+    return part, outline - low
 
 
 def _straight(frame: Frame, region: Region, view: View) -> NDArray[np.uint8]:
-    """The floor of a tray, straight, wherever the tray has swung to."""
+    """Rectified image of the rest position of a tray, without removal of its motion."""
     nodes = nodes_of(region, view)
     image = np.ascontiguousarray(frame.image).reshape(*frame.image.shape[:2], -1)
     gray = np.empty((region.height, region.width), dtype=np.uint8)

@@ -1,4 +1,4 @@
-"""The speed of a bag by every method at once, beside each other and beside the truth."""
+"""Comparison of the speeds of a bag by every method, with the ground truth if it is known."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 AUTO = 'auto'
 METHODS = 'tracking', 'structure_function', 'binarised_area'
-"""What is compared; `auto` is whichever of them is chosen from the data."""
+"""The compared methods; `auto` is the one of them that is selected from the data."""
 
 _COLUMNS = {
     'tray': '1',
@@ -60,31 +60,31 @@ class ComparedSpeeds:
     speeds: dict[str, list[SpeedEstimate]]
     truth: list[GroundTruth] = field(default_factory=list)
 
-    def true_speeds(self, found: Sequence[SpeedEstimate]) -> NDArray[np.float64]:
+    def true_speeds(self, estimates: Sequence[SpeedEstimate]) -> NDArray[np.float64]:
         """The true mean projected speed over the window of each estimate, (n,), [m/s].
 
-        NaN where the truth is not known.
+        NaN if the truth is not known.
         """
         if not self.truth:
-            return np.full(len(found), np.nan)
+            return np.full(len(estimates), np.nan)
         stamps = np.array([truth.stamp_ns for truth in self.truth], dtype=np.int64)
         sums = np.cumsum([0.0, *(truth.mean_projected_speed for truth in self.truth)])
-        middles = np.array([estimate.stamp_ns for estimate in found], dtype=np.int64)
-        # A stamp on the edge is inside, whatever its last digits.
-        halves = np.array([0.5 * estimate.window * NS + 1e3 for estimate in found])
+        middles = np.array([estimate.stamp_ns for estimate in estimates], dtype=np.int64)
+        # A stamp on the edge of the window is inside, despite rounding.
+        halves = np.array([0.5 * estimate.window * NS + 1e3 for estimate in estimates])
         first = np.searchsorted(stamps, middles - halves)
         last = np.searchsorted(stamps, middles + halves)
         counts = np.maximum(last - first, 1)
         return np.where(last > first, (sums[last] - sums[first]) / counts, np.nan)
 
     def ratios(self, method: str, cycle: int | None = None) -> NDArray[np.float64]:
-        """Estimates over the truth, those of which both are known.
+        """Estimate / truth, where both are known.
 
         Parameters
         ----------
         method : str
         cycle : int, optional
-            Of this cycle alone.
+            Restrict to this cycle.
         """
         estimates = [
             speed for speed in self.speeds[method] if cycle is None or speed.cycle == cycle
@@ -95,18 +95,18 @@ class ComparedSpeeds:
         return np.asarray(ratios[np.isfinite(ratios)])
 
     def chosen(self, cycle: int | None = None) -> dict[str, float]:
-        """Share of the speeds chosen from the data that each method gave."""
-        found = [
+        """Fraction of the automatically selected speeds that come from each method."""
+        selected = [
             speed.method.name.lower()
             for speed in self.speeds[AUTO]
             if cycle is None or speed.cycle == cycle
         ]
-        return {method: found.count(method) / len(found) for method in METHODS if found}
+        return {method: selected.count(method) / len(selected) for method in METHODS if selected}
 
     @property
     def cycles(self) -> list[int]:
-        """Cycles in which anything was measured."""
-        return sorted({estimate.cycle for found in self.speeds.values() for estimate in found})
+        """Cycles with at least one speed."""
+        return sorted({speed.cycle for speeds in self.speeds.values() for speed in speeds})
 
 
 @dataclass(slots=True, kw_only=True)
@@ -115,8 +115,8 @@ class BagSpeeds:
 
     Parameters
     ----------
-    epoch_ns : int
-        What times count from.
+    epoch_ns : int, [ns]
+        Origin of the times in the table.
     trays : dict of int to ComparedSpeeds
     frames : int
     notices : list of str
@@ -128,7 +128,7 @@ class BagSpeeds:
     notices: list[str] = field(default_factory=list)
 
     def first_cycle(self) -> int:
-        """The first cycle after a shaking event; 0 where there was none."""
+        """The first cycle after a shaking event; 0 if there was none."""
         cycles = {cycle for tray in self.trays.values() for cycle in tray.cycles}
         return min(cycles - {0}, default=0)
 
@@ -146,19 +146,19 @@ def compare_speeds(
     ----------
     path : Path
     settings : PipelineSettings
-        Its `speed.method` does not matter.
+        Its `speed.method` is ignored.
     image_topic : str, optional
     progress : callable, optional
-        Called with the frames done and the frames there are.
+        Called with the number of frames done and the total.
 
     Raises
     ------
     RecordingError
-        When the bag cannot be read or holds no camera.
+        If the bag cannot be read or has no camera.
     ConfigurationError
-        When the settings cannot be used.
+        If the settings are invalid.
     FrameError
-        When no frame can be used.
+        If no frame can be used.
     """
     images = BagImages(path, settings, image_topic)
     truth = images.bag.truth(images.epoch_ns)
@@ -169,7 +169,7 @@ def compare_speeds(
         for number, tray in images.trays.items()
         for method in (AUTO, *METHODS)
     }
-    found = BagSpeeds(
+    result = BagSpeeds(
         epoch_ns=images.epoch_ns,
         trays={
             number: ComparedSpeeds(
@@ -182,34 +182,34 @@ def compare_speeds(
     )
     for shot in images.shots(progress):
         for image in shot.images:
-            for method, speeds in found.trays[image.tray].speeds.items():
+            for method, speeds in result.trays[image.tray].speeds.items():
                 records = estimators[image.tray, method].push(image)
                 speeds += [record for record in records if isinstance(record, SpeedEstimate)]
-    found.frames = images.frames
-    found.notices = images.notices
-    return found
+    result.frames = images.frames
+    result.notices = images.notices
+    return result
 
 
-def write_speeds(path: Path, found: BagSpeeds) -> None:
-    """Write every estimate as a table, CSV, with the truth over its window.
+def write_speeds(path: Path, bag_speeds: BagSpeeds) -> None:
+    """Write all speeds as CSV, with the truth over the window of each.
 
     Raises
     ------
     RecordingError
-        When the file cannot be written.
+        If the file cannot be written.
     """
-    write_csv(path, list(_COLUMNS), list(_COLUMNS.values()), _rows(found))
+    write_csv(path, list(_COLUMNS), list(_COLUMNS.values()), _rows(bag_speeds))
 
 
-def _rows(found: BagSpeeds) -> Iterator[tuple[object, ...]]:
-    for number, tray in found.trays.items():
+def _rows(bag_speeds: BagSpeeds) -> Iterator[tuple[object, ...]]:
+    for number, tray in bag_speeds.trays.items():
         for method, speeds in tray.speeds.items():
             for speed, true in zip(speeds, tray.true_speeds(speeds).tolist(), strict=True):
                 start = speed.cycle_start_ns
                 yield (
                     number,
                     method,
-                    (speed.stamp_ns - found.epoch_ns) / NS,
+                    (speed.stamp_ns - bag_speeds.epoch_ns) / NS,
                     speed.cycle,
                     float('nan') if start is None else (speed.stamp_ns - start) / NS,
                     speed.mean_projected_speed.value,

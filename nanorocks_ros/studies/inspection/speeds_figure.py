@@ -1,4 +1,4 @@
-"""The picture of one cycle: the speed by every method, and the truth where it is known."""
+"""Figure of the speeds of one cycle by every method, with the ground truth if it is known."""
 
 from __future__ import annotations
 
@@ -30,23 +30,23 @@ _COLOURS = {
 }
 _TRUTH, _CHOSEN = '#8a8a8a', '#111111'
 _WIDTH, _HEIGHT, _DPI = 12.0, 3.4, 110
-# Of the largest true speed, or the largest by tracking and structure function: what is higher is
-# cut off.
+# Upper limit of the speed axis, as a multiple of the largest true speed, or of the largest speed
+# by tracking and structure function.
 _HEADROOM = 1.6
-# Estimates over the truth that are shown, and within which they should lie.
-_RATIOS, _GOAL = (0.4, 10.0), 0.1
+# Range of the axis of estimate / truth, and tolerance of the shaded band.
+_RATIOS, _TOLERANCE = (0.4, 10.0), 0.1
 
 
-def speeds_figure(path: Path, found: BagSpeeds, cycle: int) -> None:
-    """Draw the speeds of one cycle by every method, a row for each tray.
+def speeds_figure(path: Path, bag_speeds: BagSpeeds, cycle: int) -> None:
+    """Draw the speeds of one cycle by every method, one row per tray.
 
-    Bands are one standard error, as the method states it; dots are what is chosen from the data.
-    Beside it, where the truth is known, the estimates over it.
+    Bands are one standard error as stated by the method; dots are the speeds selected from the
+    data. If the truth is known, a second column shows estimate / truth.
 
     Parameters
     ----------
     path : Path
-    found : BagSpeeds
+    bag_speeds : BagSpeeds
     cycle : int
         One of `ComparedSpeeds.cycles`; times count from its shaking event, those of cycle 0
         from the epoch.
@@ -54,55 +54,57 @@ def speeds_figure(path: Path, found: BagSpeeds, cycle: int) -> None:
     Raises
     ------
     RecordingError
-        When the picture cannot be written.
+        If the file cannot be written.
 
     References
     ----------
     After [B19] fig. 2.
     """
-    known = any(tray.truth for tray in found.trays.values())
-    figure = Figure(figsize=(_WIDTH, _HEIGHT * len(found.trays) + 0.4), layout='constrained')
-    shares: dict[str, Any] = {'width_ratios': (3, 2)} if known else {}
-    rows = figure.subplots(len(found.trays), 1 + known, squeeze=False, sharex=True, **shares)
-    for row, (number, tray) in zip(rows, found.trays.items(), strict=True):
-        start_ns = _start_ns(found, cycle)
+    has_truth = any(tray.truth for tray in bag_speeds.trays.values())
+    figure = Figure(figsize=(_WIDTH, _HEIGHT * len(bag_speeds.trays) + 0.4), layout='constrained')
+    columns: dict[str, Any] = {'width_ratios': (3, 2)} if has_truth else {}
+    rows = figure.subplots(
+        len(bag_speeds.trays), 1 + has_truth, squeeze=False, sharex=True, **columns
+    )
+    for row, (number, tray) in zip(rows, bag_speeds.trays.items(), strict=True):
+        start_ns = _start_ns(bag_speeds, cycle)
         _draw_speeds(row[0], tray, cycle, start_ns)
         row[0].set_title(f'tray {number}, cycle {cycle}', loc='left', fontsize=10)
-        if known:
+        if has_truth:
             _draw_ratios(row[1], tray, cycle, start_ns)
     since = 'since the shaking event' if cycle else 'since the beginning'
     for axes in rows[-1]:
         axes.set_xlabel(f'time {since} [s]')
     rows[0, 0].legend(frameon=False, fontsize=8)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=_DPI)
+    with atomic_file(path) as file:
+        figure.savefig(file, dpi=_DPI)
 
 
-def _start_ns(found: BagSpeeds, cycle: int) -> int:
+def _start_ns(bag_speeds: BagSpeeds, cycle: int) -> int:
     starts = [
         speed.cycle_start_ns
-        for tray in found.trays.values()
+        for tray in bag_speeds.trays.values()
         for speeds in tray.speeds.values()
         for speed in speeds
         if speed.cycle == cycle and speed.cycle_start_ns is not None
     ]
-    return min(starts, default=found.epoch_ns)
+    return min(starts, default=bag_speeds.epoch_ns)
 
 
-def _of(tray: ComparedSpeeds, method: str, cycle: int) -> list[SpeedEstimate]:
+def _in_cycle(tray: ComparedSpeeds, method: str, cycle: int) -> list[SpeedEstimate]:
     return [speed for speed in tray.speeds[method] if speed.cycle == cycle]
 
 
 def _draw_speeds(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) -> None:
-    tops = [0.0]
-    truth = [one for one in tray.truth if one.cycle == cycle]
+    shown = [0.0]
+    truth = [record for record in tray.truth if record.cycle == cycle]
     if truth:
-        values = [_MM * one.mean_projected_speed for one in truth]
-        times = [(one.stamp_ns - start_ns) / NS for one in truth]
+        values = [_MM * record.mean_projected_speed for record in truth]
+        times = [(record.stamp_ns - start_ns) / NS for record in truth]
         axes.plot(times, values, color=_TRUTH, lw=4, alpha=0.6, label='truth')
-        tops += values
+        shown += values
     for method in METHODS:
-        estimates = _of(tray, method, cycle)
+        estimates = _in_cycle(tray, method, cycle)
         times = [(estimate.stamp_ns - start_ns) / NS for estimate in estimates]
         speed = _MM * np.array([estimate.mean_projected_speed.value for estimate in estimates])
         error = _MM * np.array([estimate.mean_projected_speed.error for estimate in estimates])
@@ -110,8 +112,8 @@ def _draw_speeds(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) ->
         axes.fill_between(times, speed - error, speed + error, color=colour, alpha=0.2, lw=0)
         axes.plot(times, speed, color=colour, lw=1.2, label=method.replace('_', ' '))
         if not truth and method != 'binarised_area':
-            tops += speed[np.isfinite(speed)].tolist()
-    chosen = _of(tray, AUTO, cycle)
+            shown += speed[np.isfinite(speed)].tolist()
+    chosen = _in_cycle(tray, AUTO, cycle)
     axes.plot(
         [(estimate.stamp_ns - start_ns) / NS for estimate in chosen],
         [_MM * estimate.mean_projected_speed.value for estimate in chosen],
@@ -120,16 +122,16 @@ def _draw_speeds(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) ->
         color=_CHOSEN,
         label='chosen from the data',
     )
-    if max(tops) > 0.0:
-        axes.set_ylim(0.0, _HEADROOM * max(tops))
+    if max(shown) > 0.0:
+        axes.set_ylim(0.0, _HEADROOM * max(shown))
     axes.set_ylabel('mean projected speed [mm/s]')
     axes.grid(alpha=0.25)
 
 
 def _draw_ratios(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) -> None:
-    axes.axhspan(1.0 - _GOAL, 1.0 + _GOAL, color=_TRUTH, alpha=0.25, lw=0)
+    axes.axhspan(1.0 - _TOLERANCE, 1.0 + _TOLERANCE, color=_TRUTH, alpha=0.25, lw=0)
     for method in METHODS:
-        estimates = _of(tray, method, cycle)
+        estimates = _in_cycle(tray, method, cycle)
         true = tray.true_speeds(estimates)
         times = [(estimate.stamp_ns - start_ns) / NS for estimate in estimates]
         speeds = np.array([estimate.mean_projected_speed.value for estimate in estimates])
@@ -141,5 +143,5 @@ def _draw_ratios(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) ->
     axes.yaxis.set_major_formatter('{x:g}')
     axes.yaxis.set_minor_locator(mpl.ticker.NullLocator())
     axes.set_ylabel('estimate / truth')
-    axes.set_title(f'grey: within {100 * _GOAL:.0f} %', loc='left', fontsize=10)
+    axes.set_title(f'grey: within {100 * _TOLERANCE:.0f} %', loc='left', fontsize=10)
     axes.grid(alpha=0.25)

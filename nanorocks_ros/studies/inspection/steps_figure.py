@@ -1,4 +1,4 @@
-"""The picture of the preprocessing of a frame, step by step and tray by tray."""
+"""Figure of the preprocessing of a frame: eight steps for each tray."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.inspection.preprocessing_steps import FrameSteps, TraySteps
 
 _WIDTH, _COLUMNS, _DPI = 15.0, 4, 110
-# Of each panel its title, and of each tray its headline, [in].
+# Height of the title of a panel and of the headline of a tray, [in].
 _TITLE, _HEADLINE = 0.45, 0.35
 _MM2 = 1e6
 _EDGE = '#3cdc3c'
@@ -44,12 +44,12 @@ def steps_figure(path: Path, steps: FrameSteps, settings: SpeedSettings) -> None
     path : Path
     steps : FrameSteps
     settings : SpeedSettings
-        Of the binarised area.
+        Settings of the binarised area.
 
     Raises
     ------
     RecordingError
-        When the picture cannot be written.
+        If the file cannot be written.
 
     References
     ----------
@@ -62,12 +62,12 @@ def steps_figure(path: Path, steps: FrameSteps, settings: SpeedSettings) -> None
     for part, tray, drawn in zip(parts[:, 0], steps.trays.values(), panels, strict=True):
         part.suptitle(_headline(tray, steps), fontsize=11, x=0.01, ha='left', weight='bold')
         axes = part.subplots(2, _COLUMNS, squeeze=False).ravel()
-        for place, (title, draw) in zip(axes, drawn, strict=True):
-            place.set_title(title, fontsize=9, loc='left')
-            place.set_axis_off()
-            draw(place)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=_DPI)
+        for panel, (title, draw) in zip(axes, drawn, strict=True):
+            panel.set_title(title, fontsize=9, loc='left')
+            panel.set_axis_off()
+            draw(panel)
+    with atomic_file(path) as file:
+        figure.savefig(file, dpi=_DPI)
 
 
 def _height(steps: TraySteps) -> float:
@@ -89,54 +89,54 @@ _Panel = tuple[str, 'Callable[[Axes], None]']
 
 def _panels(steps: TraySteps, settings: SpeedSettings) -> list[_Panel]:
     image = steps.image
-    steady = image.gray if image.color is None else image.color
+    stabilised = image.gray if image.color is None else image.color
     averages = _AVERAGES[settings.averaging].format(settings.averaged_frames)
     return [
-        ('1  as filmed, with the floor when at rest', lambda axes: _filmed(axes, steps)),
+        ('1  as filmed, with the floor when at rest', lambda axes: _draw_raw(axes, steps)),
         ('2  straightened', lambda axes: _show(axes, steps.straight)),
-        (f'3  stabilised: {_moved(steps)}', lambda axes: _show(axes, steady)),
+        (f'3  stabilised: {_displacement_text(steps)}', lambda axes: _show(axes, stabilised)),
         ('4  gray mix', lambda axes: _show(axes, image.gray)),
         ('5  darkness, as the tracker sees it', lambda axes: _show(axes, steps.darkness)),
-        (f'6  tracked: {_found(steps)}', lambda axes: _tracked(axes, steps)),
+        (f'6  tracked: {_tracked_counts(steps)}', lambda axes: _draw_tracks(axes, steps)),
         (f'7  {averages}', lambda axes: _show(axes, _stretched(steps.difference))),
-        (f'8  {_binarised(steps, settings)}', lambda axes: _show(axes, steps.mask)),
+        (f'8  {_mask_title(steps, settings)}', lambda axes: _show(axes, steps.mask)),
     ]
 
 
-def _moved(steps: TraySteps) -> str:
+def _displacement_text(steps: TraySteps) -> str:
     shift = np.array(steps.image.displacement) * steps.pixels_per_metre
     if np.isnan(shift).any():
-        return 'not followed'
-    return f'the tray is {shift[0]:+.2f}, {shift[1]:+.2f} px from its place'
+        return 'tray displacement unknown'
+    return f'tray displaced by {shift[0]:+.2f}, {shift[1]:+.2f} px'
 
 
-def _found(steps: TraySteps) -> str:
+def _tracked_counts(steps: TraySteps) -> str:
     tracks = steps.tracks
     if tracks is None:
-        return 'nothing, the camera is gray'
+        return 'none, the camera is gray'
     return ', '.join(
-        f'{int((tracks.seen & (tracks.species == k)).sum())} of {one.count} {one.material}'
-        for k, one in enumerate(steps.tray.species)
+        f'{int((tracks.seen & (tracks.species == k)).sum())} of {species.count} {species.material}'
+        for k, species in enumerate(steps.tray.species)
     )
 
 
-def _binarised(steps: TraySteps, settings: SpeedSettings) -> str:
+def _mask_title(steps: TraySteps, settings: SpeedSettings) -> str:
     if steps.moving_area is None:
         return 'binarised: too few frames since the beginning or the shaking event'
     return (
         f'despeckled, over {settings.threshold:g} sigma: {_MM2 * steps.moving_area:.1f} mm$^2$ '
-        'move'
+        'moving'
     )
 
 
-def _filmed(axes: Axes, steps: TraySteps) -> None:
+def _draw_raw(axes: Axes, steps: TraySteps) -> None:
     _show(axes, steps.raw)
-    # Pixels are drawn around their number; ours are counted from the corner of the first.
+    # Matplotlib centres the first pixel at 0; the outline counts from the corner of that pixel.
     closed = np.vstack([steps.outline, steps.outline[:1]]) - 0.5
     axes.plot(*closed.T, color=_EDGE, lw=0.9)
 
 
-def _tracked(axes: Axes, steps: TraySteps) -> None:
+def _draw_tracks(axes: Axes, steps: TraySteps) -> None:
     if steps.tracks is None:
         _show(axes, None)
     else:
@@ -153,7 +153,7 @@ def _show(axes: Axes, picture: NDArray[Any] | None) -> None:
 
 
 def _stretched(difference: NDArray[Any] | None) -> NDArray[Any] | None:
-    """From black to white, whatever the largest difference is."""
+    """Scale a difference image to the range 0 to 255."""
     if difference is None:
         return None
     return difference * (255.0 / max(float(difference.max()), 1.0))

@@ -1,4 +1,4 @@
-"""The picture of a tray with its tracks drawn over it, as in [B19] fig. 3c."""
+"""Overlay of bead tracks on a tray image, as in [B19] fig. 3c."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.records import Tracks, TrayImage
 
-# Colours of tracks, bgr, apart from each other and from red, blue, copper and gray.
+# Colours of tracks, bgr, distinct from each other and from red, blue, copper and gray.
 _COLOURS = (
     (80, 255, 120),
     (0, 235, 255),
@@ -28,7 +28,7 @@ _COLOURS = (
     (200, 255, 200),
 )
 _HIDDEN = (255, 0, 255)
-# Parts of a pixel in which OpenCV takes coordinates, as a power of two.
+# Fractional bits of the coordinates that are passed to OpenCV.
 _SHIFT = 4
 _GAP_PX = 12
 
@@ -41,23 +41,23 @@ def overlay(
     magnification: int = 3,
     path_frames: int = 30,
 ) -> NDArray[np.uint8]:
-    """Draw the beads of one picture, and the ways they came.
+    """Draw the beads of one image and their paths.
 
     Parameters
     ----------
     image : TrayImage
     tracks : sequence of Tracks
-        Up to and with that of the image.
+        Tracks up to and including those of the image.
     pixels_per_metre : float, [px/m]
-        Of the image.
+        Scale of the image.
     magnification : int
     path_frames : int
-        Length of the ways drawn, in pictures.
+        Length of the paths, in frames.
 
     Returns
     -------
     ndarray of uint8, (rows, columns, 3), bgr
-        Beads that are hidden, and so predicted, are magenta.
+        Hidden beads, whose positions are predicted, are magenta.
     """
     picture = image.gray if image.color is None else image.color
     large = cv2.resize(
@@ -66,20 +66,20 @@ def overlay(
     canvas: Any = large if large.ndim == 3 else cv2.cvtColor(large, cv2.COLOR_GRAY2BGR)
     scale = magnification * pixels_per_metre * 2**_SHIFT
     if tracks:
-        for number, way in _ways(tracks[-path_frames:]).items():
-            points = np.round(way * scale - 2 ** (_SHIFT - 1)).astype(np.int32)
+        for number, positions in _paths(tracks[-path_frames:]).items():
+            points = np.round(positions * scale - 2 ** (_SHIFT - 1)).astype(np.int32)
             cv2.polylines(canvas, [points], False, _colour(number), 1, cv2.LINE_AA, _SHIFT)
         _draw_beads(canvas, tracks[-1], scale)
     return np.asarray(canvas, dtype=np.uint8)
 
 
 def write_overlay(path: Path, pictures: Sequence[NDArray[np.uint8]]) -> None:
-    """Write overlays below each other, as a PNG.
+    """Write several overlays, stacked vertically, as a PNG.
 
     Raises
     ------
     RecordingError
-        When the file cannot be written.
+        If the file cannot be written.
     """
     width = max(picture.shape[1] for picture in pictures)
     parts = [
@@ -88,28 +88,28 @@ def write_overlay(path: Path, pictures: Sequence[NDArray[np.uint8]]) -> None:
     ]
     encoded, content = cv2.imencode('.png', np.vstack(parts)[:-_GAP_PX])
     if not encoded:
-        raise RecordingError(str(path), 'the picture cannot be encoded', 'name a .png file')
-    with atomic_file(path) as part:
-        part.write_bytes(content.tobytes())
+        raise RecordingError(str(path), 'the image cannot be encoded', 'name a .png file')
+    with atomic_file(path) as file:
+        file.write_bytes(content.tobytes())
 
 
 def _colour(number: int) -> tuple[int, int, int]:
     return _COLOURS[number % len(_COLOURS)]
 
 
-def _ways(tracks: Sequence[Tracks]) -> dict[int, NDArray[np.float64]]:
-    """Places of each bead of the last picture, in order, [m]."""
-    ways: dict[int, list[NDArray[np.float64]]] = {int(one): [] for one in tracks[-1].ids}
+def _paths(tracks: Sequence[Tracks]) -> dict[int, NDArray[np.float64]]:
+    """Positions of each bead of the last record, in order of time, [m]."""
+    paths: dict[int, list[NDArray[np.float64]]] = {int(number): [] for number in tracks[-1].ids}
     for record in tracks:
-        for number, place in zip(record.ids.tolist(), record.positions, strict=True):
-            if number in ways:
-                ways[number].append(place)
-    return {number: np.array(way) for number, way in ways.items()}
+        for number, position in zip(record.ids.tolist(), record.positions, strict=True):
+            if number in paths:
+                paths[number].append(position)
+    return {number: np.array(positions) for number, positions in paths.items()}
 
 
 def _draw_beads(canvas: NDArray[np.uint8], tracks: Tracks, scale: float) -> None:
     columns = (tracks.ids.tolist(), tracks.positions, tracks.radii.tolist(), tracks.seen.tolist())
-    for number, place, radius, seen in zip(*columns, strict=True):
-        centre = [round(float(one) * scale - 2 ** (_SHIFT - 1)) for one in place]
+    for number, position, radius, seen in zip(*columns, strict=True):
+        centre = [round(float(axis) * scale - 2 ** (_SHIFT - 1)) for axis in position]
         colour = _colour(number) if seen else _HIDDEN
         cv2.circle(canvas, centre, round(radius * scale), colour, 1, cv2.LINE_AA, _SHIFT)

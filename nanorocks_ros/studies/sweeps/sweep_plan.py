@@ -5,14 +5,14 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+from nanorocks_ros.experiment.trays import load_trays, tray_by_number, tray_values
 from nanorocks_ros.settings import SimulationSettings, rows, with_values
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ class SweepPlan:
                 'axes': {axis.name: axis.values for axis in self.axes},
                 'times': self.times,
                 'settings': {row.name: row.default for row in rows(self.settings)},
-                'trays': {str(tray.number): asdict(tray) for tray in self.trays},
+                'trays': {str(tray.number): tray_values(tray) for tray in self.trays},
             }
         )
 

@@ -13,7 +13,7 @@ from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.jobs.progress import Progress
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.image_messages import encode_jpeg
 from nanorocks_ros.recordings.messages.message_builders import (
@@ -80,9 +80,9 @@ def film_into_bag(
     frames = max(1, round(duration * settings.frame_rate))
     truth_topic = topics.TRUTH.absolute(settings.tray)
     table = {
-        topics.EPOCH.absolute(): offered(topics.EPOCH),
-        topics.RAW_COMPRESSED.absolute(): offered(topics.RAW_COMPRESSED),
-        truth_topic: offered(topics.TRUTH),
+        topics.EPOCH.absolute(): offered_topic(topics.EPOCH),
+        topics.RAW_COMPRESSED.absolute(): offered_topic(topics.RAW_COMPRESSED),
+        truth_topic: offered_topic(topics.TRUTH),
     }
     labels = [field.name for field in layout(GroundTruth).fields]
     provenance = {
@@ -127,4 +127,4 @@ def check_camera(settings: SimulationSettings, tray: Tray) -> None:
     SimulationError
         With the sizes of both.
     """
-    TrayCamera(settings, tray, np.array([tray.diameter]), ('',))
+    TrayCamera(settings, tray, np.array([tray.diameter]), (tray.species[0].material,))

@@ -8,7 +8,7 @@ import cv2
 
 from nanorocks_ros import __version__
 from nanorocks_ros.outputs.atomic_files import write_bytes
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import (
     camera_info_message,
@@ -145,10 +145,10 @@ class SceneRecorder:
 
     def _table(self) -> dict[str, Any]:
         common = (topics.EPOCH, topics.CAMERA_INFO, topics.RAW_COMPRESSED)
-        table = {topic.absolute(): offered(topic) for topic in common}
+        table = {topic.absolute(): offered_topic(topic) for topic in common}
         for tray in self._scene.trays:
             for topic in (topics.TRUTH, topics.BEADS):
-                table[topic.absolute(tray)] = offered(topic)
+                table[topic.absolute(tray)] = offered_topic(topic)
         return table
 
     def _provenance(self, compression: CompressionSettings) -> dict[str, str]:

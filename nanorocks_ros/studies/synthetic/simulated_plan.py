@@ -13,6 +13,7 @@ import numpy as np
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError, SimulationError
+from nanorocks_ros.experiment.trays import tray_values
 from nanorocks_ros.simulation.initial_state import rules_of
 from nanorocks_ros.simulation.shaken_tray import check_settings
 
@@ -129,7 +130,7 @@ class SimulationPlan:
             'nanorocks_ros': __version__,
             'units': 'SI',
             'settings': asdict(self.settings),
-            'tray': asdict(self.tray),
+            'tray': tray_values(self.tray),
             'runs': self.runs,
             'duration': self.duration,
         }

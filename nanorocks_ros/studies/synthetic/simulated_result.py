@@ -15,7 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.engine.gas import EventCounts
+    from nanorocks_ros.simulation.engine.event_counts import EventCounts
     from nanorocks_ros.studies.synthetic.simulated_plan import SimulationPlan
 
 
@@ -40,7 +40,7 @@ class SimulatedRun:
     body : ndarray of int32, (n_kept, n)
         Body of each bead: the smallest bead number in it.
     events : structured ndarray (n_events,)
-        As `engine.run_record.EVENT`; empty unless the plan keeps events.
+        As `run_record.EVENT`; empty unless they are kept.
     """
 
     number: int

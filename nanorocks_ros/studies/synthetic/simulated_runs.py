@@ -11,10 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.experiment.materials import known_materials
 from nanorocks_ros.experiment.trays import Species, Tray
 from nanorocks_ros.jobs.tasks import Workers, as_completed
 from nanorocks_ros.settings import SimulationSettings
-from nanorocks_ros.simulation.engine.gas import MOST_FOR_SCAN, EventCounts, HardSphereGas
+from nanorocks_ros.simulation.engine.event_counts import EventCounts
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.kernel_choice import MOST_FOR_SCAN
 from nanorocks_ros.simulation.initial_state import resting_beads, rules_of
 from nanorocks_ros.simulation.shaken_tray import after_shaking
 from nanorocks_ros.studies.synthetic.simulated_plan import SimulationPlan
@@ -23,7 +26,7 @@ from nanorocks_ros.studies.synthetic.simulated_result import SimulatedRun, Simul
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from nanorocks_ros.simulation.engine.run_record import Course
+    from nanorocks_ros.simulation.engine.run_record import RunRecord
 
 # Less work than this is done sooner in this process than with others [s].
 _MIN_SECONDS_FOR_PROCESSES = 3.0
@@ -125,7 +128,7 @@ def _simulated_run(
     return _run_record(gas, course, run, time.thread_time() - start)
 
 
-def _run_record(gas: HardSphereGas, course: Course, run: int, seconds: float) -> SimulatedRun:
+def _run_record(gas: HardSphereGas, course: RunRecord, run: int, seconds: float) -> SimulatedRun:
     n_times, n = course.positions.shape[:2]
     alone = np.broadcast_to(np.arange(n, dtype=np.int32), (n_times, n))
     return SimulatedRun(
@@ -154,9 +157,8 @@ def load_compiled_code() -> None:
     """Load the compiled code, which takes a second in each process."""
     settings = SimulationSettings()
     for count in (2, MOST_FOR_SCAN + 1):
-        species = Species(
-            material='', diameter_low=1e-3, diameter_high=1e-3, density=1e3, count=count
-        )
+        material = known_materials()['acrylic']
+        species = Species(properties=material, diameter_low=1e-3, diameter_high=1e-3, count=count)
         tray = Tray(number=1, dimensions=(0.02, 0.02, 0.02), species=(species,), chalk=False)
         plan = SimulationPlan(settings=settings, tray=tray, duration=0.1, samples=2, events=True)
         _simulated_run(plan, 0)

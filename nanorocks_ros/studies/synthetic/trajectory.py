@@ -9,7 +9,7 @@ import numpy as np
 
 from nanorocks_ros.outputs.atomic_files import atomic_file
 from nanorocks_ros.outputs.parquet import Column, write_parquet
-from nanorocks_ros.simulation.initial_state import stock
+from nanorocks_ros.simulation.initial_state import inventory
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -107,7 +107,7 @@ def _event_rows(run: SimulatedRun) -> dict[str, NDArray[Any]]:
 
 def _bead_arrays(simulated: SimulatedRuns) -> dict[str, Callable[[], Any]]:
     """Functions that make the arrays, so that only one array at a time is in memory twice."""
-    drawn = stock(simulated.plan.tray)
+    drawn = inventory(simulated.plan.tray)
 
     def joined(name: str) -> Callable[[], Any]:
         if len(simulated.runs) == 1:
@@ -162,7 +162,7 @@ def _bead_columns(simulated: SimulatedRuns) -> tuple[Column, ...]:
 
 def _bead_rows(simulated: SimulatedRuns, run: SimulatedRun) -> dict[str, NDArray[Any]]:
     """A row for each bead at each time, in the order of times."""
-    drawn = stock(simulated.plan.tray)
+    drawn = inventory(simulated.plan.tray)
     times = simulated.plan.times
     n_times, n = run.body.shape
 

@@ -1,4 +1,4 @@
-"""``nanorocks import``, ``info`` and ``salvage`` as people and programs call them."""
+"""The commands ``nanorocks import``, ``info`` and ``salvage``."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ import pytest
 from mcap.writer import Writer as McapWriter
 
 from nanorocks_ros.cli.main import main
+from nanorocks_ros.recordings.bag.offered_topics import OfferedTopic
 from nanorocks_ros.recordings.bag.reader import open_bag
-from nanorocks_ros.recordings.bag.writer import BagWriter, OfferedQos, OfferedTopic
+from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import (
     compressed_image_message,
     float_array_message,
 )
+from nanorocks_ros.recordings.offered_qos import OfferedQos
 
 CAMERA = '/nanorocks/camera/image_raw/compressed'
 SPEED = '/nanorocks/tray_3/speed'
@@ -48,8 +50,8 @@ def write_bag(path, numbers=range(20), pictures=jpeg, metadata=None):
     return path
 
 
-def called(capsys, *arguments):
-    """Exit code, what was printed, and the last line on standard error."""
+def run(capsys, *arguments):
+    """Run a command; returns exit code, standard output and last line of standard error."""
     code = main([str(argument) for argument in arguments])
     printed = capsys.readouterr()
     return code, printed.out, (printed.err.splitlines() or [''])[-1]
@@ -65,46 +67,46 @@ def images(folder, count=6):
 # --- info -----------------------------------------------------------------------------------
 
 
-def test_info_says_what_a_bag_holds(tmp_path, capsys):
+def test_info_prints_the_contents_of_a_bag(tmp_path, capsys):
     numbers = [*range(10), *range(15, 20)]
     path = write_bag(tmp_path / 'a bag: é', numbers, metadata={'nanorocks_ros': '9'})
-    code, out, _ = called(capsys, 'info', path, '--json')
-    found = json.loads(out)
+    code, out, _ = run(capsys, 'info', path, '--json')
+    printed = json.loads(out)
     assert code == 0
-    topics = {one['name']: one for one in found['topics']}
+    topics = {topic['name']: topic for topic in printed['topics']}
     assert set(topics) == {CAMERA, SPEED}
     assert topics[CAMERA]['type'] == 'sensor_msgs/msg/CompressedImage'
     assert topics[CAMERA]['count'] == 15
     assert topics[CAMERA]['rate'] == pytest.approx(25.0)
     assert topics[CAMERA]['gaps'] == 1
     assert topics[CAMERA]['longest_gap'] == pytest.approx(0.24)
-    assert found['duration'] == pytest.approx(0.76)
-    assert found['complete'] is True
-    assert found['trays'] == [3]
-    assert found['pictures'] == 'jpeg'
-    assert found['metadata'] == {'nanorocks_ros': '9'}
-    said = [one['what'] for one in found['health']]
-    assert any('no camera_info' in one for one in said)
-    assert any('frames are missing at 1 places' in one for one in said)
-    code, out, _ = called(capsys, 'info', path)
+    assert printed['duration'] == pytest.approx(0.76)
+    assert printed['complete'] is True
+    assert printed['trays'] == [3]
+    assert printed['pictures'] == 'jpeg'
+    assert printed['metadata'] == {'nanorocks_ros': '9'}
+    problems = [problem['what'] for problem in printed['health']]
+    assert any('no camera_info' in problem for problem in problems)
+    assert any('frames are missing at 1 places' in problem for problem in problems)
+    code, out, _ = run(capsys, 'info', path)
     assert code == 0
     assert f'{CAMERA} [sensor_msgs/msg/CompressedImage]: 15, 25 Hz, 1 gaps' in out
 
 
-def test_info_says_what_is_wrong_and_what_to_do(tmp_path, capsys):
+def test_info_prints_problems_and_remedies(tmp_path, capsys):
     path = write_bag(tmp_path / 'my bag', range(100))
     file = path / 'my bag.mcap'
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
-    code, out, _ = called(capsys, 'info', path, '--json')
-    found = json.loads(out)
+    code, out, _ = run(capsys, 'info', path, '--json')
+    printed = json.loads(out)
     assert code == 0
-    assert found['complete'] is False
-    assert found['messages_lost'] == 200 - sum(one['count'] for one in found['topics']) > 0
-    (cut,) = [one for one in found['health'] if 'cut short' in one['what']]
-    assert cut['remedy'] == f"nanorocks salvage '{path}' -o NEW copies what can be read"
+    assert printed['complete'] is False
+    assert printed['messages_lost'] == 200 - sum(topic['count'] for topic in printed['topics']) > 0
+    (cut,) = [problem for problem in printed['health'] if 'cut short' in problem['what']]
+    assert cut['remedy'] == f"nanorocks salvage '{path}' -o NEW copies readable messages"
 
 
-def test_info_and_salvage_leave_out_messages_of_a_time_that_cannot_be(tmp_path, capsys):
+def test_info_and_salvage_skip_messages_with_impossible_times(tmp_path, capsys):
     path = tmp_path / 'x.mcap'
     writer = McapWriter(str(path))
     writer.start()
@@ -113,80 +115,84 @@ def test_info_and_salvage_leave_out_messages_of_a_time_that_cannot_be(tmp_path, 
     for stamp in (START_NS, START_NS + STEP_NS, START_NS | 1 << 63):
         writer.add_message(channel, stamp, b'\0\1\0\0\0', stamp)
     writer.finish()
-    code, out, _ = called(capsys, 'info', path, '--json')
-    found = json.loads(out)
+    code, out, _ = run(capsys, 'info', path, '--json')
+    printed = json.loads(out)
     assert code == 0
-    assert (found['messages_lost'], found['complete'], found['duration']) == (1, False, 0.04)
-    assert any('1 messages have a time that cannot be' in one['what'] for one in found['health'])
-    assert called(capsys, 'info', path)[0] == 0
-    _, out, _ = called(capsys, 'salvage', path, '-o', tmp_path / 'new', '--json')
-    found = json.loads(out)
-    assert (found['messages_recovered'], found['messages_lost']) == (2, 1)
+    assert (printed['messages_lost'], printed['complete'], printed['duration']) == (1, False, 0.04)
+    assert any(
+        '1 messages with impossible time stamps were skipped' in problem['what']
+        for problem in printed['health']
+    )
+    assert run(capsys, 'info', path)[0] == 0
+    _, out, _ = run(capsys, 'salvage', path, '-o', tmp_path / 'new', '--json')
+    printed = json.loads(out)
+    assert (printed['messages_recovered'], printed['messages_lost']) == (2, 1)
 
 
 @pytest.mark.parametrize(('key', 'remedy'), [
     ('import', 'import it again'), ('salvage', 'salvage the damaged bag again'),
 ])  # fmt: skip
-def test_info_says_that_the_making_of_a_bag_was_interrupted(tmp_path, capsys, key, remedy):
+def test_info_reports_an_interrupted_import_or_salvage(tmp_path, capsys, key, remedy):
     path = write_bag(tmp_path / 'bag', metadata={key: 'unfinished'})
-    _, out, _ = called(capsys, 'info', path, '--json')
-    found = json.loads(out)
-    assert found['complete'] is False
-    (part,) = [one for one in found['health'] if 'holds only part of' in one['what']]
+    _, out, _ = run(capsys, 'info', path, '--json')
+    printed = json.loads(out)
+    assert printed['complete'] is False
+    (part,) = [problem for problem in printed['health'] if 'holds only part of' in problem['what']]
     assert part['remedy'] == remedy
-    _, out, _ = called(capsys, 'info', path)
+    _, out, _ = run(capsys, 'info', path)
     assert 'NOT complete' in out
 
 
-def test_films_within_messages_are_told_from_pictures(tmp_path, capsys):
+def test_video_packets_in_messages_are_not_supported(tmp_path, capsys):
     path = write_bag(tmp_path / 'bag', pictures=lambda number: b'\0\0\0\1\x67' + bytes(99))
-    _, out, _ = called(capsys, 'info', path, '--json')
+    _, out, _ = run(capsys, 'info', path, '--json')
     assert json.loads(out)['pictures'] == 'h264'
     assert any(
-        "'h264', which is not supported" in one['what'] for one in json.loads(out)['health']
+        "'h264', which is not supported" in problem['what']
+        for problem in json.loads(out)['health']
     )
-    code, _, last = called(capsys, 'analyse', path, '--no-output')
+    code, _, last = run(capsys, 'analyse', path, '--no-output')
     assert code == 1
-    assert "holds 'h264', a film whose pictures need each other; record JPEG or PNG" in last
+    assert "holds 'h264', a video whose frames depend on each other; record JPEG or PNG" in last
 
 
-def test_what_strangers_wrote_into_a_bag_does_not_reach_the_terminal(tmp_path, capsys):
+def test_control_sequences_in_a_bag_are_escaped(tmp_path, capsys):
     path = write_bag(tmp_path / 'bag', range(3), metadata={HOSTILE: HOSTILE})
-    code, out, _ = called(capsys, 'info', path)
+    code, out, _ = run(capsys, 'info', path)
     assert code == 0
     assert '\x1b' not in out
     assert not any(line.startswith('nanorocks: all is well') for line in out.splitlines())
-    _, out, _ = called(capsys, 'info', path, '--json')
+    _, out, _ = run(capsys, 'info', path, '--json')
     assert json.loads(out)['metadata'] == {HOSTILE: HOSTILE}
 
 
 # --- salvage --------------------------------------------------------------------------------
 
 
-def test_salvage_prints_what_programs_rely_on(tmp_path, capsys):
+def test_salvage_prints_the_documented_json(tmp_path, capsys):
     path = write_bag(tmp_path / 'bag', range(100))
     file = path / 'bag.mcap'
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
     new = tmp_path / 'ñew bag'
-    code, out, _ = called(capsys, 'salvage', path, '-o', new, '--json')
-    found = json.loads(out)
+    code, out, _ = run(capsys, 'salvage', path, '-o', new, '--json')
+    printed = json.loads(out)
     assert code == 0
-    assert found['messages_recovered'] == len(list(open_bag(new).messages())) > 50
-    assert found['messages_recovered'] + found['messages_lost'] == 200
-    code, _, last = called(capsys, 'salvage', path, '-o', new)
+    assert printed['messages_recovered'] == len(list(open_bag(new).messages())) > 50
+    assert printed['messages_recovered'] + printed['messages_lost'] == 200
+    code, _, last = run(capsys, 'salvage', path, '-o', new)
     assert code == 1
     assert last.endswith('exists already and is not overwritten; pass another path')
 
 
-# --- names of any bytes ---------------------------------------------------------------------
+# --- names that are not UTF-8-----------------------------------------------------------------
 
 
 @pytest.mark.parametrize('command', ['import', 'import --each', 'salvage', 'info'])
-def test_names_that_are_no_utf_8_are_shown_all_the_same(tmp_path, command):
-    """Where standard output takes nothing but UTF-8."""
-    place = os.fsencode(tmp_path) + b'/lat\xe9\n'
-    os.mkdir(place)
-    folder = Path(os.fsdecode(place))
+def test_names_that_are_not_utf_8_are_printed_escaped(tmp_path, command):
+    """Standard output accepts UTF-8 only."""
+    path = os.fsencode(tmp_path) + b'/lat\xe9\n'
+    os.mkdir(path)
+    folder = Path(os.fsdecode(path))
     bag = write_bag(folder / 'bag')
     arguments = {
         'info': [bag],
@@ -204,7 +210,7 @@ def test_names_that_are_no_utf_8_are_shown_all_the_same(tmp_path, command):
     assert b'imported, ' in done.stdout or b'lat\\udce9\\n/' in done.stdout
 
 
-# --- what cannot be used --------------------------------------------------------------------
+# --- invalid input -------------------------------------------------------------------------
 
 BAD = {
     'nothing.mcap': (b'', 'is empty (0 bytes)'),
@@ -217,14 +223,14 @@ BAD = {
 
 @pytest.mark.parametrize('name', BAD)
 @pytest.mark.parametrize('command', ['info', 'salvage', 'analyse'])
-def test_a_bag_that_is_none_is_one_line_and_exit_code_1(tmp_path, capsys, command, name):
-    content, what = BAD[name]
+def test_an_invalid_bag_is_reported_in_one_line_with_exit_code_1(tmp_path, capsys, command, name):
+    content, problem = BAD[name]
     (tmp_path / name).write_bytes(content)
     more = ['-o', tmp_path / 'new'] if command == 'salvage' else []
-    code, out, last = called(capsys, command, tmp_path / name, *more)
+    code, out, last = run(capsys, command, tmp_path / name, *more)
     assert code == 1
     assert out == ''
-    assert what in last
+    assert problem in last
     assert '; ' in last
 
 
@@ -235,7 +241,7 @@ def test_a_bag_that_is_none_is_one_line_and_exit_code_1(tmp_path, capsys, comman
 ])  # fmt: skip
 def test_a_wrong_call_of_import_is_exit_code_2(tmp_path, capsys, arguments):
     folder = images(tmp_path / 'images')
-    code, _, last = called(capsys, 'import', folder, '-o', tmp_path / 'bag', *arguments)
+    code, _, last = run(capsys, 'import', folder, '-o', tmp_path / 'bag', *arguments)
     assert code == 2
     assert '; ' in last
     assert not (tmp_path / 'bag').exists()
@@ -244,36 +250,36 @@ def test_a_wrong_call_of_import_is_exit_code_2(tmp_path, capsys, arguments):
 @pytest.mark.parametrize('arguments', [
     ['--rate', '1e-8'], ['--rate', '1', '--start', '2038-01-19T03:14:05Z'],
 ])  # fmt: skip
-def test_a_film_beyond_what_a_ros_time_holds_is_refused(tmp_path, capsys, arguments):
+def test_a_film_after_2038_is_refused(tmp_path, capsys, arguments):
     folder = images(tmp_path / 'images', 20)
-    code, _, last = called(capsys, 'import', folder, '-o', tmp_path / 'bag', *arguments)
+    code, _, last = run(capsys, 'import', folder, '-o', tmp_path / 'bag', *arguments)
     assert code == 1
-    assert 'a stamp lies beyond what a ROS time holds, which ends on 2038-01-19; ' in last
+    assert 'a time stamp is after 2038-01-19, ' in last
     assert last.endswith('pass an earlier --start, or the true --rate')
 
 
-def test_each_ends_with_what_could_not_be_imported(tmp_path, capsys):
+def test_each_prints_the_failed_films_at_the_end(tmp_path, capsys):
     folder = tmp_path / 'films'
     folder.mkdir()
     images(folder / 'good')
     (folder / 'bad.mp4').write_bytes(b'no film')
-    code, out, last = called(
+    code, out, last = run(
         capsys, 'import', folder, '--each', '-o', tmp_path / 'bags', '--rate', '30', '--json'
     )
-    found = json.loads(out)
+    printed = json.loads(out)
     assert code == 1
-    assert [one['bag'] for one in found['imported']] == [str(tmp_path / 'bags' / 'good')]
-    (failed,) = found['failed']
+    assert [result['bag'] for result in printed['imported']] == [str(tmp_path / 'bags' / 'good')]
+    (failed,) = printed['failed']
     assert failed['video'] == str(folder / 'bad.mp4')
-    assert 'is no video that can be read' in failed['reason']
+    assert 'is not a readable video' in failed['reason']
     assert '1 of 2 videos could not be imported' in last
 
 
-# --- a full disk, folders that cannot be written ---------------------------------------------
+# --- full disks and read-only folders --------------------------------------------------------
 
 
 def limited(size, *arguments):
-    """Run the command where no file may grow beyond a size, which the system says like this."""
+    """Run the command with a limit on the file size, which acts like a full disk."""
     code = 'import signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); '
     code += 'from nanorocks_ros.cli.main import main; exit(main())'
     return subprocess.run(
@@ -287,7 +293,7 @@ def limited(size, *arguments):
 
 
 @pytest.mark.parametrize('command', ['import', 'salvage'])
-def test_a_disk_that_is_full_is_said_and_costs_nothing_that_was_written(tmp_path, command):
+def test_a_full_disk_is_reported_and_written_messages_are_readable(tmp_path, command):
     big = (1280, 960)
     if command == 'import':
         source = tmp_path / 'images'
@@ -309,12 +315,12 @@ def test_a_disk_that_is_full_is_said_and_costs_nothing_that_was_written(tmp_path
 
 @pytest.mark.skipif(os.geteuid() == 0, reason='root may write everywhere')
 @pytest.mark.parametrize('command', ['import', 'salvage'])
-def test_a_folder_that_cannot_be_written_is_said(tmp_path, capsys, command):
+def test_a_read_only_folder_is_reported(tmp_path, capsys, command):
     closed = tmp_path / 'closed'
     closed.mkdir(mode=0o500)
     source = images(tmp_path / 'images') if command == 'import' else write_bag(tmp_path / 'bag')
     more = ['--rate', '30'] if command == 'import' else []
-    code, _, last = called(capsys, command, source, '-o', closed / 'new', *more)
+    code, _, last = run(capsys, command, source, '-o', closed / 'new', *more)
     assert code == 1
     assert 'cannot be written (Permission denied)' in last
 
@@ -324,6 +330,6 @@ def test_a_bag_below_a_file_is_refused(tmp_path, capsys, command):
     (tmp_path / 'file').touch()
     source = images(tmp_path / 'images') if command == 'import' else write_bag(tmp_path / 'bag')
     more = ['--rate', '30'] if command == 'import' else []
-    code, _, last = called(capsys, command, source, '-o', tmp_path / 'file' / 'new', *more)
+    code, _, last = run(capsys, command, source, '-o', tmp_path / 'file' / 'new', *more)
     assert code == 1
     assert 'cannot be written (Not a directory)' in last

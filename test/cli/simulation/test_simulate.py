@@ -22,7 +22,7 @@ QUICK = ('--duration', '1', '--times', '6')
 # Said where the engine has not been compiled yet.
 ONCE = 'compiling'
 OWN = """
-densities_g_cm3: {steel: 7.8}
+materials: {steel: {density_g_cm3: 7.8, color_bgr: [150, 150, 150]}}
 trays:
   4:
     dimensions_mm: [10, 10, 3]

@@ -79,7 +79,7 @@ def test_no_effects_is_a_quiet_picture_and_single_effects_can_be_added(capsys, t
         (['--scene', '--bag', 'b', '--scene-glare', 'much'], 2, '--scene-glare: '),
         (['--scene', '--bag', 'b', '--scene-glare', '9'], 2, 'scene.glare: 9 is outside [0, 5]'),
         (['--scene', '--bag', 'b', '--scene-trays', '1', '9'], 2, 'scene.trays: 9 is outside'),
-        (['--scene', '--bag', 'b', '--scene-trays', '2', '2'], 2, 'name none, or one twice'),
+        (['--scene', '--bag', 'b', '--scene-trays', '2', '2'], 2, 'is empty or has duplicates'),
         (['--scene', '--bag', 'b', '--compression-codec', 'av1'], 2, 'is none of jpeg, jpeg_rate'),
         (['--scene', '--picture', 'scene.pdf'], 2, 'scene.pdf ends in none of .png'),
         (

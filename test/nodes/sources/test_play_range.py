@@ -11,8 +11,10 @@ pytest.importorskip('rclpy')
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.nodes.sources.play_range import PlayRange
+from nanorocks_ros.recordings.bag.offered_topics import OfferedTopic
 from nanorocks_ros.recordings.bag.reader import open_bag
-from nanorocks_ros.recordings.bag.writer import BagWriter, OfferedQos, OfferedTopic
+from nanorocks_ros.recordings.bag.writer import BagWriter
+from nanorocks_ros.recordings.offered_qos import OfferedQos
 from nanorocks_ros.settings import BagSettings
 
 NS = 10**9

@@ -50,4 +50,4 @@ def test_a_scene_that_cannot_be_filmed_is_refused_in_one_line(graph):
     ended = graph.wait(graph.start('simulator', 'whole_scene:=true', 'scene.trays:=[1, 1]'))
     assert ended.code == 2
     assert 'Traceback' not in ended.output
-    assert 'name none, or one twice' in ended.output
+    assert 'is empty or has duplicates' in ended.output

@@ -1,4 +1,4 @@
-"""Which recordings paths, patterns and folders name, and what tells that one has changed."""
+"""Recordings found by paths, patterns and folders, and detection of changes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from nanorocks_ros.recordings.mcap.mcap_blocks import MAGIC
 
 @pytest.fixture
 def flight(tmp_path):
-    """Two days of recordings, and what else lies around there."""
+    """Two days of recordings, with results, notes and an empty folder."""
     for name in ('day_1/run_2', 'day_1/run_10', 'day_2/run_2'):
         (tmp_path / name).mkdir(parents=True)
         (tmp_path / name / f'{name[-1]}_0.mcap').write_bytes(MAGIC)
@@ -36,18 +36,18 @@ def flight(tmp_path):
     return tmp_path
 
 
-def names(found, folder):
-    return [str(bag.relative_to(folder)) for bag in found.bags]
+def names(result, folder):
+    return [str(bag.relative_to(folder)) for bag in result.bags]
 
 
-def test_a_folder_of_recordings_gives_each_of_them_in_order_of_their_numbers(flight):
+def test_recordings_in_a_folder_are_sorted_by_their_numbers(flight):
     bags = find_bags([str(flight / 'day_1')])
     assert names(bags, flight) == ['day_1/loose.mcap', 'day_1/run_2', 'day_1/run_10']
     assert bags.left_out == [f'{flight}/day_1/run_2_results: holds results']
     assert len(find_bags([str(flight)]).bags) == 4
 
 
-def test_a_pattern_leaves_out_what_is_no_recording_but_not_one_that_never_began(flight):
+def test_a_pattern_skips_other_files_but_not_empty_recordings(flight):
     bags = find_bags([str(flight / 'day_1' / '*')])
     assert set(names(bags, flight)) == {
         'day_1/loose.mcap',
@@ -55,22 +55,22 @@ def test_a_pattern_leaves_out_what_is_no_recording_but_not_one_that_never_began(
         'day_1/run_2',
         'day_1/run_10',
     }
-    assert {one.rpartition('/')[2] for one in bags.left_out} == {
-        'notes.txt: is no recording',
+    assert {notice.rpartition('/')[2] for notice in bags.left_out} == {
+        'notes.txt: is not a recording',
         'run_2_results: holds results',
     }
-    # Folders with a marker in them are results wherever they lie; files of a recording are it.
+    # Folders with a results marker are skipped anywhere; files of a recording belong to it.
     assert len(find_bags([str(flight / '*' / 'run_2'), str(flight / '*/*/*.mcap')]).bags) == 3
 
 
-def test_each_is_taken_once_whatever_the_names(flight):
+def test_a_recording_with_several_names_is_found_once(flight):
     os.symlink(flight / 'day_1' / 'run_2', flight / 'link')
-    one = str(flight / 'day_1' / 'run_2')
-    found = find_bags([one, f'{one}/', f'{one}/2_0.mcap', str(flight / 'link'), one])
-    assert len(found.bags) == 1
+    path = str(flight / 'day_1' / 'run_2')
+    result = find_bags([path, f'{path}/', f'{path}/2_0.mcap', str(flight / 'link'), path])
+    assert len(result.bags) == 1
 
 
-def test_what_is_not_there_is_told_and_the_rest_is_found(flight):
+def test_missing_inputs_are_reported_and_the_others_found(flight):
     bags = find_bags([str(flight / 'day_3*'), str(flight / 'day_2'), str(flight / 'nothing')])
     assert names(bags, flight) == ['day_2/run_2']
     first, second = (str(error) for error in bags.missing.values())
@@ -86,7 +86,7 @@ def test_a_file_with_the_name_of_a_pattern_is_that_file(flight):
     assert is_pattern(str(flight / '*'))
 
 
-def test_files_of_one_name_and_a_number_are_one_recording_others_are_many(tmp_path):
+def test_numbered_files_of_one_name_are_one_recording_others_are_several(tmp_path):
     for kind, files in (('crashed', ('run_0', 'run_1')), ('many', ('run', 'walk'))):
         (tmp_path / kind).mkdir()
         for name in files:
@@ -97,7 +97,7 @@ def test_files_of_one_name_and_a_number_are_one_recording_others_are_many(tmp_pa
     assert not is_collection(tmp_path / 'not there')
 
 
-def test_the_hash_is_of_the_content_wherever_it_lies(flight, tmp_path):
+def test_the_hash_depends_on_the_content_only(flight, tmp_path):
     bag = flight / 'day_1' / 'run_10'
     moved = shutil.copytree(bag, tmp_path / 'elsewhere')
     assert content_hash(moved) == content_hash(bag)
@@ -107,7 +107,7 @@ def test_the_hash_is_of_the_content_wherever_it_lies(flight, tmp_path):
     assert content_hash(loose) != content_hash(bag)
 
 
-def test_the_state_tells_a_change_even_where_size_and_time_are_put_back(flight):
+def test_the_state_reveals_a_change_with_restored_size_and_time(flight):
     file = flight / 'day_1' / 'loose.mcap'
     before, times = file_states(file), file.stat()
     assert file_states(file) == before
@@ -118,25 +118,25 @@ def test_the_state_tells_a_change_even_where_size_and_time_are_put_back(flight):
     assert file_states(file) != before
 
 
-def test_a_recording_of_ros_1_is_found_for_whoever_says_what_to_do_with_it(flight):
+def test_a_ros_1_bag_is_found(flight):
     (flight / 'day_2' / 'old.bag').write_bytes(b'#ROSBAG V2.0\n')
     assert names(find_bags([str(flight / 'day_2')]), flight) == ['day_2/old.bag', 'day_2/run_2']
 
 
-def test_a_folder_that_cannot_be_read_costs_no_other_recording(flight, monkeypatch):
+def test_an_unreadable_folder_does_not_hide_other_recordings(flight, monkeypatch):
     closed = flight / 'day_1' / 'closed'
-    for one in (closed, flight / 'day_1' / 'lost+found'):
-        one.mkdir()
-    listed = Path.iterdir
+    for folder in (closed, flight / 'day_1' / 'lost+found'):
+        folder.mkdir()
+    original = Path.iterdir
 
     def iterdir(folder):
         if folder.name in ('closed', 'lost+found'):
             raise PermissionError(errno.EACCES, 'Permission denied', str(folder))
-        return listed(folder)
+        return original(folder)
 
     monkeypatch.setattr(Path, 'iterdir', iterdir)
-    found = find_bags([str(flight / 'day_1')])
-    assert len(found.bags) == 3
+    result = find_bags([str(flight / 'day_1')])
+    assert len(result.bags) == 3
     assert is_collection(flight / 'day_1')
-    assert set(found.missing) == {str(closed)}
-    assert 'cannot be read (Permission denied)' in str(found.missing[str(closed)])
+    assert set(result.missing) == {str(closed)}
+    assert 'cannot be read (Permission denied)' in str(result.missing[str(closed)])

@@ -1,4 +1,4 @@
-"""Every recording is read as far as it can be, and what cannot be read is said in one line."""
+"""BagReader: intact, truncated and damaged recordings, and errors in one line."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def one_line(error: RecordingError) -> str:
     return text
 
 
-def test_a_whole_bag_says_what_it_holds(tmp_path, record):
+def test_an_intact_bag_has_all_topics_and_no_notice(tmp_path, record):
     bag = open_bag(record(tmp_path / 'run', frames=31))
     assert bag.complete
     assert bag.notices == ()
@@ -47,21 +47,21 @@ def test_a_whole_bag_says_what_it_holds(tmp_path, record):
     assert bag.end_ns == START_NS + 30 * 33_333_333
 
 
-def test_the_bare_file_reads_like_the_folder(tmp_path, record):
+def test_the_storage_file_alone_is_read_like_the_folder(tmp_path, record):
     path = record(tmp_path / 'run')
     from_folder = list(open_bag(path).messages())
     assert list(open_bag(str(path / 'run.mcap')).messages()) == from_folder
     assert len(from_folder) == 81
 
 
-def test_only_the_topics_asked_for_are_given(tmp_path, record):
+def test_only_the_requested_topics_are_read(tmp_path, record):
     bag = open_bag(record(tmp_path / 'run'))
     assert {m.topic for m in bag.messages([SPEED, EPOCH])} == {SPEED, EPOCH}
     assert list(bag.messages(['/not/there'])) == []
     assert list(bag.messages([])) == []
 
 
-def test_a_bag_can_be_read_twice_and_by_two_at_once(tmp_path, record):
+def test_a_bag_can_be_read_by_two_iterators_at_the_same_time(tmp_path, record):
     bag = open_bag(record(tmp_path / 'run'))
     pairs = list(zip(bag.messages(), bag.messages(), strict=True))
     assert all(message == other for message, other in pairs)
@@ -69,7 +69,7 @@ def test_a_bag_can_be_read_twice_and_by_two_at_once(tmp_path, record):
 
 
 @pytest.mark.parametrize('compression', list(CompressionType))
-def test_messages_come_in_order_of_time_whatever_their_order_in_the_file(tmp_path, compression):
+def test_messages_are_sorted_by_time(tmp_path, compression):
     stamps = np.random.default_rng(3).permutation(300)
     path = write_times(tmp_path / 'x.mcap', stamps, compression=compression, chunk_size=400)
     bag = open_bag(path)
@@ -86,7 +86,7 @@ def test_messages_come_in_order_of_time_whatever_their_order_in_the_file(tmp_pat
     {'use_chunking': False, 'use_statistics': False},
     {'enable_crcs': False},
 ])  # fmt: skip
-def test_files_without_parts_of_the_index_are_whole_all_the_same(tmp_path, options):
+def test_files_without_parts_of_the_index_are_complete(tmp_path, options):
     bag = open_bag(write_times(tmp_path / 'x.mcap', range(50), **options))
     assert [m.log_time_ns for m in bag.messages()] == list(range(50))
     assert bag.topics['/time'].count == 50
@@ -110,7 +110,7 @@ def write_times(path, stamps, **options):
 
 @pytest.mark.parametrize('plugin', list(StoragePlugin))
 @pytest.mark.parametrize('version', [8, 9])
-def test_how_topics_were_offered_comes_back(tmp_path, plugin, version):
+def test_the_offered_quality_of_service_is_read_back(tmp_path, plugin, version):
     store = get_typestore(Stores.ROS2_JAZZY)
     offered = OfferedQos(reliable=False, transient_local=True, depth=7)
     with Writer(tmp_path / 'run', version=version, storage_plugin=plugin) as writer:
@@ -125,11 +125,11 @@ def test_how_topics_were_offered_comes_back(tmp_path, plugin, version):
 
 
 @pytest.mark.parametrize('text', ['', '[', '3', '- 1', '- depth: x', '- {depth: 1}', '[' * 500])
-def test_qualities_of_service_that_make_no_sense_are_not_known(text):
+def test_an_invalid_quality_of_service_is_none(text):
     assert recorded_qos(text) is None
 
 
-# --- a part of it ---------------------------------------------------------------------------
+# --- a time range ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize('plugin', list(StoragePlugin))
@@ -142,14 +142,14 @@ def test_qualities_of_service_that_make_no_sense_are_not_known(text):
     (4, None, []),
     (-(2**70), 2**70, [1, 2, 3]),
 ])  # fmt: skip
-def test_of_a_stretch_of_time_both_ends_are_given(tmp_path, plugin, start, end, expected):
+def test_a_time_range_includes_both_ends(tmp_path, plugin, start, end, expected):
     bag = open_bag(write_with_rosbags(tmp_path / 'run', plugin))
     messages = bag.messages(['/time'], start_ns=start, end_ns=end)
     assert [m.log_time_ns for m in messages] == expected
 
 
 @pytest.mark.parametrize('cut', [None, -30])
-def test_to_seek_only_the_chunks_of_that_time_are_read(tmp_path, record, monkeypatch, cut):
+def test_only_the_chunks_of_a_time_range_are_read(tmp_path, record, monkeypatch, cut):
     path = record(tmp_path / 'run', frames=400)
     file = path / 'run.mcap'
     file.write_bytes(file.read_bytes()[:cut])
@@ -165,9 +165,9 @@ def test_to_seek_only_the_chunks_of_that_time_are_read(tmp_path, record, monkeyp
         return messages
 
     monkeypatch.setattr(mcap_file, 'load', counting)
-    found = list(bag.messages(start_ns=start, end_ns=end))
-    assert found == [m for m in everything if start <= m.log_time_ns <= end]
-    assert len(found) <= loaded < len(everything) / 2
+    selected = list(bag.messages(start_ns=start, end_ns=end))
+    assert selected == [m for m in everything if start <= m.log_time_ns <= end]
+    assert len(selected) <= loaded < len(everything) / 2
 
 
 def test_seeking_in_a_split_recording_skips_whole_files(tmp_path, record):
@@ -203,12 +203,12 @@ def test_a_bag_cut_anywhere_is_read_up_to_the_cut(tmp_path, record):
         assert not bag.complete
         (notice,) = bag.notices
         assert f'cut short; {len(messages)} messages over ' in notice
-        assert 'bytes at the end hold no whole record' in notice
+        assert 'bytes at the end hold no complete record' in notice
         before = len(messages)
     assert before == len(everything)
 
 
-def test_of_a_chunk_cut_in_its_middle_the_whole_messages_are_used(tmp_path, record):
+def test_complete_messages_of_a_truncated_chunk_are_read(tmp_path, record):
     path = record(tmp_path / 'run', frames=25, size=30_000) / 'run.mcap'
     with path.open('rb') as stream:
         chunk = make_reader(stream).get_summary().chunk_indexes[0]
@@ -222,7 +222,7 @@ def test_of_a_chunk_cut_in_its_middle_the_whole_messages_are_used(tmp_path, reco
     {'compression': CompressionType.LZ4, 'chunk_size': 500},
     {'compression': CompressionType.NONE, 'chunk_size': 500},
 ])  # fmt: skip
-def test_other_ways_to_store_are_read_up_to_the_cut_too(tmp_path, options):
+def test_other_storage_options_are_read_up_to_the_cut(tmp_path, options):
     whole = write_times(tmp_path / 'x.mcap', range(100), **options).read_bytes()
     counts = []
     for cut in range(1, len(whole), 37):
@@ -251,16 +251,18 @@ def test_a_folder_without_metadata_is_read_with_a_notice(tmp_path, record):
     (path / 'metadata.yaml').unlink()
     bag = open_bag(path)
     assert len(list(bag.messages())) == 81
-    assert bag.notices == (f'{path}: has no metadata.yaml, as after a crash; it is read without',)
+    assert bag.notices == (
+        f'{path}: has no metadata.yaml, as after a crash; the bag is read without it',
+    )
 
 
 @pytest.mark.parametrize('text', ['', '[', 'a: b', '- 1', 'rosbag2_bagfile_information: 3', '\0'])
-def test_metadata_that_makes_no_sense_is_passed_over(tmp_path, record, text):
+def test_invalid_metadata_is_ignored_with_a_notice(tmp_path, record, text):
     path = record(tmp_path / 'run', frames=2)
     (path / 'metadata.yaml').write_text(text)
     bag = open_bag(path)
     assert len(list(bag.messages())) == 5
-    assert 'cannot be understood' in bag.notices[0]
+    assert 'cannot be parsed' in bag.notices[0]
 
 
 # --- damaged --------------------------------------------------------------------------------
@@ -290,13 +292,13 @@ def test_a_flipped_bit_anywhere_costs_messages_but_never_more(tmp_path, record):
     whole = path.read_bytes()
     everything = dict.fromkeys(open_bag(path).messages())
     generator = np.random.default_rng(2)
-    places = [
+    offsets = [
         *generator.integers(8, len(whole), 200).tolist(),
         *range(len(whole) - 700, len(whole)),
     ]
-    for place in places:
+    for offset in offsets:
         content = bytearray(whole)
-        content[place] ^= 1 << int(generator.integers(8))
+        content[offset] ^= 1 << int(generator.integers(8))
         path.write_bytes(content)
         bag = open_bag(path)
         messages = list(bag.messages())
@@ -304,7 +306,7 @@ def test_a_flipped_bit_anywhere_costs_messages_but_never_more(tmp_path, record):
         for message in messages:
             if message in everything:
                 continue
-            # A name in the index may have changed, never what was measured.
+            # A name in the index may be damaged, but never the content of a message.
             assert message.cdr in {m.cdr for m in everything}
 
 
@@ -347,7 +349,7 @@ def test_an_empty_last_file_of_a_split_recording_costs_only_itself(tmp_path, rec
     assert any('run_1.mcap: is empty (0 bytes)' in notice for notice in bag.notices)
 
 
-def test_a_missing_file_of_a_split_recording_is_said(tmp_path, record):
+def test_a_missing_file_of_a_split_recording_is_reported(tmp_path, record):
     folder = record(tmp_path / 'run', frames=4)
     text = (folder / 'metadata.yaml').read_text()
     (folder / 'metadata.yaml').write_text(text.replace('  - run.mcap', '  - run.mcap\n  - b.mcap'))
@@ -403,7 +405,7 @@ def test_a_damaged_sqlite_file_is_no_traceback(tmp_path):
     assert all('cannot be read as a recording' in text for text in refusals)
 
 
-def test_files_compressed_as_a_whole_are_refused_with_the_remedy(tmp_path):
+def test_file_compression_is_refused_with_a_remedy(tmp_path):
     folder = write_with_rosbags(tmp_path / 'run', StoragePlugin.SQLITE3, CompressionMode.FILE)
     with pytest.raises(RecordingError, match=r'compressed as a whole.*; unpack them with `zstd'):
         open_bag(folder)
@@ -412,7 +414,7 @@ def test_files_compressed_as_a_whole_are_refused_with_the_remedy(tmp_path):
 # --- inputs that are no recordings ----------------------------------------------------------
 
 
-def test_a_missing_path_is_said(tmp_path):
+def test_a_missing_path_is_reported(tmp_path):
     with pytest.raises(RecordingError, match=r'nowhere: does not exist; pass a rosbag2 folder'):
         open_bag(tmp_path / 'nowhere')
 
@@ -429,7 +431,7 @@ def test_a_folder_without_storage_is_no_bag(tmp_path):
         open_bag(tmp_path)
 
 
-def test_wrong_magic_is_said(tmp_path):
+def test_wrong_magic_bytes_are_reported(tmp_path):
     (tmp_path / 'x.mcap').write_bytes(b'\x89PNG\r\n\x1a\n' + bytes(100))
     with pytest.raises(
         RecordingError, match=r"x\.mcap: is not an MCAP file \(begins with b'\\x89P"
@@ -437,7 +439,7 @@ def test_wrong_magic_is_said(tmp_path):
         open_bag(tmp_path / 'x.mcap')
 
 
-def test_a_file_of_no_bytes_is_said(tmp_path):
+def test_an_empty_file_is_reported(tmp_path):
     (tmp_path / 'x.mcap').touch()
     with pytest.raises(RecordingError, match=r'x\.mcap: is empty \(0 bytes\); record it again'):
         open_bag(tmp_path / 'x.mcap')
@@ -491,7 +493,7 @@ def test_the_first_topic_of_several_is_chosen(tmp_path, record):
     assert bag.require_topic(['/not/there', SPEED, CAMERA]) == SPEED
 
 
-def test_a_missing_topic_is_said_with_those_there_are(tmp_path):
+def test_the_error_for_a_missing_topic_lists_the_present_ones(tmp_path):
     bag = open_bag(write_times(tmp_path / 'x.mcap', [1]))
     with pytest.raises(RecordingError) as caught:
         bag.require_topic(['/nanorocks/camera/image_raw'])
@@ -501,37 +503,37 @@ def test_a_missing_topic_is_said_with_those_there_are(tmp_path):
     )
 
 
-def test_bytes_that_do_not_fit_their_type_are_said(tmp_path, record):
+def test_bytes_that_do_not_fit_their_type_are_refused(tmp_path, record):
     bag = open_bag(record(tmp_path / 'run', frames=1))
     message = next(iter(bag.messages([CAMERA])))
     for length in itertools.chain(range(0, 60), [1000]):
-        broken = BagMessage(
+        truncated = BagMessage(
             topic=message.topic,
             type=message.type,
             log_time_ns=message.log_time_ns,
             cdr=message.cdr[:length],
         )
         with pytest.raises(
-            RecordingError, match=r'is no sensor_msgs/msg/CompressedImage'
+            RecordingError, match=r'is not a valid sensor_msgs/msg/CompressedImage'
         ) as caught:
-            bag.deserialize(broken)
+            bag.deserialize(truncated)
         assert caught.value.__cause__ is not None
         one_line(caught.value)
 
 
-@pytest.mark.parametrize(('encoding', 'text', 'what'), [
-    ('cdr', b'', 'is not known'),
-    ('cdr', b'nonsense ((', 'is not known'),
+@pytest.mark.parametrize(('encoding', 'text', 'problem'), [
+    ('cdr', b'', 'is unknown'),
+    ('cdr', b'nonsense ((', 'is unknown'),
     ('json', b'int32 a', "is encoded as 'json', not cdr"),
 ])  # fmt: skip
-def test_a_type_that_cannot_be_known_is_said(tmp_path, encoding, text, what):
+def test_an_unknown_type_is_refused(tmp_path, encoding, text, problem):
     writer = McapWriter(str(tmp_path / 'x.mcap'))
     writer.start()
     schema = writer.register_schema('my_msgs/msg/Odd', 'ros2msg', text)
     writer.add_message(writer.register_channel('/odd', encoding, schema), 1, b'1234', 1)
     writer.finish()
     bag = open_bag(tmp_path / 'x.mcap')
-    with pytest.raises(RecordingError, match=what) as caught:
+    with pytest.raises(RecordingError, match=problem) as caught:
         bag.deserialize(next(iter(bag.messages())))
     one_line(caught.value)
 
@@ -540,7 +542,7 @@ def test_a_type_that_cannot_be_known_is_said(tmp_path, encoding, text, what):
 
 
 def test_a_long_bag_is_read_chunk_by_chunk(tmp_path, record, monkeypatch):
-    """Never are more than two chunks open: the one being given and the next."""
+    """At most two chunks are in memory: the current one and the next."""
     path = record(tmp_path / 'run', frames=400)
     for content in (None, -30):
         file = path / 'run.mcap'
@@ -555,14 +557,14 @@ def test_a_long_bag_is_read_chunk_by_chunk(tmp_path, record, monkeypatch):
 
         with monkeypatch.context() as patch:
             patch.setattr(mcap_file, 'load', counting)
-            for given, _ in enumerate(bag.messages(), start=1):
-                assert sum(loaded) - given <= 2 * max(loaded)
+            for count, _ in enumerate(bag.messages(), start=1):
+                assert sum(loaded) - count <= 2 * max(loaded)
         assert len(loaded) >= 8
 
 
 @pytest.mark.parametrize('chunked', [True, False])
 @pytest.mark.parametrize('ended', [True, False])
-def test_messages_of_a_time_that_cannot_be_are_left_out_and_counted(tmp_path, chunked, ended):
+def test_messages_with_impossible_times_are_skipped_and_counted(tmp_path, chunked, ended):
     path = tmp_path / 'x.mcap'
     writer = McapWriter(str(path), use_chunking=chunked, enable_crcs=False)
     writer.start()
@@ -578,7 +580,5 @@ def test_messages_of_a_time_that_cannot_be_are_left_out_and_counted(tmp_path, ch
         assert [message.log_time_ns for message in bag.messages()] == [5, 6, 8, 2**63 - 1]
         assert bag.messages_lost == 2
         assert not bag.complete
-        assert (
-            bag.notices[-1] == f'{path}: 2 messages have a time that cannot be and were left out'
-        )
+        assert bag.notices[-1] == f'{path}: 2 messages with impossible time stamps were skipped'
     assert (bag.start_ns, bag.end_ns) == (5, 2**63 - 1)

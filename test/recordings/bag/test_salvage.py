@@ -1,4 +1,4 @@
-"""Whatever is wrong with a recording, a new one gets every message that can be read."""
+"""Salvage of damaged recordings: every readable message is copied."""
 
 from __future__ import annotations
 
@@ -30,23 +30,23 @@ IMAGE = 'sensor_msgs/msg/CompressedImage'
 
 
 def salvaged(source, target):
-    """What was salvaged; the source is as it was, and the new recording is whole."""
+    """Salvage; check that the source is unchanged and the new recording complete."""
     before = {file: hashlib.sha256(file.read_bytes()).digest() for file in files(source)}
-    found = salvage(source, target, lambda done, total: None)
+    result = salvage(source, target, lambda done, total: None)
     assert {file: hashlib.sha256(file.read_bytes()).digest() for file in files(source)} == before
     bag = open_bag(target)
     assert bag.complete
     assert bag.notices == ()
     messages = list(bag.messages())
-    assert len(messages) == found.recovered
+    assert len(messages) == result.recovered
     if {info.encoding for info in bag.topics.values()} == {'cdr'}:
         with Reader(target) as reader:
-            assert reader.message_count == found.recovered
-    return found, messages
+            assert reader.message_count == result.recovered
+    return result, messages
 
 
 def files(path):
-    return [one for one in path.rglob('*') if one.is_file()] if path.is_dir() else [path]
+    return [file for file in path.rglob('*') if file.is_file()] if path.is_dir() else [path]
 
 
 def chunks(path):
@@ -56,8 +56,8 @@ def chunks(path):
 
 def test_a_whole_recording_is_copied_message_by_message(tmp_path, record):
     path = record(tmp_path / 'run')
-    found, messages = salvaged(path, tmp_path / 'new')
-    assert (found.recovered, found.lost) == (81, 0)
+    result, messages = salvaged(path, tmp_path / 'new')
+    assert (result.recovered, result.lost) == (81, 0)
     assert messages == list(open_bag(path).messages())
     old, new = open_bag(path), open_bag(tmp_path / 'new')
     assert {k: (v.type, v.qos) for k, v in new.topics.items()} == {
@@ -68,47 +68,47 @@ def test_a_whole_recording_is_copied_message_by_message(tmp_path, record):
 
 
 @pytest.mark.parametrize('share', [0.3, 0.6, 0.95, 0.999])
-def test_what_lies_before_a_cut_is_recovered_and_the_rest_counted(tmp_path, record, share):
+def test_messages_before_a_cut_are_recovered_and_the_others_counted(tmp_path, record, share):
     path = record(tmp_path / 'run', frames=100, size=9000)
     everything = list(open_bag(path).messages())
     file = path / 'run.mcap'
     content = file.read_bytes()
     file.write_bytes(content[: int(share * len(content))])
-    found, messages = salvaged(path, tmp_path / 'new')
+    result, messages = salvaged(path, tmp_path / 'new')
     assert messages == everything[: len(messages)]
-    assert found.recovered + found.lost == len(everything) == 201
-    assert found.recovered > (share - 0.2) * 201
+    assert result.recovered + result.lost == len(everything) == 201
+    assert result.recovered > (share - 0.2) * 201
 
 
 def test_without_metadata_and_without_an_end(tmp_path, record):
     path = record(tmp_path / 'run', frames=100, size=9000)
     (path / 'metadata.yaml').unlink()
-    found, _ = salvaged(path, tmp_path / 'new')
-    assert (found.recovered, found.lost) == (201, 0)
-    # The file itself keeps a copy of what metadata.yaml says.
+    result, _ = salvaged(path, tmp_path / 'new')
+    assert (result.recovered, result.lost) == (201, 0)
+    # The MCAP file contains a copy of metadata.yaml.
     assert open_bag(tmp_path / 'new').metadata['tray'] == '3'
     file = path / 'run.mcap'
     file.write_bytes(file.read_bytes()[:-100])
-    found, _ = salvaged(path, tmp_path / 'newer')
-    assert found.recovered == 201
+    result, _ = salvaged(path, tmp_path / 'newer')
+    assert result.recovered == 201
 
 
 @pytest.mark.parametrize('ended', [True, False])
 @pytest.mark.parametrize('number', range(3))
 @pytest.mark.parametrize('place', [1, 6, 'middle'])
 def test_a_damaged_chunk_costs_its_own_messages_alone(tmp_path, record, ended, number, place):
-    """Wherever it is damaged: in its length, or in its middle."""
+    """The damage is in its length or in its middle."""
     path = record(tmp_path / 'run', frames=100, size=9000)
     everything = list(open_bag(path).messages())
     file = path / 'run.mcap'
     whole = bytearray(file.read_bytes())
-    places = chunks(file)
-    number = min(number, len(places) - 1)
-    chunk = places[number]
+    indexes = chunks(file)
+    number = min(number, len(indexes) - 1)
+    chunk = indexes[number]
     at = chunk.chunk_length // 2 if place == 'middle' else place
     whole[chunk.chunk_start_offset + at] ^= 0x55
     file.write_bytes(whole if ended else whole[:-40])
-    found, messages = salvaged(path, tmp_path / 'new')
+    result, messages = salvaged(path, tmp_path / 'new')
     assert [message for message in everything if message in messages] == messages
     outside = [
         message
@@ -116,26 +116,26 @@ def test_a_damaged_chunk_costs_its_own_messages_alone(tmp_path, record, ended, n
         if not chunk.message_start_time <= message.log_time_ns <= chunk.message_end_time
     ]
     assert [message for message in messages if message in outside] == outside
-    assert found.recovered + found.lost == len(everything)
+    assert result.recovered + result.lost == len(everything)
 
 
 def changed(path, start, content, cut=0):
-    """With other bytes at one place, and without its end."""
+    """Overwrite bytes of a file, and cut its end."""
     whole = bytearray(path.read_bytes())
     whole[start : start + len(content)] = content
     path.write_bytes(whole[: len(whole) - cut])
 
 
 @pytest.mark.parametrize('cut', [0, 40])
-def test_a_length_inside_a_chunk_that_no_memory_holds_costs_that_chunk(tmp_path, record, cut):
+def test_an_impossible_length_inside_a_chunk_costs_that_chunk(tmp_path, record, cut):
     path = record(tmp_path / 'run', frames=100, size=9000)
     everything = list(open_bag(path).messages())
     # The highest byte of the length of the records, behind times, size, checksum and 'zstd'.
     changed(path / 'run.mcap', chunks(path / 'run.mcap')[1].chunk_start_offset + 52, b'\xff', cut)
-    found, messages = salvaged(path, tmp_path / 'new')
+    result, messages = salvaged(path, tmp_path / 'new')
     assert [message for message in everything if message in messages] == messages
-    assert found.lost > 0
-    assert found.recovered + found.lost == 201
+    assert result.lost > 0
+    assert result.recovered + result.lost == 201
 
 
 @pytest.mark.parametrize('cut', [0, 40])
@@ -144,34 +144,34 @@ def test_an_mcap_file_that_is_damaged_in_its_first_bytes_is_read(tmp_path, recor
     path = record(tmp_path / 'run', frames=100, size=9000)
     everything = list(open_bag(path).messages())
     changed(path / 'run.mcap', 0, content, cut)
-    found, messages = salvaged(path, tmp_path / 'new')
+    result, messages = salvaged(path, tmp_path / 'new')
     assert messages == everything
-    assert found.lost == 0
-    assert f'{path}/run.mcap: is damaged at its beginning; the rest is read' in found.notices
-    # Nothing else takes it for whole.
+    assert result.lost == 0
+    assert f'{path}/run.mcap: its first bytes are damaged; the rest is read' in result.notices
+    # Without salvaging the file is refused.
     with pytest.raises(RecordingError, match='is not an MCAP file') as refusal:
         open_bag(path)
-    remedy = 'pass a rosbag2 folder' if cut else 'ends as one; nanorocks salvage recovers what'
+    remedy = 'pass a rosbag2 folder' if cut else 'ends like an MCAP file; run nanorocks salvage'
     assert remedy in str(refusal.value)
 
 
 @pytest.mark.parametrize('cut', [0, 8])
 def test_a_first_sector_that_is_lost_costs_its_chunk_alone(tmp_path, record, cut):
-    """Topics and types, which stood in it, come again at the end."""
+    """Topics and types in the first sector are repeated at the end of the file."""
     path = record(tmp_path / 'run', frames=100, size=9000)
     everything = list(open_bag(path).messages())
     first, second, *_ = chunks(path / 'run.mcap')
     changed(path / 'run.mcap', 0, bytes(512), cut)
-    found, messages = salvaged(path, tmp_path / 'new')
+    result, messages = salvaged(path, tmp_path / 'new')
     assert first.chunk_start_offset < 512
     assert messages == everything[-len(messages) :]
     assert messages[0].log_time_ns == second.message_start_time
-    assert found.recovered + found.lost == 201
+    assert result.recovered + result.lost == 201
     assert set(open_bag(tmp_path / 'new').topics) == {CAMERA, SPEED}
 
 
 @pytest.mark.parametrize('size', [3, 600, 3_000_000])
-def test_what_is_no_mcap_at_all_is_said(tmp_path, size):
+def test_a_file_that_is_not_mcap_is_refused(tmp_path, size):
     noise = np.random.default_rng(2).bytes(size)
     (tmp_path / 'x.mcap').write_bytes(noise)
     with pytest.raises(RecordingError, match=r'is not an MCAP file \(begins with .*\); pass a'):
@@ -188,7 +188,7 @@ def write_unknown(path, encoding, text):
 
 
 @pytest.mark.parametrize(('encoding', 'text'), [('cdr', b'nonsense (('), ('json', b'')])
-def test_messages_that_nobody_understands_are_copied_too(tmp_path, encoding, text):
+def test_messages_of_unknown_types_are_copied(tmp_path, encoding, text):
     path = write_unknown(tmp_path / 'x.mcap', encoding, text)
     _, (message,) = salvaged(path, tmp_path / 'new')
     assert message.cdr == b'1234'
@@ -211,21 +211,21 @@ def write_sqlite(path, count, size=3000):
     return path
 
 
-def test_of_a_sqlite_file_the_rows_that_can_be_read_are_recovered(tmp_path):
+def test_readable_rows_of_a_sqlite_file_are_recovered(tmp_path):
     path = write_sqlite(tmp_path / 'run', 100)
     everything = list(open_bag(path).messages())
     file = next(path.glob('*.db3'))
     content = file.read_bytes()
     assert salvaged(path, tmp_path / 'whole')[1] == everything
     file.write_bytes(content[: int(0.6 * len(content)) // 4096 * 4096])
-    found, messages = salvaged(path, tmp_path / 'cut')
+    result, messages = salvaged(path, tmp_path / 'cut')
     assert 40 <= len(messages) <= 70
     assert [message for message in everything if message in messages] == messages
-    assert found.recovered + found.lost == 100
+    assert result.recovered + result.lost == 100
     file.write_bytes(content[:81920] + bytes(40960) + content[122880:])
-    found, messages = salvaged(path, tmp_path / 'hole')
+    result, messages = salvaged(path, tmp_path / 'hole')
     assert 70 <= len(messages) < 100
-    assert found.recovered + found.lost == 100
+    assert result.recovered + result.lost == 100
 
 
 def test_the_target_is_not_overwritten(tmp_path, record):
@@ -236,7 +236,7 @@ def test_the_target_is_not_overwritten(tmp_path, record):
 
 
 @pytest.mark.parametrize('content', [b'\x89MCAP0\r\n', b'\x89MCAP0\r\n' + bytes(500)])
-def test_where_nothing_is_left_nothing_is_made(tmp_path, content):
+def test_without_readable_messages_no_recording_is_written(tmp_path, content):
     (tmp_path / 'x.mcap').write_bytes(content)
     with pytest.raises(RecordingError, match='holds no message that can be recovered'):
         salvage(tmp_path / 'x.mcap', tmp_path / 'new', lambda *_: None)
@@ -254,17 +254,17 @@ def test_a_damaged_page_of_a_sqlite_file_costs_its_own_rows_alone(tmp_path, shar
     file.write_bytes(content)
     bag = open_bag(path)
     for _ in range(2):
-        found = list(bag.messages())
-        assert [message for message in everything if message in found] == found
-        assert len(found) >= 400 - 8
-        assert len(found) + bag.messages_lost == 400
+        result = list(bag.messages())
+        assert [message for message in everything if message in result] == result
+        assert len(result) >= 400 - 8
+        assert len(result) + bag.messages_lost == 400
     assert not bag.complete
-    found, messages = salvaged(path, tmp_path / 'new')
+    result, messages = salvaged(path, tmp_path / 'new')
     assert len(messages) >= 400 - 8
-    assert found.recovered + found.lost == 400
+    assert result.recovered + result.lost == 400
 
 
-def test_of_a_sqlite_file_whose_index_is_damaged_nothing_is_lost(tmp_path):
+def test_a_damaged_index_of_a_sqlite_file_costs_no_messages(tmp_path):
     path = write_sqlite(tmp_path / 'run', 2000, size=30)
     everything = list(open_bag(path).messages())
     file = next(path.glob('*.db3'))
@@ -272,10 +272,10 @@ def test_of_a_sqlite_file_whose_index_is_damaged_nothing_is_lost(tmp_path):
     leaves = [place for place in range(0, len(content), 4096) if content[place] == 0x0A]
     content[leaves[-2] : leaves[-2] + 4096] = bytes(4096)
     file.write_bytes(content)
-    found, messages = salvaged(path, tmp_path / 'new')
+    result, messages = salvaged(path, tmp_path / 'new')
     assert messages == everything
-    assert found.lost == 0
-    assert 'damaged' in found.notices[0]
+    assert result.lost == 0
+    assert 'damaged' in result.notices[0]
 
 
 @pytest.mark.parametrize('change', [
@@ -283,7 +283,7 @@ def test_of_a_sqlite_file_whose_index_is_damaged_nothing_is_lost(tmp_path):
     "data = 'hello'", "data = CAST(x'ff00' AS TEXT)", 'topic_id = 77', "topic_id = 'x'",
 ])  # fmt: skip
 @pytest.mark.parametrize('damaged', [False, True])
-def test_a_row_that_cannot_have_been_written_so_is_left_out(tmp_path, change, damaged):
+def test_a_row_with_invalid_values_is_skipped(tmp_path, change, damaged):
     path = write_sqlite(tmp_path / 'run', 60, size=20_000)
     everything = list(open_bag(path).messages())
     file = next(path.glob('*.db3'))
@@ -291,24 +291,24 @@ def test_a_row_that_cannot_have_been_written_so_is_left_out(tmp_path, change, da
         database.execute(f'UPDATE messages SET {change} WHERE id = 10')
     if damaged:
         content = bytearray(file.read_bytes())
-        # A page in the middle of a row, which says where the next one is: without it that is seen.
+        # A page in the middle of a row, which links to the next page of the row.
         starts = range(len(content) // 8192 * 4096, len(content), 4096)
         start = next(k for k in starts if content[k : k + 4] == (k // 4096 + 2).to_bytes(4, 'big'))
         content[start : start + 4096] = bytes(4096)
         file.write_bytes(content)
-    found, messages = salvaged(path, tmp_path / 'new')
+    result, messages = salvaged(path, tmp_path / 'new')
     assert everything[9] not in messages
     assert [message for message in everything if message in messages] == messages
-    assert found.recovered + found.lost == 60
-    assert found.recovered >= (55 if damaged else 59)
-    left_out = 'run.db3: 1 messages have a time, topic or content that cannot be and were left out'
-    assert damaged or found.notices == (f'{path}/{left_out}',)
+    assert result.recovered + result.lost == 60
+    assert result.recovered >= (55 if damaged else 59)
+    notice = 'run.db3: 1 messages with an invalid time, topic or content were skipped'
+    assert damaged or result.notices == (f'{path}/{notice}',)
     report = bag_info(path, lambda *_: None)
     assert not report.complete
-    assert report.messages_lost == found.lost
+    assert report.messages_lost == result.lost
 
 
-def test_an_index_that_knows_better_than_a_damaged_row_is_not_asked(tmp_path):
+def test_a_damaged_row_is_skipped_even_if_the_index_has_its_time(tmp_path):
     path = write_sqlite(tmp_path / 'run', 60)
     file = next(path.glob('*.db3'))
     with closing(sqlite3.connect(file)) as database, database:
@@ -318,8 +318,8 @@ def test_an_index_that_knows_better_than_a_damaged_row_is_not_asked(tmp_path):
     heads = re.finditer(rb'\x06\x00[\x01\x09]\x06[\x80-\xff][\x00-\x7f]', bytes(content))
     content[next(heads).start() + 3] ^= 1
     file.write_bytes(content)
-    found, messages = salvaged(path, tmp_path / 'new')
-    assert (found.recovered, found.lost, len(messages)) == (59, 1, 59)
+    result, messages = salvaged(path, tmp_path / 'new')
+    assert (result.recovered, result.lost, len(messages)) == (59, 1, 59)
 
 
 @pytest.mark.parametrize('unmerged', [False, True])
@@ -336,7 +336,7 @@ def test_a_sqlite_file_with_a_log_beside_it_is_read_and_not_touched(
         database.execute('PRAGMA journal_mode=WAL')
         with database:
             database.execute('DELETE FROM messages WHERE id = 60')
-        # As a recorder leaves it that was killed.
+        # As left by a killed recorder.
         shutil.copytree(path, left)
     if not unmerged:
         shutil.rmtree(left)
@@ -354,7 +354,7 @@ def test_a_sqlite_file_with_a_log_beside_it_is_read_and_not_touched(
     assert not list(scratch.iterdir())
 
 
-def test_definitions_that_are_lost_cost_no_messages(tmp_path):
+def test_lost_definitions_cost_no_messages(tmp_path):
     path = write_sqlite(tmp_path / 'run', 20)
     everything = list(open_bag(path).messages())
     file = next(path.glob('*.db3'))
@@ -377,8 +377,8 @@ def test_rows_behind_a_hole_of_thousands_are_found(tmp_path):
     leaves = [place for place in range(0, len(content), 4096) if content[place] == 0x0D]
     content[leaves[-2] : leaves[-2] + 4096] = bytes(4096)
     file.write_bytes(content)
-    found = salvage(path, tmp_path / 'new', lambda *_: None)
-    assert found.recovered > 1000
+    result = salvage(path, tmp_path / 'new', lambda *_: None)
+    assert result.recovered > 1000
 
 
 def interrupted(source, target):
@@ -392,18 +392,18 @@ def interrupted(source, target):
         salvage(source, target, progress)
 
 
-def test_an_interrupted_salvage_does_not_pass_as_whole(tmp_path, record):
+def test_an_interrupted_salvage_is_not_complete(tmp_path, record):
     path = record(tmp_path / 'run')
     interrupted(path, tmp_path / 'part')
     part = open_bag(tmp_path / 'part')
     assert 40 <= len(list(part.messages())) < 81
     assert part.metadata['salvage'] == 'unfinished'
     assert not part.complete
-    said = 'holds only part of what was salvaged, since that was interrupted'
-    assert part.notices == (f'{tmp_path / "part"}: {said}',)
-    # Nor does a copy of it.
-    found = salvage(tmp_path / 'part', tmp_path / 'copy', lambda *_: None)
-    assert found.notices == part.notices
+    notice = 'holds only part of the readable messages because its salvage was interrupted'
+    assert part.notices == (f'{tmp_path / "part"}: {notice}',)
+    # A copy of it is unfinished, too.
+    result = salvage(tmp_path / 'part', tmp_path / 'copy', lambda *_: None)
+    assert result.notices == part.notices
     assert not open_bag(tmp_path / 'copy').complete
     salvaged(path, tmp_path / 'new')
     assert open_bag(tmp_path / 'new').metadata['salvage'] == 'complete'

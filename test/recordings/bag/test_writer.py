@@ -1,4 +1,4 @@
-"""Recordings are rosbag2 folders that others read, and they survive accidents."""
+"""BagWriter: rosbag2 folders that other tools read and that survive a crash."""
 
 from __future__ import annotations
 
@@ -17,21 +17,23 @@ from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.recordings.bag.offered_topics import OfferedTopic
 from nanorocks_ros.recordings.bag.reader import open_bag
-from nanorocks_ros.recordings.bag.writer import BagWriter, OfferedQos, OfferedTopic
+from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import (
     camera_info_message,
     float_array_message,
     image_message,
     time_message,
 )
+from nanorocks_ros.recordings.offered_qos import OfferedQos
 
 EPOCH = '/nanorocks/epoch'
 SPEED = '/nanorocks/tray_3/speed'
 CAMERA = '/nanorocks/camera/image_raw/compressed'
 
 
-def test_rosbags_own_reader_opens_the_folder(tmp_path, record):
+def test_the_reader_of_rosbags_opens_the_folder(tmp_path, record):
     path = record(tmp_path / 'run', frames=40)
     with Reader(path) as bag:
         assert {c.topic: c.msgcount for c in bag.connections} == {EPOCH: 1, CAMERA: 40, SPEED: 40}
@@ -40,15 +42,15 @@ def test_rosbags_own_reader_opens_the_folder(tmp_path, record):
     assert stamps == sorted(stamps)
 
 
-def test_any_reader_deserialises_what_was_written(tmp_path, record):
+def test_the_reader_of_rosbags_deserializes_the_messages(tmp_path, record):
     path = record(tmp_path / 'run', frames=3)
     store = get_typestore(Stores.ROS2_JAZZY)
     with AnyReader([path], default_typestore=store) as bag:
         chosen = [c for c in bag.connections if c.topic == SPEED]
-        found = [bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages(chosen)]
-    assert [message.data[0] for message in found] == [0.0, 0.5, 1.0]
-    assert np.isnan(found[0].data[1])
-    dimension = found[0].layout.dim[0]
+        messages = [bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages(chosen)]
+    assert [message.data[0] for message in messages] == [0.0, 0.5, 1.0]
+    assert np.isnan(messages[0].data[1])
+    dimension = messages[0].layout.dim[0]
     assert (dimension.label, dimension.size, dimension.stride) == ('time,cycle', 2, 2)
 
 
@@ -68,17 +70,17 @@ def test_metadata_holds_the_offered_qos(tmp_path, record):
     assert profile['offered_qos_profiles'][0]['durability'] == 'transient_local'
 
 
-def test_the_mcap_file_carries_the_offered_qos_and_the_provenance_too(tmp_path, record):
+def test_the_mcap_file_contains_the_offered_qos_and_the_provenance(tmp_path, record):
     path = record(tmp_path / 'run', frames=1)
     with (path / 'run.mcap').open('rb') as stream:
         reader = make_reader(stream)
         channels = reader.get_summary().channels.values()
         assert all('depth' in c.metadata['offered_qos_profiles'] for c in channels)
-        (kept,) = reader.iter_metadata()
-    assert "tray: '3'" in kept.metadata['serialized_metadata']
+        (metadata,) = reader.iter_metadata()
+    assert "tray: '3'" in metadata.metadata['serialized_metadata']
 
 
-def test_provenance_comes_back(tmp_path, record):
+def test_provenance_is_read_back(tmp_path, record):
     bag = open_bag(record(tmp_path / 'run', frames=1))
     assert bag.metadata == {'nanorocks_ros': '0.0', 'tray': '3'}
 
@@ -120,9 +122,9 @@ def test_a_path_below_a_file_is_refused(tmp_path, topics):
     assert isinstance(caught.value.__cause__, OSError)
 
 
-def test_a_topic_that_was_not_announced_is_refused(tmp_path, topics):
+def test_an_undeclared_topic_is_refused(tmp_path, topics):
     with (
-        pytest.raises(RecordingError, match=r"topic '/other' was not announced"),
+        pytest.raises(RecordingError, match=r"topic '/other' was not declared"),
         BagWriter(tmp_path / 'run', topics, metadata={}) as bag,
     ):
         bag.write('/other', 0, time_message(0))
@@ -130,7 +132,7 @@ def test_a_topic_that_was_not_announced_is_refused(tmp_path, topics):
 
 def test_a_message_of_another_type_is_refused(tmp_path, topics):
     with (
-        pytest.raises(RecordingError, match=r'Time is no std_msgs/msg/Float32MultiArray'),
+        pytest.raises(RecordingError, match=r'Time is not a valid std_msgs/msg/Float32MultiArray'),
         BagWriter(tmp_path / 'run', topics, metadata={}) as bag,
     ):
         bag.write(SPEED, 0, time_message(0))
@@ -146,14 +148,16 @@ def test_a_type_without_usable_definition_is_refused(tmp_path, definition):
         bag.write_raw('/odd', 0, b'')
 
 
-def test_a_full_disk_is_said_and_leaves_what_fitted(tmp_path):
+def test_a_full_disk_is_reported_and_written_messages_are_readable(tmp_path):
     script = tmp_path / 'recorder.py'
     script.write_text(
         'import resource, sys\n'
         'import numpy as np\n'
         'from nanorocks_ros.errors import RecordingError\n'
         'from nanorocks_ros.recordings.messages.message_builders import compressed_image_message\n'
-        'from nanorocks_ros.recordings.bag.writer import BagWriter, OfferedQos, OfferedTopic\n'
+        'from nanorocks_ros.recordings.bag.offered_topics import OfferedTopic\n'
+        'from nanorocks_ros.recordings.bag.writer import BagWriter\n'
+        'from nanorocks_ros.recordings.offered_qos import OfferedQos\n'
         'resource.setrlimit(resource.RLIMIT_FSIZE, (2_500_000, 2_500_000))\n'
         "kind = OfferedTopic(msgtype='sensor_msgs/msg/CompressedImage', qos=OfferedQos())\n"
         'noise = np.random.default_rng(0)\n'
@@ -180,17 +184,17 @@ def test_a_full_disk_is_said_and_leaves_what_fitted(tmp_path):
 
 def test_a_negative_stamp_is_refused(tmp_path, topics):
     with (
-        pytest.raises(RecordingError, match=r'stamp -1 ns lies before 1970'),
+        pytest.raises(RecordingError, match=r'stamp -1 ns is before 1970'),
         BagWriter(tmp_path / 'run', topics, metadata={}) as bag,
     ):
         bag.write(EPOCH, -1, time_message(0))
 
 
-def test_a_stamp_that_no_ros_time_holds_is_refused(tmp_path, topics):
+def test_a_stamp_after_2038_is_refused(tmp_path, topics):
     last_ns = (2**31 - 1) * 1_000_000_000
     with BagWriter(tmp_path / 'run', topics, metadata={}) as bag:
         bag.write(EPOCH, last_ns, time_message(last_ns))
-        with pytest.raises(RecordingError, match=r'beyond what a ROS time holds, .*; .*--rate'):
+        with pytest.raises(RecordingError, match=r'is after 2038-01-19, .*; .*--rate'):
             bag.write(EPOCH, last_ns + 1_000_000_000, time_message(last_ns + 1_000_000_000))
     assert [message.log_time_ns for message in open_bag(tmp_path / 'run').messages()] == [last_ns]
 
@@ -199,13 +203,13 @@ def test_a_number_that_does_not_fit_its_field_is_refused(tmp_path, topics):
     message = time_message(7)
     message.nanosec = -1
     with (
-        pytest.raises(RecordingError, match=r'Time is no builtin_interfaces/msg/Time \('),
+        pytest.raises(RecordingError, match=r'Time is not a valid builtin_interfaces/msg/Time \('),
         BagWriter(tmp_path / 'run', topics, metadata={}) as bag,
     ):
         bag.write(EPOCH, 7, message)
 
 
-def test_after_an_exception_what_was_written_is_readable(tmp_path, topics):
+def test_after_an_exception_written_messages_are_readable(tmp_path, topics):
     def record_until_it_fails():
         with BagWriter(tmp_path / 'run', topics, metadata={}) as writer:
             writer.write(EPOCH, 7, time_message(7))
@@ -218,7 +222,7 @@ def test_after_an_exception_what_was_written_is_readable(tmp_path, topics):
     assert [m.log_time_ns for m in bag.messages()] == [7]
 
 
-def test_raw_messages_come_back_byte_for_byte(tmp_path, topics, record):
+def test_raw_messages_are_read_back_byte_for_byte(tmp_path, topics, record):
     source = list(open_bag(record(tmp_path / 'run', frames=5)).messages())
     with BagWriter(tmp_path / 'copy', topics, metadata={}) as bag:
         for message in source:
@@ -226,7 +230,7 @@ def test_raw_messages_come_back_byte_for_byte(tmp_path, topics, record):
     assert list(open_bag(tmp_path / 'copy').messages()) == source
 
 
-def test_types_beyond_jazzy_are_kept_with_their_definition(tmp_path):
+def test_types_that_are_not_part_of_jazzy_are_written_with_their_definition(tmp_path):
     kind = OfferedTopic(
         msgtype='my_msgs/msg/Grain', qos=OfferedQos(), definition='float64 radius\nstring name\n'
     )
@@ -239,7 +243,7 @@ def test_types_beyond_jazzy_are_kept_with_their_definition(tmp_path):
     assert (grain.radius, grain.name) == (0.5, 'hi')
 
 
-def test_images_and_camera_infos_come_back(tmp_path):
+def test_images_and_camera_infos_are_read_back(tmp_path):
     image = np.arange(60, dtype=np.uint8).reshape(4, 5, 3)
     field = np.linspace(0, 1, 12, dtype=np.float32).reshape(3, 4)
     matrix = np.array([[900.0, 0, 960], [0, 900, 540], [0, 0, 1]])
@@ -270,7 +274,9 @@ def test_a_killed_recorder_loses_at_most_the_last_second(tmp_path):
     script.write_text(
         'import os, sys, signal\n'
         'from nanorocks_ros.recordings.messages.message_builders import time_message\n'
-        'from nanorocks_ros.recordings.bag.writer import BagWriter, OfferedQos, OfferedTopic\n'
+        'from nanorocks_ros.recordings.bag.offered_topics import OfferedTopic\n'
+        'from nanorocks_ros.recordings.bag.writer import BagWriter\n'
+        'from nanorocks_ros.recordings.offered_qos import OfferedQos\n'
         "kind = OfferedTopic(msgtype='builtin_interfaces/msg/Time', qos=OfferedQos())\n"
         "with BagWriter(sys.argv[1], {'/t': kind}, metadata={}) as bag:\n"
         '    for number in range(100):\n'

@@ -1,4 +1,4 @@
-"""Frames from image messages of both worlds, and refusals that name the topic."""
+"""Frames from image messages of rosbags and rclpy, and errors that name the topic."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_a_frame_holds_the_pixels_the_stamp_and_the_encoding(encoding, channels)
 
 
 def ros_image(image, encoding, padding=0):
-    """A message as rclpy hands it out: its data is an array.array."""
+    """A message as rclpy returns it: its data is an array.array."""
     height, width = image.shape[:2]
     rows = np.pad(image.reshape(height, -1), ((0, 0), (0, padding)), constant_values=99)
     return SimpleNamespace(
@@ -83,7 +83,7 @@ def test_an_unknown_encoding_is_refused():
         frame_from_image(message, WHERE)
     assert str(caught.value) == (
         f"{WHERE}: encoding 'bayer_rggb8' is not supported (bgr8, rgb8, mono8); "
-        'let the camera publish one of these'
+        'configure the camera to publish one of these'
     )
 
 
@@ -100,7 +100,7 @@ def test_an_unknown_encoding_is_refused():
 def test_sizes_that_do_not_fit_are_refused(wrong):
     message = ros_image(picture(), 'bgr8')
     vars(message).update(wrong)
-    with pytest.raises(FrameError, match=r'bytes in rows of .* are no .* bgr8 image'):
+    with pytest.raises(FrameError, match=r'bytes in rows of .* do not fit a .* bgr8 image'):
         frame_from_image(message, WHERE)
 
 
@@ -112,7 +112,7 @@ def smooth(channels=3):
 
 @pytest.mark.parametrize('kind', [bytes, lambda content: array('B', content)])
 @pytest.mark.parametrize(('channels', 'encoding'), [(3, 'bgr8'), (1, 'mono8')])
-def test_a_jpeg_comes_back_nearly_as_it_was(kind, channels, encoding):
+def test_a_jpeg_is_decoded_with_small_errors(kind, channels, encoding):
     image = smooth(channels)
     message = compressed_image_message(STAMP_NS, 'camera', 'jpeg', encode_jpeg(image, 95))
     message.data = kind(message.data.tobytes())
@@ -122,23 +122,23 @@ def test_a_jpeg_comes_back_nearly_as_it_was(kind, channels, encoding):
     assert np.abs(frame.image.astype(int) - image).max() < 8
 
 
-def test_a_png_comes_back_exactly():
+def test_a_png_is_decoded_exactly():
     image = picture()
     content = cv2.imencode('.png', image)[1].tobytes()
     message = compressed_image_message(1, 'camera', 'bgr8; png compressed bgr8', content)
     assert np.array_equal(frame_from_compressed(message, WHERE).image, image)
 
 
-def test_a_jpeg_padded_with_zeros_is_whole():
+def test_a_jpeg_padded_with_zeros_is_complete():
     content = encode_jpeg(smooth(), 90) + bytes(3)
     message = compressed_image_message(1, 'camera', 'jpeg', content)
     assert frame_from_compressed(message, WHERE).image.shape == (48, 64, 3)
 
 
-@pytest.mark.parametrize('content', [b'', b'\xff\xd8', b'no picture', bytes(100)])
-def test_bytes_that_are_no_picture_are_refused(content):
+@pytest.mark.parametrize('content', [b'', b'\xff\xd8', b'not an image', bytes(100)])
+def test_bytes_that_are_not_an_image_are_refused(content):
     message = compressed_image_message(7, 'camera', 'jpeg', content)
-    with pytest.raises(FrameError, match=rf'the picture at 7 ns \({len(content)} bytes, format'):
+    with pytest.raises(FrameError, match=rf'the image at 7 ns \({len(content)} bytes, format'):
         frame_from_compressed(message, WHERE)
 
 
@@ -168,19 +168,19 @@ def test_a_quality_out_of_range_is_refused(quality):
     np.zeros(4, np.uint8),
     np.zeros((0, 4), np.uint8),
 ])  # fmt: skip
-def test_arrays_that_are_no_pictures_are_not_encoded(image):
-    with pytest.raises(FrameError, match='is no picture'):
+def test_arrays_that_are_not_images_are_refused(image):
+    with pytest.raises(FrameError, match='is not an image'):
         encode_jpeg(image, 90)
 
 
 @pytest.mark.parametrize(
     ('stamp_ns', 'message'),
-    [(0, 'a frame without a stamp'), (-5_000_000_000, 'a frame of -5 s since 1970')],
+    [(0, 'a frame has no time stamp'), (-5_000_000_000, 'time stamp -5 s, before 1970')],
 )
 def test_a_frame_without_a_usable_stamp_is_refused_raw_and_compressed(stamp_ns, message):
     raw = image_message(stamp_ns, 'camera', 'mono8', smooth(1))
     jpeg = compressed_image_message(stamp_ns, 'camera', 'jpeg', encode_jpeg(smooth(), 90))
-    for read, one in ((frame_from_image, raw), (frame_from_compressed, jpeg)):
+    for convert, image in ((frame_from_image, raw), (frame_from_compressed, jpeg)):
         with pytest.raises(FrameError, match=message) as refused:
-            read(one, WHERE)
-        assert 'let the driver of the camera stamp its frames' in str(refused.value)
+            convert(image, WHERE)
+        assert 'configure the camera driver to stamp its frames' in str(refused.value)

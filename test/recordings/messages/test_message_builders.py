@@ -33,7 +33,7 @@ def test_an_array_needs_a_value_for_each_label():
     ('mono8', np.zeros(4, np.uint8)),
 ])  # fmt: skip
 def test_an_image_that_does_not_fit_its_encoding_is_refused(encoding, image):
-    with pytest.raises(FrameError, match=f'is no {encoding}; give'):
+    with pytest.raises(FrameError, match=f'does not fit {encoding}; give'):
         image_message(0, 'camera', encoding, image)
 
 
@@ -42,7 +42,7 @@ def test_an_image_of_an_unknown_encoding_is_refused():
         image_message(0, 'camera', '16UC1', np.zeros((4, 4), np.uint8))
 
 
-def test_a_view_is_sent_as_what_it_shows():
+def test_a_view_of_an_array_is_sent_without_the_rest():
     image = np.arange(100, dtype=np.uint8).reshape(10, 10)
     message = image_message(0, 'camera', 'mono8', image[2:4, 3:6])
     assert message.data.tolist() == [23, 24, 25, 33, 34, 35]

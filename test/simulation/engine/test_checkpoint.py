@@ -1,4 +1,4 @@
-"""A gas that was saved goes on bit by bit as it would have; no other file is taken for one."""
+"""A checkpoint continues bit by bit; damaged and foreign files are refused."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import pytest
 from gases import BOX, KERNELS, RULES, mixture
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas, Kernel
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.kernel_choice import Kernel
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 HALF, END = 7.3, 20.0
 TIMES = np.linspace(HALF, END, 12)
@@ -22,38 +24,38 @@ def gas_for(name, kernel=Kernel.SCAN, n=20):
     return HardSphereGas(mixture(8, n, rules), rules, kernel)
 
 
-def rest_of(gas):
+def remaining_record(gas):
     return gas.follow(END, TIMES, TIMES, log=True)
 
 
-def assert_identical(one, other):
-    """Every bit of two courses."""
+def assert_identical(first, second):
+    """Assert that two run records agree bit by bit."""
     for field in ('times', 'positions', 'velocities', 'spins', 'bodies', 'events'):
-        a, b = getattr(one, field), getattr(other, field)
+        a, b = getattr(first, field), getattr(second, field)
         assert (a is None) == (b is None), field
         if a is not None:
             np.testing.assert_array_equal(a, b)
-    for field in type(one.observations).__slots__:
+    for field in type(first.observations).__slots__:
         np.testing.assert_array_equal(
-            getattr(one.observations, field), getattr(other.observations, field)
+            getattr(first.observations, field), getattr(second.observations, field)
         )
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
 @pytest.mark.parametrize('name', RULES)
-def test_a_saved_gas_goes_on_bit_by_bit(tmp_path, name, kernel):
+def test_a_loaded_gas_continues_bit_by_bit(tmp_path, name, kernel):
     path = tmp_path / 'gas.npz'
     straight = gas_for(name, kernel)
     straight.run_until(HALF)
     straight.save(path)
-    expected = rest_of(straight)
+    expected = remaining_record(straight)
     loaded = HardSphereGas.load(path)
     assert loaded.now == HALF
     assert loaded.kernel == kernel
-    assert_identical(rest_of(loaded), expected)
+    assert_identical(remaining_record(loaded), expected)
     assert len(expected.events) > 30
     assert loaded.counts == straight.counts
-    for field in ('books', 'bodies', 'stuck', 'radii', 'masses'):
+    for field in ('ledger', 'bodies', 'stuck', 'radii', 'masses'):
         np.testing.assert_array_equal(getattr(loaded, field), getattr(straight, field))
 
 
@@ -63,7 +65,7 @@ def test_saving_changes_nothing(tmp_path, kernel):
     for gas in (saved, unsaved):
         gas.run_until(HALF)
     saved.save(tmp_path / 'gas')
-    assert_identical(rest_of(saved), rest_of(unsaved))
+    assert_identical(remaining_record(saved), remaining_record(unsaved))
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
@@ -76,7 +78,7 @@ def test_a_gas_can_be_saved_before_its_first_event_and_again_and_again(tmp_path,
         gas.save(path)
         gas = HardSphereGas.load(path)
     expected.run_until(HALF)
-    assert_identical(rest_of(gas), rest_of(expected))
+    assert_identical(remaining_record(gas), remaining_record(expected))
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
@@ -88,7 +90,7 @@ def test_a_gas_stopped_in_the_middle_of_its_events_can_be_saved(tmp_path, kernel
     loaded = HardSphereGas.load(tmp_path / 'gas')
     for gas in (straight, loaded):
         gas.run_until(HALF)
-    assert_identical(rest_of(loaded), rest_of(straight))
+    assert_identical(remaining_record(loaded), remaining_record(straight))
 
 
 def test_a_loaded_gas_can_be_kicked_and_seen_by_species(tmp_path):
@@ -97,11 +99,11 @@ def test_a_loaded_gas_can_be_kicked_and_seen_by_species(tmp_path):
     gas.save(tmp_path / 'gas')
     loaded = HardSphereGas.load(tmp_path / 'gas')
     velocities = np.random.default_rng(1).normal(size=(20, 3))
-    courses = []
-    for each in (gas, loaded):
-        each.kick(velocities)
-        courses.append(rest_of(each))
-    assert_identical(*courses)
+    records = []
+    for copy in (gas, loaded):
+        copy.kick(velocities)
+        records.append(remaining_record(copy))
+    assert_identical(*records)
     np.testing.assert_array_equal(loaded.beads().species, mixture(8, 20, SPECIES).species)
 
 
@@ -117,14 +119,14 @@ def saved(tmp_path):
     return path
 
 
-def test_a_file_is_replaced_whole_and_leaves_no_other_behind(saved):
+def test_a_checkpoint_is_replaced_atomically(saved):
     gas = gas_for('elastic', n=4)
     gas.save(saved)
     assert HardSphereGas.load(saved).radii.size == 4
     assert [path.name for path in saved.parent.iterdir()] == [saved.name]
 
 
-def test_where_nothing_can_be_written_the_error_names_the_file(tmp_path):
+def test_an_unwritable_path_is_named(tmp_path):
     gas = gas_for('elastic', n=3)
     for path in (tmp_path / 'no folder' / 'gas', tmp_path):
         with pytest.raises(SimulationError) as error:
@@ -141,15 +143,15 @@ def refused(path):
     return str(error.value)
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path):
+def test_a_missing_file_is_named(tmp_path):
     assert 'No such file' in refused(tmp_path / 'nothing')
     refused(tmp_path)
 
 
 def test_a_file_cut_short_anywhere_is_refused(saved):
-    whole = saved.read_bytes()
-    for length in range(0, len(whole), max(1, len(whole) // 60)):
-        saved.write_bytes(whole[:length])
+    content = saved.read_bytes()
+    for length in range(0, len(content), max(1, len(content) // 60)):
+        saved.write_bytes(content[:length])
         refused(saved)
 
 
@@ -163,19 +165,19 @@ def loaded_or_refused(path):
 
 def test_a_file_with_one_changed_bit_is_refused_or_the_same_gas(saved):
     """Some bits of a zip archive are of no consequence: dates, versions."""
-    whole = saved.read_bytes()
+    content = saved.read_bytes()
     expected = HardSphereGas.load(saved)
     random = np.random.default_rng(1)
     refusals = 0
-    for place in random.choice(len(whole), 150, replace=False):
-        changed = bytearray(whole)
+    for place in random.choice(len(content), 150, replace=False):
+        changed = bytearray(content)
         changed[place] ^= 1 << random.integers(8)
         saved.write_bytes(changed)
-        found = loaded_or_refused(saved)
-        if found is None:
+        loaded_gas = loaded_or_refused(saved)
+        if loaded_gas is None:
             refusals += 1
         else:
-            for a, b in zip(found._state, expected._state, strict=True):
+            for a, b in zip(loaded_gas._state, expected._state, strict=True):
                 np.testing.assert_array_equal(a, b)
     assert refusals > 75
 

@@ -1,4 +1,4 @@
-"""Inelastic collapse: with a contact duration it ends, without one it ends in a clear error."""
+"""Inelastic collapse: avoided with a contact duration, a clear error without one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from gases import (
 )
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 
@@ -36,18 +37,18 @@ def crowd(seed=1):
 @pytest.mark.parametrize(
     ('restitution', 'of_walls'), [(0.3, 0.5), (0.0, 0.5), (0.5, 0.0), (0.0, 0.0)]
 )
-def test_a_gas_that_would_collapse_comes_to_its_end(kernel, restitution, of_walls):
+def test_the_contact_duration_prevents_collapse(kernel, restitution, of_walls):
     beads = crowd()
     rules = CollisionRules(box=TRAY, restitution=restitution, wall_restitution=of_walls)
     gas = HardSphereGas(beads, rules, kernel)
-    course = gas.follow(30.0, np.linspace(0.0, 30.0, 61))
+    record = gas.follow(30.0, np.linspace(0.0, 30.0, 61))
     assert gas.now == 30.0
     assert gas.counts.elastic_pair > 100
     assert energy(gas.beads()) < 1e-3 * energy(beads)
-    assert smallest_gap(course.positions, beads.radii, rules) > -1e-10 * beads.radii.min()
+    assert smallest_gap(record.positions, beads.radii, rules) > -1e-10 * beads.radii.min()
 
 
-def test_beads_that_neither_bounce_nor_stick_come_to_rest_beside_one_another(kernel):
+def test_beads_of_restitution_0_come_to_rest_in_contact(kernel):
     """Restitution 0: all of the normal velocity goes, at once and once."""
     gas = gas_of(
         [(3, 5, 5), (7, 5, 5)],
@@ -55,18 +56,18 @@ def test_beads_that_neither_bounce_nor_stick_come_to_rest_beside_one_another(ker
         restitution=0.0,
         kernel=kernel,
     )
-    course = gas.follow(3.0, [1.5, 3.0], log=True)
-    assert course.events['time'] == near([1.0])
-    assert course.velocities[1] == near(np.array([(0, 0.5, 0)] * 2))
-    assert course.positions[1] == near(np.array([(4, 6.5, 5), (6, 6.5, 5)]))
+    record = gas.follow(3.0, [1.5, 3.0], log=True)
+    assert record.events['time'] == near([1.0])
+    assert record.velocities[1] == near(np.array([(0, 0.5, 0)] * 2))
+    assert record.positions[1] == near(np.array([(4, 6.5, 5), (6, 6.5, 5)]))
 
 
-def test_a_bead_that_does_not_bounce_slides_along_the_wall(kernel):
+def test_a_bead_of_restitution_0_slides_along_the_wall(kernel):
     gas = gas_of([(3, 5, 5)], [(-1, 0.25, 0)], wall_restitution=0.0, kernel=kernel)
-    course = gas.follow(10.0, [10.0], log=True)
-    assert len(course.events) == 1
-    assert course.positions[0, 0] == near([1, 7.5, 5])
-    assert course.velocities[0, 0].tolist() == [0, 0.25, 0]
+    record = gas.follow(10.0, [10.0], log=True)
+    assert len(record.events) == 1
+    assert record.positions[0, 0] == near([1, 7.5, 5])
+    assert record.velocities[0, 0].tolist() == [0, 0.25, 0]
 
 
 def trapped(kernel, **rules):
@@ -103,9 +104,9 @@ def test_a_bead_trapped_among_neighbours_that_close_in_gets_away(kernel):
         contact_duration=1e-3,
         kernel=kernel,
     )
-    course = gas.follow(100.0, np.linspace(0.0, 100.0, 201))
+    record = gas.follow(100.0, np.linspace(0.0, 100.0, 201))
     assert gas.counts.elastic_pair > 10
-    assert smallest_gap(course.positions, gas.radii, CollisionRules(box=(20, 20, 20))) > -1e-10
+    assert smallest_gap(record.positions, gas.radii, CollisionRules(box=(20, 20, 20))) > -1e-10
 
 
 def test_contacts_within_the_contact_duration_are_elastic(kernel):
@@ -119,9 +120,9 @@ def test_contacts_within_the_contact_duration_are_elastic(kernel):
             contact_duration=duration,
             **halved,
         )
-        course = gas.follow(10.0, [2.0, 10.0], log=True)
-        assert course.events['time'] == near([1.0, 5.0, 9.0])
-        assert course.velocities[:, 1, 0] == near([0.5, speed])
+        record = gas.follow(10.0, [2.0, 10.0], log=True)
+        assert record.events['time'] == near([1.0, 5.0, 9.0])
+        assert record.velocities[:, 1, 0] == near([0.5, speed])
         assert gas.counts.elastic_pair == (duration > 8.0)
 
 
@@ -135,10 +136,10 @@ def test_a_bead_back_at_the_same_wall_soon_bounces_elastically(kernel):
         contact_duration=13.0,
         kernel=kernel,
     )
-    course = gas.follow(22.0, [2.0, 6.0, 14.0, 22.0], log=True)
-    assert course.events['time'] == near([1, 5, 13, 21])
-    assert course.events['partner'].tolist() == [1, 0, 1, 0]
-    assert course.velocities[:, 0, 0] == near([-0.5, 0.25, -0.25, 0.125])
+    record = gas.follow(22.0, [2.0, 6.0, 14.0, 22.0], log=True)
+    assert record.events['time'] == near([1, 5, 13, 21])
+    assert record.events['partner'].tolist() == [1, 0, 1, 0]
+    assert record.velocities[:, 0, 0] == near([-0.5, 0.25, -0.25, 0.125])
     assert gas.counts.elastic_wall == 1
 
 
@@ -193,13 +194,13 @@ class TestWithoutAContactDuration:
             gas.run_until(30.0)
         return gas, str(error.value)
 
-    def test_collapse_ends_in_an_error_that_says_what_to_do(self, kernel):
+    def test_collapse_ends_in_an_error_with_the_remedy(self, kernel):
         gas, message = self.collapsed(kernel)
         assert 'events taken and only 2 s of 30 s reached' in message
         assert 'raise most_events, the contact duration or the restitution' in message
         assert gas.now == near(2.0, 1e-5)
 
-    def test_the_collapsed_gas_can_still_be_looked_at(self, kernel):
+    def test_a_collapsed_gas_can_still_be_read(self, kernel):
         gas, _ = self.collapsed(kernel)
         beads = gas.beads()
         assert beads.positions[:, 0] == near([1, 3])
@@ -211,9 +212,9 @@ class TestWithoutAContactDuration:
 
     def test_one_trapped_bead_stops_a_whole_gas(self, kernel):
         random = np.random.default_rng(1)
-        others = placed(random, np.full(100, 0.5), (10, 20, 10)) + np.array([6.0, 0.0, 0.0])
+        packed = placed(random, np.full(100, 0.5), (10, 20, 10)) + np.array([6.0, 0.0, 0.0])
         gas = gas_of(
-            [(1.1, 5, 5), (3.2, 5, 5), *others],
+            [(1.1, 5, 5), (3.2, 5, 5), *packed],
             [(0, 0, 0), (-0.1, 0, 0), *np.abs(0.1 * random.normal(size=(100, 3)))],
             radii=[1.0, 1.0] + [0.5] * 100,
             masses=[1e-6, 1.0] + [0.1] * 100,
@@ -240,9 +241,9 @@ def test_too_many_events_end_in_an_error_after_which_the_gas_goes_on(kernel):
         stopped.run_until(30.0, most_events=100)
     assert all_taken(stopped.counts) == 100
     assert 0.0 < stopped.now < 30.0
-    course = stopped.follow(30.0, [30.0])
+    record = stopped.follow(30.0, [30.0])
     assert stopped.now == 30.0
-    np.testing.assert_array_equal(course.positions, expected.positions)
+    np.testing.assert_array_equal(record.positions, expected.positions)
 
 
 def test_the_log_does_not_lengthen_what_most_events_allow(kernel):
@@ -253,11 +254,11 @@ def test_the_log_does_not_lengthen_what_most_events_allow(kernel):
     assert all_taken(gas.counts) == 5000
 
 
-def test_progress_is_told_while_a_gas_is_followed(kernel):
+def test_progress_is_reported_during_a_run(kernel):
     rules = CollisionRules(box=(8, 7, 6.5))
     gas = HardSphereGas(mixture(1, 10, rules), rules, kernel)
-    told = []
-    gas.follow(1e5, progress=told.append)
-    assert len(told) >= 3
-    assert told == sorted(told)
-    assert 0.0 < told[0] < told[-1] <= 1e5
+    reported = []
+    gas.follow(1e5, progress=reported.append)
+    assert len(reported) >= 3
+    assert reported == sorted(reported)
+    assert 0.0 < reported[0] < reported[-1] <= 1e5

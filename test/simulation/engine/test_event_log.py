@@ -1,4 +1,4 @@
-"""The log of events is complete: it tells every change of every velocity, and nothing else."""
+"""The event log holds every change of every velocity, and nothing else."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from gases import BOX, KERNELS, RULES, mixture, to_nearest
 
-from nanorocks_ros.simulation.engine.collision_rules import UniformRestitution
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
+from nanorocks_ros.simulation.engine.rules.restitution_laws import UniformRestitution
 
 BEADS = 12
 EVENTS = 400
@@ -23,33 +24,33 @@ def between_events(name, kernel):
     ends = np.append(events['time'], events['time'][-1] + 1e-3)
     times = 0.5 * (np.insert(ends[:-1], 0, 0.0) + ends)
     times[-1] = ends[-1]
-    course = HardSphereGas(beads, rules, kernel).follow(times[-1], times, log=True)
-    np.testing.assert_array_equal(course.events[: len(events)], events)
-    return beads, rules, events, course
+    record = HardSphereGas(beads, rules, kernel).follow(times[-1], times, log=True)
+    np.testing.assert_array_equal(record.events[: len(events)], events)
+    return beads, rules, events, record
 
 
-def bodies_of(course, k):
-    return np.arange(BEADS) if course.bodies is None else course.bodies[k]
+def bodies_of(record, k):
+    return np.arange(BEADS) if record.bodies is None else record.bodies[k]
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
 @pytest.mark.parametrize('name', RULES)
 def test_between_two_frames_only_the_beads_of_the_event_change(name, kernel):
-    _, _, events, course = between_events(name, kernel)
+    _, _, events, record = between_events(name, kernel)
     assert np.all(np.diff(events['time']) >= 0.0)
     for k, event in enumerate(events):
-        bodies = bodies_of(course, k)
+        bodies = bodies_of(record, k)
         involved = bodies == bodies[event['bead']]
         if event['kind'] in ('pair', 'merge'):
             assert event['bead'] < event['partner']
             involved |= bodies == bodies[event['partner']]
         else:
             assert 0 <= event['partner'] < 6
-        changed = np.any(course.velocities[k + 1] != course.velocities[k], axis=1)
+        changed = np.any(record.velocities[k + 1] != record.velocities[k], axis=1)
         assert not np.any(changed & ~involved)
         assert changed[involved].any()
-        flown = course.velocities[k] * (course.times[k + 1] - course.times[k])
-        moved = course.positions[k + 1] - course.positions[k]
+        flown = record.velocities[k] * (record.times[k + 1] - record.times[k])
+        moved = record.positions[k + 1] - record.positions[k]
         np.testing.assert_allclose(moved[~involved], flown[~involved], atol=PRECISION)
 
 
@@ -59,16 +60,16 @@ SMOOTH = [name for name, rule in RULES.items() if 'tangential_restitution' not i
 @pytest.mark.parametrize('kernel', KERNELS)
 @pytest.mark.parametrize('name', SMOOTH)
 def test_replaying_the_impulses_gives_the_velocities(name, kernel):
-    beads, rules, events, course = between_events(name, kernel)
+    beads, rules, events, record = between_events(name, kernel)
     replayed = 0
     fixed = np.zeros(BEADS, dtype=bool)
     for k, event in enumerate(events):
-        v, after = course.velocities[k].copy(), course.velocities[k + 1]
+        v, after = record.velocities[k].copy(), record.velocities[k + 1]
         i, j = event['bead'], event['partner']
-        bodies = bodies_of(course, k)
+        bodies = bodies_of(record, k)
         masses = np.array([beads.masses[bodies == body].sum() for body in bodies])
         per_mass = np.where(fixed, 0.0, 1.0 / masses)
-        places = course.positions[k] + v * (event['time'] - course.times[k])
+        places = record.positions[k] + v * (event['time'] - record.times[k])
         if event['kind'] in ('pair', 'merge'):
             apart = to_nearest(places[j] - places[i], rules.box, rules.periodic)
             reach = beads.radii[i] + beads.radii[j]
@@ -97,15 +98,15 @@ def test_replaying_the_impulses_gives_the_velocities(name, kernel):
 
 @pytest.mark.parametrize('kernel', KERNELS)
 def test_a_bead_at_a_wall_is_where_that_wall_is(kernel):
-    _, rules, events, course = between_events('inelastic', kernel)
+    _, rules, events, record = between_events('inelastic', kernel)
     beads = mixture(6, BEADS, rules)
     walls = 0
     for k, event in enumerate(events):
         if event['kind'] == 'wall':
             axis, far = divmod(int(event['partner']), 2)
             i = event['bead']
-            since = event['time'] - course.times[k]
-            place = course.positions[k, i, axis] + since * course.velocities[k, i, axis]
+            since = event['time'] - record.times[k]
+            place = record.positions[k, i, axis] + since * record.velocities[k, i, axis]
             radius = beads.radii[i]
             wall = rules.box[axis] - radius if far else radius
             assert abs(place - wall) < PRECISION
@@ -127,10 +128,10 @@ def test_a_long_log_holds_every_event_once(kernel):
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
-def test_a_log_changes_nothing(kernel):
+def test_the_event_log_does_not_change_the_trajectories(kernel):
     rules = CollisionRules(box=BOX, restitution=0.99)
     beads = mixture(7, BEADS, rules)
     logged, silent = (HardSphereGas(beads, rules, kernel) for _ in range(2))
-    course = logged.follow(600.0, [600.0], log=True)
-    assert len(course.events) > 4096
-    np.testing.assert_array_equal(course.positions, silent.follow(600.0, [600.0]).positions)
+    record = logged.follow(600.0, [600.0], log=True)
+    assert len(record.events) > 4096
+    np.testing.assert_array_equal(record.positions, silent.follow(600.0, [600.0]).positions)

@@ -1,4 +1,4 @@
-"""What holds for every gas, whatever the rules, and whatever is asked of it on the way."""
+"""Properties of every gas, for all rules and all kinds of output."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ from gases import BOX, KERNELS, energy, mixture, smallest_gap
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nanorocks_ros.simulation.engine.collision_rules import (
+from nanorocks_ros.simulation.engine.beads import Beads
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.kernel_choice import Kernel
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
+from nanorocks_ros.simulation.engine.rules.restitution_laws import (
     UniformRestitution,
     ViscoelasticRestitution,
-    WallMotion,
 )
-from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas, Kernel
+from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 
 END = 20.0
 
@@ -85,10 +88,10 @@ shaken_or_not = rules_at_rest() | shaken
 @given(gases(rules_at_rest()))
 def test_energy_never_rises_and_nothing_overlaps_while_the_walls_are_at_rest(case):
     rules, beads, kernel = case
-    course = HardSphereGas(beads, rules, kernel).follow(END, np.linspace(0.0, END, 200))
-    energies = energy(beads, course.velocities, course.spins)
+    record = HardSphereGas(beads, rules, kernel).follow(END, np.linspace(0.0, END, 200))
+    energies = energy(beads, record.velocities, record.spins)
     assert np.all(np.diff(energies) <= 1e-12 * energies[0])
-    assert smallest_gap(course.positions, beads.radii, rules) > -1e-10
+    assert smallest_gap(record.positions, beads.radii, rules) > -1e-10
 
 
 @settings(deadline=None, max_examples=40)
@@ -97,7 +100,7 @@ def test_energy_never_rises_and_nothing_overlaps_while_the_walls_are_at_rest(cas
     st.lists(st.floats(0.0, END), max_size=30),
     st.lists(st.floats(0.0, END), max_size=8),
 )
-def test_neither_frames_nor_observations_nor_pauses_change_the_course(case, looks, pauses):
+def test_frames_observations_and_pauses_do_not_change_the_trajectories(case, looks, pauses):
     rules, beads, kernel = case
     straight = HardSphereGas(beads, rules, kernel)
     paused = HardSphereGas(beads, rules, kernel)
@@ -105,13 +108,13 @@ def test_neither_frames_nor_observations_nor_pauses_change_the_course(case, look
     events = []
     for end in [*sorted(pauses), END]:
         times = [end, *(look for look in looks if paused.now <= look <= end)]
-        course = paused.follow(end, sorted(times), sorted(times), log=True)
-        events.append(course.events)
+        record = paused.follow(end, sorted(times), sorted(times), log=True)
+        events.append(record.events)
     np.testing.assert_array_equal(np.concatenate(events), expected.events)
-    np.testing.assert_array_equal(course.positions[-1], expected.positions[0])
-    np.testing.assert_array_equal(course.velocities[-1], expected.velocities[0])
+    np.testing.assert_array_equal(record.positions[-1], expected.positions[0])
+    np.testing.assert_array_equal(record.velocities[-1], expected.velocities[0])
     assert paused.counts == straight.counts
-    np.testing.assert_array_equal(paused.books, straight.books)
+    np.testing.assert_array_equal(paused.ledger, straight.ledger)
 
 
 @settings(deadline=None, max_examples=40)
@@ -150,35 +153,38 @@ smooth_and_loose = rules_at_rest(bouncing).map(
 
 @settings(deadline=None, max_examples=40)
 @given(gases(smooth_and_loose), st.randoms(use_true_random=False))
-def test_other_numbers_for_smooth_loose_beads_change_no_bit_of_the_scan(case, random):
+def test_renumbered_smooth_beads_change_no_bit_of_the_scan(case, random):
     rules, beads, _ = case
     order = np.arange(len(beads.radii))
     random.shuffle(order)
     gas = HardSphereGas(beads, rules, Kernel.SCAN)
-    other = HardSphereGas(renumbered(beads, order), rules, Kernel.SCAN)
+    second = HardSphereGas(renumbered(beads, order), rules, Kernel.SCAN)
     times = np.linspace(0.0, END, 5)
-    course, reordered = gas.follow(END, times), other.follow(END, times)
-    np.testing.assert_array_equal(reordered.positions, course.positions[:, order])
-    np.testing.assert_array_equal(reordered.velocities, course.velocities[:, order])
-    assert (gas.counts.pair, gas.counts.wall) == (other.counts.pair, other.counts.wall)
+    record, reordered = gas.follow(END, times), second.follow(END, times)
+    np.testing.assert_array_equal(reordered.positions, record.positions[:, order])
+    np.testing.assert_array_equal(reordered.velocities, record.velocities[:, order])
+    assert (gas.counts.pair, gas.counts.wall) == (second.counts.pair, second.counts.wall)
 
 
 @settings(deadline=None, max_examples=40, derandomize=True)
 @given(gases(rules_at_rest(bouncing)), st.randoms(use_true_random=False))
-def test_other_numbers_for_the_beads_change_rounding_alone(case, random):
+def test_renumbered_beads_change_only_rounding(case, random):
     rules, beads, kernel = case
     order = np.arange(len(beads.radii))
     random.shuffle(order)
     gas = HardSphereGas(beads, rules, kernel)
-    other = HardSphereGas(renumbered(beads, order), rules, kernel)
+    second = HardSphereGas(renumbered(beads, order), rules, kernel)
     events = gas.follow(END, log=True).events[: 2 * len(beads.radii)]
-    others = other.follow(END, log=True).events[: len(events)]
-    np.testing.assert_array_equal(events['kind'], others['kind'])
-    pairs = [sorted(order[[row['bead'], row['partner']]]) for row in others[of_two(others)]]
+    second_events = second.follow(END, log=True).events[: len(events)]
+    np.testing.assert_array_equal(events['kind'], second_events['kind'])
+    pairs = [
+        sorted(order[[row['bead'], row['partner']]])
+        for row in second_events[of_two(second_events)]
+    ]
     expected = [sorted((row['bead'], row['partner'])) for row in events[of_two(events)]]
     np.testing.assert_array_equal(pairs, expected)
     for field in ('time', 'normal_speed', 'impulse'):
-        np.testing.assert_allclose(others[field], events[field], rtol=0, atol=1e-6)
+        np.testing.assert_allclose(second_events[field], events[field], rtol=0, atol=1e-6)
 
 
 def of_two(events):
@@ -193,8 +199,8 @@ def test_both_kernels_agree_until_chaos(case, motion):
         rules = replace(rules, motion=motion, wall_sticking_speed=0.0)
     scan, lists = (HardSphereGas(beads, rules, kernel) for kernel in KERNELS)
     events = scan.follow(END, log=True).events[: 3 * len(beads.radii)]
-    others = lists.follow(END, log=True).events[: len(events)]
+    second_events = lists.follow(END, log=True).events[: len(events)]
     for field in ('kind', 'bead', 'partner'):
-        np.testing.assert_array_equal(events[field], others[field])
+        np.testing.assert_array_equal(events[field], second_events[field])
     for field in ('time', 'normal_speed', 'impulse'):
-        np.testing.assert_allclose(others[field], events[field], rtol=0, atol=1e-6)
+        np.testing.assert_allclose(second_events[field], events[field], rtol=0, atol=1e-6)

@@ -1,4 +1,4 @@
-"""Both kernels and the reference engine agree event by event, until chaos parts them.
+"""Both kernels and the reference engine agree event by event, until chaos separates them.
 
 How long that is, a twin of the reference tells: its beads start 1e-13 of the box from their
 places, more than what rounding does to the engine. While the twin and the reference agree to
@@ -15,7 +15,8 @@ import pytest
 from gases import BOX, KERNELS, RULES, mixture, to_nearest
 from reference.gas import ReferenceGas
 
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 BEADS = 7
 END = 60.0
@@ -57,17 +58,25 @@ def reference_of(beads, rules, moved=0.0):
     )
 
 
-def are_alike(one, other, tolerance):
+def are_alike(first, twin_event, tolerance):
     """Whether two events are the same, in natural units."""
-    if one is None or other is None:
-        return one is other
-    same = (one.kind, one.i, one.partner) == (other.kind, other.i, other.partner)
-    differences = one.time - other.time, one.speed - other.speed, one.impulse - other.impulse
+    if first is None or twin_event is None:
+        return first is twin_event
+    same = (first.kind, first.i, first.partner) == (
+        twin_event.kind,
+        twin_event.i,
+        twin_event.partner,
+    )
+    differences = (
+        first.time - twin_event.time,
+        first.speed - twin_event.speed,
+        first.impulse - twin_event.impulse,
+    )
     return same and max(map(abs, differences)) <= tolerance
 
 
 def state_of(gas):
-    books = gas.books
+    ledger = gas.ledger
     return {
         'time': gas.time,
         'positions': gas.positions,
@@ -76,11 +85,11 @@ def state_of(gas):
         'bodies': gas.body,
         'stuck': gas.fixed,
         'lost': [
-            books.energy_lost_in_pairs,
-            books.energy_lost_at_walls,
-            books.energy_lost_in_merges,
+            ledger.energy_lost_in_pairs,
+            ledger.energy_lost_at_walls,
+            ledger.energy_lost_in_merges,
         ],
-        'given': books.wall_momentum,
+        'given': ledger.wall_momentum,
     }
 
 
@@ -91,39 +100,41 @@ def until_chaos(beads, rules, seed):
     events = []
     while True:
         state = state_of(reference)
-        event, other = reference.step(END), twin.step(END)
-        if event is None and other is None:
+        event, twin_event = reference.step(END), twin.step(END)
+        if event is None and twin_event is None:
             return Agreed(events, END, True, state)
-        if not are_alike(event, other, CHAOS):
-            following = min(it.time for it in (event, other) if it is not None)
+        if not are_alike(event, twin_event, CHAOS):
+            following = min(
+                candidate.time for candidate in (event, twin_event) if candidate is not None
+            )
             return Agreed(events, 0.5 * (events[-1].time + following), False, state)
         events.append(event)
 
 
-def compare_events(agreed, course):
-    found = course.events
-    for event, row in zip(agreed.events, found, strict=False):
-        which = row['kind'], row['bead'], row['partner']
-        assert which == (event.kind, event.i, event.partner), (event, row)
+def compare_events(agreed, record):
+    gas_events = record.events
+    for event, row in zip(agreed.events, gas_events, strict=False):
+        key = row['kind'], row['bead'], row['partner']
+        assert key == (event.kind, event.i, event.partner), (event, row)
         assert abs(row['time'] - event.time) < AGREEMENT, (event, row)
         assert abs(row['normal_speed'] - event.speed) < AGREEMENT, (event, row)
         assert abs(row['impulse'] - event.impulse) < AGREEMENT, (event, row)
     # At the very end of what is agreed, the last event may not have come, or the next one may.
-    assert abs(len(found) - len(agreed.events)) <= (0 if agreed.ended else 1)
+    assert abs(len(gas_events) - len(agreed.events)) <= (0 if agreed.ended else 1)
 
 
-def compare_states(agreed, gas, course, rules):
+def compare_states(agreed, gas, record, rules):
     state = agreed.state
     flown = state['velocities'] * (agreed.time - state['time'])
-    apart = to_nearest(course.positions[0] - state['positions'] - flown, rules.box, False)
+    apart = to_nearest(record.positions[0] - state['positions'] - flown, rules.box, False)
     np.testing.assert_allclose(apart, 0.0, atol=AGREEMENT)
-    np.testing.assert_allclose(course.velocities[0], state['velocities'], atol=AGREEMENT)
-    if course.spins is not None:
-        np.testing.assert_allclose(course.spins[0], state['spins'], atol=AGREEMENT)
+    np.testing.assert_allclose(record.velocities[0], state['velocities'], atol=AGREEMENT)
+    if record.spins is not None:
+        np.testing.assert_allclose(record.spins[0], state['spins'], atol=AGREEMENT)
     np.testing.assert_array_equal(gas.bodies, state['bodies'])
     np.testing.assert_array_equal(gas.stuck, state['stuck'])
-    np.testing.assert_allclose(gas.books[:3], state['lost'], atol=AGREEMENT)
-    np.testing.assert_allclose(gas.books[3:9], OUTWARD * state['given'], atol=AGREEMENT)
+    np.testing.assert_allclose(gas.ledger[:3], state['lost'], atol=AGREEMENT)
+    np.testing.assert_allclose(gas.ledger[3:9], OUTWARD * state['given'], atol=AGREEMENT)
 
 
 def agreement(beads, rules, seed):
@@ -131,10 +142,10 @@ def agreement(beads, rules, seed):
     agreed = until_chaos(beads, rules, seed)
     gases = [HardSphereGas(beads, rules, kernel) for kernel in KERNELS]
     for gas in gases:
-        course = gas.follow(agreed.time, [agreed.time], log=True)
-        compare_events(agreed, course)
-        if len(course.events) == len(agreed.events):
-            compare_states(agreed, gas, course, rules)
+        record = gas.follow(agreed.time, [agreed.time], log=True)
+        compare_events(agreed, record)
+        if len(record.events) == len(agreed.events):
+            compare_states(agreed, gas, record, rules)
     return agreed.events, gases
 
 

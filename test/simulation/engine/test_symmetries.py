@@ -1,4 +1,4 @@
-"""The engine has no favourite place, axis, direction, unit, frame of reference or way of time."""
+"""Symmetries of the engine: translation, axes, mirror, units, Galilei, time reversal."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from gases import ALWAYS, BOX, KERNELS, RULES, mixture, placed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nanorocks_ros.simulation.engine.collision_rules import ViscoelasticRestitution
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
+from nanorocks_ros.simulation.engine.rules.restitution_laws import ViscoelasticRestitution
 
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 
@@ -26,30 +27,30 @@ names = st.sampled_from(sorted(RULES))
 few = settings(deadline=None, max_examples=25, derandomize=True)
 
 
-def gas_and_course(beads, rules, kernel, end=None):
+def gas_and_record(beads, rules, kernel, end=None):
     """Follow for as many events as are compared, or to a time; frames on the way."""
     if end is None:
         events = HardSphereGas(beads, rules, kernel).follow(40.0, log=True).events
         end = events['time'][:EVENTS][-1]
     times = np.linspace(0.0, end, 5)
     # Not at the last event itself: rounding would put it before or after the frame.
-    course = HardSphereGas(beads, rules, kernel).follow(end, 0.999 * times, log=True)
-    return end, course
+    record = HardSphereGas(beads, rules, kernel).follow(end, 0.999 * times, log=True)
+    return end, record
 
 
-def assert_alike(course, other, matrix=None, shift=0.0, spin_matrix=None):
-    """Whether one course is the other, turned and shifted."""
+def assert_alike(record, second, matrix=None, shift=0.0, spin_matrix=None):
+    """Assert that a run record is another one, rotated and shifted."""
     matrix = np.eye(3) if matrix is None else matrix
-    np.testing.assert_allclose(other.positions, course.positions @ matrix.T + shift, atol=CHAOS)
-    np.testing.assert_allclose(other.velocities, course.velocities @ matrix.T, atol=CHAOS)
-    if course.spins is not None:
+    np.testing.assert_allclose(second.positions, record.positions @ matrix.T + shift, atol=CHAOS)
+    np.testing.assert_allclose(second.velocities, record.velocities @ matrix.T, atol=CHAOS)
+    if record.spins is not None:
         matrix = matrix if spin_matrix is None else spin_matrix
-        np.testing.assert_allclose(other.spins, course.spins @ matrix.T, atol=CHAOS)
-    assert abs(len(other.events) - len(course.events)) <= 1
+        np.testing.assert_allclose(second.spins, record.spins @ matrix.T, atol=CHAOS)
+    assert abs(len(second.events) - len(record.events)) <= 1
     for field in ('time', 'normal_speed', 'impulse'):
-        n = min(len(other.events), len(course.events))
+        n = min(len(second.events), len(record.events))
         assert n >= EVENTS // 2
-        np.testing.assert_allclose(other.events[field][:n], course.events[field][:n], atol=CHAOS)
+        np.testing.assert_allclose(second.events[field][:n], record.events[field][:n], atol=CHAOS)
 
 
 def turned(beads, rules, matrix, shift):
@@ -80,25 +81,25 @@ def turned(beads, rules, matrix, shift):
 
 @few
 @given(name=names, seed=seeds, order=st.permutations(range(3)))
-def test_axes_may_have_other_names(kernel, name, seed, order):
+def test_permuted_axes_permute_the_trajectories(kernel, name, seed, order):
     rules = CollisionRules(box=BOX, **RULES[name])
     beads = mixture(seed, BEADS, rules)
     matrix = np.eye(3)[list(order)]
-    end, course = gas_and_course(beads, rules, kernel)
-    _, other = gas_and_course(*turned(beads, rules, matrix, 0.0), kernel, end)
-    assert_alike(course, other, matrix, spin_matrix=matrix * np.linalg.det(matrix))
+    end, record = gas_and_record(beads, rules, kernel)
+    _, second = gas_and_record(*turned(beads, rules, matrix, 0.0), kernel, end)
+    assert_alike(record, second, matrix, spin_matrix=matrix * np.linalg.det(matrix))
 
 
 @few
 @given(name=names, seed=seeds, signs=st.tuples(*[st.sampled_from([1.0, -1.0])] * 3))
-def test_a_mirror_shows_the_mirrored_course(kernel, name, seed, signs):
+def test_a_mirrored_gas_has_mirrored_trajectories(kernel, name, seed, signs):
     rules = CollisionRules(box=BOX, **RULES[name])
     beads = mixture(seed, BEADS, rules)
     matrix = np.diag(signs)
     shift = np.where(np.array(signs) < 0, BOX, 0.0)
-    end, course = gas_and_course(beads, rules, kernel)
-    _, other = gas_and_course(*turned(beads, rules, matrix, shift), kernel, end)
-    assert_alike(course, other, matrix, shift, matrix * np.linalg.det(matrix))
+    end, record = gas_and_record(beads, rules, kernel)
+    _, second = gas_and_record(*turned(beads, rules, matrix, shift), kernel, end)
+    assert_alike(record, second, matrix, shift, matrix * np.linalg.det(matrix))
 
 
 PERIODIC = [name for name, rule in RULES.items() if 'motion' not in rule]
@@ -118,15 +119,15 @@ def test_a_periodic_box_may_be_anywhere_and_in_motion(kernel, name, seed, shift,
     moved = replace(
         beads, positions=beads.positions + shift, velocities=beads.velocities + np.array(boost)
     )
-    end, course = gas_and_course(beads, rules, kernel)
-    _, other = gas_and_course(moved, rules, kernel, end)
-    drift = np.array(shift) + np.multiply.outer(other.times, boost)
-    other = replace(
-        other,
-        positions=other.positions - drift[:, np.newaxis],
-        velocities=other.velocities - np.array(boost),
+    end, record = gas_and_record(beads, rules, kernel)
+    _, second = gas_and_record(moved, rules, kernel, end)
+    drift = np.array(shift) + np.multiply.outer(second.times, boost)
+    second = replace(
+        second,
+        positions=second.positions - drift[:, np.newaxis],
+        velocities=second.velocities - np.array(boost),
     )
-    assert_alike(course, other)
+    assert_alike(record, second)
 
 
 @few
@@ -135,10 +136,10 @@ def test_beads_may_start_in_any_image_of_a_periodic_box(kernel, seed, boxes):
     rules = CollisionRules(box=BOX, periodic=ALWAYS, restitution=0.9)
     beads = mixture(seed, BEADS, rules)
     away = np.array(boxes) * np.array(BOX)
-    end, course = gas_and_course(beads, rules, kernel)
+    end, record = gas_and_record(beads, rules, kernel)
     far = replace(beads, positions=beads.positions + away)
-    _, other = gas_and_course(far, rules, kernel, end)
-    assert_alike(course, other, shift=away)
+    _, second = gas_and_record(far, rules, kernel, end)
+    assert_alike(record, second, shift=away)
 
 
 def scaled(beads, rules, length, time, mass):
@@ -182,21 +183,21 @@ def test_units_that_are_powers_of_two_change_no_bit(kernel, name):
     rules = CollisionRules(box=BOX, **RULES[name])
     beads = mixture(1, BEADS, rules)
     times = np.linspace(0.0, 20.0, 11)
-    course = HardSphereGas(beads, rules, kernel).follow(20.0, times, log=True)
+    record = HardSphereGas(beads, rules, kernel).follow(20.0, times, log=True)
     for length, time, mass in itertools.product(
         (2.0**-10, 2.0**7), (2.0**-3, 2.0**8), (2.0**-20,)
     ):
         gas = HardSphereGas(*scaled(beads, rules, length, time, mass), kernel)
-        other = gas.follow(20.0 * time, times * time, log=True)
-        np.testing.assert_array_equal(other.positions, course.positions * length)
-        np.testing.assert_array_equal(other.velocities, course.velocities * (length / time))
-        np.testing.assert_array_equal(other.events['time'], course.events['time'] * time)
-        np.testing.assert_array_equal(other.events['kind'], course.events['kind'])
+        second = gas.follow(20.0 * time, times * time, log=True)
+        np.testing.assert_array_equal(second.positions, record.positions * length)
+        np.testing.assert_array_equal(second.velocities, record.velocities * (length / time))
+        np.testing.assert_array_equal(second.events['time'], record.events['time'] * time)
+        np.testing.assert_array_equal(second.events['kind'], record.events['kind'])
 
 
 @few
 @given(seed=seeds, periodic=st.tuples(*[st.booleans()] * 3))
-def test_an_elastic_gas_turned_round_goes_back_to_where_it_came_from(kernel, seed, periodic):
+def test_an_elastic_gas_is_time_reversible(kernel, seed, periodic):
     rules = CollisionRules(box=BOX, periodic=periodic)
     random = np.random.default_rng(seed)
     beads = mixture(seed, BEADS, rules)

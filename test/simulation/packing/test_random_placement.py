@@ -1,4 +1,4 @@
-"""Beads find places in boxes from almost empty to dense, apart, and the same ones every time."""
+"""Random positions from dilute to dense: no overlap, and the same for the same key."""
 
 from __future__ import annotations
 
@@ -16,7 +16,11 @@ from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for, uniform
 from nanorocks_ros.numerics.stable_sort import stable_argsort
-from nanorocks_ros.simulation.packing.random_placement import MOST_TRIES, place, placed_at_random
+from nanorocks_ros.simulation.packing.random_placement import (
+    MOST_TRIES,
+    pack_beads,
+    random_positions,
+)
 
 WALLS = (False, False, False)
 AROUND = (True, True, True)
@@ -25,7 +29,7 @@ SEED = 1
 
 
 def one_after_the_other(radii, sides, periodic, key):
-    """Random sequential insertion in plain words: the definition that `place` has to meet."""
+    """Random sequential insertion in plain words: the definition that `pack_beads` has to meet."""
     positions = np.zeros((radii.size, 3))
     inside = []
     counter = 0
@@ -52,7 +56,7 @@ def one_after_the_other(radii, sides, periodic, key):
 def beads_of(tray, run):
     """Radii of the beads of a tray as a simulation draws them, and the key of their places."""
     sizes_key = key_for(SEED, run, Purpose.DIAMETERS)
-    kinds = [one for one in tray.species for _ in range(one.count)]
+    kinds = [item for item in tray.species for _ in range(item.count)]
     radii = [
         0.5
         * (kind.diameter_low + (kind.diameter_high - kind.diameter_low) * uniform(sizes_key, i))
@@ -68,7 +72,7 @@ def cube_filled_to(filling, radii):
 
 def smallest_gap(positions, radii, sides, periodic):
     """Smallest distance between the surfaces of two beads, or of one and a wall."""
-    images = itertools.product(*((-1, 0, 1) if one else (0,) for one in periodic))
+    images = itertools.product(*((-1, 0, 1) if item else (0,) for item in periodic))
     i, j = np.triu_indices(radii.size, 1)
     gaps = [math.inf]
     for image in images:
@@ -89,16 +93,16 @@ def test_a_flown_tray_is_filled_one_bead_after_the_other(number):
     tray = load_trays()[number]
     radii, key = beads_of(tray, run=0)
     sides = np.array(tray.dimensions)
-    positions, placed = place(radii, sides, WALLS, key, MOST_TRIES)
+    positions, placed = pack_beads(radii, sides, WALLS, key, MOST_TRIES)
     assert placed == tray.count
     np.testing.assert_array_equal(positions, one_after_the_other(radii, sides, WALLS, key))
 
 
 @pytest.mark.parametrize('periodic', [AROUND, (True, False, False), (False, True, True)])
-def test_so_is_a_periodic_box_with_beads_of_many_sizes(periodic):
+def test_random_sequential_insertion_of_many_sizes_in_a_periodic_box(periodic):
     radii = np.linspace(0.02, 1.0, 60) ** 2
     sides = cube_filled_to(0.25, radii) * [1.3, 1.0, 1.0 / 1.3]
-    positions, placed = place(radii, sides, periodic, KEY, MOST_TRIES)
+    positions, placed = pack_beads(radii, sides, periodic, KEY, MOST_TRIES)
     assert placed == 60
     expected = one_after_the_other(radii, sides, periodic, KEY)
     np.testing.assert_array_equal(positions, expected)
@@ -108,19 +112,19 @@ def test_so_is_a_periodic_box_with_beads_of_many_sizes(periodic):
 @pytest.mark.parametrize('periodic', [WALLS, AROUND])
 @pytest.mark.parametrize('filling', [0.10, 0.20, 0.30, 0.35, 0.40, 0.45])
 @pytest.mark.parametrize('count', [40, 300])
-def test_alike_beads_fill_a_cube_up_to_0_45(count, filling, periodic):
+def test_equal_beads_fill_a_cube_up_to_0_45(count, filling, periodic):
     radii = np.full(count, 0.001)
     sides = cube_filled_to(filling, radii)
-    positions = placed_at_random(radii, sides, periodic=periodic, key=KEY)
+    positions = random_positions(radii, sides, periodic=periodic, key=KEY)
     assert smallest_gap(positions, radii, sides, periodic) > 0.0
 
 
 @pytest.mark.parametrize('count', range(2, 9))
-def test_so_do_very_few_where_there_are_no_walls(count):
+def test_very_few_beads_fill_a_periodic_box_up_to_0_45(count):
     radii = np.full(count, 0.5)
     sides = cube_filled_to(0.45, radii)
     for key in range(20):
-        positions = placed_at_random(radii, sides, periodic=True, key=np.uint64(key))
+        positions = random_positions(radii, sides, periodic=True, key=np.uint64(key))
         assert smallest_gap(positions, radii, sides, AROUND) > 0.0
 
 
@@ -128,7 +132,7 @@ def test_eight_beads_that_need_the_eight_corners_find_them():
     radii = np.full(8, 0.5)
     sides = cube_filled_to(0.45, radii)
     for key in range(10):
-        positions = placed_at_random(radii, sides, key=np.uint64(key))
+        positions = random_positions(radii, sides, key=np.uint64(key))
         assert smallest_gap(positions, radii, sides, WALLS) > 0.0
         assert np.unique(positions > 0.5 * sides, axis=0).shape == (8, 3)
 
@@ -138,21 +142,21 @@ def test_eight_beads_that_need_the_eight_corners_find_them():
 def test_beads_of_many_sizes_fill_a_cube_to_0_45(ratio, periodic):
     radii = np.random.default_rng(3).uniform(ratio, 1.0, 300)
     sides = cube_filled_to(0.45, radii)
-    positions = placed_at_random(radii, sides, periodic=periodic, key=KEY)
+    positions = random_positions(radii, sides, periodic=periodic, key=KEY)
     assert smallest_gap(positions, radii, sides, periodic) > 0.0
 
 
 def test_a_few_marbles_among_grains_a_fifth_of_their_size_fill_a_cube_to_0_45():
     radii = np.concatenate([np.full(10, 1.0), np.full(1250, 0.2)])
     sides = cube_filled_to(0.45, radii)
-    positions = placed_at_random(radii, sides, key=KEY)
+    positions = random_positions(radii, sides, key=KEY)
     assert smallest_gap(positions, radii, sides, WALLS) > 0.0
 
 
 def test_a_thousandfold_in_size_is_no_difficulty():
     radii = np.concatenate([np.full(3, 1.0), np.full(500, 0.001)])
     sides = np.array([2.5, 2.5, 6.0])
-    positions = placed_at_random(radii, sides, key=KEY)
+    positions = random_positions(radii, sides, key=KEY)
     assert smallest_gap(positions, radii, sides, WALLS) > 0.0
 
 
@@ -160,7 +164,7 @@ def test_a_thousandfold_in_size_is_no_difficulty():
 def test_a_tray_half_as_high_again_as_its_beads_takes_up_to_64(count):
     radii = np.full(count, 0.001)
     sides = np.array([0.015, 0.015, 0.003])
-    positions = placed_at_random(radii, sides, key=KEY)
+    positions = random_positions(radii, sides, key=KEY)
     assert smallest_gap(positions, radii, sides, WALLS) > 0.0
 
 
@@ -168,7 +172,7 @@ def test_a_tray_half_as_high_again_as_its_beads_takes_up_to_64(count):
 def test_a_slit_hardly_wider_than_its_beads_is_filled_with_a_layer(periodic):
     radii = np.full(80, 0.001)
     sides = np.array([0.022, 0.022, 0.00201])
-    positions = placed_at_random(radii, sides, periodic=periodic, key=KEY)
+    positions = random_positions(radii, sides, periodic=periodic, key=KEY)
     assert smallest_gap(positions, radii, sides, periodic) > 0.0
 
 
@@ -176,7 +180,7 @@ def test_a_slit_hardly_wider_than_its_beads_is_filled_with_a_layer(periodic):
 def test_many_beads_are_placed_with_no_two_overlapping(count, filling):
     radii = np.full(count, 0.5)
     sides = cube_filled_to(filling, radii)
-    positions = placed_at_random(radii, sides, periodic=True, key=KEY)
+    positions = random_positions(radii, sides, periodic=True, key=KEY)
     near = cKDTree(positions, boxsize=sides).query_pairs(0.999_999_999)
     assert not near
 
@@ -190,7 +194,7 @@ def test_dense_beads_touch_as_often_as_in_a_fluid_in_equilibrium():
     counts = np.zeros(10)
     keys = range(6)
     for key in keys:
-        positions = placed_at_random(radii, sides, periodic=True, key=np.uint64(key))
+        positions = random_positions(radii, sides, periodic=True, key=np.uint64(key))
         i, j = cKDTree(positions, boxsize=sides).query_pairs(1.2, output_type='ndarray').T
         d = positions[j] - positions[i]
         d -= sides * np.rint(d / sides)
@@ -207,7 +211,7 @@ def test_dense_beads_touch_as_often_as_in_a_fluid_in_equilibrium():
 def test_points_are_even_over_the_box(periodic):
     n, bins = 20_000, 20
     sides = np.array([3.0, 2.0, 1.0])
-    positions = placed_at_random(np.full(n, 1e-6), sides, periodic=periodic, key=KEY)
+    positions = random_positions(np.full(n, 1e-6), sides, periodic=periodic, key=KEY)
     for axis in range(3):
         counts, _ = np.histogram(positions[:, axis], bins, (0.0, sides[axis]))
         chi_square = np.sum((counts - n / bins) ** 2) / (n / bins)
@@ -217,7 +221,7 @@ def test_points_are_even_over_the_box(periodic):
 def test_dense_beads_are_even_over_a_periodic_box():
     radii = np.full(3000, 0.5)
     sides = cube_filled_to(0.45, radii)
-    positions = placed_at_random(radii, sides, periodic=True, key=KEY)
+    positions = random_positions(radii, sides, periodic=True, key=KEY)
     for axis in range(3):
         counts, _ = np.histogram(positions[:, axis], 10, (0.0, sides[axis]))
         # Hard spheres this dense vary less than points would, by a standard deviation of 17.
@@ -235,7 +239,7 @@ def test_beads_of_any_sizes_in_any_box_never_overlap(sizes, shape, periodic, key
     radii = np.array(sizes)
     sides = cube_filled_to(0.15, radii) * np.array(shape)
     sides = np.maximum(sides, 2.001 * radii.max())
-    positions, placed = place(radii, sides, periodic, np.uint64(key), 100)
+    positions, placed = pack_beads(radii, sides, periodic, np.uint64(key), 100)
     assert placed == radii.size
     assert smallest_gap(positions, radii, sides, periodic) > -1e-12
 
@@ -244,25 +248,25 @@ def test_the_same_key_gives_the_same_places_and_another_key_others():
     for filling in (0.2, 0.42):
         radii = np.full(100, 0.5)
         sides = cube_filled_to(filling, radii)
-        first = placed_at_random(radii, sides, key=KEY)
-        np.testing.assert_array_equal(first, placed_at_random(radii, sides, key=KEY))
-        assert not np.array_equal(first, placed_at_random(radii, sides, key=np.uint64(2)))
+        first = random_positions(radii, sides, key=KEY)
+        np.testing.assert_array_equal(first, random_positions(radii, sides, key=KEY))
+        assert not np.array_equal(first, random_positions(radii, sides, key=np.uint64(2)))
 
 
 def test_dense_places_are_the_same_bits_on_every_machine():
     radii = np.linspace(0.25, 0.5, 200)
     sides = np.array([4.0, 5.0, 4.5])
-    positions = placed_at_random(radii, sides, periodic=(True, False, True), key=KEY)
+    positions = random_positions(radii, sides, periodic=(True, False, True), key=KEY)
     assert hashlib.sha256(positions.astype('<f8').tobytes()).hexdigest()[:16] == 'd0e977edc49e14e1'
 
 
 def test_flags_may_be_one_or_three():
     radii, sides = np.full(30, 0.5), (4.0, 4.0, 4.0)
-    expected = placed_at_random(radii, sides, periodic=(True, True, True), key=KEY)
-    found = placed_at_random(radii, sides, periodic=True, key=KEY)
-    np.testing.assert_array_equal(found, expected)
-    found, _ = place(radii, np.array(sides), np.array([True] * 3), KEY, MOST_TRIES)
-    np.testing.assert_array_equal(found, expected)
+    expected = random_positions(radii, sides, periodic=(True, True, True), key=KEY)
+    packed = random_positions(radii, sides, periodic=True, key=KEY)
+    np.testing.assert_array_equal(packed, expected)
+    packed, _ = pack_beads(radii, np.array(sides), np.array([True] * 3), KEY, MOST_TRIES)
+    np.testing.assert_array_equal(packed, expected)
 
 
 @pytest.mark.parametrize(
@@ -275,13 +279,13 @@ def test_flags_may_be_one_or_three():
 )
 def test_beads_for_which_there_is_no_room_are_refused_in_time(count, sides):
     with pytest.raises(SimulationError, match=rf'found room for only \d+ of {count} beads'):
-        placed_at_random(np.full(count, 0.5), sides, key=KEY)
+        random_positions(np.full(count, 0.5), sides, key=KEY)
 
 
 def test_those_that_found_room_are_the_largest_and_have_valid_places():
     radii = np.linspace(0.3, 0.5, 60)
     sides = cube_filled_to(0.75, radii)
-    positions, placed = place(radii, sides, WALLS, KEY, MOST_TRIES)
+    positions, placed = pack_beads(radii, sides, WALLS, KEY, MOST_TRIES)
     assert 10 < placed < 60
     inside = np.argsort(radii)[-placed:]
     assert smallest_gap(positions[inside], radii[inside], sides, WALLS) > 0.0
@@ -305,23 +309,23 @@ def test_those_that_found_room_are_the_largest_and_have_valid_places():
         ([0.5] * 99, (3, 3, 3), r'beads: fill 1\.92 of the box; give fewer beads'),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(radii, sides, message):
+def test_invalid_input_is_refused_in_one_line(radii, sides, message):
     for periodic in (False, True):
         with pytest.raises(SimulationError, match=f'^{message}') as caught:
-            placed_at_random(radii, sides, periodic=periodic, key=KEY)
+            random_positions(radii, sides, periodic=periodic, key=KEY)
         assert '\n' not in str(caught.value)
 
 
 @pytest.mark.parametrize('flags', [(True, False), 'yes', 1, None])
-def test_flags_that_are_none_are_refused(flags):
+def test_invalid_flags_are_refused(flags):
     with pytest.raises(SimulationError, match=r'^periodic: .*; give True or False, or three'):
-        placed_at_random([0.5], (4, 4, 4), periodic=flags, key=KEY)
+        random_positions([0.5], (4, 4, 4), periodic=flags, key=KEY)
 
 
 @pytest.mark.parametrize('radius', [0.0, -0.5, math.nan, math.inf, 2.0])
-def test_compiled_code_places_none_where_one_cannot_be(radius):
+def test_compiled_code_places_no_bead_when_one_does_not_fit(radius):
     radii = np.array([0.5, radius, 0.5])
-    assert place(radii, np.full(3, 4.0), WALLS, KEY, 100)[1] == 0
+    assert pack_beads(radii, np.full(3, 4.0), WALLS, KEY, 100)[1] == 0
 
 
 @given(st.lists(st.integers(-4, 4)))

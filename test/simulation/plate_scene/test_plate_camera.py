@@ -1,4 +1,4 @@
-"""The picture of the scene shows everything where it is, and each effect does what it says."""
+"""Pictures of the scene: positions, sizes, and each effect of the camera."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ def share_of_bead(scene, tray, place, moved=(0.0, 0.0), **bead):
     motion = PlateMotion(moved, (0.0, 0.0))
     sides = TRAYS[tray].dimensions
     elsewhere = [sides[0] - place[0], sides[1] - place[1], 0.0015]
-    here, there = (drawn(camera, tray, p, motion=motion) for p in (place, elsewhere))
+    first_place, second_place = (drawn(camera, tray, p, motion=motion) for p in (place, elsewhere))
     column, row = camera.geometry.camera.distorted(
         camera.geometry.rectified(tray, np.array([place]))
     )[0]
-    y, x = np.mgrid[0.5 : here.shape[0], 0.5 : here.shape[1]]
+    y, x = np.mgrid[0.5 : first_place.shape[0], 0.5 : first_place.shape[1]]
     # Red is brighter there, or darker: one sign, as the bead is of one even colour.
-    change = (here - there)[:, :, 1]
+    change = (first_place - second_place)[:, :, 1]
     near = np.hypot(x - column, y - row) < 25
     weight = np.where(near, np.abs(change), 0.0)
     weight[weight < 2.0] = 0.0
@@ -94,24 +94,24 @@ def test_the_plate_moves_by_its_displacement_to_a_twentieth_of_a_pixel():
     # Least squares of the first order, about the nearest whole pixel.
     nearest = np.rint(np.array(displacement) * SCALE).astype(int)
     shifted = np.roll(still, (nearest[1], nearest[0]), (0, 1))
-    down, across = (one[part].ravel() for one in np.gradient(shifted))
+    down, across = (first[part].ravel() for first in np.gradient(shifted))
     change = (shifted - swung)[part].ravel()
-    found = np.linalg.lstsq(np.column_stack([across, down]), change, rcond=None)[0] + nearest
-    np.testing.assert_allclose(found, np.array(displacement) * SCALE, atol=0.05)
+    shift = np.linalg.lstsq(np.column_stack([across, down]), change, rcond=None)[0] + nearest
+    np.testing.assert_allclose(shift, np.array(displacement) * SCALE, atol=0.05)
 
 
-def test_no_picture_leaves_a_trace_in_the_next():
+def test_pictures_do_not_depend_on_earlier_ones():
     scene = replace(SceneSettings(), pixels_per_metre=SCALE, noise=0.0)
-    one, other = (camera_with_one.__wrapped__(2, scene) for _ in range(2))
-    here, there = (0.004, 0.005, 0.001), (0.030, 0.0052, 0.002)
+    first, second = (camera_with_one.__wrapped__(2, scene) for _ in range(2))
+    first_place, second_place = (0.004, 0.005, 0.001), (0.030, 0.0052, 0.002)
     swung = PlateMotion((0.0002, 0.0001), (0.0, 0.0))
-    before = drawn(one, 2, here)
-    np.testing.assert_array_equal(drawn(one, 2, here), before)
-    drawn(one, 2, there, motion=swung)
-    np.testing.assert_array_equal(drawn(one, 2, here), before)
-    moved = drawn(one, 2, here, motion=swung)
-    drawn(other, 2, there)
-    np.testing.assert_array_equal(drawn(other, 2, here, motion=swung), moved)
+    before = drawn(first, 2, first_place)
+    np.testing.assert_array_equal(drawn(first, 2, first_place), before)
+    drawn(first, 2, second_place, motion=swung)
+    np.testing.assert_array_equal(drawn(first, 2, first_place), before)
+    moved = drawn(first, 2, first_place, motion=swung)
+    drawn(second, 2, second_place)
+    np.testing.assert_array_equal(drawn(second, 2, first_place, motion=swung), moved)
 
 
 @pytest.mark.parametrize('noise', [0.5, 2.0, 6.0])
@@ -129,10 +129,10 @@ def test_without_noise_frames_of_the_same_scene_are_the_same():
 
 
 def test_the_noise_of_a_frame_depends_on_its_number_alone():
-    one, other = (empty_camera.__wrapped__(replace(PLAIN, noise=2.0)) for _ in range(2))
-    expected = [one.picture({}, k) for k in range(3)]
+    first, second = (empty_camera.__wrapped__(replace(PLAIN, noise=2.0)) for _ in range(2))
+    expected = [first.picture({}, k) for k in range(3)]
     for k in (2, 0, 1):
-        np.testing.assert_array_equal(other.picture({}, k), expected[k])
+        np.testing.assert_array_equal(second.picture({}, k), expected[k])
     assert not np.array_equal(expected[0], expected[1])
 
 
@@ -184,7 +184,7 @@ def test_light_falls_towards_the_edge_by_the_vignetting_and_rises_by_the_gradien
     assert falls[0] - falls[1] == pytest.approx(0.4, abs=0.03)
 
 
-def test_bands_of_light_roll_over_the_picture_and_come_round():
+def test_bands_of_light_are_periodic():
     camera = empty_camera(replace(PLAIN, flicker=0.1, flicker_period=4.0))
     levels = [
         camera.picture({}, 0, time=t).astype(float)[380].mean() for t in np.arange(0, 4, 0.25)
@@ -300,16 +300,16 @@ def test_grains_are_dark_and_of_irregular_outline():
 def test_beads_do_not_depend_on_what_other_effects_are_on():
     place = (0.016, 0.005, 0.0015)
     scenes = (PLAIN, replace(PLAIN, glare=1.0), replace(PLAIN, turning=2.0))
-    one, glaring, turning = (
+    first, glaring, turning = (
         drawn(camera_with_one(5, s, material='glass'), 5, place) for s in scenes
     )
-    np.testing.assert_array_equal(turning, one)
+    np.testing.assert_array_equal(turning, first)
     x, y, width, height = camera_with_one(5).geometry.regions[5]
     part = np.s_[y : y + height, x + width // 3 : x + width]
-    np.testing.assert_array_equal(glaring[part], one[part])
+    np.testing.assert_array_equal(glaring[part], first[part])
 
 
-def test_positions_that_cannot_be_drawn_are_refused():
+def test_invalid_positions_are_refused():
     camera = camera_with_one(1)
     with pytest.raises(SimulationError, match=r'positions of tray 1: shape \(2, 3\)'):
         camera.picture({1: np.zeros((2, 3))}, 0)
@@ -322,7 +322,7 @@ def test_positions_that_cannot_be_drawn_are_refused():
         camera.picture({1: np.full((1, 3), 0.005)}, 0, motion=far)
 
 
-def test_a_camera_that_cannot_be_is_refused():
+def test_an_invalid_camera_is_refused():
     with pytest.raises(ConfigurationError, match='lies outside a picture of 960 x 760 px'):
         empty_camera(SceneSettings(pixels_per_metre=14000.0))
     with pytest.raises(ConfigurationError, match='give four numbers and two'):

@@ -1,4 +1,4 @@
-"""A film of the scene tells the truth about every bead, and is the same every time."""
+"""Films of the scene: ground truth of every bead, and reproducibility."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def film(simulation=SHAKEN, scene=SMALL):
     return SceneFilm(simulation, scene)
 
 
-def test_the_truth_is_that_of_the_gas_in_each_tray():
-    found = film().at(9, 300_000_000)
-    for truth, beads, number in zip(found.trays, found.beads, (1, 3), strict=True):
+def test_the_truth_agrees_with_the_gas_in_each_tray():
+    scene_moment = film().at(9, 300_000_000)
+    for truth, beads, number in zip(scene_moment.trays, scene_moment.beads, (1, 3), strict=True):
         gas = ShakenTray(replace(SHAKEN, tray=number), TRAYS[number], run=number)
         positions, velocities = gas.at(0.3)
         np.testing.assert_array_equal(beads.positions, positions)
@@ -34,19 +34,19 @@ def test_the_truth_is_that_of_the_gas_in_each_tray():
         np.testing.assert_array_equal(beads.radii, gas.radii)
         assert truth.tray == beads.tray == number
         assert truth.cycle == beads.cycle == 1
-        assert truth.stamp_ns == beads.stamp_ns == found.frame.stamp_ns == 300_000_000
+        assert truth.stamp_ns == beads.stamp_ns == scene_moment.frame.stamp_ns == 300_000_000
         assert truth.mean_projected_speed == pytest.approx(beads.projected_speeds.mean())
         assert [np.sum(beads.species == k) for k in range(len(TRAYS[number].species))] == [
-            one.count for one in TRAYS[number].species
+            first_moment.count for first_moment in TRAYS[number].species
         ]
 
 
-def test_trays_with_the_same_beads_do_different_things():
-    found = film(scene=replace(SMALL, trays=(2, 3))).at(9, 0)
-    assert not np.array_equal(found.beads[0].velocities, found.beads[1].velocities)
+def test_trays_with_the_same_beads_differ():
+    scene_moment = film(scene=replace(SMALL, trays=(2, 3))).at(9, 0)
+    assert not np.array_equal(scene_moment.beads[0].velocities, scene_moment.beads[1].velocities)
 
 
-def test_one_tray_may_hold_another_gas_than_the_rest():
+def test_one_tray_may_have_other_settings():
     elastic = replace(SHAKEN, restitution=1.0, wall_restitution=1.0, seed=99, first_shake=0.2)
     moment = SceneFilm(SHAKEN, SMALL, gases={3: elastic}).at(9, 0)
     alone, same = film().at(9, 0).beads
@@ -59,10 +59,12 @@ def test_one_tray_may_hold_another_gas_than_the_rest():
 
 
 def test_positions_are_relative_to_the_floor_of_the_swinging_tray():
-    one = film(scene=SWINGING).at(14, 0)
+    first_moment = film(scene=SWINGING).at(14, 0)
     still = film(scene=replace(SWINGING, swing_knocks=False)).at(14, 0)
     at_rest = film(scene=SMALL).at(14, 0)
-    for beads, unknocked, resting in zip(one.beads, still.beads, at_rest.beads, strict=True):
+    for beads, unknocked, resting in zip(
+        first_moment.beads, still.beads, at_rest.beads, strict=True
+    ):
         assert 1e-5 < np.hypot(*beads.displacement) < 2e-4
         # Without knocks the gas is that of a plate at rest, seen from the moving floor.
         np.testing.assert_allclose(
@@ -93,15 +95,15 @@ def test_the_swing_is_a_damped_sine_that_ends_before_the_next_shaking_event():
     scene = replace(SWINGING, swing_direction=0.0, swing_frequency=2.0, swing_damping=0.2)
     motion = wall_motion_of(SHAKEN, scene)
     for since in (0.0, 0.125, 3.1, 20.0):
-        found = plate_motion(motion, since)
+        scene_moment = plate_motion(motion, since)
         expected = 2e-4 * math.exp(-0.2 * since) * math.sin(4.0 * math.pi * since)
-        assert found.displacement == pytest.approx((expected, 0.0), abs=1e-15)
+        assert scene_moment.displacement == pytest.approx((expected, 0.0), abs=1e-15)
         if since > 0.0:
             ahead, behind = (
                 plate_motion(motion, since + step).displacement[0] for step in (1e-6, -1e-6)
             )
             slope = (ahead - behind) / 2e-6
-            assert found.velocity[0] == pytest.approx(slope, rel=1e-5)
+            assert scene_moment.velocity[0] == pytest.approx(slope, rel=1e-5)
     assert plate_motion(motion, None).displacement == (0.0, 0.0)
     assert plate_motion(motion, 60.0).displacement == (0.0, 0.0)
     assert motion.end <= SHAKEN.shake_period
@@ -117,26 +119,27 @@ def test_the_plate_comes_through_several_shaking_events():
 
 def test_clusters_are_in_the_truth():
     sticky = replace(SHAKEN, sticking_speed=0.02, first_shake=0.0)
-    found = film(sticky, replace(SMALL, trays=(3,))).at(60, 0)
-    bodies = found.beads[0].bodies
-    assert found.trays[0].bodies == np.unique(bodies).size < bodies.size
+    scene_moment = film(sticky, replace(SMALL, trays=(3,))).at(60, 0)
+    bodies = scene_moment.beads[0].bodies
+    assert scene_moment.trays[0].bodies == np.unique(bodies).size < bodies.size
     stuck = np.flatnonzero(bodies != np.arange(bodies.size))
-    one = stuck[0]
-    mates = np.flatnonzero(bodies == bodies[one])
+    first_moment = stuck[0]
+    mates = np.flatnonzero(bodies == bodies[first_moment])
     gaps = np.linalg.norm(
-        found.beads[0].positions[mates] - found.beads[0].positions[one], axis=1
-    ) - (found.beads[0].radii[mates] + found.beads[0].radii[one])
+        scene_moment.beads[0].positions[mates] - scene_moment.beads[0].positions[first_moment],
+        axis=1,
+    ) - (scene_moment.beads[0].radii[mates] + scene_moment.beads[0].radii[first_moment])
     assert np.sort(np.abs(gaps))[0] < 1e-9
 
 
 def test_a_film_is_the_same_every_time_and_a_frame_needs_none_before_it():
     scene = replace(SceneSettings(), pixels_per_metre=7500.0, trays=(2,))
-    whole = [moment.frame.image for moment in film(scene=scene).moments(8)]
+    images = [moment.frame.image for moment in film(scene=scene).moments(8)]
     alone = film(scene=scene).at(7, 0).frame.image
-    np.testing.assert_array_equal(alone, whole[7])
-    assert not np.array_equal(whole[6], whole[7])
-    other = film(replace(SHAKEN, seed=2), scene).at(7, 0).frame.image
-    assert not np.array_equal(alone, other)
+    np.testing.assert_array_equal(alone, images[7])
+    assert not np.array_equal(images[6], images[7])
+    other_seed = film(replace(SHAKEN, seed=2), scene).at(7, 0).frame.image
+    assert not np.array_equal(alone, other_seed)
 
 
 def test_stamps_are_those_of_the_frame_rate():
@@ -159,7 +162,7 @@ def test_no_effects_means_all_strengths_zero_but_shading():
 def test_scenes_that_cannot_be_filmed_are_refused():
     with pytest.raises(ConfigurationError, match=r'noise: -1.0 is outside \[0, 64\]; glare: nan'):
         SceneFilm(SHAKEN, replace(SMALL, noise=-1.0, glare=math.nan))
-    with pytest.raises(ConfigurationError, match='name none, or one twice'):
+    with pytest.raises(ConfigurationError, match='is empty or has duplicates'):
         SceneFilm(SHAKEN, replace(SMALL, trays=(1, 1)))
     with pytest.raises(ConfigurationError, match='has no place on the plate'):
         SceneFilm(SHAKEN, replace(SMALL, trays=(1,)), {1: replace(TRAYS[1], place=None)})

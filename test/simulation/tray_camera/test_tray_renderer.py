@@ -1,4 +1,4 @@
-"""Pictures show the beads where they are, as large as they are, with the noise asked for."""
+"""Pictures of a tray: positions, sizes and noise of the beads."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import pytest
 from small_gases import acrylic, tray_of
 
 from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.experiment.materials import known_materials
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
-from nanorocks_ros.simulation.tray_camera.bead_colours import LOOKS
 from nanorocks_ros.simulation.tray_camera.bead_drawing import draw_bead
 from nanorocks_ros.simulation.tray_camera.tray_film import film
 from nanorocks_ros.simulation.tray_camera.tray_renderer import TrayCamera
@@ -60,13 +60,13 @@ def pixels_of(camera, positions):
 
 
 @pytest.mark.parametrize('place', [(0.0075, 0.0075), (0.00412, 0.01123), (0.0031, 0.0049)])
-@pytest.mark.parametrize('material', sorted(LOOKS))
+@pytest.mark.parametrize('material', sorted(known_materials()))
 def test_a_bead_in_a_picture_is_where_and_as_large_as_it_should_be(place, material):
     camera = camera_of(QUIET, material=material)
     position = np.array([[*place, 0.0015]])
     elsewhere = np.array([[0.015 - place[0] + 0.003, 0.0128, 0.0015]])
-    here, there = (crop(camera, camera.picture(p, 0)) for p in (position, elsewhere))
-    change = np.abs(here - there).max(axis=2)
+    at_place, elsewhere_crop = (crop(camera, camera.picture(p, 0)) for p in (position, elsewhere))
+    change = np.abs(at_place - elsewhere_crop).max(axis=2)
     column, row = pixels_of(camera, position)[0] - np.array(camera.region[:2])
     near = (
         np.hypot(*(np.mgrid[0.5:202.0, 0.5:202.0] - np.array([row, column])[:, None, None])) < 20
@@ -100,7 +100,7 @@ def test_the_upper_bead_hides_the_lower_one():
 
 def test_beads_differ_from_the_floor_and_from_each_other_in_colour():
     mean = {}
-    for material in LOOKS:
+    for material in known_materials():
         camera = camera_of(QUIET, material=material)
         column, row = pixels_of(camera, np.full((1, 2), 0.0075))[0].astype(int)
         picture = camera.picture(np.full((1, 3), 0.0075), 0)
@@ -159,17 +159,19 @@ def test_without_noise_nothing_moves_but_the_beads():
 
 
 def test_frames_are_the_same_on_every_machine():
-    found = []
+    checksums = []
     for number in (1, 5):
         settings = SimulationSettings(first_shake=0.0, tray=number, width_px=640, height_px=480)
         frames = film(settings, load_trays()[number], 3)
-        found.append([zlib.crc32(frame.image.tobytes()) for frame, _ in frames])
-    assert found == GOLDEN
+        checksums.append([zlib.crc32(frame.image.tobytes()) for frame, _ in frames])
+    assert checksums == GOLDEN
 
 
 def test_another_seed_gives_other_frames():
-    one, other = (next(film(SimulationSettings(seed=seed), TRAY, 1))[0].image for seed in (1, 2))
-    assert not np.array_equal(one, other)
+    first_frame, second_frame = (
+        next(film(SimulationSettings(seed=seed), TRAY, 1))[0].image for seed in (1, 2)
+    )
+    assert not np.array_equal(first_frame, second_frame)
 
 
 def test_a_film_pairs_each_frame_with_its_truth():
@@ -200,11 +202,13 @@ def test_a_tray_that_fills_the_picture_has_no_surroundings():
     assert camera.picture(np.full((1, 3), 0.0075), 0).shape == (202, 202, 3)
 
 
-def test_what_cannot_be_drawn_is_refused():
+def test_invalid_input_of_the_camera_is_refused():
     with pytest.raises(SimulationError, match='202 x 202 px in a picture of 200 x 260'):
         camera_of(replace(QUIET, width_px=200))
     with pytest.raises(SimulationError, match='materials: 1 of them'):
         TrayCamera(QUIET, TRAY, np.full(2, 0.001), ('glass',))
+    with pytest.raises(SimulationError, match=r"material 'lead': is not described \(known: JSC-1"):
+        camera_of(QUIET, material='lead')
     with pytest.raises(SimulationError, match='radii: not all positive'):
         camera_of(QUIET, radius=float('nan'))
     with pytest.raises(SimulationError, match='edge_width_px'):
@@ -215,6 +219,6 @@ def test_what_cannot_be_drawn_is_refused():
             camera.picture(bad, 0)
 
 
-def test_a_film_that_cannot_be_made_is_refused_at_once():
+def test_an_impossible_film_is_refused_at_once():
     with pytest.raises(SimulationError, match='found room for only'):
         film(SimulationSettings(), tray_of(acrylic(100)))

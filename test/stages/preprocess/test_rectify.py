@@ -8,7 +8,7 @@ import pytest
 
 from nanorocks_ros.experiment.lens import Camera
 from nanorocks_ros.experiment.plate import Region
-from nanorocks_ros.experiment.view import Straight, View
+from nanorocks_ros.experiment.view import IdentityLens, View
 from nanorocks_ros.stages.preprocess.crop_interpolation import fill_by_pixels, moved
 from nanorocks_ros.stages.preprocess.rectify import (
     mix_weights,
@@ -26,7 +26,7 @@ LENS = View(
         distortion=(-0.02, 0.004, 0.0, 0.0),
     )
 )
-NO_LENS = View(camera=Straight(width=320, height=240))
+NO_LENS = View(camera=IdentityLens(width=320, height=240))
 # Neither side is a multiple of the distance between two nodes.
 REGION = Region(31, 22, 133, 78)
 MIX = (0.45, 0.45, 0.1)

@@ -8,14 +8,14 @@ from plates import SCALE, Plate
 
 from nanorocks_ros.experiment.lens import Camera
 from nanorocks_ros.experiment.plate import Region
-from nanorocks_ros.experiment.view import Straight, View
+from nanorocks_ros.experiment.view import IdentityLens, View
 from nanorocks_ros.stages.preprocess.stabilise import Shift, TrayRegistration
 
 MIX = np.array([0.3, 0.4, 0.3])
 
 
 def follower(plate, tray=3, camera=None):
-    straight = Straight(width=plate.shape[1], height=plate.shape[0])
+    straight = IdentityLens(width=plate.shape[1], height=plate.shape[0])
     view = View(camera=camera or straight)
     return TrayRegistration(plate.regions[tray], view, 0.002 * SCALE, MIX)
 
@@ -94,7 +94,7 @@ def test_what_a_neighbour_says_helps_after_a_jump(plate):
 
 
 def test_without_walls_there_is_nothing_to_follow():
-    view = View(camera=Straight(width=120, height=100))
+    view = View(camera=IdentityLens(width=120, height=100))
     tracker = TrayRegistration(Region(20, 20, 60, 50), view, 8.0, np.ones(1))
     flat = np.full((100, 120, 1), 120, np.uint8)
     assert tracker.push(flat, None) is None

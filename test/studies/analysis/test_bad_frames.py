@@ -10,7 +10,7 @@ import pytest
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.calibration import CameraInfo
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import (
@@ -36,7 +36,9 @@ def picture(number):
 def bag_of(path, pictures, rate=30, info=None):
     """A bag of gray pictures, with what is told of the lens where anything is."""
     names = (topics.EPOCH, topics.RAW, topics.CAMERA_INFO)
-    with BagWriter(path, {name.absolute(): offered(name) for name in names}, metadata={}) as bag:
+    with BagWriter(
+        path, {name.absolute(): offered_topic(name) for name in names}, metadata={}
+    ) as bag:
         bag.write(topics.EPOCH.absolute(), NS, time_message(NS))
         if info is not None:
             message = camera_info_message(
@@ -115,8 +117,8 @@ def changed_sample(path, topic, number, change):
     source, seen = open_bag(SAMPLE), 0
     names = [topics.RAW_COMPRESSED.absolute(), topics.TRUTH.absolute(1)]
     table = {
-        names[0]: offered(topics.RAW_COMPRESSED),
-        names[1]: offered(topics.TRUTH),
+        names[0]: offered_topic(topics.RAW_COMPRESSED),
+        names[1]: offered_topic(topics.TRUTH),
     }
     with BagWriter(path, table, metadata={}) as bag:
         for message in source.messages(names, end_ns=source.start_ns + 3 * NS):
@@ -159,7 +161,9 @@ def test_a_message_of_the_truth_that_is_none_is_told_and_the_rest_is_taken(tmp_p
 
 def without_stamps(path, frames):
     names = (topics.RAW,)
-    with BagWriter(path, {name.absolute(): offered(name) for name in names}, metadata={}) as bag:
+    with BagWriter(
+        path, {name.absolute(): offered_topic(name) for name in names}, metadata={}
+    ) as bag:
         for number in range(30):
             stamp_ns = 0 if number in frames else NS + number * NS // 30
             message = image_message(stamp_ns, 'camera', 'mono8', picture(number))
@@ -175,4 +179,4 @@ def test_frames_without_a_stamp_are_refused_and_set_no_epoch(tmp_path, capsys):
     path = without_stamps(tmp_path / 'none', range(30))
     assert main(['analyse', str(path), '--no-output']) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert 'a frame without a stamp; let the driver of the camera stamp its frames' in line
+    assert 'a frame has no time stamp; configure the camera driver to stamp its frames' in line

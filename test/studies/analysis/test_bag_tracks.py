@@ -14,7 +14,7 @@ import pytest
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.outputs import parquet as parquet_files
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings
@@ -164,7 +164,9 @@ def test_a_gray_camera_is_refused_with_the_remedy(tmp_path):
     names = (topics.EPOCH, topics.RAW)
     path = tmp_path / 'gray'
     rng = np.random.default_rng(1)
-    with BagWriter(path, {name.absolute(): offered(name) for name in names}, metadata={}) as bag:
+    with BagWriter(
+        path, {name.absolute(): offered_topic(name) for name in names}, metadata={}
+    ) as bag:
         bag.write(topics.EPOCH.absolute(), NS, time_message(NS))
         for number in range(4):
             pixels = rng.integers(90, 110, (210, 210), dtype=np.uint8)

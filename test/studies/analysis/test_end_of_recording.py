@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
@@ -50,7 +50,7 @@ def film(tmp_path_factory):
     path = tmp_path_factory.mktemp('film') / 'bag'
     simulation = SimulationSettings(width_px=260, height_px=260, seed=2)
     camera = TrayCamera(simulation, TRAY, np.full(5, RADIUS), ('acrylic',) * 5)
-    table = {topic.absolute(): offered(topic) for topic in (topics.EPOCH, topics.RAW)}
+    table = {topic.absolute(): offered_topic(topic) for topic in (topics.EPOCH, topics.RAW)}
     with BagWriter(path, table, metadata={}) as bag:
         bag.write(topics.EPOCH.absolute(), 0, time_message(0))
         for frame in range(FRAMES):

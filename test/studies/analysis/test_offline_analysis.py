@@ -18,7 +18,7 @@ import pytest
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
@@ -41,7 +41,10 @@ def analysis():
 
 def raw_bag(path, stamps, pictures=None, encoding='mono8', topic=topics.RAW, metadata=None):
     """A bag of raw gray pictures: a bright square that moves to the right."""
-    table = {topics.EPOCH.absolute(): offered(topics.EPOCH), topic.absolute(): offered(topic)}
+    table = {
+        topics.EPOCH.absolute(): offered_topic(topics.EPOCH),
+        topic.absolute(): offered_topic(topic),
+    }
     with BagWriter(path, table, metadata=metadata or {}) as bag:
         bag.write(topics.EPOCH.absolute(), stamps[0], time_message(stamps[0]))
         for number, stamp_ns in enumerate(stamps):
@@ -231,13 +234,13 @@ def test_a_parameter_file_for_the_nodes_does_for_the_command(capsys, tmp_path):
 
 
 def empty_bag(path):
-    with BagWriter(path, {topics.RAW.absolute(): offered(topics.RAW)}, metadata={}):
+    with BagWriter(path, {topics.RAW.absolute(): offered_topic(topics.RAW)}, metadata={}):
         pass
     return path
 
 
 def other_bag(path):
-    with BagWriter(path, {'/chatter': offered(topics.EPOCH)}, metadata={}) as bag:
+    with BagWriter(path, {'/chatter': offered_topic(topics.EPOCH)}, metadata={}) as bag:
         bag.write('/chatter', NS, time_message(NS))
     return path
 
@@ -356,7 +359,7 @@ def test_one_picture_that_cannot_be_decoded_is_left_out_and_told(capsys, tmp_pat
     path = tmp_path / 'bag'
     name = topics.RAW_COMPRESSED.absolute()
     source = open_bag(SAMPLE)
-    with BagWriter(path, {name: offered(topics.RAW_COMPRESSED)}, metadata={}) as bag:
+    with BagWriter(path, {name: offered_topic(topics.RAW_COMPRESSED)}, metadata={}) as bag:
         for number, message in enumerate(source.messages([name])):
             if number == 90:
                 break
@@ -380,7 +383,7 @@ def test_cycles_of_a_second_pass_are_cycles_of_their_own(tmp_path):
     name = topics.RAW_COMPRESSED.absolute()
     source = open_bag(SAMPLE)
     length = source.end_ns - source.start_ns + NS
-    with BagWriter(path, {name: offered(topics.RAW_COMPRESSED)}, metadata={}) as bag:
+    with BagWriter(path, {name: offered_topic(topics.RAW_COMPRESSED)}, metadata={}) as bag:
         for again in range(2):
             for message in source.messages([name]):
                 content = source.deserialize(message)

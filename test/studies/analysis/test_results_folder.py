@@ -91,18 +91,18 @@ def test_tables_in_parquet_hold_the_numbers_of_the_csv(tmp_path):
 
 
 def test_every_kind_of_result_goes_into_the_bag_and_into_the_tables(tmp_path):
-    found = analysis()
+    analysed = analysis()
     for product in MEASURED:
-        if not found.trays[5].of(product.record):
+        if not analysed.trays[5].of(product.record):
             values = np.ones(len(layout(product.record).fields))
-            found.trays[5].add(
+            analysed.trays[5].add(
                 from_array(product.record, values, tray=5, epoch_ns=0, where='test')
             )
-    write_results(found, tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
+    write_results(analysed, tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
     bag = open_bag(tmp_path / 'results' / 'results_bag')
     assert bag.complete
     tables = {path.stem.removeprefix('tray_5_') for path in (tmp_path / 'results').glob('*.csv')}
-    assert {one.rpartition('/')[2] for one in bag.topics} == {*tables, 'epoch'}
+    assert {topic.rpartition('/')[2] for topic in bag.topics} == {*tables, 'epoch'}
     assert len(tables) == len(MEASURED)
 
 
@@ -119,8 +119,8 @@ def test_records_that_came_in_another_order_stand_by_their_stamps_in_the_bag(tmp
         )
         for number, stamp in enumerate(came)
     ]
-    found = Analysis(epoch_ns=0, trays={5: TrayResults(merges)})
-    write_results(found, tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
+    analysed = Analysis(epoch_ns=0, trays={5: TrayResults(merges)})
+    write_results(analysed, tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
     bag = open_bag(tmp_path / 'results' / 'results_bag')
     topic = topics.MERGE.absolute(5)
     stored = [
@@ -138,8 +138,8 @@ def test_tables_in_parquet_are_put_together_of_pieces(tmp_path):
     from pyarrow import parquet
 
     speeds = [replace(SPEED, stamp_ns=number * NS) for number in range(2500)]
-    found = Analysis(epoch_ns=0, trays={5: TrayResults(speeds)})
-    write_results(found, tmp_path / 'out', tmp_path / 'bag', PipelineSettings(), 'parquet')
+    analysed = Analysis(epoch_ns=0, trays={5: TrayResults(speeds)})
+    write_results(analysed, tmp_path / 'out', tmp_path / 'bag', PipelineSettings(), 'parquet')
     table = parquet.read_table(tmp_path / 'out' / 'tray_5_speed.parquet')
     assert table['time'].to_pylist() == list(range(2500))
 
@@ -159,8 +159,8 @@ def test_a_cycle_that_a_merge_ended_in_hindsight_is_one_cycle_and_a_second_pass_
         replace(COR, cycle=cycle, stamp_ns=round(time * NS), status=status)
         for cycle, time, status in course
     ]
-    found = [
+    last = [
         (estimate.cycle, estimate.stamp_ns / NS, estimate.status)
         for estimate in last_of_each_cycle(cors)
     ]
-    assert found == [course[5], course[9], course[11], course[12]]
+    assert last == [course[5], course[9], course[11], course[12]]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from plates import Plate
 
-from nanorocks_ros.experiment.calibration import CameraInfo, view_of
+from nanorocks_ros.experiment.calibration import CameraInfo, rectified_view
 from nanorocks_ros.stages.preprocess.plate_search import guess_plate
 from nanorocks_ros.studies.calibration.plate_fit import fit_plate
 
@@ -34,7 +34,7 @@ class Tilted:
             r=tuple(rotation.T.ravel()),
             p=(focal, 0, middle[0] - 0.5, 0, 0, focal, middle[1] - 0.5, 0, 0, 0, 1, 0),
         )
-        self.view = view_of(self.info, 'test')
+        self.view = rectified_view(self.info, 'test')
 
     def rectified(self, points):
         """Where points of the picture are on the plate as seen from straight above."""

@@ -1,4 +1,4 @@
-"""A bag of each film of a campaign, made once, and never taken for that of another film."""
+"""Import of many films into one bag each; existing bags are checked against their film."""
 
 from __future__ import annotations
 
@@ -24,68 +24,68 @@ from nanorocks_ros.cli.main import main
 from nanorocks_ros.experiment.calibration_file import load_calibration
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
-from nanorocks_ros.studies.film_import.find_films import films_of
+from nanorocks_ros.studies.film_import.find_films import find_films
 from nanorocks_ros.studies.film_import.import_each import import_each
 from nanorocks_ros.studies.film_import.import_film import import_films
 
 NS = 1_000_000_000
 
 
-def test_each_video_of_a_folder_becomes_a_bag_and_bad_ones_stop_nothing(tmp_path):
+def test_each_video_of_a_folder_is_imported_and_invalid_ones_are_listed(tmp_path):
     folder = tmp_path / 'videos'
     folder.mkdir()
     for k in (10, 9, 1):
         write_video(folder / f'run {k}.avi', range(k, k + 3))
     (folder / 'run 2.avi').write_bytes(b'no video')
-    (folder / 'read me.txt').write_text('left alone')
+    (folder / 'read me.txt').write_text('not a video')
     write_images(folder / 'stills', [f'{1_700_000_000_000 + 40 * k}.jpg' for k in range(3)])
-    films = films_of([folder]).films
+    films = find_films([folder]).films
     assert [film.stem for film in films] == ['run 1', 'run 2', 'run 9', 'run 10', 'stills']
-    told = []
-    found = import_each(films, tmp_path / 'bags', STARTED, lambda *one: told.append(one))
-    assert [one.bag.name for one in found.imported] == ['run 1', 'run 9', 'run 10', 'stills']
-    assert list(found.failed) == [folder / 'run 2.avi']
-    assert told[-1] == (1.0, 'stills')
+    calls = []
+    batch = import_each(films, tmp_path / 'bags', STARTED, lambda *call: calls.append(call))
+    assert [result.bag.name for result in batch.imported] == ['run 1', 'run 9', 'run 10', 'stills']
+    assert list(batch.failed) == [folder / 'run 2.avi']
+    assert calls[-1] == (1.0, 'stills')
     frames = BagFrames(tmp_path / 'bags' / 'run 9').frames()
     assert [number_of(frame.image) for frame in frames] == [9, 10, 11]
-    # Once more: nothing is made twice, and what failed is tried again.
+    # The second time, complete bags are skipped and failed films are imported again.
     write_video(folder / 'run 2.avi', range(2))
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / 'bags').rglob('*.mcap')}
     again = import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
-    assert [one.bag.name for one in again.imported] == ['run 2']
+    assert [result.bag.name for result in again.imported] == ['run 2']
     assert len(again.skipped) == 4
     assert not again.failed
-    assert all(one.stat().st_mtime_ns == stamp for one, stamp in before.items())
+    assert all(path.stat().st_mtime_ns == stamp for path, stamp in before.items())
     assert sorted(os.listdir(tmp_path / 'bags')) == sorted(film.stem for film in films)
 
 
-def test_a_bag_of_another_video_is_not_taken_for_ours(tmp_path):
+def test_the_bag_of_another_video_is_refused(tmp_path):
     films = [write_video(tmp_path / 'a.avi', range(3))]
     import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
     write_video(tmp_path / 'a.avi', range(5))
-    found = import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
-    assert 'was made of another a.avi' in str(found.failed[films[0]])
+    batch = import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
+    assert 'was made from another a.avi' in str(batch.failed[films[0]])
     shutil.rmtree(tmp_path / 'bags' / 'a')
     write_video(tmp_path / 'b.avi', range(3))
     import_films([tmp_path / 'b.avi'], tmp_path / 'bags' / 'a', STARTED, lambda _: None)
-    found = import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
-    assert 'is there already, but not as the bag of a.avi' in str(found.failed[films[0]])
+    batch = import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
+    assert 'exists already, but is not a complete import of a.avi' in str(batch.failed[films[0]])
 
 
-def test_videos_that_differ_in_their_ending_alone_get_bags_of_their_own(tmp_path):
+def test_videos_that_differ_only_in_their_extension_get_separate_bags(tmp_path):
     films = [write_video(tmp_path / name, range(2)) for name in ('a.avi', 'a.mkv')]
-    found = import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
-    assert [one.bag.name for one in found.imported] == ['a_avi', 'a_mkv']
+    batch = import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
+    assert [result.bag.name for result in batch.imported] == ['a_avi', 'a_mkv']
 
 
 def uncompressed(folder, numbers):
-    """A film whose size does not depend on what it shows."""
+    """A film whose file size does not depend on its content."""
     folder.mkdir(exist_ok=True)
-    return write_video(folder / 'run.avi', numbers, codec='rawvideo', form='bgr24')
+    return write_video(folder / 'run.avi', numbers, codec='rawvideo', pixel_format='bgr24')
 
 
 @pytest.mark.parametrize('kind', ['film', 'images'])
-def test_a_film_of_the_same_name_and_size_is_told_by_its_contents(tmp_path, kind):
+def test_a_film_of_the_same_name_and_size_is_distinguished_by_its_content(tmp_path, kind):
     bags, days = tmp_path / 'bags', []
     for day, first in (('monday', 0), ('tuesday', 50)):
         if kind == 'film':
@@ -96,51 +96,56 @@ def test_a_film_of_the_same_name_and_size_is_told_by_its_contents(tmp_path, kind
             days.append(write_images(tmp_path / day / 'run', names))
             (days[-1] / names[0]).write_bytes((days[-1] / names[first // 50]).read_bytes())
     import_each(days[:1], bags, STARTED, lambda *_: None)
-    found = import_each(days[1:], bags, STARTED, lambda *_: None)
-    said = str(found.failed[days[1]])
-    assert f'was made of another {days[1].name} (of the same size, with other contents)' in said
-    assert 'delete it, or pass another folder' in said
-    # The first is still known.
+    batch = import_each(days[1:], bags, STARTED, lambda *_: None)
+    message = str(batch.failed[days[1]])
+    assert f'was made from another {days[1].name} (same size, different content)' in message
+    assert 'delete it, or pass another folder' in message
+    # The bag of the first film is still accepted.
     assert import_each(days[:1], bags, STARTED, lambda *_: None).skipped == [bags / days[0].stem]
 
 
-@pytest.mark.parametrize(('change', 'what'), [
+@pytest.mark.parametrize(('change', 'difference'), [
     ({'rate': Fraction(60)}, '--rate was not given, is 60'),
     ({'start_ns': START_NS + NS}, '--start was 2023-11-14T22:13:20Z, is 2023-11-14T22:13:21Z'),
     ({'start_ns': None}, '--start was 2023-11-14T22:13:20Z, is not given'),
     ({'quality': 80}, '--quality was 95, is 80'),
 ])  # fmt: skip
-def test_a_bag_of_other_settings_is_not_taken_for_what_is_wanted(tmp_path, change, what):
-    films = [write_video(tmp_path / 'a.mkv', range(3), codec='ffv1', form='bgr0')]
+def test_a_bag_of_other_settings_is_refused(tmp_path, change, difference):
+    films = [write_video(tmp_path / 'a.mkv', range(3), codec='ffv1', pixel_format='bgr0')]
     import_each(films, tmp_path / 'bags', STARTED, lambda *_: None)
-    found = import_each(films, tmp_path / 'bags', replace(STARTED, **change), lambda *_: None)
-    assert f'was imported with other settings ({what}); delete it' in str(found.failed[films[0]])
-    assert not found.skipped
+    batch = import_each(films, tmp_path / 'bags', replace(STARTED, **change), lambda *_: None)
+    assert f'was imported with other settings ({difference}); delete it' in str(
+        batch.failed[films[0]]
+    )
+    assert not batch.skipped
 
 
-def test_a_bag_of_another_calibration_is_not_taken_for_what_is_wanted(tmp_path):
+def test_a_bag_of_another_calibration_is_refused(tmp_path):
     def settings(content):
         (tmp_path / 'lens.yaml').write_text(content)
         lens = load_calibration(tmp_path / 'lens.yaml')
         return ImportSettings(start_ns=START_NS, calibration=lens, calibration_name='lens.yaml')
 
-    def said(settings):
-        found = import_each(films, tmp_path / 'bags', settings, lambda *_: None)
-        return ''.join(str(error) for error in found.failed.values())
+    def message(settings):
+        batch = import_each(films, tmp_path / 'bags', settings, lambda *_: None)
+        return ''.join(str(error) for error in batch.failed.values())
 
     films = [write_video(tmp_path / 'a.avi', range(3))]
-    assert said(settings(CALIBRATION)) == said(settings(CALIBRATION)) == ''
-    # JPEGs go in as they are, so their quality says nothing.
-    assert said(replace(settings(CALIBRATION), quality=50)) == ''
-    assert '--calibration was lens.yaml, is not given' in said(STARTED)
+    assert message(settings(CALIBRATION)) == message(settings(CALIBRATION)) == ''
+    # JPEGs are not recompressed, so the quality does not matter.
+    assert message(replace(settings(CALIBRATION), quality=50)) == ''
+    assert '--calibration was lens.yaml, is not given' in message(STARTED)
     other = settings(CALIBRATION.replace('0.01', '0.02'))
-    assert '--calibration was lens.yaml, is one of that name with other contents' in said(other)
+    assert (
+        '--calibration was lens.yaml, is a file of the same name with different content'
+        in message(other)
+    )
 
 
-# --- what is looked for -----------------------------------------------------------------------
+# --- search for films -------------------------------------------------------------------------
 
 
-def test_films_of_all_formats_are_found_and_what_may_be_one_is_named(tmp_path, capsys):
+def test_films_of_all_formats_are_found_and_skipped_files_named(tmp_path, capsys):
     folder = tmp_path / 'films'
     folder.mkdir()
     for name, codec in (('a.mp4', 'mpeg4'), ('b.asf', 'mpeg4'), ('c.flv', 'flv1'),
@@ -150,44 +155,43 @@ def test_films_of_all_formats_are_found_and_what_may_be_one_is_named(tmp_path, c
     for name in ('notes.txt', 'lens.yaml', 'times.json', '.hidden.mov'):
         (folder / name).write_text('no film')
     shutil.copy(folder / 'a.mp4', folder / 'copy of a')
-    (folder / 'thumb.jpg').write_bytes(b'beside a film, a picture is none')
-    (folder / 'old.m2v').write_bytes(b'of a format that is not read')
+    (folder / 'thumb.jpg').write_bytes(b'an image next to a film is skipped')
+    (folder / 'old.m2v').write_bytes(b'an unsupported format')
     code = main(['import', str(folder), '--each', '-o', str(tmp_path / 'bags'), '--rate', '25',
                  '--json'])  # fmt: skip
     out, err = capsys.readouterr()
     assert code == 0
     printed = json.loads(out)
-    assert [os.path.basename(one['bag']) for one in printed['imported']] == list('abcde')
+    assert [os.path.basename(result['bag']) for result in printed['imported']] == list('abcde')
     others = ['copy of a', 'old.m2v', 'thumb.jpg']
-    assert [os.path.basename(one) for one in printed['left_out']] == others
-    assert f'left out 3 files that may be films or pictures of one, but not by their names ' \
-        f'({", ".join(others)})' in err  # fmt: skip
+    assert [os.path.basename(path) for path in printed['left_out']] == others
+    assert f'skipped 3 files without a supported video extension ({", ".join(others)})' in err
     assert 'notes' not in err
 
 
 def close(monkeypatch, folder):
-    """Let nobody look into a folder, as it is for all but root where they have no permission."""
-    really = Path.iterdir
+    """Make a folder unreadable, also for root."""
+    original = Path.iterdir
 
     def iterdir(path):
         if path == folder:
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
-        return really(path)
+        return original(path)
 
     monkeypatch.setattr(Path, 'iterdir', iterdir)
 
 
-def test_what_a_system_keeps_on_a_disk_for_itself_is_nobodys_concern(tmp_path, monkeypatch):
+def test_system_folders_are_ignored(tmp_path, monkeypatch):
     folder = tmp_path / 'films'
     (folder / 'lost+found').mkdir(parents=True)
     film = write_video(folder / 'a.avi', range(3))
     close(monkeypatch, folder / 'lost+found')
-    found = films_of([folder])
+    found = find_films([folder])
     assert (found.films, found.failed) == ([film], {})
 
 
-@pytest.mark.parametrize('passed', ['the folder', 'what is in it'])
-def test_a_folder_that_cannot_be_read_costs_no_other(tmp_path, capsys, monkeypatch, passed):
+@pytest.mark.parametrize('passed', ['the folder', 'its content'])
+def test_an_unreadable_folder_does_not_stop_the_others(tmp_path, capsys, monkeypatch, passed):
     folder = tmp_path / 'films'
     closed = folder / 'lost'
     closed.mkdir(parents=True)
@@ -199,7 +203,7 @@ def test_a_folder_that_cannot_be_read_costs_no_other(tmp_path, capsys, monkeypat
     out, err = capsys.readouterr()
     printed = json.loads(out)
     assert code == 1
-    assert [os.path.basename(one['bag']) for one in printed['imported']] == ['a', 'z']
+    assert [os.path.basename(result['bag']) for result in printed['imported']] == ['a', 'z']
     (failed,) = printed['failed']
     assert failed['video'] == str(closed)
     assert (
@@ -208,13 +212,14 @@ def test_a_folder_that_cannot_be_read_costs_no_other(tmp_path, capsys, monkeypat
     assert '1 of 3 videos could not be imported' in err
 
 
-def test_a_folder_of_which_nothing_can_be_read_is_said_in_one_line(tmp_path, capsys, monkeypatch):
+def test_an_unreadable_folder_is_reported_in_one_line(tmp_path, capsys, monkeypatch):
     closed = tmp_path / 'films'
     closed.mkdir()
     close(monkeypatch, closed)
     assert main(['import', str(closed), '--each', '-o', str(tmp_path / 'bags')]) == 1
-    said = capsys.readouterr().err.strip()
+    message = capsys.readouterr().err.strip()
     assert (
-        said == f'nanorocks: {closed}: cannot be read (Permission denied); check its permissions'
+        message
+        == f'nanorocks: {closed}: cannot be read (Permission denied); check its permissions'
     )
     assert not (tmp_path / 'bags').exists()

@@ -1,4 +1,4 @@
-"""One cycle of clusters by autocorrelation, beside the truth; the command and its picture."""
+"""Autocorrelations of one cycle compared with the truth, and their command and figure."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def silent(done, total):
 
 @pytest.fixture(scope='module')
 def bag(tmp_path_factory):
-    """The plate with trays 1 and 6, in which all that meets sticks, for two seconds."""
+    """The plate with trays 1 and 6 for two seconds; all colliding beads stick."""
     path = tmp_path_factory.mktemp('clusters') / 'bag'
     values = {
         'width_px': 1200,
@@ -56,12 +56,12 @@ def bag(tmp_path_factory):
 
 
 @pytest.fixture(scope='module')
-def found(bag):
+def clusters(bag):
     return cycle_clusters(bag, with_values(PipelineSettings(), ON_PLATE, 'test'))
 
 
-def test_the_estimates_of_the_cycle_lie_beside_the_truth(found):
-    tray = found.trays[1]
+def test_the_estimates_of_the_cycle_agree_with_the_truth(clusters):
+    tray = clusters.trays[1]
     assert tray.times == pytest.approx(0.2 * np.arange(tray.times.size) + tray.times[0], abs=0.11)
     assert 0.0 <= tray.times[0] < 0.3
     true = tray.true_sizes()
@@ -73,8 +73,8 @@ def test_the_estimates_of_the_cycle_lie_beside_the_truth(found):
     assert inside.mean() > 0.5
 
 
-def test_the_pictures_kept_are_one_of_flying_beads_and_the_last(found):
-    tray = found.trays[1]
+def test_the_snapshots_are_one_of_flying_beads_and_the_last(clusters):
+    tray = clusters.trays[1]
     first, last = tray.snapshots
     assert 0.5 <= first.since < 0.8
     assert last.since == pytest.approx(tray.times[-1])
@@ -82,8 +82,8 @@ def test_the_pictures_kept_are_one_of_flying_beads_and_the_last(found):
     assert first.values.shape == (first.gray.shape[0] // 2, first.gray.shape[1] // 2)
 
 
-def test_what_is_counted_at_the_end_is_the_truth_and_makes_the_papers_line(found):
-    tray = found.trays[1]
+def test_the_paper_calibration_uses_the_true_count_at_the_end(clusters):
+    tray = clusters.trays[1]
     counted = tray.counted()
     assert 2.0 <= counted <= 15.0
     ends = tray.column('level_area')[tray.times >= tray.times[-1] - 2.0]
@@ -91,32 +91,32 @@ def test_what_is_counted_at_the_end_is_the_truth_and_makes_the_papers_line(found
     assert sizes.mean() == pytest.approx(counted)
 
 
-def test_in_a_tray_full_of_grains_there_is_an_area_but_no_size(found):
-    tray = found.trays[6]
+def test_in_a_tray_full_of_grains_there_is_an_area_but_no_size(clusters):
+    tray = clusters.trays[6]
     assert {estimate.size_status for estimate in tray.estimates} == {SizeStatus.INSENSITIVE}
     assert (tray.column('level_area') > 0.0).all()
 
 
-def test_the_command_writes_picture_and_table_and_says_what_it_found(bag, tmp_path, capsys):
+def test_the_command_writes_figure_and_table_and_prints_the_sizes(bag, tmp_path, capsys):
     picture, table = tmp_path / 'clusters.png', tmp_path / 'clusters.csv'
     arguments = ['autocorrelation', str(bag), *FLAGS, '-o', str(picture), '--table', str(table)]
     assert main([*arguments, '--json']) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert said['cycle'] == 1
-    assert said['trays']['6']['size_status'] == 'insensitive'
-    assert said['trays']['6']['cluster_size'] is None
-    assert said['trays']['1']['true_cluster_size'] > 1.0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed['cycle'] == 1
+    assert printed['trays']['6']['size_status'] == 'insensitive'
+    assert printed['trays']['6']['cluster_size'] is None
+    assert printed['trays']['1']['true_cluster_size'] > 1.0
     assert cv2.imread(str(picture)).shape[1] > 1000
     with table.open(newline='') as stream:
         rows = list(csv.DictReader(stream))
     assert {row['tray [1]'] for row in rows} == {'1', '6'}
-    assert len(rows) == said['trays']['1']['pictures'] + said['trays']['6']['pictures']
+    assert len(rows) == printed['trays']['1']['pictures'] + printed['trays']['6']['pictures']
     assert float(rows[0]['level_area [m^2]']) > 0.0
     assert main(arguments) == 1
     assert 'add --force' in capsys.readouterr().err
 
 
-def test_without_a_shake_cycle_0_can_be_looked_at(bag):
+def test_cycle_0_before_the_first_shake_can_be_selected(bag):
     settings = with_values(PipelineSettings(), ON_PLATE, 'test')
     before = cycle_clusters(bag, settings, cycle=0).trays[1]
     assert math.isnan(before.true_onset())
@@ -124,25 +124,25 @@ def test_without_a_shake_cycle_0_can_be_looked_at(bag):
     assert before.times.max() < 0.5
 
 
-def test_a_cycle_that_is_not_there_is_one_line(bag, capsys):
+def test_a_missing_cycle_is_reported_in_one_line(bag, capsys):
     assert main(['autocorrelation', str(bag), *FLAGS, '--cycle', '7']) == 1
-    said = capsys.readouterr().err
-    assert 'holds no cycle 7; name another with --cycle: 0, 1' in said
-    assert said.count('\n') == 1
+    printed = capsys.readouterr().err
+    assert 'holds no cycle 7; name another with --cycle: 0, 1' in printed
+    assert printed.count('\n') == 1
 
 
-def test_trays_with_nothing_in_them_are_drawn_with_what_is_known(bag, tmp_path, capsys):
+def test_empty_trays_are_drawn(bag, tmp_path, capsys):
     # Trays 3 and 5 of this film are empty.
     flags = [*FLAGS[:1], '3', '5', *FLAGS[3:]]
     picture = tmp_path / 'empty.png'
     arguments = ['autocorrelation', str(bag), *flags, '-o', str(picture), '--json']
     assert main(arguments) == 0
-    said = json.loads(capsys.readouterr().out)['trays']
-    assert [said[tray]['size_status'] for tray in ('3', '5')] == ['nothing', 'nothing']
+    printed = json.loads(capsys.readouterr().out)['trays']
+    assert [printed[tray]['size_status'] for tray in ('3', '5')] == ['nothing', 'nothing']
     assert picture.exists()
 
 
-def test_without_a_known_truth_the_papers_own_counts_are_taken(tmp_path):
+def test_without_the_truth_the_counts_of_the_paper_are_used(tmp_path):
     path = tmp_path / 'bag'
     settings = with_values(
         SimulationSettings(), {'width_px': 210, 'height_px': 210, 'first_shake': 0.3}, 'test'

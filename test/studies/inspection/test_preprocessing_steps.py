@@ -1,4 +1,4 @@
-"""One frame, step by step, and the command that shows it."""
+"""Intermediate images of the preprocessing of one frame, and the command that draws them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
 from nanorocks_ros.records import MotionMask
@@ -36,7 +36,7 @@ FLAGS = ['--preprocess-layout', 'plate', '--preprocess-pixels-per-metre', str(SC
 
 @pytest.fixture(scope='module')
 def bag(tmp_path_factory):
-    """Trays 1 and 3 through the lens, on a plate that swings."""
+    """Trays 1 and 3 through the lens, on a swinging plate."""
     path = tmp_path_factory.mktemp('steps') / 'bag'
     simulation = SimulationSettings(width_px=800, height_px=640, first_shake=0.1)
     scene = with_values(
@@ -80,46 +80,46 @@ def test_the_mask_and_the_tracks_are_those_of_the_analysis(bag, settings, steps)
     np.testing.assert_array_equal(steps.trays[3].tracks.positions, tracked.positions)
 
 
-def test_what_is_moving_differs_by_more_than_the_threshold(steps):
-    one = steps.trays[1]
-    despeckled = cv2.medianBlur(one.difference, 3)
-    least = despeckled[one.mask == 255].min()
-    assert least > despeckled[one.mask == 0].max()
-    assert least > 5.0 * np.sqrt(one.image.noise_power)
+def test_moving_pixels_differ_by_more_than_the_threshold(steps):
+    tray = steps.trays[1]
+    despeckled = cv2.medianBlur(tray.difference, 3)
+    smallest = despeckled[tray.mask == 255].min()
+    assert smallest > despeckled[tray.mask == 0].max()
+    assert smallest > 5.0 * np.sqrt(tray.image.noise_power)
 
 
-def test_the_straight_picture_has_the_swing_in_it_and_the_stabilised_one_has_not(steps):
-    one = steps.trays[1]
-    shift = np.array(one.image.displacement) * SCALE
+def test_only_the_stabilised_image_is_free_of_the_swing(steps):
+    tray = steps.trays[1]
+    shift = np.array(tray.image.displacement) * SCALE
     assert np.hypot(*shift) > 1.0
-    rows, columns = one.image.gray.shape
+    rows, columns = tray.image.gray.shape
     moved = cv2.warpAffine(
-        one.straight,
+        tray.straight,
         np.array([[1.0, 0.0, -shift[0]], [0.0, 1.0, -shift[1]]]),
         (columns, rows),
         flags=cv2.INTER_LINEAR,
     )
     inner = (slice(6, -6), slice(6, -6))
 
-    def apart(picture):
-        return np.abs(picture[inner].astype(float) - one.image.color[inner]).mean()
+    def difference(picture):
+        return np.abs(picture[inner].astype(float) - tray.image.color[inner]).mean()
 
-    assert apart(moved) < 0.3 * apart(one.straight)
+    assert difference(moved) < 0.3 * difference(tray.straight)
 
 
 def test_the_outline_lies_in_the_frame_where_the_lens_shows_the_floor(steps):
-    one = steps.trays[3]
-    size = np.array(one.raw.shape[1::-1])
-    assert (one.outline >= 0).all()
-    assert (one.outline <= size).all()
-    area = cv2.contourArea(one.outline.astype(np.float32))
-    assert 0.6 * one.image.gray.size < area < one.image.gray.size
+    tray = steps.trays[3]
+    size = np.array(tray.raw.shape[1::-1])
+    assert (tray.outline >= 0).all()
+    assert (tray.outline <= size).all()
+    area = cv2.contourArea(tray.outline.astype(np.float32))
+    assert 0.6 * tray.image.gray.size < area < tray.image.gray.size
 
 
 def test_darkness_is_darkest_where_beads_are(steps):
-    one = steps.trays[1]
-    columns, rows = (one.tracks.positions[one.tracks.seen] * SCALE).astype(int).T
-    assert np.median(one.darkness[rows, columns]) > 5 * np.median(one.darkness)
+    tray = steps.trays[1]
+    columns, rows = (tray.tracks.positions[tray.tracks.seen] * SCALE).astype(int).T
+    assert np.median(tray.darkness[rows, columns]) > 5 * np.median(tray.darkness)
 
 
 def test_the_first_frame_has_no_difference_yet(bag, settings):
@@ -129,7 +129,7 @@ def test_the_first_frame_has_no_difference_yet(bag, settings):
     assert first.time == 0.0
 
 
-def test_a_time_leads_to_the_first_frame_after_it(bag, settings):
+def test_a_time_selects_the_first_frame_after_it(bag, settings):
     assert steps_of_bag(bag, settings, time=0.31).number == 10
     assert steps_of_bag(bag, settings).number == FRAMES // 2
 
@@ -145,7 +145,7 @@ def test_the_command_draws_eight_panels_for_each_tray(bag, tmp_path, capsys):
     assert tray['seen'] > 40
     assert tray['moving_area'] > 0.0
     drawn = cv2.imread(str(picture))
-    # Panels are pictures with white between them.
+    # Panels are images with white between them.
     row = (drawn[drawn.shape[0] // 8] < 250).any(axis=1)
     assert np.count_nonzero(np.diff(row.astype(int)) == 1) >= 4
     assert main([*call, '--frame', '0']) == 1
@@ -153,28 +153,30 @@ def test_the_command_draws_eight_panels_for_each_tray(bag, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ('flags', 'what'),
+    ('flags', 'message'),
     [
-        (['--frame', '18'], '--frame: 18, and the recording has 18 frames'),
-        (['--at', '60'], '--at: 60 s, and the recording has 18 frames'),
+        (['--frame', '18'], '--frame: 18, but the recording has 18 frames'),
+        (['--at', '60'], '--at: 60 s, but the recording has 18 frames'),
         (['--at', 'nan'], '--at: nan; count from 0'),
         (['--frame', '-1'], '--frame: -1; count from 0'),
         (['-o', 'steps.jpg'], 'ends in none of .png'),
         (['--trays', '9'], '9 is outside'),
     ],
 )
-def test_what_cannot_be_shown_is_said_in_a_line(bag, capsys, flags, what):
+def test_an_impossible_request_is_reported_in_one_line(bag, capsys, flags, message):
     assert main(['look', str(bag), *FLAGS, *flags]) == 2
-    said = capsys.readouterr().err
-    assert what in said
-    assert said.count('\n') == 1
+    printed = capsys.readouterr().err
+    assert message in printed
+    assert printed.count('\n') == 1
 
 
-def test_a_frame_that_cannot_be_used_is_said_in_a_line(tmp_path, capsys):
+def test_an_unusable_frame_is_reported_in_one_line(tmp_path, capsys):
     names = (topics.EPOCH, topics.RAW)
     path = tmp_path / 'black'
     rng = np.random.default_rng(1)
-    with BagWriter(path, {name.absolute(): offered(name) for name in names}, metadata={}) as bag:
+    with BagWriter(
+        path, {name.absolute(): offered_topic(name) for name in names}, metadata={}
+    ) as bag:
         bag.write(topics.EPOCH.absolute(), NS, time_message(NS))
         for number in range(5):
             pixels = rng.integers(90, 110, (210, 210, 3), dtype=np.uint8)
@@ -183,7 +185,7 @@ def test_a_frame_that_cannot_be_used_is_said_in_a_line(tmp_path, capsys):
             message = image_message(stamp_ns, 'camera', 'bgr8', dark)
             bag.write(topics.RAW.absolute(), stamp_ns, message)
     assert main(['look', str(path), '--frame', '3']) == 1
-    said = capsys.readouterr().err
-    assert 'frame 3: cannot be used; choose another' in said
-    assert said.count('\n') == 1
+    printed = capsys.readouterr().err
+    assert 'frame 3: cannot be used; choose another frame' in printed
+    assert printed.count('\n') == 1
     assert main(['look', str(path), '--frame', '4', '--json']) == 0

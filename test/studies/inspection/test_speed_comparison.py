@@ -1,4 +1,4 @@
-"""The speed by every method, beside the truth, and the command that compares them."""
+"""Comparison of the speeds by every method with the truth, and its command."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.recordings.bag.offered_topics import offered
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
 from nanorocks_ros.records import (
@@ -46,7 +46,7 @@ def bag(tmp_path_factory):
 
 
 @pytest.fixture(scope='module')
-def found(bag):
+def bag_speeds(bag):
     return compare_speeds(bag, PipelineSettings())
 
 
@@ -77,31 +77,33 @@ def truth(seconds, speed):
 
 
 @pytest.mark.parametrize('method', [AUTO, *METHODS])
-def test_each_method_gives_what_it_gives_alone(bag, found, method):
+def test_each_method_gives_the_same_speeds_as_alone(bag, bag_speeds, method):
     settings = with_values(PipelineSettings(), {'speed.method': method}, 'test')
     alone = analyse(bag, settings).trays[1].speeds
-    # As text, in which what is not known equals itself.
-    assert [repr(one) for one in found.trays[1].speeds[method]] == [repr(one) for one in alone]
+    # Compared as text, because NaN does not equal itself.
+    assert [repr(speed) for speed in bag_speeds.trays[1].speeds[method]] == [
+        repr(speed) for speed in alone
+    ]
 
 
-def test_tracking_and_structure_function_hold_against_the_truth_and_one_is_chosen(found):
-    tray = found.trays[1]
+def test_tracking_and_structure_function_agree_with_the_truth(bag_speeds):
+    tray = bag_speeds.trays[1]
     assert tray.ratios('tracking', 1).mean() == pytest.approx(1.0, abs=0.05)
     assert tray.ratios('structure_function', 1).mean() == pytest.approx(1.0, abs=0.15)
     assert tray.chosen(1) == {'tracking': 1.0, 'structure_function': 0.0, 'binarised_area': 0.0}
-    assert found.first_cycle() == 1
+    assert bag_speeds.first_cycle() == 1
 
 
 def test_the_truth_is_averaged_over_the_window_of_the_estimate():
-    known = [truth(0.1 * k, float(k)) for k in range(10)]
-    tray = ComparedSpeeds(tray=load_trays()[1], speeds={}, truth=known)
-    found = [estimate(0.5, 1.0, 0.2), estimate(0.5, 1.0, 0.0), estimate(2.0, 1.0, 0.2)]
-    assert tray.true_speeds(found)[:2].tolist() == pytest.approx([5.0, 5.0])
+    records = [truth(0.1 * k, float(k)) for k in range(10)]
+    tray = ComparedSpeeds(tray=load_trays()[1], speeds={}, truth=records)
+    estimates = [estimate(0.5, 1.0, 0.2), estimate(0.5, 1.0, 0.0), estimate(2.0, 1.0, 0.2)]
+    assert tray.true_speeds(estimates)[:2].tolist() == pytest.approx([5.0, 5.0])
     assert tray.true_speeds([estimate(0.25, 1.0, 0.5)]).tolist() == pytest.approx([2.5])
-    assert math.isnan(tray.true_speeds(found)[2])
+    assert math.isnan(tray.true_speeds(estimates)[2])
 
 
-def test_ratios_leave_out_what_is_not_known():
+def test_ratios_omit_unknown_values():
     speeds = {'tracking': [estimate(0.1, 3.0, 0.0), estimate(0.2, math.nan, 0.0)]}
     tray = ComparedSpeeds(tray=load_trays()[1], speeds=speeds, truth=[truth(0.1, 2.0)])
     assert tray.ratios('tracking').tolist() == [1.5]
@@ -110,30 +112,33 @@ def test_ratios_leave_out_what_is_not_known():
     assert np.isnan(without.true_speeds(speeds['tracking'])).all()
 
 
-def test_the_command_draws_one_cycle_and_writes_all_speeds(bag, found, tmp_path, capsys):
+def test_the_command_draws_one_cycle_and_writes_all_speeds(bag, bag_speeds, tmp_path, capsys):
     picture, table = tmp_path / 'speeds.png', tmp_path / 'speeds.csv'
     call = ['speeds', str(bag), '-o', str(picture), '--table', str(table)]
     assert main([*call, '--json']) == 0
     printed = json.loads(capsys.readouterr().out)
     tray = printed['trays']['1']
     assert set(tray['methods']) == {AUTO, *METHODS}
-    one = tray['methods']['tracking']
-    assert len(one['time']) == len(one['true_mean_projected_speed']) == len(one['quality'])
-    assert one['ratio_to_truth'] == pytest.approx(found.trays[1].ratios('tracking').mean())
+    tracking = tray['methods']['tracking']
+    assert len(tracking['time']) == len(tracking['true_mean_projected_speed'])
+    assert len(tracking['time']) == len(tracking['quality'])
+    assert tracking['ratio_to_truth'] == pytest.approx(
+        bag_speeds.trays[1].ratios('tracking').mean()
+    )
     with table.open(encoding='utf-8') as stream:
         rows = list(csv.DictReader(stream))
     counts = {name: len(tray['methods'][name]['time']) for name in tray['methods']}
     assert len(rows) == sum(counts.values())
     assert {row['method [1]'] for row in rows} == set(counts)
     drawn = cv2.imread(str(picture))
-    colours = {tuple(one) for one in drawn.reshape(-1, 3).tolist()}
-    # Tracking, structure function, what is chosen.
+    colours = {tuple(colour) for colour in drawn.reshape(-1, 3).tolist()}
+    # Tracking, structure function, selected speeds.
     assert {(0x37, 0x78, 0x1B), (0xAC, 0x66, 0x21), (0x11, 0x11, 0x11)} <= colours
     assert main(call) == 1
     assert 'exists already' in capsys.readouterr().err
 
 
-def test_a_cycle_that_is_not_there_and_a_wrong_ending_are_wrong_calls(bag, tmp_path, capsys):
+def test_a_missing_cycle_and_a_wrong_extension_are_usage_errors(bag, tmp_path, capsys):
     assert main(['speeds', str(bag), '--cycle', '7']) == 2
     assert '--cycle: 7, and speeds were measured in 0, 1' in capsys.readouterr().err
     assert main(['speeds', str(bag), '-o', str(tmp_path / 'speeds.pdf')]) == 2
@@ -146,7 +151,9 @@ def test_a_gray_camera_at_rest_is_drawn_too(tmp_path, capsys):
     names = (topics.EPOCH, topics.RAW)
     path = tmp_path / 'gray'
     rng = np.random.default_rng(1)
-    with BagWriter(path, {name.absolute(): offered(name) for name in names}, metadata={}) as bag:
+    with BagWriter(
+        path, {name.absolute(): offered_topic(name) for name in names}, metadata={}
+    ) as bag:
         bag.write(topics.EPOCH.absolute(), NS, time_message(NS))
         for number in range(20):
             pixels = rng.integers(90, 110, (210, 210), dtype=np.uint8)
@@ -154,13 +161,13 @@ def test_a_gray_camera_at_rest_is_drawn_too(tmp_path, capsys):
             message = image_message(stamp_ns, 'camera', 'mono8', pixels)
             bag.write(topics.RAW.absolute(), stamp_ns, message)
     assert main(['speeds', str(path), '-o', str(tmp_path / 'speeds.png')]) == 0
-    said = capsys.readouterr()
-    assert 'tray 1, cycle 0:\n' in said.out
-    assert 'tracking: 0 speeds\n' in said.out
+    printed = capsys.readouterr()
+    assert 'tray 1, cycle 0:\n' in printed.out
+    assert 'tracking: 0 speeds\n' in printed.out
     assert cv2.imread(str(tmp_path / 'speeds.png')) is not None
 
 
-def test_an_interruption_says_that_nothing_was_written(bag, tmp_path, capsys, monkeypatch):
+def test_an_interruption_reports_that_nothing_was_written(bag, tmp_path, capsys, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 

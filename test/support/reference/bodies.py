@@ -1,4 +1,4 @@
-"""The beads, which rigid body each belongs to, and what joining and fixing do to a body."""
+"""Beads and rigid bodies of the reference engine."""
 
 from __future__ import annotations
 

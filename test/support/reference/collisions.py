@@ -1,4 +1,4 @@
-"""How hard two bodies bounce: restitution of a pair, and the impulse between rough spheres."""
+"""Restitution and impulses of the reference engine."""
 
 from __future__ import annotations
 
@@ -79,11 +79,11 @@ def normal_impulse(normal, u, per_masses, restitution):
     return -(1.0 + restitution) * (u @ normal) * normal / sum(per_masses)
 
 
-def tangential_impulse(slipping, per_masses, radii, per_inertias, tangential, most=math.inf):
+def tangential_impulse(slipping, per_masses, radii, per_inertias, tangential, limit=math.inf):
     """Impulse on j across the normal, `most` at most; a per_inertia is 0 for what cannot turn."""
     per_mass = sum(per_masses) + sum(
         radius**2 * per_inertia for radius, per_inertia in zip(radii, per_inertias, strict=True)
     )
     gripping = -(1.0 + tangential) * slipping / per_mass
     size = math.sqrt(gripping @ gripping)
-    return gripping if size <= most else gripping * (most / size)
+    return gripping if size <= limit else gripping * (limit / size)

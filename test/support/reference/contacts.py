@@ -1,4 +1,4 @@
-"""When a pair, or a bead and a wall at rest, touch next. Delays count from now."""
+"""Contact times of pairs and of walls at rest; delays count from now."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""A slow and obvious event-driven engine: every step, ask all, take the first, move all.
+"""A slow, simple event-driven engine: each step checks all pairs and moves all beads.
 
-Nothing is remembered between events but what the physics remembers.
+It stores nothing between events but the physical state.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .tray import Tray, axis_of, inward_of
 
 @dataclass(frozen=True)
 class Event:
-    """What happened: `kind` is 'pair', 'wall', 'merge' or 'fix'.
+    """An event; `kind` is 'pair', 'wall', 'merge' or 'fix'.
 
     `partner` is the higher bead of the pair, or the wall; `speed` the normal approach speed
     before; `impulse` the magnitude of the impulse vector.
@@ -33,8 +33,8 @@ class Event:
 
 
 @dataclass
-class Books:
-    """What left the beads.
+class Ledger:
+    """Energy and momentum that left the beads.
 
     `wall_impulse` and `fixed_impulse` are the momentum vectors given to each wall and to fixed
     bodies; `wall_momentum` is the component of the former along the axis of each wall.
@@ -62,7 +62,7 @@ class ReferenceGas:
         self.tray = Tray(rules.box, rules.periodic, rules.motion)
         self.wall_restitution = np.broadcast_to(rules.wall_restitution, 6)
         self.time = 0.0
-        self.books = Books()
+        self.ledger = Ledger()
         self.last_touched = {}  # (bead, 'bead' or 'wall', partner): time
 
     positions = property(lambda self: self.beads.positions.copy())
@@ -109,10 +109,10 @@ class ReferenceGas:
         before = self.beads.energy(i, j)
         if measure(self.rules, u, u @ normal) < self.rules.sticking_speed:
             kind, impulse = 'merge', self.merge(i, j, u)
-            self.books.energy_lost_in_merges += before - self.beads.energy(i, j)
+            self.ledger.energy_lost_in_merges += before - self.beads.energy(i, j)
         else:
             kind, impulse = 'pair', self.bounce_pair(i, j, normal, u, lately)
-            self.books.energy_lost_in_pairs += before - self.beads.energy(i, j)
+            self.ledger.energy_lost_in_pairs += before - self.beads.energy(i, j)
         self.beads.count(i, j)
         return Event(self.time, kind, i, j, abs(u @ normal), math.sqrt(impulse @ impulse))
 
@@ -135,8 +135,8 @@ class ReferenceGas:
         radii = beads.radii[i], beads.radii[j]
         slipping = slip(normal, u, radii[0] * self.spins[i] + radii[1] * self.spins[j])
         along = normal_impulse(normal, u, per_masses, restitution)
-        most = self.rules.friction * math.sqrt(along @ along)
-        across = tangential_impulse(slipping, per_masses, radii, per_inertias, tangential, most)
+        limit = self.rules.friction * math.sqrt(along @ along)
+        across = tangential_impulse(slipping, per_masses, radii, per_inertias, tangential, limit)
         self.note_on_fixed(i, j, along + across)
         beads.push(i, -(along + across))
         beads.push(j, along + across)
@@ -152,9 +152,9 @@ class ReferenceGas:
     def note_on_fixed(self, i, j, impulse):
         """Note momentum that a fixed body gets, `impulse` being that on the body of j."""
         if self.fixed[i]:
-            self.books.fixed_impulse -= impulse
+            self.ledger.fixed_impulse -= impulse
         if self.fixed[j]:
-            self.books.fixed_impulse += impulse
+            self.ledger.fixed_impulse += impulse
 
     def meet_wall(self, contact):
         i, wall = contact.i, contact.partner
@@ -169,8 +169,8 @@ class ReferenceGas:
             self.beads.fix(i)
         else:
             kind, impulse = 'wall', self.bounce_wall(i, wall, u, lately)
-        self.books.energy_lost_at_walls += before - self.beads.energy(i)
-        self.books.wall_impulse[wall] += impulse
+        self.ledger.energy_lost_at_walls += before - self.beads.energy(i)
+        self.ledger.wall_impulse[wall] += impulse
         self.beads.count(i)
         return Event(self.time, kind, i, wall, abs(u[axis]), math.sqrt(impulse @ impulse))
 
@@ -189,9 +189,9 @@ class ReferenceGas:
         radii, per_inertias = (beads.radii[i],), (beads.per_inertia(i),)
         slipping = slip(normal, u, radii[0] * self.spins[i])
         along = beads.mass(i) * (approach + rebound) * normal
-        most = self.rules.wall_friction * math.sqrt(along @ along)
+        limit = self.rules.wall_friction * math.sqrt(along @ along)
         across = tangential_impulse(
-            slipping, (beads.per_mass(i),), radii, per_inertias, tangential, most
+            slipping, (beads.per_mass(i),), radii, per_inertias, tangential, limit
         )
         wall_velocity = self.tray.velocity(self.time)[axis]
         beads.push(i, -across)

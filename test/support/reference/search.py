@@ -1,4 +1,4 @@
-"""What happens next: ask every pair and every bead with every wall, take the first."""
+"""Search for the next contact among all pairs and all walls."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ def next_contact(beads, tray, now, end):
     Without an end, also None if there is none in all the windows that are searched.
     """
     for window in windows(beads, tray, now, end):
-        contact = min(contacts(beads, tray, now, window), key=lambda it: it.order, default=None)
+        contact = min(
+            contacts(beads, tray, now, window), key=lambda option: option.order, default=None
+        )
         if contact is not None and contact.time <= now + window[1]:
             return contact if contact.time <= end else None
     return None

@@ -1,4 +1,4 @@
-"""The walls: where they are, how they move, and when a bead meets one that moves.
+"""Walls of the reference engine: motion, and contact times with moving walls.
 
 Walls are numbered x low, x high, y low, y high, z low, z high.
 """

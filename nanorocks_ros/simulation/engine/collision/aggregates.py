@@ -23,15 +23,15 @@ from nanorocks_ros.simulation.engine.gas_state import (
     Y,
     Z,
 )
-from nanorocks_ros.simulation.engine.integer_width import whole
+from nanorocks_ros.simulation.engine.integer_width import as_int64
 
 if TYPE_CHECKING:
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 
 @inlined
 def advance(state: State, i: int, now: float) -> None:
-    """Move a bead along its straight line to a time."""
+    """Move a bead in free flight to a time."""
     rows = state.rows
     since = now - rows[i, TIME]
     rows[i, X] += rows[i, VX] * since
@@ -49,8 +49,8 @@ def mass_of(state: State, rules: Rules, i: int) -> float:
 
 
 @inlined
-def turns(state: State, rules: Rules, i: int) -> bool:
-    """Whether a bead can rotate: one of its own, not stuck."""
+def can_rotate(state: State, rules: Rules, i: int) -> bool:
+    """Whether a bead can rotate: a single bead that is not stuck to a wall."""
     if not rules.rough:
         return False
     if not rules.sticky:
@@ -60,8 +60,8 @@ def turns(state: State, rules: Rules, i: int) -> bool:
 
 
 @inlined
-def share(own: float, other: float) -> float:
-    """Part of a change of relative velocity that a body takes, by the masses of both."""
+def velocity_share(own: float, other: float) -> float:
+    """Fraction of a change of relative velocity that a body takes, from both masses."""
     if math.isinf(own):
         return 0.0
     if math.isinf(other):
@@ -70,8 +70,8 @@ def share(own: float, other: float) -> float:
 
 
 @inlined
-def spread(state: State, rules: Rules, i: int, now: float, marked: int) -> int:
-    """Give the velocity of a bead, just changed, to its body, and mark all of it.
+def propagate_velocity(state: State, rules: Rules, i: int, now: float, marked: int) -> int:
+    """Give the new velocity of a bead to its whole body, and mark its beads.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def spread(state: State, rules: Rules, i: int, now: float, marked: int) -> int:
     state.dirty[marked] = i
     marked += 1
     if rules.sticky:
-        k = whole(state.bodies[i, FOLLOWING])
+        k = as_int64(state.bodies[i, FOLLOWING])
         while k != i:
             advance(state, k, now)
             rows[k, VX] = rows[i, VX]
@@ -101,47 +101,47 @@ def spread(state: State, rules: Rules, i: int, now: float, marked: int) -> int:
             state.links[k, COUNTER] += 1
             state.dirty[marked] = k
             marked += 1
-            k = whole(state.bodies[k, FOLLOWING])
+            k = as_int64(state.bodies[k, FOLLOWING])
     return marked
 
 
 @inlined
-def shift(state: State, rules: Rules, i: int, axis: int, by: float) -> None:
+def shift_body(state: State, rules: Rules, i: int, axis: int, by: float) -> None:
     """Move the other beads of a body along an axis, [m]."""
     if rules.sticky:
-        k = whole(state.bodies[i, FOLLOWING])
+        k = as_int64(state.bodies[i, FOLLOWING])
         while k != i:
             state.rows[k, X + axis] += by
-            k = whole(state.bodies[k, FOLLOWING])
+            k = as_int64(state.bodies[k, FOLLOWING])
 
 
 @inlined
-def stop_spinning(state: State, rules: Rules, i: int) -> None:
-    """Take the spin from a bead."""
+def clear_spin(state: State, rules: Rules, i: int) -> None:
+    """Set the spin of a bead to 0."""
     if rules.rough:
         for axis in range(3):
             state.spins[i, axis] = 0.0
 
 
 @inlined
-def join(state: State, rules: Rules, i: int, j: int) -> None:
-    """Make one body of the bodies of two beads; velocities are left as they are."""
-    first = whole(state.bodies[i, BODY])
-    second = whole(state.bodies[j, BODY])
+def join_bodies(state: State, rules: Rules, i: int, j: int) -> None:
+    """Join the bodies of two beads; velocities do not change."""
+    first = as_int64(state.bodies[i, BODY])
+    second = as_int64(state.bodies[j, BODY])
     label = min(first, second)
     mass = state.masses[first, OF_BODY] + state.masses[second, OF_BODY]
     k = i
     while True:
         state.bodies[k, BODY] = label
-        stop_spinning(state, rules, k)
-        k = whole(state.bodies[k, FOLLOWING])
+        clear_spin(state, rules, k)
+        k = as_int64(state.bodies[k, FOLLOWING])
         if k == i:
             break
     k = j
     while True:
         state.bodies[k, BODY] = label
-        stop_spinning(state, rules, k)
-        k = whole(state.bodies[k, FOLLOWING])
+        clear_spin(state, rules, k)
+        k = as_int64(state.bodies[k, FOLLOWING])
         if k == j:
             break
     state.bodies[i, FOLLOWING], state.bodies[j, FOLLOWING] = (
@@ -154,12 +154,12 @@ def join(state: State, rules: Rules, i: int, j: int) -> None:
 
 
 @inlined
-def fix(state: State, rules: Rules, i: int) -> None:
-    """Make the mass of a body infinite: it is stuck to a wall."""
+def fix_body(state: State, rules: Rules, i: int) -> None:
+    """Fix a body to a wall: its mass becomes infinite."""
     state.masses[state.bodies[i, BODY], OF_BODY] = np.inf
     k = i
     while True:
-        stop_spinning(state, rules, k)
-        k = whole(state.bodies[k, FOLLOWING])
+        clear_spin(state, rules, k)
+        k = as_int64(state.bodies[k, FOLLOWING])
         if k == i:
             break

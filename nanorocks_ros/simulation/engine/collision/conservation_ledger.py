@@ -1,4 +1,4 @@
-"""Where momentum and angular momentum go that leave the beads."""
+"""Ledger of the energy, momentum and angular momentum that leave the beads."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.numerics.compiled import inlined
-from nanorocks_ros.simulation.engine.collision.aggregates import advance, mass_of, turns
+from nanorocks_ros.simulation.engine.collision.aggregates import advance, can_rotate, mass_of
 from nanorocks_ros.simulation.engine.gas_state import (
     AGGREGATE_SPIN,
     FOLLOWING,
@@ -20,10 +20,10 @@ from nanorocks_ros.simulation.engine.gas_state import (
     Y,
     Z,
 )
-from nanorocks_ros.simulation.engine.integer_width import whole
+from nanorocks_ros.simulation.engine.integer_width import as_int64
 
 if TYPE_CHECKING:
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 Vector = tuple[float, float, float]
 
@@ -49,7 +49,7 @@ def length(a: Vector) -> float:
 
 @inlined
 def centre_of_mass(state: State, i: int, now: float) -> Vector:
-    """Centre of mass of the body of a bead; its beads are brought to the present."""
+    """Centre of mass of the body of a bead; moves its beads to the time."""
     x, y, z, mass = 0.0, 0.0, 0.0, 0.0
     k = i
     while True:
@@ -58,24 +58,24 @@ def centre_of_mass(state: State, i: int, now: float) -> Vector:
         y += state.masses[k, OWN] * state.rows[k, Y]
         z += state.masses[k, OWN] * state.rows[k, Z]
         mass += state.masses[k, OWN]
-        k = whole(state.bodies[k, FOLLOWING])
+        k = as_int64(state.bodies[k, FOLLOWING])
         if k == i:
             break
     return x / mass, y / mass, z / mass
 
 
 @inlined
-def add(state: State, place: int, vector: Vector) -> None:
-    """Add a vector to three places of the books."""
+def add_vector(state: State, place: int, vector: Vector) -> None:
+    """Add a vector to three places of the ledger."""
     for axis in range(3):
-        state.books[place + axis] += vector[axis]
+        state.ledger[place + axis] += vector[axis]
 
 
 @inlined
-def book_lever(
+def book_lost_torque(
     state: State, rules: Rules, i: int, contact: Vector, impulse: Vector, now: float
 ) -> None:
-    """Book what an impulse on a body should have turned, but cannot.
+    """Book the angular momentum of an impulse on a body that cannot rotate.
 
     Parameters
     ----------
@@ -90,16 +90,16 @@ def book_lever(
     if not rules.sticky:
         return
     if math.isinf(mass_of(state, rules, i)):
-        add(state, MOMENTUM, impulse)
-        add(state, SPIN, cross(contact, impulse))
-    elif not turns(state, rules, i):
+        add_vector(state, MOMENTUM, impulse)
+        add_vector(state, SPIN, cross(contact, impulse))
+    elif not can_rotate(state, rules, i):
         centre = centre_of_mass(state, i, now)
         lever = contact[0] - centre[0], contact[1] - centre[1], contact[2] - centre[2]
-        add(state, AGGREGATE_SPIN, cross(lever, impulse))
+        add_vector(state, AGGREGATE_SPIN, cross(lever, impulse))
 
 
 @inlined
-def orbit_and_spin(state: State, rules: Rules, i: int, now: float) -> Vector:
+def angular_momentum(state: State, rules: Rules, i: int, now: float) -> Vector:
     """Angular momentum about the origin of a body that is free to move, [kg m^2/s]."""
     mass = mass_of(state, rules, i)
     v = state.rows[i, VX], state.rows[i, VX + 1], state.rows[i, VX + 2]

@@ -1,4 +1,4 @@
-"""Rough spheres: the tangential part of a contact, which makes beads spin."""
+"""Friction of rough spheres: the tangential impulse of a contact, which makes beads spin."""
 
 from __future__ import annotations
 
@@ -6,27 +6,27 @@ import math
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.numerics.compiled import inlined
-from nanorocks_ros.simulation.engine.collision.aggregates import mass_of, turns
+from nanorocks_ros.simulation.engine.collision.aggregates import can_rotate, mass_of
 from nanorocks_ros.simulation.engine.collision.conservation_ledger import INERTIA, Vector, cross
 from nanorocks_ros.simulation.engine.gas_state import OWN, RADIUS, VX, State
 
 if TYPE_CHECKING:
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 
 @inlined
-def softness(state: State, rules: Rules, i: int) -> float:
-    """Change of the surface velocity of a bead with a tangential impulse, [1/kg]."""
+def tangential_compliance(state: State, rules: Rules, i: int) -> float:
+    """Change of the surface velocity of a bead per tangential impulse, [1/kg]."""
     mass = mass_of(state, rules, i)
     inverse = 0.0 if math.isinf(mass) else 1.0 / mass
-    if turns(state, rules, i):
+    if can_rotate(state, rules, i):
         inverse += 1.0 / (INERTIA * state.masses[i, OWN])
     return inverse
 
 
 @inlined
 def surface_velocity(state: State, i: int, normal: Vector, side: float) -> Vector:
-    """Velocity of the point of a bead's surface at a contact, without the bead's own, [m/s].
+    """Velocity of the surface at a contact relative to the centre of the bead, [m/s].
 
     Parameters
     ----------
@@ -43,8 +43,10 @@ def surface_velocity(state: State, i: int, normal: Vector, side: float) -> Vecto
 
 
 @inlined
-def push(state: State, rules: Rules, i: int, impulse: Vector, normal: Vector, sign: float) -> None:
-    """Give a tangential impulse to a bead: velocity to its body, and spin if it can turn.
+def apply_tangential_impulse(
+    state: State, rules: Rules, i: int, impulse: Vector, normal: Vector, sign: float
+) -> None:
+    """Apply a tangential impulse to a bead: velocity of its body, and spin if it can rotate.
 
     Parameters
     ----------
@@ -62,7 +64,7 @@ def push(state: State, rules: Rules, i: int, impulse: Vector, normal: Vector, si
     if not math.isinf(mass):
         for axis in range(3):
             state.rows[i, VX + axis] += sign * impulse[axis] / mass
-    if turns(state, rules, i):
+    if can_rotate(state, rules, i):
         turn = cross(normal, impulse)
         per = 1.0 / (INERTIA * state.masses[i, OWN] * state.rows[i, RADIUS])
         for axis in range(3):
@@ -70,8 +72,8 @@ def push(state: State, rules: Rules, i: int, impulse: Vector, normal: Vector, si
 
 
 @inlined
-def tangential(slip: Vector, normal: Vector) -> Vector:
-    """The part of a velocity across a normal."""
+def tangential_part(slip: Vector, normal: Vector) -> Vector:
+    """Component of a velocity perpendicular to a normal."""
     along = slip[0] * normal[0] + slip[1] * normal[1] + slip[2] * normal[2]
     return (
         slip[0] - along * normal[0],
@@ -81,8 +83,8 @@ def tangential(slip: Vector, normal: Vector) -> Vector:
 
 
 @inlined
-def or_sliding(restitution: float, mass: float, slip: Vector, limit: float) -> float:
-    """Tangential restitution of a contact, or the lower one of surfaces that slide to its end.
+def stick_or_slip(restitution: float, mass: float, slip: Vector, limit: float) -> float:
+    """Tangential restitution of a contact, reduced where the surfaces slide.
 
     Parameters
     ----------
@@ -105,10 +107,10 @@ def or_sliding(restitution: float, mass: float, slip: Vector, limit: float) -> f
 
 
 @inlined
-def rub_pair(
+def apply_pair_friction(
     state: State, rules: Rules, i: int, j: int, normal: Vector, restitution: float, along: float
 ) -> tuple[Vector, float]:
-    """Tangential part of a collision of two beads.
+    """Apply the tangential impulse of a collision of two beads.
 
     Parameters
     ----------
@@ -130,7 +132,7 @@ def rub_pair(
     rows = state.rows
     a = surface_velocity(state, i, normal, 1.0)
     b = surface_velocity(state, j, normal, -1.0)
-    slip = tangential(
+    slip = tangential_part(
         (
             rows[j, VX] - rows[i, VX] + b[0] - a[0],
             rows[j, VX + 1] - rows[i, VX + 1] + b[1] - a[1],
@@ -138,18 +140,18 @@ def rub_pair(
         ),
         normal,
     )
-    mass = 1.0 / (softness(state, rules, i) + softness(state, rules, j))
-    restitution = or_sliding(restitution, mass, slip, rules.friction * abs(along))
+    mass = 1.0 / (tangential_compliance(state, rules, i) + tangential_compliance(state, rules, j))
+    restitution = stick_or_slip(restitution, mass, slip, rules.friction * abs(along))
     per = -mass * (1.0 + restitution)
     impulse = per * slip[0], per * slip[1], per * slip[2]
-    push(state, rules, i, impulse, normal, -1.0)
-    push(state, rules, j, impulse, normal, 1.0)
+    apply_tangential_impulse(state, rules, i, impulse, normal, -1.0)
+    apply_tangential_impulse(state, rules, j, impulse, normal, 1.0)
     square = slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2]
     return impulse, 0.5 * mass * (1.0 - restitution * restitution) * square
 
 
 @inlined
-def rub_wall(
+def apply_wall_friction(
     state: State,
     rules: Rules,
     i: int,
@@ -158,7 +160,7 @@ def rub_wall(
     restitution: float,
     along: float,
 ) -> tuple[Vector, float]:
-    """Tangential part of a collision with a wall; see `rub_pair`.
+    """Apply the tangential impulse of a collision with a wall; see `apply_pair_friction`.
 
     Returns
     -------
@@ -169,7 +171,7 @@ def rub_wall(
     """
     rows = state.rows
     a = surface_velocity(state, i, normal, 1.0)
-    slip = tangential(
+    slip = tangential_part(
         (
             wall_velocity[0] - rows[i, VX] - a[0],
             wall_velocity[1] - rows[i, VX + 1] - a[1],
@@ -177,10 +179,10 @@ def rub_wall(
         ),
         normal,
     )
-    mass = 1.0 / softness(state, rules, i)
-    restitution = or_sliding(restitution, mass, slip, rules.wall_friction * abs(along))
+    mass = 1.0 / tangential_compliance(state, rules, i)
+    restitution = stick_or_slip(restitution, mass, slip, rules.wall_friction * abs(along))
     per = -mass * (1.0 + restitution)
     impulse = per * slip[0], per * slip[1], per * slip[2]
-    push(state, rules, i, impulse, normal, -1.0)
+    apply_tangential_impulse(state, rules, i, impulse, normal, -1.0)
     square = slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2]
     return impulse, 0.5 * mass * (1.0 - restitution * restitution) * square

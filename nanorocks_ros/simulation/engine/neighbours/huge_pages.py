@@ -1,4 +1,4 @@
-"""Where a large gas lies in memory."""
+"""Huge memory pages for the state of a large gas."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 
 _LINE = 64
 _PAGE = 1 << 21
-# Below this many bytes the tables of small pages are no burden.
+# Below this many bytes small pages cost nothing.
 _LARGE = 1 << 21
 
 
 def in_large_pages(state: State) -> State:
-    """The state, side by side in large pages of memory where the system has them.
+    """The state copied into one block of huge pages, where the system has them.
 
-    Beads that collide next lie anywhere in memory: with small pages the processor looks up
-    where a page is as often as it reads a bead. A small gas is given back as it is.
+    Beads that collide next lie anywhere in memory; with small pages nearly every access misses
+    the TLB. A small gas is returned unchanged.
     """
     arrays: tuple[NDArray[Any], ...] = state
     sizes = [-(-array.nbytes // _LINE) * _LINE for array in arrays]

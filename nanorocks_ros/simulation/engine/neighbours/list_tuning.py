@@ -1,4 +1,4 @@
-"""Lists and cells for a gas: how far they reach, in which order beads stand, how much room."""
+"""Sizes of neighbour lists and cells: skin, order of the beads, room."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from nanorocks_ros.simulation.engine.neighbours.neighbour_lists import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
     from nanorocks_ros.simulation.engine.gas_state import State
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
-# Measured (`python -m benchmarks engine`): lists of about six are the fastest, whatever the
-# density, and so are shells whose centre lies this far ahead of the bead.
+# Fastest mean length of the lists at all densities, and fastest offset of the centre of a shell
+# ahead of its bead (`python -m benchmarks engine`).
 _WANTED = 6.0
 _SKINS = 0.3, 2.5
 AHEAD_OF_BEAD = 0.85
-# A little more than the reach, for the rounding of references.
+# Cell width over reach: slightly above 1, for the rounding of references.
 _CELL_SLACK = 1.004
 _FIRST_ROOM = 12
 _FIRST_CELL_ROOM = 5
@@ -42,7 +42,7 @@ _CELLS_AROUND = 27
 _MOST_CELLS = 4
 
 
-def skin_for(radii: NDArray[np.float64], rules: Rules) -> float:
+def list_skin(radii: NDArray[np.float64], rules: Rules) -> float:
     """Skin of the neighbour lists, [m]; 0 when a periodic box is too small for lists."""
     sides = np.array(rules.sides)
     diameter = 2.0 * float(np.mean(radii))
@@ -57,19 +57,19 @@ def skin_for(radii: NDArray[np.float64], rules: Rules) -> float:
     return skin if skin > 0.05 * diameter else 0.0
 
 
-def in_space_order(positions: NDArray[np.float64], width: float) -> NDArray[np.int64]:
-    """Order in which neighbours in space stand close together: along a Z-shaped curve."""
+def z_order(positions: NDArray[np.float64], width: float) -> NDArray[np.int64]:
+    """Order of the beads along a Z-order curve, so that neighbours are close in memory."""
     cells = np.floor((positions - positions.min(axis=0)) / width).astype(np.uint64)
     code = np.zeros(len(positions), dtype=np.uint64)
     for bit in range(21):
         for axis in range(3):
-            one = (cells[:, axis] >> np.uint64(bit)) & np.uint64(1)
-            code |= one << np.uint64(3 * bit + axis)
+            bits = (cells[:, axis] >> np.uint64(bit)) & np.uint64(1)
+            code |= bits << np.uint64(3 * bit + axis)
     return np.argsort(code, kind='stable')
 
 
 def with_lists(state: State, rules: Rules, skin: float) -> State:
-    """The state with lists and cells, filled."""
+    """The state with neighbour lists and cells, filled."""
     n = state.rows.shape[0]
     sides = np.array(rules.sides)
     reach = state.reach.copy()
@@ -85,11 +85,11 @@ def with_lists(state: State, rules: Rules, skin: float) -> State:
     state = state._replace(reach=reach, references=np.zeros((n, 4), dtype=np.float32))
     state = _with_room(state, int(cells.prod()), _FIRST_ROOM, _FIRST_CELL_ROOM)
     set_references(state, rules)
-    return built(state, rules)
+    return rebuilt_lists(state, rules)
 
 
-def built(state: State, rules: Rules) -> State:
-    """The state with all lists built anew, with as much room as they need."""
+def rebuilt_lists(state: State, rules: Rules) -> State:
+    """The state with all lists rebuilt, with as much room as they need."""
     room, cell_room = state.neighbours.shape[1] - 1, state.cells.shape[1] - 1
     while True:
         status = build_lists(state, rules)
@@ -103,9 +103,9 @@ def built(state: State, rules: Rules) -> State:
 def _with_room(state: State, cells: int, room: int, cell_room: int) -> State:
     n = state.rows.shape[0]
     # All that a cell and those around it can hold, or all of the largest body.
-    most = n if state.masses.shape[1] > 1 else min(n, _CELLS_AROUND * cell_room)
+    n_marked = n if state.masses.shape[1] > 1 else min(n, _CELLS_AROUND * cell_room)
     return state._replace(
         neighbours=np.zeros((n, 1 + room), dtype=np.int32),
         cells=np.zeros((cells, 1 + cell_room), dtype=np.int32),
-        dirty=np.zeros(most + 8, dtype=np.int32),
+        dirty=np.zeros(n_marked + 8, dtype=np.int32),
     )

@@ -1,9 +1,9 @@
-"""Neighbour lists: who can be met before a bead leaves the shell around its reference place.
+"""Neighbour lists: the beads that a bead can hit before it leaves the shell around its reference.
 
-Lists are symmetric. A bead that leaves its shell gets a new list alone. Cells of space, by
-reference place, say whom to consider, so a bead changes cell only then. References are rounded
-to single precision, which makes them no less exact: a bead is followed from where its
-reference is, and the reach of a list has room for the rounding of its distances.
+Lists are symmetric. A bead that leaves its shell gets a new list alone. Cells of
+space, by reference position, give the candidates, so a bead changes its cell only then.
+References are in single precision without loss of exactness: the shell is centred on the rounded
+reference, and the reach of a list allows for the rounding of distances.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from nanorocks_ros.simulation.engine.gas_state import (
     State,
     X,
 )
-from nanorocks_ros.simulation.engine.integer_width import unsigned, whole
+from nanorocks_ros.simulation.engine.integer_width import as_index, as_int64
 from nanorocks_ros.simulation.engine.pair_times import speed_square
 
 if TYPE_CHECKING:
-    from nanorocks_ros.simulation.engine.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 # Relative to the reach; single precision of coordinates up to a thousand reaches.
 _ROUNDING = 1e-3
@@ -47,20 +47,20 @@ COMPLETE, CELL_FULL, LIST_FULL = range(3)
 
 @inlined
 def cells_along(state: State, axis: int) -> int:
-    """How many cells there are along an axis."""
-    return whole(state.reach[CELLS + axis])
+    """Number of cells along an axis."""
+    return as_int64(state.reach[CELLS + axis])
 
 
 @inlined
 def cell_along(state: State, axis: int, coordinate: float) -> int:
-    """Number of the cell along an axis; what lies outside belongs to the last one there."""
-    place = whole(math.floor(coordinate * state.reach[PER_CELL + axis]))
+    """Index of the cell along an axis; positions outside belong to the outermost cell."""
+    place = as_int64(math.floor(coordinate * state.reach[PER_CELL + axis]))
     return min(max(place, 0), cells_along(state, axis) - 1)
 
 
 @inlined
 def cell_of(state: State, i: int) -> int:
-    """Cell of a bead's reference place."""
+    """Cell of a bead's reference position."""
     x = cell_along(state, 0, np.float64(state.references[i, 0]))
     y = cell_along(state, 1, np.float64(state.references[i, 1]))
     z = cell_along(state, 2, np.float64(state.references[i, 2]))
@@ -69,7 +69,7 @@ def cell_of(state: State, i: int) -> int:
 
 @inlined
 def enter_cell(state: State, i: int) -> bool:
-    """Put a bead into its cell; False when that is full."""
+    """Put a bead into its cell; False when the cell is full."""
     cells = state.cells
     cell = cell_of(state, i)
     last = cells[cell, 0] + 1
@@ -83,11 +83,11 @@ def enter_cell(state: State, i: int) -> bool:
 
 @inlined
 def leave_cell(state: State, i: int) -> None:
-    """Take a bead out of its cell; the last one there takes its place."""
+    """Remove a bead from its cell; the last bead of the cell takes its slot."""
     cells = state.cells
     cell = cell_of(state, i)
     last = cells[cell, 0]
-    moved = whole(cells[cell, last])
+    moved = as_int64(cells[cell, last])
     slot = state.links[i, SLOT]
     cells[cell, slot] = moved
     state.links[moved, SLOT] = slot
@@ -96,7 +96,7 @@ def leave_cell(state: State, i: int) -> None:
 
 @inlined
 def set_reference(state: State, rules: Rules, i: int) -> None:
-    """Make the present place of a bead its reference, in the box where that is periodic."""
+    """Make the present position of a bead its reference, folded into a periodic box."""
     near = 0
     half = state.reach[HALF_SKIN]
     speed = math.sqrt(speed_square(state.rows, i))
@@ -122,11 +122,11 @@ def set_reference(state: State, rules: Rules, i: int) -> None:
 
 
 @inlined
-def forget(state: State, i: int) -> None:
-    """Take a bead out of the lists of its neighbours, and empty its own."""
+def remove_from_lists(state: State, i: int) -> None:
+    """Remove a bead from the lists of its neighbours, and empty its own list."""
     neighbours = state.neighbours
     for k in range(1, neighbours[i, 0] + 1):
-        j = whole(neighbours[i, k])
+        j = as_int64(neighbours[i, k])
         last = neighbours[j, 0]
         place = 1
         while neighbours[j, place] != i:
@@ -163,8 +163,8 @@ def wrapped(cell: int, cells: int) -> int:
 
 
 @inlined
-def candidates(state: State, rules: Rules, i: int) -> int:
-    """Collect whom a bead may meet before one of both leaves its shell, perhaps itself.
+def collect_neighbours(state: State, rules: Rules, i: int) -> int:
+    """Collect the beads that a bead can hit before either leaves its shell; may include itself.
 
     Returns
     -------
@@ -172,31 +172,33 @@ def candidates(state: State, rules: Rules, i: int) -> int:
         How many; they stand in ``state.dirty``. One more than can be neighbours, when there
         are more.
     """
-    found = state.dirty
+    marked = state.dirty
     references = state.references
-    total = np.uint64(gather(state, rules, i))
+    total = np.uint64(collect_beads_nearby(state, rules, i))
     folded = state.links[i, FLAGS] & NEAR != 0
     x, y, z = references[i, 0], references[i, 1], references[i, 2]
-    own = np.float32((state.rows[i, RADIUS] + 2.0 * state.reach[HALF_SKIN]) * (1.0 + _ROUNDING))
+    own_reach = np.float32(
+        (state.rows[i, RADIUS] + 2.0 * state.reach[HALF_SKIN]) * (1.0 + _ROUNDING)
+    )
     count = np.uint64(0)
     for k in range(total):
-        j = unsigned(found[k])
+        j = as_index(marked[k])
         dx = references[j, 0] - x
         dy = references[j, 1] - y
         dz = references[j, 2] - z
         if folded:
-            dx = nearest_single(rules, 0, dx)
-            dy = nearest_single(rules, 1, dy)
-            dz = nearest_single(rules, 2, dz)
-        reach = own + references[j, 3]
-        found[count] = j
+            dx = minimum_image_single(rules, 0, dx)
+            dy = minimum_image_single(rules, 1, dy)
+            dz = minimum_image_single(rules, 2, dz)
+        reach = own_reach + references[j, 3]
+        marked[count] = j
         count += np.uint64(dx * dx + dy * dy + dz * dz < reach * reach)
-    return whole(count)
+    return as_int64(count)
 
 
 @inlined
-def nearest_single(rules: Rules, axis: int, difference: float) -> float:
-    """A difference of coordinates to the nearest image of the other, single precision."""
+def minimum_image_single(rules: Rules, axis: int, difference: float) -> float:
+    """Difference of coordinates to the nearest periodic image, single precision."""
     if rules.periodic[axis]:
         boxes = np.rint(difference * np.float32(rules.per_side[axis]))
         return difference - np.float32(rules.sides[axis]) * boxes
@@ -204,9 +206,9 @@ def nearest_single(rules: Rules, axis: int, difference: float) -> float:
 
 
 @inlined
-def gather(state: State, rules: Rules, i: int) -> int:
-    """Collect the beads of a cell and those around it in ``state.dirty``; how many."""
-    found = state.dirty
+def collect_beads_nearby(state: State, rules: Rules, i: int) -> int:
+    """Collect the beads of a cell and the cells around it in ``state.dirty``; returns how many."""
+    marked = state.dirty
     cells = state.cells
     nx, ny, nz = cells_along(state, 0), cells_along(state, 1), cells_along(state, 2)
     cx = cell_along(state, 0, np.float64(state.references[i, 0]))
@@ -219,19 +221,19 @@ def gather(state: State, rules: Rules, i: int) -> int:
             row = (plane + wrapped(iy, ny)) * nz
             for iz in range(first_cell(rules, 2, cz, nz), last_cell(rules, 2, cz, nz)):
                 cell = np.uint64(row + wrapped(iz, nz))
-                # Four at once, whether they are there or not: how many cannot be foreseen.
+                # Always copies four: the number in the cell cannot be predicted by the processor.
                 for k in range(_AT_ONCE):
-                    found[total + np.uint64(k)] = cells[cell, np.uint64(1 + k)]
+                    marked[total + np.uint64(k)] = cells[cell, np.uint64(1 + k)]
                 held = np.uint64(cells[cell, 0])
                 for k in range(_AT_ONCE, held):
-                    found[total + np.uint64(k)] = cells[cell, np.uint64(1 + k)]
+                    marked[total + np.uint64(k)] = cells[cell, np.uint64(1 + k)]
                 total += held
-    return whole(total)
+    return as_int64(total)
 
 
 @inlined
 def find_neighbours(state: State, rules: Rules, i: int, above: bool) -> bool:
-    """Fill the list of a bead, and enter it in those of the others; False when one is full.
+    """Fill the list of a bead and enter it in those of its neighbours; False when one is full.
 
     Parameters
     ----------
@@ -242,32 +244,32 @@ def find_neighbours(state: State, rules: Rules, i: int, above: bool) -> bool:
         Only those with a higher number: for building all lists at once.
     """
     neighbours = state.neighbours
-    most = neighbours.shape[1] - 1
-    mine = whole(neighbours[i, 0])
-    for k in range(candidates(state, rules, i)):
-        j = whole(state.dirty[k])
+    capacity = neighbours.shape[1] - 1
+    n_own = as_int64(neighbours[i, 0])
+    for k in range(collect_neighbours(state, rules, i)):
+        j = as_int64(state.dirty[k])
         if j == i or (above and j < i):
             continue
-        others = neighbours[j, 0]
-        if mine == most or others == most:
+        n_others = neighbours[j, 0]
+        if n_own == capacity or n_others == capacity:
             return False
-        mine += 1
-        neighbours[i, mine] = j
-        neighbours[j, others + 1] = i
-        neighbours[j, 0] = others + 1
-    neighbours[i, 0] = mine
+        n_own += 1
+        neighbours[i, n_own] = j
+        neighbours[j, n_others + 1] = i
+        neighbours[j, 0] = n_others + 1
+    neighbours[i, 0] = n_own
     return True
 
 
 @inlined
 def renew(state: State, rules: Rules, i: int, now: float) -> bool:
-    """Give a bead a new list around where it is now; False when a list or cell is full.
+    """Rebuild the list of a bead at its present position; False when a list or cell is full.
 
     The lists are then incomplete and must be built again, with more room.
     """
     advance(state, i, now)
     leave_cell(state, i)
-    forget(state, i)
+    remove_from_lists(state, i)
     set_reference(state, rules, i)
     state.counts[RENEWED] += 1
     return find_neighbours(state, rules, i, False) and enter_cell(state, i)
@@ -275,7 +277,7 @@ def renew(state: State, rules: Rules, i: int, now: float) -> bool:
 
 @kernel
 def build_lists(state: State, rules: Rules) -> int:
-    """Build all lists around the present references; what was full, if anything."""
+    """Build all lists from the present references; returns what was full, if anything."""
     state.cells[:, 0] = 0
     state.neighbours[:, 0] = 0
     n = state.rows.shape[0]
@@ -290,7 +292,7 @@ def build_lists(state: State, rules: Rules) -> int:
 
 @kernel
 def set_references(state: State, rules: Rules) -> None:
-    """Make the present place of every bead its reference."""
+    """Make the present position of every bead its reference."""
     for i in range(state.rows.shape[0]):
         set_reference(state, rules, i)
         state.references[i, 3] = np.float32(state.rows[i, RADIUS])

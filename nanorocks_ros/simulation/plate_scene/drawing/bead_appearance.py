@@ -1,4 +1,4 @@
-"""What the bodies of a tray look like: drawn once for each, like their sizes."""
+"""Appearance of the bodies of a tray: colour, shape, orientation, dust; drawn once per body."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.simulation.initial_state import stock
+from nanorocks_ros.simulation.initial_state import inventory
 from nanorocks_ros.simulation.plate_scene.drawing.grains import FACETS, LOBES, SHAPE
 from nanorocks_ros.simulation.plate_scene.drawing.scene_bodies import GRAIN, SPHERE
-from nanorocks_ros.simulation.tray_camera.bead_colours import looks_of
+from nanorocks_ros.simulation.tray_camera.bead_looks import look_rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import SceneSettings
 
 _SHAPES = 97
-# Columns of a look, as the fields of materials.Look.
+# Columns of a look, as the fields of experiment.materials.Look.
 _AMBIENT, _DIFFUSE, _DARKENING, _GLOW, _SHEEN, _HIGHLIGHT = range(3, 9)
 # Spread of brightness from bead to bead, and from facet to facet of a grain.
 _SPREAD, _MINERALS = 0.06, 0.22
@@ -30,7 +30,7 @@ _COOLING = 4.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Appearance:
-    """Looks of the bodies of one tray, one row for each.
+    """Appearance of the bodies of one tray, one row for each.
 
     Parameters
     ----------
@@ -41,9 +41,9 @@ class Appearance:
     stretch : ndarray (n,)
         Square root of the ratio of the axes.
     angles, rates : ndarray (n,), [rad], [rad/s]
-        Orientation at first, and how fast it turns right after shaking.
+        Orientation at the start, and angular speed right after shaking.
     dust : ndarray (n,)
-        Share of it on the bead, 0 to 2.
+        Dust on the bead, 0 to 2.
     """
 
     looks: NDArray[np.float64]
@@ -55,7 +55,7 @@ class Appearance:
 
     @staticmethod
     def joined(parts: list[Appearance]) -> Appearance:
-        """Those of several trays, one after the other."""
+        """Appearance of several trays, one after the other."""
         first = parts or [_NOTHING]
         names = [field.name for field in fields(Appearance)]
         return Appearance(
@@ -77,24 +77,25 @@ _NOTHING = Appearance(
 
 
 def appearance_of(tray: Tray, scene: SceneSettings, rng: np.random.Generator) -> Appearance:
-    """Draw what the bodies of a tray look like."""
-    drawn = stock(tray)
+    """Draw the appearance of the bodies of a tray at random."""
+    drawn = inventory(tray)
     n = len(drawn.materials)
-    # All numbers are drawn, needed or not: an effect that is switched off changes no other.
+    # All numbers are drawn, used or not, so that an effect that is off does not change the others.
     brightness = 1.0 + _SPREAD * rng.standard_normal(n)
     ratio = 1.0 + scene.ovality * np.abs(rng.standard_normal(n))
     angles = rng.uniform(0.0, 2.0 * math.pi, n)
     rates = scene.turning * rng.standard_normal(n)
     dust = 0.55 + 0.9 * rng.random(n)
-    looks = looks_of(drawn.materials)
+    materials = [tray.materials[name] for name in drawn.materials]
+    looks = look_rows(materials)
     looks[:, :3] *= np.maximum(brightness, 0.5)[:, np.newaxis]
     _shade(looks, scene)
-    is_copper = np.array([name == 'copper' for name in drawn.materials])
-    is_grain = np.array([name == 'JSC-1' for name in drawn.materials])
+    is_oval = np.array([material.shape == 'oval' for material in materials])
+    is_grain = np.array([material.shape == 'grain' for material in materials])
     return Appearance(
         looks=looks,
         kinds=np.where(is_grain, GRAIN, SPHERE).astype(np.int64),
-        stretch=np.where(is_copper, np.sqrt(np.minimum(ratio, 1.8)), 1.0),
+        stretch=np.where(is_oval, np.sqrt(np.minimum(ratio, 1.8)), 1.0),
         angles=angles,
         rates=rates,
         dust=dust * (scene.chalk if tray.chalk else 0.0),
@@ -102,7 +103,7 @@ def appearance_of(tray: Tray, scene: SceneSettings, rng: np.random.Generator) ->
 
 
 def _shade(looks: NDArray[np.float64], scene: SceneSettings) -> None:
-    """Shading and highlights as strong as the settings say, in place."""
+    """Scale shading and highlights by the settings, in place."""
     flat = 1.0 - scene.shading
     # In the mean over a disc this is as bright as the shaded sphere, nearly.
     looks[:, _AMBIENT] += flat * 0.6 * looks[:, _DIFFUSE]
@@ -112,8 +113,8 @@ def _shade(looks: NDArray[np.float64], scene: SceneSettings) -> None:
     looks[:, _HIGHLIGHT] *= scene.highlights
 
 
-def turned_since(time: float, events: list[float]) -> float:
-    """By how much a body with a rate of 1 rad/s has turned, [rad].
+def turned_angle(time: float, events: list[float]) -> float:
+    """Angle by which a body with an initial rate of 1 rad/s has turned, [rad].
 
     Parameters
     ----------
@@ -142,7 +143,7 @@ def grain_shapes(irregularity: float, rng: np.random.Generator) -> NDArray[np.fl
     ndarray (97, SHAPE)
     """
     shapes = np.zeros((_SHAPES, SHAPE))
-    # Two lobes most, four least: chips rather than stars.
+    # The lobes of lowest order are the largest: chips rather than stars.
     weights = np.repeat([0.75, 0.5, 0.43], 2)
     lobes = irregularity * weights * rng.standard_normal((_SHAPES, LOBES))
     lobes = np.clip(lobes, -1.6 * irregularity, 1.6 * irregularity)
@@ -158,7 +159,7 @@ def grain_shapes(irregularity: float, rng: np.random.Generator) -> NDArray[np.fl
 def outline_moments(
     lobes: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """What the outlines of grains of mean radius 1 come to.
+    """Area, centroid and extent of the outlines of grains of mean radius 1.
 
     Parameters
     ----------

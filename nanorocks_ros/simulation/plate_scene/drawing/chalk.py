@@ -17,7 +17,7 @@ _PATTERN = 128
 def dusted_floor(
     floor: NDArray[np.float32], chalk: float, metre: float, rng: np.random.Generator
 ) -> NDArray[np.float32]:
-    """A floor with patches of dust on it, most of it along the walls.
+    """A floor with patches of dust, most of it along the walls.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def dusted_floor(
 
 
 def dust_pattern(rng: np.random.Generator) -> NDArray[np.float32]:
-    """Shares of dust on the beads, (128, 128): coarse patches and specks, mean about 0.4."""
+    """Pattern of dust on beads, (128, 128): coarse patches and specks, mean about 0.4."""
     shape = (_PATTERN, _PATTERN)
     field = 0.9 * _blotches(shape, 6.0, rng, wrap=True) + 0.45 * _blotches(shape, 2.2, rng, True)
     return np.asarray(np.clip(0.38 + 0.24 * field, 0.05, 0.9), dtype=np.float32)
@@ -51,7 +51,7 @@ def dust_pattern(rng: np.random.Generator) -> NDArray[np.float32]:
 def _blotches(
     shape: tuple[int, int], size: float, rng: np.random.Generator, wrap: bool = False
 ) -> NDArray[np.float32]:
-    """Smooth noise of standard deviation 1 whose patches are about so many pixels wide."""
+    """Smooth noise of standard deviation 1 with patches of about the given width."""
     border = cv2.BORDER_REFLECT
     raw = rng.standard_normal(shape, dtype=np.float32)
     if wrap:

@@ -1,4 +1,4 @@
-"""Grains: outlines of a few lobes, and facets that catch the light one by one."""
+"""Drawing of grains: an outline of a few lobes, and flat facets."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from nanorocks_ros.simulation.plate_scene.simd_rectangles import (
     ZERO,
     X,
     Y,
-    box,
-    compose,
-    covered,
-    lay_out,
-    short,
+    blend_body,
+    coverage,
+    drawn_rectangle,
+    fill_coordinates,
+    float32,
 )
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ LOBES = 6
 FACETS = 5
 SHAPE = LOBES + 4 * FACETS
 
-_TINY, _BACK = short(1e-9), short(-2.0)
+_TINY, _BACK = float32(1e-9), float32(-2.0)
 
 
 @inlined
@@ -57,7 +57,7 @@ def facet(
     k: int,
     level: float,
 ) -> tuple[float, float]:
-    """The facet that faces a point best, and its light, after one more facet."""
+    """The facet that faces a point best, and its light, after a further facet."""
     n = LOBES + 4 * k
     along = point[0] * shape[n] + point[1] * shape[n + 1] + point[2] * shape[n + 2]
     return max(best, along), (level if along > best else light)
@@ -73,7 +73,7 @@ def grain_pixels(
     levels: NDArray[np.float32],
     width: float,
 ) -> None:
-    """Shares and light of the pixels of a grain, without branches so that it runs in lanes.
+    """Coverage and light of the pixels of a grain, without branches so that SIMD applies.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def grain_pixels(
         best, light = facet(best, light, point, shape, 2, l2)
         best, light = facet(best, light, point, shape, 3, l3)
         best, light = facet(best, light, point, shape, 4, l4)
-        out[SHARE, j] = covered((distance - edge) * radius, width)
+        out[SHARE, j] = coverage((distance - edge) * radius, width)
         out[LEVELS, j] = blue * light
         out[LEVELS + 1, j] = green * light
         out[LEVELS + 2, j] = red * light
@@ -141,7 +141,7 @@ def draw_grain(
         down = shape[n] * sine + shape[n + 1] * cosine
         lambert = max(right * LAMP_X + down * LAMP_Y + shape[n + 2] * LAMP_Z, ZERO)
         levels[k] = STEPS * (look[AMBIENT] + look[DIFFUSE] * lambert) * shape[n + 3]
-    left, top, columns, rows = box(canvas, place, width)
-    n = lay_out(buffer, rows, columns, left + 0.5 - place[COLUMN], top + 0.5 - place[ROW])
+    left, top, columns, rows = drawn_rectangle(canvas, place, width)
+    n = fill_coordinates(buffer, rows, columns, left + 0.5 - place[COLUMN], top + 0.5 - place[ROW])
     grain_pixels(buffer, n, turned, shape, look, levels, width)
-    compose(canvas, buffer, left, top, columns, rows)
+    blend_body(canvas, buffer, left, top, columns, rows)

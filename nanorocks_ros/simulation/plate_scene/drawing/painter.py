@@ -1,4 +1,4 @@
-"""The beads of all trays and their shadows, drawn where the lens puts them."""
+"""Painter of the beads of all trays and their shadows, through the lens."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from nanorocks_ros.simulation.plate_scene.drawing.chalk import dust_pattern
 from nanorocks_ros.simulation.plate_scene.drawing.grains import LOBES
 from nanorocks_ros.simulation.plate_scene.drawing.scene_bodies import GRAIN, draw_bodies
 from nanorocks_ros.simulation.plate_scene.drawing.shadows import draw_shadows
-from nanorocks_ros.simulation.plate_scene.simd_rectangles import PLACE, short
+from nanorocks_ros.simulation.plate_scene.simd_rectangles import PLACE, float32
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -49,12 +49,12 @@ class BeadPainter:
     radii : mapping of int to ndarray (n,), [m]
         Of the beads, for each tray that is drawn.
     seed : int
-        Of what the beads look like.
+        Of the appearance of the beads.
 
     Raises
     ------
     SimulationError
-        For radii that are not those of the beads of a tray.
+        For radii that do not match the beads of a tray.
     """
 
     def __init__(
@@ -81,20 +81,20 @@ class BeadPainter:
         self._looks = self._look.looks.astype(np.float32)
         count = sum(self._counts.values())
         size, centroid, furthest = outline_moments(shapes[:, :LOBES])
-        which = np.arange(count) % len(self._shapes)
+        shape_index = np.arange(count) % len(self._shapes)
         grain = self._look.kinds == GRAIN
-        # An outline has the area of the grain, and its centroid where the grain is.
+        # An outline has the area of the grain, and its centroid at the position of the grain.
         spheres = np.concatenate([*radii.values(), np.empty(0)]) * geometry.scale
-        self._radii_px = spheres / np.where(grain, size[which], 1.0)
-        self._offsets = np.where(grain[:, np.newaxis], -centroid[which], 0.0)
-        self._reach = np.where(grain, furthest[which], 1.0)
+        self._radii_px = spheres / np.where(grain, size[shape_index], 1.0)
+        self._offsets = np.where(grain[:, np.newaxis], -centroid[shape_index], 0.0)
+        self._reach = np.where(grain, furthest[shape_index], 1.0)
         self._width = float(np.hypot(_SHARP * _STEP_DEVIATION, scene.defocus_px) / _STEP_DEVIATION)
         counts = list(self._counts.values())
         corners = [geometry.regions[number][:2] for number in radii]
         floors = [_floor(geometry, number) for number in radii]
         self._corners, self._floors = (
-            np.repeat(np.array(one, dtype=np.float64).reshape(-1, size), counts, axis=0)
-            for one, size in ((corners, 2), (floors, 4))
+            np.repeat(np.array(points, dtype=np.float64).reshape(-1, size), counts, axis=0)
+            for points, size in ((corners, 2), (floors, 4))
         )
 
     def paint(
@@ -109,7 +109,7 @@ class BeadPainter:
         if not len(places):
             return
         points = places[:, :2] * self._geometry.scale + self._corners
-        seen = self._geometry.camera.distorted(points)
+        pixels = self._geometry.camera.distorted(points)
         lens = self._geometry.local_scales(points)
         if self._shadows > 0.0:
             height = places[:, 2] * self._geometry.scale
@@ -118,12 +118,12 @@ class BeadPainter:
         draw_bodies(
             canvas,
             self._order(places[:, 2]),
-            self._rows(seen, lens, turned).astype(np.float32),
+            self._rows(pixels, lens, turned).astype(np.float32),
             self._looks,
             look.kinds,
             self._shapes,
             self._dust,
-            short(self._width),
+            float32(self._width),
         )
 
     def _checked(self, positions: Mapping[int, NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -134,17 +134,17 @@ class BeadPainter:
                 f'give those of {sorted(self._counts)}',
             )
         for number, count in self._counts.items():
-            one = np.asarray(positions[number])
-            if one.shape != (count, 3) or not np.isfinite(one).all():
+            points = np.asarray(positions[number])
+            if points.shape != (count, 3) or not np.isfinite(points).all():
                 raise SimulationError(
                     f'positions of tray {number}',
-                    f'shape {one.shape}, expected {(count, 3)}',
+                    f'shape {points.shape}, expected {(count, 3)}',
                     'give finite positions',
                 )
         return np.concatenate([np.empty((0, 3)), *(positions[k] for k in self._counts)])
 
     def _order(self, heights: NDArray[np.float64]) -> NDArray[np.int64]:
-        """The lowest first, tray by tray: so what is drawn on stays in the cache."""
+        """Drawing order: the lowest first, tray by tray, which keeps the canvas in the cache."""
         ends = np.cumsum([0, *self._counts.values()])
         return np.concatenate(
             [
@@ -154,14 +154,14 @@ class BeadPainter:
         )
 
     def _rows(
-        self, seen: NDArray[np.float64], lens: NDArray[np.float64], turned: float
+        self, pixels: NDArray[np.float64], lens: NDArray[np.float64], turned: float
     ) -> NDArray[np.float64]:
-        """One row for each bead, as `bodies.draw_bodies` reads it."""
+        """One row for each bead, as `draw_bodies` reads it."""
         look, radii = self._look, self._radii_px
         angles = look.angles + look.rates * turned
         cosine, sine = np.cos(angles), np.sin(angles)
         longer, shorter = look.stretch, 1.0 / look.stretch
-        # The bead as an oval, then as the lens shows it: a matrix from the unit disc to pixels.
+        # An oval, then seen through the lens: a matrix from the unit disc to pixels.
         a = radii * (longer * cosine**2 + shorter * sine**2)
         d = radii * (longer * sine**2 + shorter * cosine**2)
         b = radii * (longer - shorter) * cosine * sine
@@ -171,8 +171,8 @@ class BeadPainter:
         across = cosine * self._offsets[:, 0] - sine * self._offsets[:, 1]
         down = sine * self._offsets[:, 0] + cosine * self._offsets[:, 1]
         rows = np.empty((len(radii), PLACE))
-        rows[:, 0] = seen[:, 0] + xx * across + xy * down
-        rows[:, 1] = seen[:, 1] + yx * across + yy * down
+        rows[:, 0] = pixels[:, 0] + xx * across + xy * down
+        rows[:, 1] = pixels[:, 1] + yx * across + yy * down
         rows[:, 2] = np.hypot(xx, xy) * self._reach
         rows[:, 3] = np.hypot(yx, yy) * self._reach
         rows[:, 4] = np.sqrt(area)
@@ -197,11 +197,11 @@ class BeadPainter:
         spots[:, 5] = np.minimum(blur, _WIDEST_BLUR * spots[:, 4])
         across, down = np.array(displacement) * geometry.scale
         spots[:, 6:] = self._floors + np.array([across, across, down, down])
-        draw_shadows(canvas, spots.astype(np.float32), short(self._shadows))
+        draw_shadows(canvas, spots.astype(np.float32), float32(self._shadows))
 
 
 def _floor(geometry: SceneGeometry, tray: int) -> tuple[int, int, int, int]:
-    """First and last column and row of the picture that the floor of a tray reaches."""
+    """Bounds of the floor of a tray in the picture: columns, then rows."""
     region = geometry.regions[tray]
     x, y, width, height = geometry.bounds(
         region.x, region.y, region.x + region.width, region.y + region.height

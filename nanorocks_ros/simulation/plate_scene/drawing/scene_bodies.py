@@ -1,4 +1,4 @@
-"""All bodies of the scene, drawn one over the other."""
+"""Drawing of all bodies of the scene, from the lowest to the highest."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def draw_bodies(
     dust: NDArray[np.float32],
     width: float,
 ) -> None:
-    """Draw bodies over what is there and over each other.
+    """Draw bodies over the canvas and over each other.
 
     Parameters
     ----------
@@ -48,22 +48,22 @@ def draw_bodies(
         (2 x 2) from pixels to parts of the radius; cosine and sine of the angle that the body
         has turned by; share of dust.
     looks : ndarray of float32, (n, 9)
-        Columns as the fields of `materials.Look`, levels below 1000.
+        Columns as the fields of `experiment.materials.Look`, levels below 1000.
     kinds : ndarray of int64, (n,)
         `SPHERE` or `GRAIN`.
     shapes : ndarray of float32, (n_shapes, SHAPE)
         Grains take one after the other.
     dust : ndarray of float32, (size, size)
-        Where dust is on beads; each begins elsewhere in it.
+        Pattern of dust; each bead starts at another place of it.
     width : float32, [px]
         Of the outlines.
     """
-    most = 0.0
+    max_pixels = 0.0
     for k in range(order.size):
         sides = places[k, HALF_WIDTH : HALF_HEIGHT + 1]
         across, down = 2.0 * sides[0] + width + 2.0 + LANES, 2.0 * sides[1] + width + 2.0
-        most = max(most, across * down)
-    buffer = np.empty((BUFFERS, int(most) + LANES), dtype=np.float32)
+        max_pixels = max(max_pixels, across * down)
+    buffer = np.empty((BUFFERS, int(max_pixels) + LANES), dtype=np.float32)
     turned = np.empty(PLACE, dtype=np.float32)
     levels = np.empty(FACETS, dtype=np.float32)
     for k in range(order.size):

@@ -21,9 +21,9 @@ from nanorocks_ros.simulation.plate_scene.simd_rectangles import (
     SHARE,
     X,
     Y,
-    box,
-    covered,
-    lay_out,
+    coverage,
+    drawn_rectangle,
+    fill_coordinates,
 )
 
 if TYPE_CHECKING:
@@ -37,13 +37,13 @@ _BLUR, _FLOOR = 5, 6
 def shadow_pixels(
     out: NDArray[np.float32], n: int, spot: NDArray[np.float32], strength: float
 ) -> None:
-    """Share of the light that a shadow leaves of the pixels laid out in a buffer."""
+    """Fraction of the light that a shadow leaves, for the pixels of a buffer."""
     radius, width = spot[RADIUS], spot[_BLUR]
     left, right = spot[_FLOOR] - spot[COLUMN], spot[_FLOOR + 1] - spot[COLUMN]
     top, bottom = spot[_FLOOR + 2] - spot[ROW], spot[_FLOOR + 3] - spot[ROW]
     for j in range(n):
         x, y = out[X, j], out[Y, j]
-        share = strength * covered(math.sqrt(x * x + y * y) - radius, width)
+        share = strength * coverage(math.sqrt(x * x + y * y) - radius, width)
         on_floor = (x > left) & (x < right) & (y > top) & (y < bottom)
         out[SHARE, j] = ONE - share if on_floor else ONE
 
@@ -57,7 +57,7 @@ def darken(
     columns: int,
     rows: int,
 ) -> None:
-    """Leave a rectangle of a canvas the light that `shadow_pixels` found."""
+    """Multiply a rectangle of a canvas by the light of `shadow_pixels`."""
     for channel in range(3):
         k = np.uint64(0)
         for i in range(top, top + rows):
@@ -75,7 +75,7 @@ def draw_shadows(
     spots: NDArray[np.float32],
     strength: float,
 ) -> None:
-    """Darken the floor where bodies keep the light away.
+    """Darken the floor in the shadows of bodies.
 
     Parameters
     ----------
@@ -87,14 +87,16 @@ def draw_shadows(
     strength : float32
         Share of the light that the deepest shadow takes.
     """
-    most = 0.0
+    max_pixels = 0.0
     for k in range(spots.shape[0]):
         side = 2.0 * spots[k, HALF_WIDTH] + spots[k, _BLUR] + 2.0
-        most = max(most, side * (side + LANES))
-    buffer = np.empty((BUFFERS, int(most) + LANES), dtype=np.float32)
+        max_pixels = max(max_pixels, side * (side + LANES))
+    buffer = np.empty((BUFFERS, int(max_pixels) + LANES), dtype=np.float32)
     for k in range(spots.shape[0]):
         spot, width = spots[k], spots[k, _BLUR]
-        left, top, columns, rows = box(canvas, spot, width)
-        n = lay_out(buffer, rows, columns, left + 0.5 - spot[COLUMN], top + 0.5 - spot[ROW])
+        left, top, columns, rows = drawn_rectangle(canvas, spot, width)
+        n = fill_coordinates(
+            buffer, rows, columns, left + 0.5 - spot[COLUMN], top + 0.5 - spot[ROW]
+        )
         shadow_pixels(buffer, n, spot, strength)
         darken(canvas, buffer, left, top, columns, rows)

@@ -1,4 +1,4 @@
-"""Beads: spheres and ovals with shading, a mirror image of the lamp, and dust."""
+"""Drawing of beads: spheres and ovals with shading, a highlight, and dust."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ from nanorocks_ros.simulation.plate_scene.simd_rectangles import (
     ZERO,
     X,
     Y,
-    box,
-    compose,
-    covered,
-    lay_out,
-    short,
+    blend_body,
+    coverage,
+    drawn_rectangle,
+    fill_coordinates,
+    float32,
 )
 
 if TYPE_CHECKING:
@@ -49,13 +49,13 @@ if TYPE_CHECKING:
 # Half way between the lamp and the camera a mirror would show the lamp.
 _HALF_LENGTH = math.sqrt(LAMP_X**2 + LAMP_Y**2 + (1.0 + LAMP_Z) ** 2)
 _HALF_X, _HALF_Y, _HALF_Z = (
-    short(value / _HALF_LENGTH) for value in (LAMP_X, LAMP_Y, 1.0 + LAMP_Z)
+    float32(value / _HALF_LENGTH) for value in (LAMP_X, LAMP_Y, 1.0 + LAMP_Z)
 )
-_LAMP_ACROSS = short(0.60)
+_LAMP_ACROSS = float32(0.60)
 _CHALK = np.array([226.0, 229.0, 231.0], dtype=np.float32)
 
 # Squares of the pattern of dust to the radius of a bead.
-_DUST_SQUARES = short(12.0)
+_DUST_SQUARES = float32(12.0)
 
 
 @kernel
@@ -66,7 +66,7 @@ def bead_pixels(
     look: NDArray[np.float32],
     width: float,
 ) -> None:
-    """Shares and light of the pixels of a bead, without branches so that it runs in lanes.
+    """Coverage and light of the pixels of a bead, without branches so that SIMD applies.
 
     The light is that of `drawing.shade`.
 
@@ -101,7 +101,7 @@ def bead_pixels(
         narrow = narrow * narrow
         away = max(-lamp / _LAMP_ACROSS, ZERO)
         light = (ambient + diffuse * lambert) * (ONE - darkening * (ONE - z) * (ONE - z))
-        out[SHARE, j] = covered((distance - ONE) * radius, width)
+        out[SHARE, j] = coverage((distance - ONE) * radius, width)
         light += glow * away * away * z + sheen * broad
         out[LEVELS, j] = blue * light + highlight * narrow
         out[LEVELS + 1, j] = green * light + highlight * narrow
@@ -115,7 +115,7 @@ def bead_pixels(
 def put_dust(
     out: NDArray[np.float32], n: int, dust: NDArray[np.float32], start: int, cover: float
 ) -> None:
-    """Hide the pixels that `bead_pixels` left under dust."""
+    """Put dust over the pixels of `bead_pixels`."""
     size = dust.shape[0]
     for j in range(n):
         y = int((out[DOWN, j] + ONE) * _DUST_SQUARES) + start
@@ -138,9 +138,9 @@ def draw_bead(
     buffer: NDArray[np.float32],
 ) -> None:
     """Draw a shaded sphere, or oval, under its dust; see `draw_bodies`."""
-    left, top, columns, rows = box(canvas, place, width)
-    n = lay_out(buffer, rows, columns, left + 0.5 - place[COLUMN], top + 0.5 - place[ROW])
+    left, top, columns, rows = drawn_rectangle(canvas, place, width)
+    n = fill_coordinates(buffer, rows, columns, left + 0.5 - place[COLUMN], top + 0.5 - place[ROW])
     bead_pixels(buffer, n, place, look, width)
     if place[DUST] > 0.0:
         put_dust(buffer, n, dust, start, place[DUST])
-    compose(canvas, buffer, left, top, columns, rows)
+    blend_body(canvas, buffer, left, top, columns, rows)

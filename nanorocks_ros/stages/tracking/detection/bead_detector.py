@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import cv2
 import numpy as np
 
-from nanorocks_ros.experiment.colours import hue_of
 from nanorocks_ros.stages.tracking.detection.background_model import (
     initial_background,
     update_background,
@@ -239,7 +238,7 @@ class _Background(NamedTuple):
 
 
 def _class_of(species: Species) -> int:
-    return {1: RED, -1: BLUE, 0: GRAY}[hue_of(species.material)]
+    return {1: RED, -1: BLUE, 0: GRAY}[species.properties.hue]
 
 
 def _rounded(mean: NDArray[np.float32]) -> NDArray[np.uint8]:

@@ -7,12 +7,9 @@ import pytest
 from gases import ALWAYS, NEVER, beads_of, energy, gas_of, placed, smallest_gap
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine.gas import (
-    MOST_FOR_SCAN,
-    CollisionRules,
-    HardSphereGas,
-    Kernel,
-)
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.kernel_choice import MOST_FOR_SCAN, Kernel
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 
 def first_events(beads, rules, kernel, n):
@@ -33,12 +30,12 @@ def lists_that_agree(beads, rules, events_per_bead=1):
         beads, rules, Kernel.SCAN, int(events_per_bead * len(beads.radii))
     )
     lists = HardSphereGas(beads, rules, Kernel.LISTS)
-    course = lists.follow(scan.now, [scan.now], log=True)
+    record = lists.follow(scan.now, [scan.now], log=True)
     for field in ('kind', 'bead', 'partner'):
-        np.testing.assert_array_equal(course.events[field], expected.events[field])
+        np.testing.assert_array_equal(record.events[field], expected.events[field])
     for field in ('time', 'normal_speed', 'impulse'):
-        np.testing.assert_allclose(course.events[field], expected.events[field], atol=1e-6)
-    np.testing.assert_allclose(course.positions, expected.positions, atol=1e-6)
+        np.testing.assert_allclose(record.events[field], expected.events[field], atol=1e-6)
+    np.testing.assert_allclose(record.positions, expected.positions, atol=1e-6)
     return lists
 
 
@@ -60,7 +57,7 @@ def most_in_a_cell(gas):
 
 @pytest.mark.parametrize('periodic', [NEVER, ALWAYS, (True, False, True)])
 @pytest.mark.parametrize(('spacing', 'events_per_bead'), [(2.05, 4), (3.0, 2), (7.0, 0.7)])
-def test_lists_find_what_asking_everybody_finds(periodic, spacing, events_per_bead):
+def test_lists_agree_with_the_scan(periodic, spacing, events_per_bead):
     """From half full to one part in a hundred, where chaos comes sooner; sizes from 0.5 to 1."""
     radii = np.random.default_rng(2).uniform(0.5, 1.0, 6 * 5 * 5)
     rules = CollisionRules(
@@ -97,9 +94,9 @@ def test_lists_that_overflow_on_the_way_grow(periodic, sticking_speed):
     room = most_in_a_list(HardSphereGas(beads, rules, Kernel.LISTS))
     gas = lists_that_agree(beads, rules, events_per_bead=2)
     assert most_in_a_list(gas) > room
-    course = gas.follow(gas.now + 20.0, np.linspace(gas.now, gas.now + 20.0, 21))
-    assert smallest_gap(course.positions, gas.radii, rules) > -1e-10
-    assert energy(gas.beads()) + gas.books[:3].sum() == pytest.approx(energy(beads), rel=1e-12)
+    record = gas.follow(gas.now + 20.0, np.linspace(gas.now, gas.now + 20.0, 21))
+    assert smallest_gap(record.positions, gas.radii, rules) > -1e-10
+    assert energy(gas.beads()) + gas.ledger[:3].sum() == pytest.approx(energy(beads), rel=1e-12)
 
 
 @pytest.mark.parametrize('periodic', [NEVER, ALWAYS])
@@ -187,9 +184,9 @@ def test_a_periodic_box_too_small_for_lists_is_scanned_and_lists_are_refused():
     rules = CollisionRules(box=(40.5, 40.5, 4.05), periodic=ALWAYS)
     gas = HardSphereGas(beads, rules)
     assert gas.kernel == Kernel.SCAN
-    course = gas.follow(30.0, np.linspace(0.0, 30.0, 31))
+    record = gas.follow(30.0, np.linspace(0.0, 30.0, 31))
     assert gas.counts.pair > 100
-    assert smallest_gap(course.positions, beads.radii, rules) > -1e-10
+    assert smallest_gap(record.positions, beads.radii, rules) > -1e-10
     with pytest.raises(SimulationError, match='periodic box is too small for lists; use the scan'):
         HardSphereGas(beads, rules, Kernel.LISTS)
 

@@ -1,4 +1,4 @@
-"""The same beads and rules have the same course, bit by bit, on every machine."""
+"""The same beads and rules give the same trajectories, bit by bit, on every machine."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from gases import ALWAYS, BOX, KERNELS, RULES, Beads, placed
 
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 # CRC-32 of places and velocities after 30 s. The rules are those that need no more than
 # + - * /, square roots and integers; sines and powers differ from machine to machine.
@@ -41,34 +42,34 @@ def beads_for(rules, n=20):
 def fingerprint(name, kernel):
     box = tuple(1.5 * side for side in BOX)
     rules = CollisionRules(box=box, **RULES[name])
-    course = HardSphereGas(beads_for(rules), rules, kernel).follow(30.0, [30.0])
+    record = HardSphereGas(beads_for(rules), rules, kernel).follow(30.0, [30.0])
     return tuple(
         zlib.crc32(np.ascontiguousarray(array).tobytes())
-        for array in (course.positions, course.velocities)
+        for array in (record.positions, record.velocities)
     )
 
 
 @pytest.mark.parametrize('name', GOLDEN)
-def test_the_course_has_not_changed(name):
+def test_trajectories_match_stored_checksums(name):
     scan, lists = (fingerprint(name, kernel) for kernel in KERNELS)
     assert {'scan': scan, 'lists': lists} == GOLDEN[name]
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
 @pytest.mark.parametrize('name', RULES)
-def test_the_same_gas_twice_is_the_same(name, kernel):
+def test_two_runs_are_bit_identical(name, kernel):
     assert fingerprint(name, kernel) == fingerprint(name, kernel)
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
-def test_the_last_bit_of_one_place_changes_the_course(kernel):
+def test_one_changed_bit_of_a_position_changes_the_trajectories(kernel):
     """What is compared above is as sharp as can be."""
     rules = CollisionRules(box=BOX, periodic=ALWAYS)
     beads = beads_for(rules, 6)
     moved = beads.positions.copy()
     moved[0, 0] = np.nextafter(moved[0, 0], np.inf)
-    one, other = (
+    first, second = (
         HardSphereGas(replace(beads, positions=positions), rules, kernel).follow(30.0, [30.0])
         for positions in (beads.positions, moved)
     )
-    assert not np.array_equal(one.positions, other.positions)
+    assert not np.array_equal(first.positions, second.positions)

@@ -1,4 +1,4 @@
-"""Bodies: beads that stick to each other and to walls, worked out by hand, and in gases."""
+"""Beads that stick to each other and to walls, against solutions by hand, and in gases."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from gases import KERNELS, energy, gas_of, mixture, momentum, near, to_nearest
 
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 
 
-def what_happened(course):
-    return [(row['kind'].item(), row['bead'], row['partner']) for row in course.events]
+def event_list(record):
+    return [(row['kind'].item(), row['bead'], row['partner']) for row in record.events]
 
 
 @pytest.mark.parametrize(
@@ -27,7 +28,7 @@ def what_happened(course):
         ('merge', {'sticking_speed': 2.01, 'sticking_measure': 'total'}),
     ],
 )
-def test_slow_pairs_merge_by_the_speed_that_is_to_count(kernel, kind, rules):
+def test_slow_pairs_merge_by_the_chosen_speed_measure(kernel, kind, rules):
     """The relative speed is 2, along the normal 2 cos 30° = 1.732; masses 1 and 3."""
     gas = gas_of(
         [(2, 5, 5), (6, 6, 5)],
@@ -39,16 +40,16 @@ def test_slow_pairs_merge_by_the_speed_that_is_to_count(kernel, kind, rules):
         **rules,
     )
     had, moved = energy(gas.beads()), momentum(gas.beads())
-    course = gas.follow(2.0, [0.5, 2.0], log=True)
-    assert course.events[0]['kind'] == kind
-    assert course.events[0]['normal_speed'] == near(math.sqrt(3.0))
+    record = gas.follow(2.0, [0.5, 2.0], log=True)
+    assert record.events[0]['kind'] == kind
+    assert record.events[0]['normal_speed'] == near(math.sqrt(3.0))
     assert momentum(gas.beads()) == near(moved)
     if kind == 'merge':
-        assert course.bodies.tolist() == [[0, 1], [0, 0]]
-        assert course.velocities[1] == near(np.array([(0.5, 0, 0)] * 2))
-        assert not course.spins[1].any()
-        assert course.events[0]['impulse'] == near(0.75 * 2)
-        assert gas.books[:3] == near([0, 0, had - 0.5])
+        assert record.bodies.tolist() == [[0, 1], [0, 0]]
+        assert record.velocities[1] == near(np.array([(0.5, 0, 0)] * 2))
+        assert not record.spins[1].any()
+        assert record.events[0]['impulse'] == near(0.75 * 2)
+        assert gas.ledger[:3] == near([0, 0, had - 0.5])
 
 
 def test_beads_meet_once_for_all_and_sticking_goes_before_the_contact_duration(kernel):
@@ -63,9 +64,9 @@ def test_beads_meet_once_for_all_and_sticking_goes_before_the_contact_duration(k
         contact_duration=100.0,
         kernel=kernel,
     )
-    course = gas.follow(50.0, [50.0], log=True)
-    assert what_happened(course) == [('pair', 0, 1), ('wall', 1, 1), ('merge', 0, 1)]
-    assert course.bodies.tolist() == [[0, 0]]
+    record = gas.follow(50.0, [50.0], log=True)
+    assert event_list(record) == [('pair', 0, 1), ('wall', 1, 1), ('merge', 0, 1)]
+    assert record.bodies.tolist() == [[0, 0]]
 
 
 def test_a_merged_body_bounces_as_one(kernel):
@@ -78,27 +79,27 @@ def test_a_merged_body_bounces_as_one(kernel):
         sticking_speed=1.5,
         kernel=kernel,
     )
-    course = gas.follow(2.6, [1.5, 2.6], log=True)
-    assert what_happened(course) == [('merge', 0, 1), ('pair', 1, 2), ('wall', 0, 0)]
-    assert course.velocities[0, :, 0] == near([-2, -2, 0.5])
-    assert course.velocities[1, :, 0] == near([2, 2, 0.5])
-    assert course.events['impulse'] == near([0.5, 5.0, 8.0])
-    assert course.positions[1, 1, 0] - course.positions[1, 0, 0] == near(2.0)
+    record = gas.follow(2.6, [1.5, 2.6], log=True)
+    assert event_list(record) == [('merge', 0, 1), ('pair', 1, 2), ('wall', 0, 0)]
+    assert record.velocities[0, :, 0] == near([-2, -2, 0.5])
+    assert record.velocities[1, :, 0] == near([2, 2, 0.5])
+    assert record.events['impulse'] == near([0.5, 5.0, 8.0])
+    assert record.positions[1, 1, 0] - record.positions[1, 0, 0] == near(2.0)
     assert gas.bodies.tolist() == [0, 0, 2]
     assert gas.counts.merge == 1
 
 
-def test_the_smallest_number_names_a_body_whoever_merges_last(kernel):
+def test_a_body_has_the_smallest_number_of_its_beads(kernel):
     gas = gas_of(
         [(8, 5, 5), (2, 5, 5), (5, 5, 5)],
         [(-0.5, 0, 0), (1, 0, 0), (0, 0, 0)],
         sticking_speed=3.0,
         kernel=kernel,
     )
-    course = gas.follow(3.0, [0.9, 1.05, 3.0], log=True)
-    assert what_happened(course) == [('merge', 1, 2), ('merge', 0, 2)]
-    assert course.bodies.tolist() == [[0, 1, 2], [0, 1, 1], [0, 0, 0]]
-    assert course.velocities[2, :, 0] == near([1 / 6] * 3)
+    record = gas.follow(3.0, [0.9, 1.05, 3.0], log=True)
+    assert event_list(record) == [('merge', 1, 2), ('merge', 0, 2)]
+    assert record.bodies.tolist() == [[0, 1, 2], [0, 1, 1], [0, 0, 0]]
+    assert record.velocities[2, :, 0] == near([1 / 6] * 3)
     assert not gas.stuck.any()
 
 
@@ -113,16 +114,16 @@ def test_a_slow_bead_stays_at_a_wall_and_reflects_as_one_of_infinite_mass(kernel
         wall_sticking_speed=0.6,
         kernel=kernel,
     )
-    course = gas.follow(8.0, [8.0], log=True)
-    assert what_happened(course) == [('fix', 0, 0), ('pair', 0, 1)]
-    assert course.events['time'] == near([4.0, 6.0])
-    assert course.events['impulse'] == near([0.5, 3 * 1.5 * 2])
+    record = gas.follow(8.0, [8.0], log=True)
+    assert event_list(record) == [('fix', 0, 0), ('pair', 0, 1)]
+    assert record.events['time'] == near([4.0, 6.0])
+    assert record.events['impulse'] == near([0.5, 3 * 1.5 * 2])
     assert gas.stuck.tolist() == [True, False]
-    assert course.positions[0, 0].tolist() == [1, 5, 5]
-    assert course.velocities[0, :, 0] == near([0, 1])
-    assert gas.books[:3] == near([0.5 * 3 * 4 * 0.75, 0.125, 0])
-    assert gas.books[3:9] == near([0.5, 0, 0, 0, 0, 0])
-    assert gas.books[9:12] == near([-0.5 - 9.0, 0, 0])
+    assert record.positions[0, 0].tolist() == [1, 5, 5]
+    assert record.velocities[0, :, 0] == near([0, 1])
+    assert gas.ledger[:3] == near([0.5 * 3 * 4 * 0.75, 0.125, 0])
+    assert gas.ledger[3:9] == near([0.5, 0, 0, 0, 0, 0])
+    assert gas.ledger[9:12] == near([-0.5 - 9.0, 0, 0])
 
 
 @pytest.mark.parametrize(
@@ -135,18 +136,18 @@ def test_a_slow_bead_stays_at_a_wall_and_reflects_as_one_of_infinite_mass(kernel
         ('fix', {'wall_sticking_speed': 1.31, 'sticking_measure': 'total'}),
     ],
 )
-def test_slow_beads_stay_at_a_wall_by_the_speed_that_is_to_count(kernel, kind, rules):
+def test_slow_beads_stick_to_a_wall_by_the_chosen_speed_measure(kernel, kind, rules):
     """The speed is 1.3, along the normal 0.5."""
     gas = gas_of([(3, 2, 5)], [(-0.5, 1.2, 0)], kernel=kernel, **rules)
-    course = gas.follow(5.0, [5.0], log=True)
-    assert what_happened(course) == [(kind, 0, 0)]
-    assert course.events['normal_speed'] == near([0.5])
-    assert course.events['impulse'] == near([1.3 if kind == 'fix' else 1.0])
+    record = gas.follow(5.0, [5.0], log=True)
+    assert event_list(record) == [(kind, 0, 0)]
+    assert record.events['normal_speed'] == near([0.5])
+    assert record.events['impulse'] == near([1.3 if kind == 'fix' else 1.0])
     expected = (0, 0, 0) if kind == 'fix' else (0.5, 1.2, 0)
-    assert course.velocities[0, 0] == near(expected)
+    assert record.velocities[0, 0] == near(expected)
 
 
-def test_what_sticks_to_a_bead_at_a_wall_is_stuck_too(kernel):
+def test_a_bead_that_sticks_to_a_stuck_bead_is_stuck(kernel):
     gas = gas_of(
         [(3, 5, 5), (8, 5, 5), (13, 5, 5)],
         [(-0.5, 0, 0), (-0.5, 0, 0), (-0.5, 0, 0)],
@@ -155,14 +156,14 @@ def test_what_sticks_to_a_bead_at_a_wall_is_stuck_too(kernel):
         wall_sticking_speed=0.6,
         kernel=kernel,
     )
-    course = gas.follow(60.0, [5.0, 15.0, 60.0], log=True)
-    assert what_happened(course) == [('fix', 0, 0), ('merge', 0, 1), ('merge', 1, 2)]
+    record = gas.follow(60.0, [5.0, 15.0, 60.0], log=True)
+    assert event_list(record) == [('fix', 0, 0), ('merge', 0, 1), ('merge', 1, 2)]
     assert gas.stuck.all()
     assert gas.bodies.tolist() == [0, 0, 0]
-    assert course.positions[2, :, 0] == near([1, 3, 5])
-    assert not course.velocities[2].any()
+    assert record.positions[2, :, 0] == near([1, 3, 5])
+    assert not record.velocities[2].any()
     assert gas.counts.merge == 2
-    assert gas.books[9:12] == near([-1.5, 0, 0])
+    assert gas.ledger[9:12] == near([-1.5, 0, 0])
 
 
 def test_a_body_stops_as_a_whole_at_a_wall_that_one_of_its_beads_reaches(kernel):
@@ -173,11 +174,11 @@ def test_a_body_stops_as_a_whole_at_a_wall_that_one_of_its_beads_reaches(kernel)
         wall_sticking_speed=0.6,
         kernel=kernel,
     )
-    course = gas.follow(10.0, [10.0], log=True)
-    assert what_happened(course) == [('merge', 0, 1), ('fix', 0, 0)]
-    assert course.positions[0, :, 0] == near([1, 3])
+    record = gas.follow(10.0, [10.0], log=True)
+    assert event_list(record) == [('merge', 0, 1), ('fix', 0, 0)]
+    assert record.positions[0, :, 0] == near([1, 3])
     assert gas.stuck.all()
-    assert gas.books[3] == near(2 * 0.5)
+    assert gas.ledger[3] == near(2 * 0.5)
 
 
 @pytest.mark.parametrize('walls', [False, True])
@@ -190,20 +191,20 @@ def test_bodies_keep_their_shape_their_velocity_and_their_members(kernel, walls)
         wall_sticking_speed=0.2 if walls else 0.0,
     )
     gas = HardSphereGas(mixture(4, 40, rules), rules, kernel)
-    course = gas.follow(60.0, np.linspace(0.0, 60.0, 61))
+    record = gas.follow(60.0, np.linspace(0.0, 60.0, 61))
     assert gas.counts.merge > 10
     assert gas.counts.merge == 40 - np.unique(gas.bodies).size
-    largest = np.bincount(course.bodies[-1]).max()
+    largest = np.bincount(record.bodies[-1]).max()
     assert largest >= 3
     for k in range(1, 61):
-        bodies = course.bodies[k]
+        bodies = record.bodies[k]
         assert np.all(bodies == bodies[bodies])
         assert np.all(bodies <= np.arange(40))
-        np.testing.assert_array_equal(course.velocities[k], course.velocities[k][bodies])
+        np.testing.assert_array_equal(record.velocities[k], record.velocities[k][bodies])
         # Who was together stays together, at the same distances.
-        before = course.bodies[k - 1]
+        before = record.bodies[k - 1]
         assert np.all(bodies == bodies[before])
-        moved = course.positions[k] - course.positions[k - 1]
+        moved = record.positions[k] - record.positions[k - 1]
         np.testing.assert_allclose(moved, moved[before], atol=1e-11)
 
 

@@ -1,4 +1,4 @@
-"""Running observables say the same as frames taken at the same instants, and as the events."""
+"""Observables agree with the frames of the same instants and with the event log."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from gases import BOX, KERNELS, RULES, energy, gas_of, mixture, near
 
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 END = 12.0
 TIMES = np.array([0.0, 0.4, 1.0, 1.0, 2.5, 5.5, 8.0, 11.9, END])
@@ -24,10 +25,10 @@ cases = pytest.mark.parametrize('kernel', KERNELS)
 
 @cases
 @pytest.mark.parametrize('name', RULES)
-def test_means_are_those_of_the_frames(name, kernel):
-    beads, _, course = followed(name, kernel)
-    seen = course.observations
-    v = course.velocities
+def test_means_agree_with_the_frames(name, kernel):
+    beads, _, record = followed(name, kernel)
+    seen = record.observations
+    v = record.velocities
     np.testing.assert_array_equal(seen.times, TIMES)
     np.testing.assert_allclose(seen.mean_speed, np.linalg.norm(v, axis=2).mean(axis=1), 1e-14)
     projected = np.hypot(v[..., 0], v[..., 1]).mean(axis=1)
@@ -41,9 +42,9 @@ def test_means_are_those_of_the_frames(name, kernel):
 
 @cases
 @pytest.mark.parametrize('name', RULES)
-def test_counts_are_those_of_the_events_until_then(name, kernel):
-    _, gas, course = followed(name, kernel)
-    seen, events = course.observations, course.events
+def test_counts_agree_with_the_event_log(name, kernel):
+    _, gas, record = followed(name, kernel)
+    seen, events = record.observations, record.events
     for kind, counts in (
         ('pair', seen.pair_collisions),
         ('wall', seen.wall_collisions),
@@ -55,24 +56,24 @@ def test_counts_are_those_of_the_events_until_then(name, kernel):
     assert seen.pair_collisions[-1] == gas.counts.pair > 0
     assert seen.wall_collisions[-1] == gas.counts.wall
     bodies = [14] * TIMES.size
-    if course.bodies is not None:
-        bodies = [np.unique(frame).size for frame in course.bodies]
+    if record.bodies is not None:
+        bodies = [np.unique(frame).size for frame in record.bodies]
     np.testing.assert_array_equal(seen.bodies, bodies)
     assert seen.bodies[-1] == 14 - seen.merges[-1]
 
 
 @cases
 @pytest.mark.parametrize('name', RULES)
-def test_the_books_are_those_of_the_frames_and_events_until_then(name, kernel):
-    beads, gas, course = followed(name, kernel)
-    seen = course.observations
-    left = energy(beads, course.velocities, course.spins)
+def test_the_ledger_agrees_with_frames_and_events(name, kernel):
+    beads, gas, record = followed(name, kernel)
+    seen = record.observations
+    left = energy(beads, record.velocities, record.spins)
     np.testing.assert_allclose(left + seen.energy_lost.sum(axis=1), left[0], 1e-12)
-    np.testing.assert_array_equal(seen.energy_lost[-1], gas.books[:3])
-    np.testing.assert_array_equal(seen.wall_impulse[-1], gas.books[3:9])
+    np.testing.assert_array_equal(seen.energy_lost[-1], gas.ledger[:3])
+    np.testing.assert_array_equal(seen.wall_impulse[-1], gas.ledger[3:9])
     if 'tangential_restitution' in RULES[name]:
         return  # the impulse of an event then has a tangential part
-    events = course.events
+    events = record.events
     for wall in range(6):
         hits = events[(events['kind'] == 'wall') & (events['partner'] == wall)]
         if 'fix' not in events['kind']:
@@ -81,19 +82,19 @@ def test_the_books_are_those_of_the_frames_and_events_until_then(name, kernel):
 
 
 @cases
-def test_what_is_written_down_counts_on_when_a_gas_is_followed_further(kernel):
+def test_observations_continue_over_several_runs(kernel):
     rules = CollisionRules(box=BOX, restitution=0.9)
     beads = mixture(3, 14, rules)
-    whole = HardSphereGas(beads, rules, kernel).follow(END, (), TIMES).observations
+    straight = HardSphereGas(beads, rules, kernel).follow(END, (), TIMES).observations
     gas = HardSphereGas(beads, rules, kernel)
     parts = [gas.follow(end, (), [end]).observations for end in (1.0, 5.5, END)]
     for field in ('mean_speed', 'pair_collisions', 'energy_lost', 'wall_impulse'):
-        found = np.concatenate([getattr(part, field) for part in parts])
-        np.testing.assert_array_equal(found, getattr(whole, field)[[3, 5, 8]])
+        joined = np.concatenate([getattr(part, field) for part in parts])
+        np.testing.assert_array_equal(joined, getattr(straight, field)[[3, 5, 8]])
 
 
 @cases
-def test_temperatures_of_species_without_beads_are_not_known(kernel):
+def test_temperatures_of_species_without_beads_are_nan(kernel):
     gas = gas_of(
         [(2, 5, 5), (8, 5, 5)],
         [(1, 2, 3), (0.5, 0, 0)],
@@ -109,7 +110,7 @@ def test_temperatures_of_species_without_beads_are_not_known(kernel):
 
 
 @cases
-def test_species_may_be_told_apart_though_they_bounce_alike(kernel):
+def test_species_may_have_equal_restitutions(kernel):
     gas = gas_of(
         [(3, 5, 5), (7, 5, 5)],
         [(1, 0, 0), (-1, 0, 0)],
@@ -117,19 +118,19 @@ def test_species_may_be_told_apart_though_they_bounce_alike(kernel):
         restitution=0.5,
         kernel=kernel,
     )
-    course = gas.follow(1.5, [1.5], [1.5])
-    assert course.velocities[0, :, 0] == near([-0.5, 0.5])
-    assert course.observations.granular_temperature.shape == (1, 3, 3)
+    record = gas.follow(1.5, [1.5], [1.5])
+    assert record.velocities[0, :, 0] == near([-0.5, 0.5])
+    assert record.observations.granular_temperature.shape == (1, 3, 3)
     assert gas.beads().species.tolist() == [2, 0]
 
 
 @cases
-def test_nothing_asked_for_is_an_empty_course(kernel):
+def test_a_run_without_output_has_an_empty_record(kernel):
     rules = CollisionRules(box=BOX)
-    course = HardSphereGas(mixture(3, 5, rules), rules, kernel).follow(1.0)
-    assert course.positions.shape == course.velocities.shape == (0, 5, 3)
-    assert course.spins is None
-    assert course.bodies is None
-    assert course.observations.mean_speed.shape == (0,)
-    assert course.observations.wall_impulse.shape == (0, 6)
-    assert len(course.events) == 0
+    record = HardSphereGas(mixture(3, 5, rules), rules, kernel).follow(1.0)
+    assert record.positions.shape == record.velocities.shape == (0, 5, 3)
+    assert record.spins is None
+    assert record.bodies is None
+    assert record.observations.mean_speed.shape == (0,)
+    assert record.observations.wall_impulse.shape == (0, 6)
+    assert len(record.events) == 0

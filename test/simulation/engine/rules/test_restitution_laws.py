@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from gases import BOX, KERNELS, energy, gas_of, mixture, near
 
-from nanorocks_ros.simulation.engine.collision_rules import (
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
+from nanorocks_ros.simulation.engine.rules.restitution_laws import (
     UniformRestitution,
     ViscoelasticRestitution,
 )
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
 
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 
@@ -40,7 +41,7 @@ def rebound(kernel, restitution, speed=2.0, **more):
     return (v[1] - v[0]) / speed
 
 
-def test_each_pair_of_species_has_its_own(kernel):
+def test_each_pair_of_species_has_its_own_restitution(kernel):
     table = [[0.1, 0.4, 0.3], [0.4, 0.9, 0.2], [0.3, 0.2, 0.7]]
     for a in range(3):
         for b in range(3):
@@ -56,7 +57,7 @@ def test_an_array_of_a_table_and_one_number_for_all_are_the_same(kernel):
     np.testing.assert_array_equal(one.positions, other.positions)
 
 
-def test_a_random_one_is_even_about_its_mean_and_within_its_range(kernel):
+def test_a_random_restitution_is_uniform_in_its_range(kernel):
     law = UniformRestitution(mean=0.95, width=0.1)
     rules = CollisionRules(box=BOX, restitution=law, wall_restitution=1.02, allow_gain=True)
     beads = mixture(1, 12, rules)
@@ -75,11 +76,11 @@ def test_a_random_one_is_even_about_its_mean_and_within_its_range(kernel):
     assert abs(np.corrcoef(drawn[1:], drawn[:-1])[0, 1]) < 4 / math.sqrt(n)
 
 
-def test_a_random_one_of_no_width_is_its_mean(kernel):
+def test_a_random_restitution_of_width_0_is_its_mean(kernel):
     assert rebound(kernel, UniformRestitution(mean=0.6, width=0.0)) == near(0.6)
 
 
-def test_random_ones_depend_on_the_seed_alone_and_not_on_the_kernel(kernel):
+def test_random_restitutions_depend_on_the_seed_not_on_the_kernel(kernel):
     def first(seed, kernel):
         rules = CollisionRules(
             box=BOX, restitution=UniformRestitution(mean=0.7, width=0.6), seed=seed
@@ -88,13 +89,13 @@ def test_random_ones_depend_on_the_seed_alone_and_not_on_the_kernel(kernel):
         events = HardSphereGas(beads, rules, kernel).follow(20.0, log=True).events
         return restitutions(events, beads.masses)[:20]
 
-    here = first(1, kernel)
+    values = first(1, kernel)
     for other in KERNELS:
-        np.testing.assert_allclose(first(1, other), here, atol=1e-6)
-    assert np.abs(first(2, kernel) - here).max() > 0.1
+        np.testing.assert_allclose(first(1, other), values, atol=1e-6)
+    assert np.abs(first(2, kernel) - values).max() > 0.1
 
 
-def test_a_kick_does_not_draw_the_same_ones_again(kernel):
+def test_a_kick_does_not_repeat_random_restitutions(kernel):
     law = UniformRestitution(mean=0.5, width=0.8)
     gas = gas_of([(3, 5, 5), (7, 5, 5)], [(1, 0, 0), (-1, 0, 0)], restitution=law, kernel=kernel)
     seen = []
@@ -115,7 +116,7 @@ def pade(z):
 
 
 @pytest.mark.parametrize('value', [0.2, 0.6, 0.9])
-def test_a_viscoelastic_one_is_the_published_function_of_speed(kernel, value):
+def test_a_viscoelastic_restitution_is_the_published_function_of_speed(kernel, value):
     law = ViscoelasticRestitution(value=value, at_speed=0.5)
     assert rebound(kernel, law, speed=0.5) == near(value)
     # The argument that has the value, by a plain search; it goes with speed^(1/10).
@@ -126,34 +127,34 @@ def test_a_viscoelastic_one_is_the_published_function_of_speed(kernel, value):
         assert rebound(kernel, law, speed=speed) == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_viscoelastic_one_falls_with_speed_and_is_elastic_in_the_limit_of_none(kernel):
+def test_a_viscoelastic_restitution_falls_with_speed_from_1(kernel):
     law = ViscoelasticRestitution(value=0.8, at_speed=1.0)
     speeds = [1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3]
-    found = [rebound(kernel, law, speed=speed) for speed in speeds]
-    assert np.all(np.diff(found) < 0.0)
+    restitution_values = [rebound(kernel, law, speed=speed) for speed in speeds]
+    assert np.all(np.diff(restitution_values) < 0.0)
     # Leading orders of the theory: 1 - 1.15344 z² + ..., with z² going as speed^(1/5).
     weak = ViscoelasticRestitution(value=0.9999, at_speed=1.0)
     losses = [1.0 - rebound(kernel, weak, speed=speed) for speed in (1.0, 32.0)]
     assert losses[1] / losses[0] == pytest.approx(2.0, rel=0.02)
-    assert 1.0 - found[0] < 0.01
+    assert 1.0 - restitution_values[0] < 0.01
 
 
 def test_a_gas_of_viscoelastic_beads_becomes_more_elastic_as_it_cools(kernel):
     rules = CollisionRules(box=BOX, restitution=ViscoelasticRestitution(value=0.7, at_speed=2.0))
     beads = mixture(1, 12, rules)
     gas = HardSphereGas(beads, rules, kernel)
-    found = restitutions(gas.follow(200.0, log=True).events, beads.masses)
-    assert found[-50:].mean() > found[:50].mean() + 0.03
+    restitution_values = restitutions(gas.follow(200.0, log=True).events, beads.masses)
+    assert restitution_values[-50:].mean() > restitution_values[:50].mean() + 0.03
 
 
-@pytest.mark.parametrize('what', ['restitution', 'wall_restitution'])
-def test_above_one_heats_when_that_is_allowed(kernel, what):
-    rules = CollisionRules(box=BOX, allow_gain=True, **{what: 1.05})
+@pytest.mark.parametrize('rule', ['restitution', 'wall_restitution'])
+def test_a_restitution_above_1_heats_the_gas(kernel, rule):
+    rules = CollisionRules(box=BOX, allow_gain=True, **{rule: 1.05})
     gas = HardSphereGas(mixture(1, 8, rules), rules, kernel)
     had = energy(gas.beads())
     gas.run_until(10.0)
     assert energy(gas.beads()) > 1.2 * had
-    assert gas.books[:3].sum() == pytest.approx(had - energy(gas.beads()), rel=1e-12)
+    assert gas.ledger[:3].sum() == pytest.approx(had - energy(gas.beads()), rel=1e-12)
 
 
 def test_walls_may_have_another_restitution_than_beads(kernel):
@@ -161,5 +162,5 @@ def test_walls_may_have_another_restitution_than_beads(kernel):
     gas = HardSphereGas(mixture(1, 10, rules), rules, kernel)
     gas.run_until(10.0)
     assert gas.counts.wall > 20
-    assert gas.books[0] > 0.0
-    assert abs(gas.books[1]) < 1e-12
+    assert gas.ledger[0] > 0.0
+    assert abs(gas.ledger[1]) < 1e-12

@@ -1,4 +1,4 @@
-"""The beads and the books together keep energy, momentum and angular momentum."""
+"""Beads and ledger together conserve energy, momentum and angular momentum."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from gases import (
     smallest_gap,
 )
 
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 BOX = (12.0, 11.0, 10.0)
 BEADS = 40
@@ -40,16 +41,16 @@ def states(gas):
 
 @pytest.mark.parametrize('kernel', KERNELS)
 @pytest.mark.parametrize('name', RULES)
-def test_energy_and_momentum_of_beads_and_books_are_kept(name, kernel):
+def test_energy_and_momentum_of_beads_and_ledger_are_conserved(name, kernel):
     gas, rules = gas_and_rules(name, kernel)
     start = gas.beads()
     had, moved = energy(start), momentum(start)
     scale = np.sum(start.masses * np.linalg.norm(start.velocities, axis=1))
     for beads in states(gas):
-        exchanged = max(had, np.abs(gas.books[:3]).sum())
-        assert abs(energy(beads) + gas.books[:3].sum() - had) <= PRECISION * exchanged
-        given = np.abs(gas.books[3:12]).max()
-        total = momentum(beads) + gas.books[MOMENTUM]
+        exchanged = max(had, np.abs(gas.ledger[:3]).sum())
+        assert abs(energy(beads) + gas.ledger[:3].sum() - had) <= PRECISION * exchanged
+        given = np.abs(gas.ledger[3:12]).max()
+        total = momentum(beads) + gas.ledger[MOMENTUM]
         assert np.abs(total - moved).max() <= PRECISION * max(scale, given)
     assert gas.counts.pair > 100
     assert (gas.counts.wall > 100) == (not all(rules.periodic))
@@ -67,17 +68,17 @@ BOOKED = [
 
 @pytest.mark.parametrize('kernel', KERNELS)
 @pytest.mark.parametrize('name', BOOKED)
-def test_angular_momentum_of_rough_and_sticky_beads_and_books_is_kept(name, kernel):
+def test_angular_momentum_of_rough_and_sticky_beads_and_ledger_is_conserved(name, kernel):
     gas, rules = gas_and_rules(name, kernel)
     start = gas.beads()
     turned = angular_momentum(start)
     scale = np.sum(start.masses * np.linalg.norm(start.velocities, axis=1)) * max(BOX)
     for beads in states(gas):
-        given = max(scale, np.abs(gas.books[3:]).max() * max(BOX))
-        total = angular_momentum(beads) + gas.books[TO_WALLS] + gas.books[TO_AGGREGATES]
+        given = max(scale, np.abs(gas.ledger[3:]).max() * max(BOX))
+        total = angular_momentum(beads) + gas.ledger[TO_WALLS] + gas.ledger[TO_AGGREGATES]
         assert np.abs(total - turned).max() <= PRECISION * given
-    assert np.abs(gas.books[TO_WALLS]).max() > 1.0
-    assert (np.abs(gas.books[TO_AGGREGATES]).max() > 0.1) == (rules.sticking_speed > 0)
+    assert np.abs(gas.ledger[TO_WALLS]).max() > 1.0
+    assert (np.abs(gas.ledger[TO_AGGREGATES]).max() > 0.1) == (rules.sticking_speed > 0)
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
@@ -104,7 +105,7 @@ def test_momentum_given_to_walls_is_that_of_the_reversed_normal_velocities(kerne
         bounces = np.sum(events['partner'] == wall)
         push = 2 * beads.masses[0] * abs(beads.velocities[0, wall // 2])
         assert bounces > 5
-        assert gas.books[3 + wall] == pytest.approx(bounces * push, rel=PRECISION)
+        assert gas.ledger[3 + wall] == pytest.approx(bounces * push, rel=PRECISION)
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
@@ -112,5 +113,5 @@ def test_a_shaken_tray_gains_what_its_walls_give(kernel):
     gas, _ = gas_and_rules('shaken', kernel)
     had = energy(gas.beads())
     gas.run_until(5.0)
-    assert gas.books[1] < 0.0
+    assert gas.ledger[1] < 0.0
     assert energy(gas.beads()) > had

@@ -1,4 +1,4 @@
-"""Energy, momentum and room in gases of the reference engine."""
+"""Energy, momentum and overlap in gases of the reference engine."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ GASES = {
 
 
 @pytest.mark.parametrize('name', GASES)
-def test_the_books_add_up_and_nothing_overlaps(name):
+def test_the_ledger_balances_and_nothing_overlaps(name):
     gas = shaken_gas(Rules(**GASES[name]))
     had, moved = energy(gas), momentum(gas)
     kinds, time = set(), 0.0
@@ -81,25 +81,25 @@ def test_the_books_add_up_and_nothing_overlaps(name):
         time = event.time
         kinds.add(event.kind)
         assert smallest_gap(gas) > -1e-11
-    books = gas.books
-    lost = books.energy_lost_in_pairs + books.energy_lost_at_walls + books.energy_lost_in_merges
+    ledger = gas.ledger
+    lost = ledger.energy_lost_in_pairs + ledger.energy_lost_at_walls + ledger.energy_lost_in_merges
     assert energy(gas) + lost == pytest.approx(had, rel=1e-12)
-    given = books.wall_impulse.sum(axis=0) + books.fixed_impulse
+    given = ledger.wall_impulse.sum(axis=0) + ledger.fixed_impulse
     assert momentum(gas) + given == pytest.approx(moved, rel=1e-12, abs=1e-11)
     if 'motion' in GASES[name]:
-        assert books.energy_lost_at_walls < 0.0
+        assert ledger.energy_lost_at_walls < 0.0
     else:
-        assert min(lost, books.energy_lost_at_walls) > -1e-11
+        assert min(lost, ledger.energy_lost_at_walls) > -1e-11
     assert ('merge' in kinds) == ('sticking_speed' in GASES[name])
     assert ('fix' in kinds) == ('wall_sticking_speed' in GASES[name])
 
 
 def test_executing_in_pieces_changes_nothing():
-    whole, pieces = (shaken_gas(Rules(periodic=ALWAYS, restitution=0.9)) for _ in range(2))
-    events = whole.run_until(2.0)
+    straight, pieces = (shaken_gas(Rules(periodic=ALWAYS, restitution=0.9)) for _ in range(2))
+    events = straight.run_until(2.0)
     parts = [event for end in (0.3, 0.9, 1.3, 2.0) for event in pieces.run_until(end)]
     assert [(e.kind, e.i, e.partner) for e in events] == [(e.kind, e.i, e.partner) for e in parts]
-    assert whole.positions == pytest.approx(pieces.positions, abs=1e-9)
+    assert straight.positions == pytest.approx(pieces.positions, abs=1e-9)
 
 
 @pytest.mark.parametrize(

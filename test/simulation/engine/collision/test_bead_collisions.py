@@ -1,4 +1,4 @@
-"""Smooth beads: two and three of them, and a bead at a wall, worked out by hand."""
+"""Collisions of smooth beads with each other and with walls, against solutions by hand."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from gases import ALWAYS, KERNELS, gas_of, near
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 
 
-def what_happened(course):
-    return [(row['kind'].item(), row['bead'], row['partner']) for row in course.events]
+def event_list(record):
+    return [(row['kind'].item(), row['bead'], row['partner']) for row in record.events]
 
 
 @pytest.mark.parametrize('restitution', [0.0, 0.5, 0.89, 1.0])
-def test_two_beads_meet_head_on_when_and_as_momentum_and_restitution_say(kernel, restitution):
+def test_two_beads_collide_head_on(kernel, restitution):
     """Gap 2, closing speed 1.6: after 1.25 s. Their centre of mass moves at -0.2."""
     gas = gas_of(
         [(3, 5, 5), (7, 5, 5)],
@@ -23,20 +23,20 @@ def test_two_beads_meet_head_on_when_and_as_momentum_and_restitution_say(kernel,
         restitution=restitution,
         kernel=kernel,
     )
-    course = gas.follow(1.5, [1.2499999, 1.2500001, 1.5], log=True)
+    record = gas.follow(1.5, [1.2499999, 1.2500001, 1.5], log=True)
     after = -0.2 - 1.2 * restitution, -0.2 + 0.4 * restitution
-    assert course.velocities[0, :, 0] == near([1, -0.6])
-    assert course.velocities[1, :, 0] == near(after)
-    assert not course.velocities[..., 1:].any()
-    assert course.positions[2, :, 0] == near([4.25 + 0.25 * after[0], 6.25 + 0.25 * after[1]])
-    assert what_happened(course) == [('pair', 0, 1)]
+    assert record.velocities[0, :, 0] == near([1, -0.6])
+    assert record.velocities[1, :, 0] == near(after)
+    assert not record.velocities[..., 1:].any()
+    assert record.positions[2, :, 0] == near([4.25 + 0.25 * after[0], 6.25 + 0.25 * after[1]])
+    assert event_list(record) == [('pair', 0, 1)]
     reduced = 0.75
-    event = course.events[0]
+    event = record.events[0]
     assert event['time'] == near(1.25)
     assert event['normal_speed'] == near(1.6)
     assert event['impulse'] == near(reduced * (1 + restitution) * 1.6)
     lost = 0.5 * reduced * (1 - restitution**2) * 1.6**2
-    assert gas.books[:3] == near([lost, 0, 0])
+    assert gas.ledger[:3] == near([lost, 0, 0])
 
 
 def test_an_oblique_collision_changes_the_normal_velocity_alone(kernel):
@@ -48,15 +48,15 @@ def test_an_oblique_collision_changes_the_normal_velocity_alone(kernel):
         restitution=0.5,
         kernel=kernel,
     )
-    course = gas.follow(0.7, [0.6, 0.7], log=True)
-    assert course.events['time'] == near([0.6])
-    assert course.events['normal_speed'] == near([4.0])
-    assert course.events['impulse'] == near([4.5])
-    assert course.positions[0] == near(np.array([(5, 5, 5), (6.6, 6.2, 5)]))
-    assert course.velocities[1] == near(np.array([(1.4, -2.7, 0), (1.2, 0.9, 0)]))
+    record = gas.follow(0.7, [0.6, 0.7], log=True)
+    assert record.events['time'] == near([0.6])
+    assert record.events['normal_speed'] == near([4.0])
+    assert record.events['impulse'] == near([4.5])
+    assert record.positions[0] == near(np.array([(5, 5, 5), (6.6, 6.2, 5)]))
+    assert record.velocities[1] == near(np.array([(1.4, -2.7, 0), (1.2, 0.9, 0)]))
 
 
-def test_beads_that_pass_at_more_than_their_reach_do_not_collide(kernel):
+def test_beads_that_pass_at_a_distance_do_not_collide(kernel):
     gas = gas_of([(2, 5, 5), (8, 7.0000001, 5)], [(1, 0, 0), (-1, 0, 0)], kernel=kernel)
     gas.run_until(6.0)
     assert gas.counts.pair == 0
@@ -65,14 +65,14 @@ def test_beads_that_pass_at_more_than_their_reach_do_not_collide(kernel):
 def test_a_graze_just_within_reach_turns_beads_by_next_to_nothing(kernel):
     """Offset (1 - 1e-8) of the reach: normal speed 2 sqrt(2e-8) = 2.83e-4."""
     gas = gas_of([(2, 5, 5), (8, 7 - 2e-8, 5)], [(1, 0, 0), (-1, 0, 0)], kernel=kernel)
-    course = gas.follow(4.0, [4.0], log=True)
-    assert what_happened(course) == [('pair', 0, 1)]
+    record = gas.follow(4.0, [4.0], log=True)
+    assert event_list(record) == [('pair', 0, 1)]
     closing = 2.0 * np.sqrt(1.0 - (1.0 - 1e-8) ** 2)
-    assert course.events['normal_speed'] == pytest.approx([closing], rel=1e-6)
-    assert course.velocities[0, 0, 1] == pytest.approx(-closing, rel=1e-6)
+    assert record.events['normal_speed'] == pytest.approx([closing], rel=1e-6)
+    assert record.velocities[0, 0, 1] == pytest.approx(-closing, rel=1e-6)
 
 
-def test_touching_beads_that_part_are_left_alone(kernel):
+def test_touching_beads_that_separate_do_not_collide(kernel):
     gas = gas_of([(4, 5, 5), (6, 5, 5)], [(-1, 0, 0), (1, 0, 0)], kernel=kernel)
     gas.run_until(2.5)
     assert gas.counts.pair == 0
@@ -87,21 +87,21 @@ def test_three_in_a_row_with_restitution_one_half(kernel):
         restitution=0.5,
         kernel=kernel,
     )
-    course = gas.follow(7.0, [7.0], log=True)
-    assert what_happened(course) == [('pair', 0, 1), ('pair', 1, 2), ('pair', 0, 1)]
-    assert course.events['time'] == near([3 / 8, 3 / 8 + 2 / 3, 3 / 8 + 2 / 3 + 16 / 3])
-    assert course.events['normal_speed'] == near([4.0, 3.0, 0.25])
-    assert course.velocities[0, :, 0] == near([0.8125, 0.9375, 2.25])
+    record = gas.follow(7.0, [7.0], log=True)
+    assert event_list(record) == [('pair', 0, 1), ('pair', 1, 2), ('pair', 0, 1)]
+    assert record.events['time'] == near([3 / 8, 3 / 8 + 2 / 3, 3 / 8 + 2 / 3 + 16 / 3])
+    assert record.events['normal_speed'] == near([4.0, 3.0, 0.25])
+    assert record.velocities[0, :, 0] == near([0.8125, 0.9375, 2.25])
 
 
 def test_a_row_of_touching_beads_hands_the_speed_on_at_one_instant(kernel):
     gas = gas_of(
         [(1.5, 5, 5), (5, 5, 5), (7, 5, 5)], [(3, 0, 0), (0, 0, 0), (0, 0, 0)], kernel=kernel
     )
-    course = gas.follow(0.6, [0.6], log=True)
-    assert what_happened(course) == [('pair', 0, 1), ('pair', 1, 2)]
-    assert course.events['time'] == near([0.5, 0.5])
-    assert course.velocities[0, :, 0] == near([0, 0, 3])
+    record = gas.follow(0.6, [0.6], log=True)
+    assert event_list(record) == [('pair', 0, 1), ('pair', 1, 2)]
+    assert record.events['time'] == near([0.5, 0.5])
+    assert record.velocities[0, :, 0] == near([0, 0, 3])
 
 
 def test_of_two_beads_that_are_hit_at_once_the_lower_number_is_hit_first(kernel):
@@ -111,11 +111,11 @@ def test_of_two_beads_that_are_hit_at_once_the_lower_number_is_hit_first(kernel)
         [(5, 0, 0), (0, 0, 0), (0, 0, 0)],
         kernel=kernel,
     )
-    course = gas.follow(0.7, [0.7], log=True)
-    assert what_happened(course) == [('pair', 0, 1), ('pair', 0, 2)]
-    assert course.events['time'] == near([0.6, 0.6])
+    record = gas.follow(0.7, [0.7], log=True)
+    assert event_list(record) == [('pair', 0, 1), ('pair', 0, 2)]
+    assert record.events['time'] == near([0.6, 0.6])
     expected = np.array([(-0.504, -0.672, 0), (3.2, 2.4, 0), (2.304, -1.728, 0)])
-    assert course.velocities[0] == near(expected)
+    assert record.velocities[0] == near(expected)
 
 
 @pytest.mark.parametrize('axis', [0, 1, 2])
@@ -128,42 +128,42 @@ def test_a_bead_leaves_each_wall_with_the_restitution_of_that_wall(kernel, axis,
     velocity = np.full(3, 0.125)
     velocity[axis] = outward
     gas = gas_of([(5, 5, 5)], [velocity], wall_restitution=of_walls, masses=2.0, kernel=kernel)
-    course = gas.follow(6.0, [6.0], log=True)
-    assert what_happened(course) == [('wall', 0, wall)]
+    record = gas.follow(6.0, [6.0], log=True)
+    assert event_list(record) == [('wall', 0, wall)]
     expected = np.full(3, 5 + 6 * 0.125)
     expected[axis] = 5 + outward * (4 - 2 * of_walls[wall])
-    assert course.positions[0, 0] == near(expected)
+    assert record.positions[0, 0] == near(expected)
     velocity[axis] *= -of_walls[wall]
-    assert course.velocities[0, 0] == near(velocity)
-    assert gas.books[1] == near(1 - of_walls[wall] ** 2)
+    assert record.velocities[0, 0] == near(velocity)
+    assert gas.ledger[1] == near(1 - of_walls[wall] ** 2)
     given = np.zeros(6)
     given[wall] = 2 * (1 + of_walls[wall])
-    assert gas.books[3:9] == near(given)
-    assert gas.books[9 + axis] == near(outward * given[wall])
+    assert gas.ledger[3:9] == near(given)
+    assert gas.ledger[9 + axis] == near(outward * given[wall])
 
 
 def test_a_bead_in_a_corner_meets_three_walls_one_after_the_other(kernel):
     gas = gas_of([(5, 5, 5)], [(1, 1, 1)], wall_restitution=0.5, kernel=kernel)
-    course = gas.follow(5.0, [4.0, 5.0], log=True)
-    assert what_happened(course) == [('wall', 0, 1), ('wall', 0, 3), ('wall', 0, 5)]
-    assert course.positions[0, 0].tolist() == [9.0, 9.0, 9.0]
-    assert course.velocities[1, 0].tolist() == [-0.5, -0.5, -0.5]
+    record = gas.follow(5.0, [4.0, 5.0], log=True)
+    assert event_list(record) == [('wall', 0, 1), ('wall', 0, 3), ('wall', 0, 5)]
+    assert record.positions[0, 0].tolist() == [9.0, 9.0, 9.0]
+    assert record.velocities[1, 0].tolist() == [-0.5, -0.5, -0.5]
 
 
 def test_a_bead_meets_a_wall_before_a_bead_that_it_meets_at_the_same_instant(kernel):
     """It moves along x and y by 1; both contacts come after exactly 1 s."""
     gas = gas_of([(8, 2, 5), (9, 5, 5)], [(1, 1, 0), (0, 0, 0)], kernel=kernel)
-    course = gas.follow(1.0, [1.0], log=True)
-    assert what_happened(course) == [('wall', 0, 1), ('pair', 0, 1)]
-    assert course.velocities[0].tolist() == [[-1, 0, 0], [0, 1, 0]]
+    record = gas.follow(1.0, [1.0], log=True)
+    assert event_list(record) == [('wall', 0, 1), ('pair', 0, 1)]
+    assert record.velocities[0].tolist() == [[-1, 0, 0], [0, 1, 0]]
 
 
 def test_a_frame_at_the_instant_of_a_collision_shows_what_is_after_it(kernel):
     gas = gas_of([(0.5, 0.5, 0.5)], [(0.25, 0, 0)], radii=0.25, box=(1, 1, 1), kernel=kernel)
-    course = gas.follow(2.0, [1.0], [1.0])
-    assert course.positions[0, 0, 0] == 0.75
-    assert course.velocities[0, 0, 0] == -0.25
-    assert course.observations.wall_collisions.tolist() == [1]
+    record = gas.follow(2.0, [1.0], [1.0])
+    assert record.positions[0, 0, 0] == 0.75
+    assert record.velocities[0, 0, 0] == -0.25
+    assert record.observations.wall_collisions.tolist() == [1]
 
 
 @pytest.mark.parametrize('apart', [4.0, 7.0, 9.0, 9.9])
@@ -176,11 +176,11 @@ def test_beads_that_part_in_a_periodic_box_meet_on_its_other_side(kernel, apart,
     velocities[:, axis] = -1.0, 1.0
     gas = gas_of(places, velocities, box=(side,) * 3, periodic=ALWAYS, kernel=kernel)
     meeting = (side - apart - 2.0) / 2.0
-    course = gas.follow(meeting + 0.5, [meeting + 0.5], log=True)
-    assert what_happened(course) == [('pair', 0, 1)]
-    assert course.events['time'] == near([meeting])
-    assert course.velocities[0, :, axis] == near([1, -1])
-    assert course.positions[0, :, axis] == near([5.5 - meeting, 4.5 + apart + meeting])
+    record = gas.follow(meeting + 0.5, [meeting + 0.5], log=True)
+    assert event_list(record) == [('pair', 0, 1)]
+    assert record.events['time'] == near([meeting])
+    assert record.velocities[0, :, axis] == near([1, -1])
+    assert record.positions[0, :, axis] == near([5.5 - meeting, 4.5 + apart + meeting])
 
 
 @pytest.mark.parametrize('apart', [2.5, 3.9, 4.1, 4.5, 5.0, 5.5])
@@ -193,10 +193,10 @@ def test_beads_that_approach_across_half_a_periodic_box_meet_in_its_middle(kerne
     velocities[:, axis] = 1.0, -1.0
     gas = gas_of(places, velocities, box=(8, 8, 8), periodic=ALWAYS, kernel=kernel)
     meeting = 0.5 * (apart - 2.0)
-    course = gas.follow(meeting + 0.5, [meeting + 0.5], log=True)
-    assert what_happened(course) == [('pair', 0, 1)]
-    assert course.events['time'] == near([meeting])
-    assert course.positions[0, :, axis] == near([2.5, 5.5])
+    record = gas.follow(meeting + 0.5, [meeting + 0.5], log=True)
+    assert event_list(record) == [('pair', 0, 1)]
+    assert record.events['time'] == near([meeting])
+    assert record.positions[0, :, axis] == near([2.5, 5.5])
 
 
 def test_a_long_flight_passes_many_images(kernel):
@@ -211,6 +211,6 @@ def test_a_long_flight_passes_many_images(kernel):
     scan = np.arange(0.0, 100.0, 1e-4)
     x = (3 + 4 * scan - 5 + 5) % 10 - 5
     y = (6 + 0.05 * scan - 1 + 5) % 10 - 5
-    course = gas.follow(100.0, log=True)
-    assert course.events['time'][0] == pytest.approx(scan[np.argmax(x**2 + y**2 <= 4)], abs=2e-4)
-    assert course.events['time'][0] > 50.0
+    record = gas.follow(100.0, log=True)
+    assert record.events['time'][0] == pytest.approx(scan[np.argmax(x**2 + y**2 <= 4)], abs=2e-4)
+    assert record.events['time'][0] > 50.0

@@ -1,4 +1,4 @@
-"""Rules that cannot be are refused, in a sentence that says which and why."""
+"""Invalid rules are refused; the error names the value and the reason."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import pytest
 from gases import BOX
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine.collision_rules import (
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
+from nanorocks_ros.simulation.engine.rules.restitution_laws import (
     UniformRestitution,
     ViscoelasticRestitution,
-    WallMotion,
 )
-from nanorocks_ros.simulation.engine.gas import CollisionRules
+from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 
 NAN, INF = math.nan, math.inf
 MOTION = WallMotion(amplitude=(1, 0, 0), angular_frequency=1.0)
@@ -106,7 +106,7 @@ def viscoelastic(value, at_speed):
         ({'seed': -1}, 'seed: root seed -1'),
     ],
 )
-def test_what_is_wrong_with_a_rule_is_said(change, message):
+def test_an_invalid_rule_is_refused_with_the_remedy(change, message):
     with pytest.raises(SimulationError, match=message):
         CollisionRules(**{'box': BOX, **change})
 
@@ -137,7 +137,7 @@ def test_a_restitution_above_one_is_accepted_when_gain_is_allowed(change):
         uniform(NAN, 0.0),
     ],
 )
-def test_gain_does_not_allow_what_is_not_a_restitution(change):
+def test_gain_still_refuses_values_that_are_no_restitution(change):
     with pytest.raises(SimulationError, match='restitution'):
         CollisionRules(box=BOX, allow_gain=True, **change)
 
@@ -157,7 +157,7 @@ def test_a_swing_without_a_frequency_or_with_negative_damping_is_refused(make):
         CollisionRules(box=BOX, motion=make())
 
 
-def test_rules_at_the_very_ends_of_their_ranges_are_accepted():
+def test_rules_at_the_limits_of_their_ranges_are_accepted():
     for value in (0.0, 1.0):
         CollisionRules(box=BOX, restitution=value, wall_restitution=value)
     for value in (-1.0, 1.0):

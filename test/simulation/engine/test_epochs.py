@@ -1,4 +1,4 @@
-"""Time is counted anew now and then, so that no digits are lost; nothing else comes of it."""
+"""Epochs keep the precision of times, and change nothing else."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from gases import (
 )
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine.collision_rules import WallMotion
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.engine.gas_state import EPOCH, QUANTUM
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
+from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 
@@ -36,7 +37,7 @@ def pair_of_gases(beads, rules, kernel, quantum=OFTEN):
 
 @pytest.mark.parametrize('quantum', [2.0**-10, OFTEN, 0.125])
 @pytest.mark.parametrize('name', RULES)
-def test_the_course_until_chaos_is_the_same(kernel, name, quantum):
+def test_trajectories_agree_until_chaos(kernel, name, quantum):
     """With events much rarer than time is counted anew, as rare, and more frequent."""
     rules = CollisionRules(box=BOX, **RULES[name])
     gas, often = pair_of_gases(mixture(9, 10, rules), rules, kernel, quantum)
@@ -44,22 +45,25 @@ def test_the_course_until_chaos_is_the_same(kernel, name, quantum):
     end = 0.5 * (events['time'][-1] + events['time'][-2])
     times = np.linspace(0.0, end, 7)
     gas, _ = pair_of_gases(mixture(9, 10, rules), rules, kernel)
-    course, other = (each.follow(end, times, times, log=True) for each in (gas, often))
+    record, second = (run.follow(end, times, times, log=True) for run in (gas, often))
     assert often._state.clock[EPOCH] >= 5 * quantum
     assert gas._state.clock[EPOCH] == 0.0
     for field in ('kind', 'bead', 'partner'):
-        np.testing.assert_array_equal(other.events[field], course.events[field])
+        np.testing.assert_array_equal(second.events[field], record.events[field])
     for field in ('time', 'normal_speed', 'impulse'):
-        np.testing.assert_allclose(other.events[field], course.events[field], atol=1e-6)
-    np.testing.assert_allclose(other.positions, course.positions, atol=1e-6)
-    np.testing.assert_allclose(other.velocities, course.velocities, atol=1e-6)
+        np.testing.assert_allclose(second.events[field], record.events[field], atol=1e-6)
+    np.testing.assert_allclose(second.positions, record.positions, atol=1e-6)
+    np.testing.assert_allclose(second.velocities, record.velocities, atol=1e-6)
     for field in ('mean_speed', 'energy_lost', 'wall_impulse', 'granular_temperature'):
-        seen, found = getattr(course.observations, field), getattr(other.observations, field)
-        np.testing.assert_allclose(found, seen, atol=1e-6)
+        first_values, second_values = (
+            getattr(record.observations, field),
+            getattr(second.observations, field),
+        )
+        np.testing.assert_allclose(second_values, first_values, atol=1e-6)
     assert often.now == end
 
 
-def test_contacts_are_remembered_while_time_is_counted_anew(kernel):
+def test_contacts_are_kept_across_epochs(kernel):
     """The second contact of the pair comes 8 s after the first, within 8.1 s but not 7.9 s."""
     for duration, speed in ((7.9, 0.25), (8.1, 0.5)):
         gas = gas_of(
@@ -72,32 +76,32 @@ def test_contacts_are_remembered_while_time_is_counted_anew(kernel):
             kernel=kernel,
         )
         gas._state.clock[QUANTUM] = 0.25
-        course = gas.follow(10.0, [10.0], log=True)
-        assert course.events['time'] == near([1.0, 5.0, 9.0])
-        assert course.velocities[0, 1, 0] == near(speed)
+        record = gas.follow(10.0, [10.0], log=True)
+        assert record.events['time'] == near([1.0, 5.0, 9.0])
+        assert record.velocities[0, 1, 0] == near(speed)
 
 
-def test_walls_go_on_moving_while_time_is_counted_anew(kernel):
+def test_walls_move_on_across_epochs(kernel):
     motion = WallMotion(amplitude=(0.3, 0, 0), angular_frequency=2 * np.pi, start=20.25)
     gas = gas_of([(5, 5, 5)], [(0, 0.25, 0)], motion=motion, kernel=kernel)
     gas._state.clock[QUANTUM] = 0.5
     # A bead at rest along x, 0.15 from the wall that comes 1/12 s after the start.
-    other = gas_of([(1.15, 5, 5)], [(0, 0.25, 0)], motion=motion, kernel=kernel)
-    other._state.clock[QUANTUM] = 0.5
-    events = other.follow(21.0, log=True).events
+    second = gas_of([(1.15, 5, 5)], [(0, 0.25, 0)], motion=motion, kernel=kernel)
+    second._state.clock[QUANTUM] = 0.5
+    events = second.follow(21.0, log=True).events
     assert events['time'][events['partner'] == 0] == near([20.25 + 1 / 12])
     assert gas.follow(21.0, log=True).events['partner'].tolist() == [3]
 
 
-def test_frames_fall_where_they_should_whatever_time_is_counted_from(kernel):
+def test_frame_times_do_not_depend_on_epochs(kernel):
     gas = gas_of([(5, 5, 5)], [(0.5, 0, 0)], box=(9, 10, 10), kernel=kernel)
     gas._state.clock[QUANTUM] = 0.25
     times = np.arange(0.0, 1000.0, 0.37)
-    course = gas.follow(1000.0, times)
+    record = gas.follow(1000.0, times)
     # Between walls 7 apart, from 4 beyond the first: unfolded, then folded.
     path = (4.0 + 0.5 * times) % 14.0
     expected = 1.0 + np.minimum(path, 14.0 - path)
-    np.testing.assert_allclose(course.positions[:, 0, 0], expected, atol=1e-10)
+    np.testing.assert_allclose(record.positions[:, 0, 0], expected, atol=1e-10)
 
 
 def test_times_may_be_saved_and_loaded_in_any_epoch(kernel, tmp_path):
@@ -109,9 +113,9 @@ def test_times_may_be_saved_and_loaded_in_any_epoch(kernel, tmp_path):
     expected = gas.follow(20.0, [8.0, 20.0], log=True)
     loaded = HardSphereGas.load(tmp_path / 'gas')
     assert loaded.now == 7.7
-    course = loaded.follow(20.0, [8.0, 20.0], log=True)
-    np.testing.assert_array_equal(course.events, expected.events)
-    np.testing.assert_array_equal(course.positions, expected.positions)
+    record = loaded.follow(20.0, [8.0, 20.0], log=True)
+    np.testing.assert_array_equal(record.events, expected.events)
+    np.testing.assert_array_equal(record.positions, expected.positions)
 
 
 @pytest.mark.parametrize('periodic', [False, True])
@@ -124,20 +128,20 @@ def test_a_run_of_very_many_epochs_keeps_energy_and_gaps(kernel, periodic):
     )
     gas, often = pair_of_gases(mixture(9, 10, rules), rules, kernel, 2.0**-6)
     had, turned = energy(often.beads()), angular_momentum(often.beads())
-    for each in (gas, often):
-        course = each.follow(300.0, np.linspace(0.0, 300.0, 301))
-        assert each.counts.pair > 500
-        assert abs(energy(each.beads()) / had - 1.0) < 1e-12
-        assert smallest_gap(course.positions, each.radii, rules) > -1e-10
+    for run in (gas, often):
+        record = run.follow(300.0, np.linspace(0.0, 300.0, 301))
+        assert run.counts.pair > 500
+        assert abs(energy(run.beads()) / had - 1.0) < 1e-12
+        assert smallest_gap(record.positions, run.radii, rules) > -1e-10
     if not periodic:
-        total = angular_momentum(often.beads()) + often.books[12:15]
+        total = angular_momentum(often.beads()) + often.ledger[12:15]
         assert total == pytest.approx(turned, abs=1e-9)
     # Observables of the two, which are different gases by now, are of one equilibrium.
-    rates = [each.counts.pair for each in (gas, often)]
+    rates = [run.counts.pair for run in (gas, often)]
     assert rates[1] == pytest.approx(rates[0], rel=0.2)
 
 
-def test_time_is_counted_anew_by_itself_in_a_long_run(kernel):
+def test_a_long_run_starts_new_epochs(kernel):
     gas = gas_of([(5, 5, 5)], [(1, 0.7, 0.4)], kernel=kernel)
     quantum = gas._state.clock[QUANTUM]
     crossing = 10 / np.sqrt(1.65)

@@ -1,4 +1,4 @@
-"""Beads and times that cannot be are refused, in a sentence that says which and why."""
+"""Invalid beads and times are refused; the error names the value and the reason."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import pytest
 from gases import ALWAYS, KERNELS, beads_of, gas_of
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine.gas import Beads, CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.beads import Beads
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 NAN, INF = math.nan, math.inf
 BOX = (10.0, 10.0, 10.0)
@@ -58,7 +60,7 @@ def gas_with(change, **rules):
         ({'spins': [0, 0]}, 'spins: shape'),
     ],
 )
-def test_what_is_not_a_finite_number_for_each_bead_is_refused(change, message):
+def test_arrays_of_another_shape_or_not_finite_are_refused(change, message):
     with pytest.raises(SimulationError, match=message):
         gas_with(change, tangential_restitution=0.5)
 
@@ -75,20 +77,20 @@ def test_what_is_not_a_finite_number_for_each_bead_is_refused(change, message):
         ([(5, 5, -3), (5, 5, 5)], 'positions: bead 0 reaches 4 m into a wall'),
     ],
 )
-def test_beads_in_one_another_or_in_a_wall_are_refused(kernel, places, message):
+def test_overlapping_beads_and_beads_in_a_wall_are_refused(kernel, places, message):
     with pytest.raises(SimulationError, match=message):
         gas_of(places, np.zeros((2, 3)), kernel=kernel)
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
-def test_beads_in_one_another_through_a_periodic_side_are_refused(kernel):
+def test_beads_that_overlap_across_a_periodic_side_are_refused(kernel):
     places = [(0.5, 5, 5), (9.9, 5, 5)]
     with pytest.raises(SimulationError, match='positions: beads 0 and 1 overlap'):
         gas_of(places, np.zeros((2, 3)), periodic=ALWAYS, kernel=kernel)
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
-def test_of_many_beads_the_two_that_overlap_are_named(kernel):
+def test_the_overlapping_pair_of_many_beads_is_named(kernel):
     places = 3.0 * np.array(list(np.ndindex(6, 6, 6))) + 1.5
     places[137] = places[52] + (1.0, 0.5, 0.0)
     with pytest.raises(SimulationError, match='beads 52 and 137 overlap'):
@@ -126,7 +128,7 @@ def test_more_beads_than_the_box_has_volume_are_refused():
         (['a', 'b'], 'species: '),
     ],
 )
-def test_species_that_the_restitution_does_not_know_are_refused(species, message):
+def test_species_without_a_restitution_are_refused(species, message):
     with pytest.raises(SimulationError, match=message):
         gas_with({'species': species}, restitution=[[0.9, 0.8], [0.8, 0.7]])
 
@@ -137,7 +139,7 @@ def test_spins_for_smooth_beads_are_refused():
     gas_with({'spins': np.zeros((2, 3))}, wall_tangential_restitution=0.0)
 
 
-def test_the_arrays_given_are_copied_and_left_alone():
+def test_input_arrays_are_copied():
     beads = beads_of([(3, 5, 5), (7, 5, 5)], [(1, 0, 0), (-1, 0, 0)])
     before = replace(beads, positions=beads.positions.copy(), velocities=beads.velocities.copy())
     gas = HardSphereGas(beads, CollisionRules(box=BOX))
@@ -156,7 +158,7 @@ def gas():
 
 
 @pytest.mark.parametrize('end', [1.4999, 0.0, -1.0, NAN, INF, -INF])
-def test_time_does_not_go_backwards_nor_to_no_end(gas, end):
+def test_an_end_in_the_past_or_not_finite_is_refused(gas, end):
     with pytest.raises(SimulationError, match=r'end: .* s, already at 1\.5 s; give a later time'):
         gas.run_until(end)
     assert gas.now == 1.5
@@ -175,15 +177,15 @@ def test_time_does_not_go_backwards_nor_to_no_end(gas, end):
         (['soon'], 'not an array of numbers'),
     ],
 )
-def test_times_that_are_not_on_the_way_are_refused(gas, kind, times, message):
+def test_times_outside_the_run_are_refused(gas, kind, times, message):
     with pytest.raises(SimulationError, match=f'{kind}: .*{message}|{kind}: {message}'):
         gas.follow(3.0, **{kind: times})
     assert gas.now == 1.5
-    course = gas.follow(3.0, [1.5, 3.0])
-    assert course.positions[1, :, 0] == pytest.approx([2, 8])
+    record = gas.follow(3.0, [1.5, 3.0])
+    assert record.positions[1, :, 0] == pytest.approx([2, 8])
 
 
-def test_a_kick_that_cannot_be_is_refused_and_leaves_the_gas_as_it_was(gas):
+def test_an_invalid_kick_is_refused_without_a_change(gas):
     for velocities, message in (
         ([(NAN, 0, 0), (0, 0, 0)], r'velocities: nan at \[0, 0\]'),
         ([(1, 0, 0)], r'velocities: shape \(1, 3\), expected \(2, 3\)'),

@@ -1,4 +1,4 @@
-"""A gas is given other velocities, or other beads, and goes on from there."""
+"""A gas is restarted with other velocities or positions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import pytest
 from gases import ALWAYS, BOX, KERNELS, RULES, energy, gas_of, mixture, near
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine.gas import CollisionRules, HardSphereGas
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 
@@ -22,15 +23,15 @@ def running(name, kernel, n=14):
 
 
 @pytest.mark.parametrize('name', ['inelastic', 'periodic', 'species'])
-def test_a_kick_keeps_places_and_starts_time_again(kernel, name):
+def test_a_kick_keeps_positions_and_restarts_time(kernel, name):
     gas, _ = running(name, kernel)
-    before, counts, books = gas.beads(), gas.counts, gas.books
+    before, counts, ledger = gas.beads(), gas.counts, gas.ledger
     velocities = np.random.default_rng(1).normal(size=(14, 3))
     gas.kick(velocities)
     assert gas.now == 0.0
     assert gas.counts == counts
     assert gas.kernel == kernel
-    np.testing.assert_array_equal(gas.books, books)
+    np.testing.assert_array_equal(gas.ledger, ledger)
     after = gas.beads()
     # Places in a periodic box are wrapped, and unwrapped again.
     np.testing.assert_allclose(after.positions, before.positions, atol=1e-13)
@@ -39,7 +40,7 @@ def test_a_kick_keeps_places_and_starts_time_again(kernel, name):
         np.testing.assert_array_equal(getattr(after, field), getattr(before, field))
 
 
-def test_a_kick_parts_bodies_frees_what_was_stuck_and_stops_spins(kernel):
+def test_a_kick_separates_bodies_and_stops_spins(kernel):
     gas, _ = running('rough and sticking', kernel)
     assert gas.counts.merge > 0
     assert gas.stuck.any()
@@ -54,14 +55,14 @@ def test_a_kick_parts_bodies_frees_what_was_stuck_and_stops_spins(kernel):
     assert gas.counts.pair > collisions + 10
 
 
-def test_a_kick_of_nothing_stops_a_gas(kernel):
+def test_a_kick_of_zero_velocities_stops_a_gas(kernel):
     gas, _ = running('inelastic', kernel)
     places = gas.beads().positions
     collisions = gas.counts.pair
     gas.kick(np.zeros((14, 3)))
-    course = gas.follow(1e6, [1e6])
-    np.testing.assert_array_equal(course.positions[0], places)
-    assert not course.velocities.any()
+    record = gas.follow(1e6, [1e6])
+    np.testing.assert_array_equal(record.positions[0], places)
+    assert not record.velocities.any()
     assert gas.counts.pair == collisions
 
 
@@ -69,9 +70,9 @@ def test_beads_that_touch_when_they_are_kicked_into_each_other_collide_at_once(k
     gas = gas_of([(4, 5, 5), (6, 5, 5)], [(0, 0, 0), (0, 0, 0)], kernel=kernel)
     gas.run_until(5.0)
     gas.kick([(1, 0, 0), (-1, 0, 0)])
-    course = gas.follow(1.0, [1.0], log=True)
-    assert course.events['time'].tolist() == [0.0]
-    assert course.velocities[0, :, 0].tolist() == [-1, 1]
+    record = gas.follow(1.0, [1.0], log=True)
+    assert record.events['time'].tolist() == [0.0]
+    assert record.velocities[0, :, 0].tolist() == [-1, 1]
 
 
 def test_many_kicks_add_no_energy_but_their_own(kernel):
@@ -85,33 +86,33 @@ def test_many_kicks_add_no_energy_but_their_own(kernel):
         gas.kick(random.normal(size=(14, 3)))
         given += energy(gas.beads()) - energy(before)
     gas.run_until(3.0)
-    assert energy(gas.beads()) + gas.books[0] == near(given)
+    assert energy(gas.beads()) + gas.ledger[0] == near(given)
 
 
-def test_a_gas_can_be_set_going_with_the_same_beads_elsewhere(kernel):
+def test_a_gas_restarts_with_its_beads_at_other_positions(kernel):
     gas, rules = running('rough', kernel)
     counts = gas.counts
     beads = mixture(12, 14, rules)
-    gas.set_going(beads)
-    course = gas.follow(5.0, [0.0, 5.0])
+    gas.restart(beads)
+    record = gas.follow(5.0, [0.0, 5.0])
     expected = HardSphereGas(beads, rules, kernel).follow(5.0, [0.0, 5.0])
-    np.testing.assert_array_equal(course.positions, expected.positions)
-    np.testing.assert_array_equal(course.spins, expected.spins)
+    np.testing.assert_array_equal(record.positions, expected.positions)
+    np.testing.assert_array_equal(record.spins, expected.spins)
     assert gas.counts.pair > counts.pair
 
 
-def test_a_gas_is_not_set_going_with_other_beads(kernel):
+def test_a_restart_with_another_number_of_beads_is_refused(kernel):
     gas, rules = running('inelastic', kernel)
     before = gas.beads()
     with pytest.raises(SimulationError, match='beads: 13 of them; give 14'):
-        gas.set_going(mixture(12, 13, rules))
+        gas.restart(mixture(12, 13, rules))
     moved = replace(before, positions=before.positions + 5.0)
     with pytest.raises(SimulationError, match='into a wall'):
-        gas.set_going(moved)
+        gas.restart(moved)
     together = before.positions.copy()
     together[1] = together[0]
     with pytest.raises(SimulationError, match='overlap'):
-        gas.set_going(replace(before, positions=together))
+        gas.restart(replace(before, positions=together))
     # And is what it was.
     assert gas.now == 30.0
     np.testing.assert_array_equal(gas.beads().positions, before.positions)

@@ -1,0 +1,80 @@
+"""Choice between scan and neighbour lists, and the state arranged for it."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.simulation.engine.gas_state import BODY, ORIGINAL, new_state
+from nanorocks_ros.simulation.engine.neighbours.list_tuning import (
+    list_skin,
+    with_lists,
+    z_order,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.simulation.engine.gas_state import State
+    from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
+
+# From so many beads on lists are faster (`python -m benchmarks engine`).
+MOST_FOR_SCAN = 32
+
+
+class Kernel(IntEnum):
+    """How the next event of a bead is predicted."""
+
+    AUTOMATIC = 0
+    SCAN = 1
+    LISTS = 2
+
+
+def arranged_state(
+    checked: tuple[NDArray[np.float64], ...],
+    species: NDArray[np.int32],
+    spins: NDArray[np.float64],
+    rules: Rules,
+    kernel: Kernel,
+) -> State:
+    """The state for a kernel, with the beads in the order that suits it.
+
+    Parameters
+    ----------
+    checked : tuple of ndarray
+        Radii, masses, positions and velocities, see `check_beads`.
+    species : ndarray of int32, (n,)
+    spins : ndarray (n, 3) or (0, 3), [rad/s]
+    rules : Rules
+    kernel : Kernel
+
+    Raises
+    ------
+    SimulationError
+        For lists in a periodic box that is too small for them.
+    """
+    radii, masses, positions, velocities = checked
+    skin = list_skin(radii, rules)
+    if kernel == Kernel.LISTS and not skin:
+        raise SimulationError(
+            'kernel', 'the periodic box is too small for lists', 'use the scan, or a larger box'
+        )
+    listed = kernel == Kernel.LISTS or (
+        kernel == Kernel.AUTOMATIC and radii.size > MOST_FOR_SCAN and skin > 0.0
+    )
+    order = np.arange(radii.size)
+    if listed:
+        order = z_order(positions, 2.0 * float(radii.max()) + skin)
+    state = new_state(
+        positions[order], velocities[order], radii[order], masses[order], species[order], rules
+    )
+    state.links[:, ORIGINAL] = order
+    if spins.shape[0]:
+        state.spins[:] = spins[order]
+    if rules.sticky:
+        state.masses[:, 1] = masses
+        state.bodies[:, BODY] = order
+    return with_lists(state, rules, skin) if listed else state

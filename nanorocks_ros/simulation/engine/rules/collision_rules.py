@@ -1,0 +1,256 @@
+"""Rules of collisions: box, restitutions, sticking, friction and motion of the walls."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.numerics.counter_rng import Purpose, key_for
+from nanorocks_ros.simulation.engine.rules.restitution_laws import (
+    CONSTANT,
+    UNIFORM,
+    VISCOELASTIC,
+    Restitution,
+    UniformRestitution,
+    ViscoelasticRestitution,
+    viscoelastic_scale,
+)
+from nanorocks_ros.simulation.engine.rules.rule_checks import (
+    checked_axes,
+    checked_box,
+    checked_friction,
+    checked_non_negative,
+    checked_restitutions,
+    checked_tangential,
+    three_floats,
+)
+from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion, check_motion
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+# Hertz contact of two 2 mm acrylic beads that meet at 10 mm/s lasts about this long.
+CONTACT_DURATION = 4e-5
+
+_NOT_STICKING = 0.0
+_WALLS = 6
+
+STICKING_MEASURES = 'normal', 'total'
+
+
+class Rules(NamedTuple):
+    """`CollisionRules` for compiled code."""
+
+    sides: tuple[float, float, float]
+    per_side: tuple[float, float, float]
+    periodic: tuple[bool, bool, bool]
+    kind: int
+    restitution: NDArray[np.float64]
+    first: float
+    second: float
+    seed_key: np.uint64
+    wall_restitution: tuple[float, float, float, float, float, float]
+    contact_duration: float
+    sticky: bool
+    sticking_speed: float
+    wall_sticking_speed: float
+    total_measure: bool
+    rough: bool
+    tangential: float
+    wall_tangential: float
+    friction: float
+    wall_friction: float
+    moving: bool
+    amplitude: tuple[float, float, float]
+    angular_frequency: float
+    damping: float
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CollisionRules:
+    """The box and the outcome of collisions.
+
+    Parameters
+    ----------
+    box : tuple of 3 floats, [m], > 0
+        Sides; a corner is the origin.
+    periodic : tuple of 3 bools
+        Axes without walls, on which the box repeats itself.
+    restitution : float, or (n_species, n_species) array, or a law, 0 to 1
+        Of the normal relative velocity of two beads: constant, by species, drawn at random or
+        falling with speed.
+    wall_restitution : float or 6 floats, 0 to 1
+        Low and high wall of x, y and z.
+    contact_duration : float, [s], >= 0
+        A contact is elastic when the last one of the same two beads (or of the same bead and
+        wall) was less than this ago; without it, inelastic collapse leads to events without
+        end.
+    sticking_speed : float, [m/s], >= 0
+        Bodies that meet more slowly merge into a rigid body that does not rotate.
+    wall_sticking_speed : float, [m/s], >= 0
+        Bodies that meet a wall more slowly stay there.
+    sticking_measure : 'normal' or 'total'
+        Speed to compare: normal component, or magnitude of the relative velocity.
+    tangential_restitution, wall_tangential_restitution : float or None, -1 to 1
+        Of rough spheres, which rotate: of the tangential velocity of the surfaces at the
+        contact; -1 is smooth, 1 perfectly rough. None: beads have no spin; for the walls:
+        smooth.
+    friction, wall_friction : float, >= 0
+        Of rough spheres, Coulomb's: where the tangential impulse would be larger than this times
+        the normal one, surfaces slide, and it is as large. Infinite: nothing slides.
+    motion : WallMotion or None
+    seed, run : int, >= 0
+        Of a restitution drawn at random; runs of one seed differ.
+    allow_gain : bool
+        Accept restitutions above 1, which feed energy in at every collision.
+
+    Raises
+    ------
+    SimulationError
+        For an invalid value.
+
+    References
+    ----------
+    Luding, McNamara 1998, Granular Matter 1, 113 (contact duration); Jenkins, Richman 1985,
+    Phys. Fluids 28, 3485 (rough spheres).
+    """
+
+    box: tuple[float, float, float]
+    periodic: tuple[bool, bool, bool] = (False, False, False)
+    restitution: Restitution | Sequence[Sequence[float]] | NDArray[np.float64] = 1.0
+    wall_restitution: float | Sequence[float] = 1.0
+    contact_duration: float = CONTACT_DURATION
+    sticking_speed: float = _NOT_STICKING
+    wall_sticking_speed: float = _NOT_STICKING
+    sticking_measure: str = 'normal'
+    tangential_restitution: float | None = None
+    wall_tangential_restitution: float | None = None
+    friction: float = math.inf
+    wall_friction: float = math.inf
+    motion: WallMotion | None = None
+    seed: int = 0
+    run: int = 0
+    allow_gain: bool = False
+
+    def __post_init__(self) -> None:
+        self.compiled()
+
+    @property
+    def species(self) -> int:
+        """Number of species in the table of restitutions; 1 for a law or a single value."""
+        law = self.restitution
+        if isinstance(law, UniformRestitution | ViscoelasticRestitution):
+            return 1
+        return int(np.atleast_2d(np.asarray(law, dtype=np.float64)).shape[0])
+
+    def compiled(self) -> Rules:
+        """The rules as compiled code takes them.
+
+        Raises
+        ------
+        SimulationError
+            For an invalid value.
+        """
+        self._check_sticking()
+        kind, table, first, second = self._law()
+        sides = checked_box(self.box)
+        motion = self.motion or WallMotion(amplitude=(0.0, 0.0, 0.0), angular_frequency=1.0)
+        if self.motion is not None:
+            check_motion(motion)
+        return Rules(
+            sides=sides,
+            per_side=(1.0 / sides[0], 1.0 / sides[1], 1.0 / sides[2]),
+            periodic=checked_axes(self.periodic),
+            kind=kind,
+            restitution=table,
+            first=first,
+            second=second,
+            seed_key=key_for(self.seed, self.run, Purpose.RESTITUTION),
+            wall_restitution=self._walls(),
+            contact_duration=checked_non_negative('contact_duration', self.contact_duration, 's'),
+            sticky=self.sticking_speed > 0.0 or self.wall_sticking_speed > 0.0,
+            sticking_speed=float(self.sticking_speed),
+            wall_sticking_speed=float(self.wall_sticking_speed),
+            total_measure=self.sticking_measure == 'total',
+            rough=self.tangential_restitution is not None
+            or self.wall_tangential_restitution is not None,
+            tangential=checked_tangential('tangential_restitution', self.tangential_restitution),
+            wall_tangential=checked_tangential(
+                'wall_tangential_restitution', self.wall_tangential_restitution
+            ),
+            friction=checked_friction('friction', self.friction),
+            wall_friction=checked_friction('wall_friction', self.wall_friction),
+            moving=self.motion is not None,
+            amplitude=three_floats(motion.amplitude),
+            angular_frequency=float(motion.angular_frequency),
+            damping=float(motion.damping),
+            start=float(motion.start),
+            end=float(motion.end),
+        )
+
+    def _check_sticking(self) -> None:
+        checked_non_negative('sticking_speed', self.sticking_speed, 'm/s')
+        checked_non_negative('wall_sticking_speed', self.wall_sticking_speed, 'm/s')
+        if self.sticking_measure not in STICKING_MEASURES:
+            raise SimulationError(
+                'sticking_measure',
+                f'{self.sticking_measure!r} is none of {", ".join(STICKING_MEASURES)}',
+                'give one of them',
+            )
+        if self.wall_sticking_speed > 0.0 and self.motion is not None:
+            raise SimulationError(
+                'wall_sticking_speed',
+                'bodies cannot stick to walls that move',
+                'let the tray be at rest, or set it to 0',
+            )
+
+    def _law(self) -> tuple[int, NDArray[np.float64], float, float]:
+        law = self.restitution
+        none = np.zeros((1, 1))
+        if isinstance(law, UniformRestitution):
+            low, high = law.mean - 0.5 * law.width, law.mean + 0.5 * law.width
+            highest = sys.float_info.max if self.allow_gain else 1.0
+            if not (law.width >= 0.0 and low >= 0.0 and high <= highest):
+                raise SimulationError(
+                    'restitution',
+                    f'{law!r} reaches from {low:.6g} to {high:.6g}',
+                    'keep mean ± width / 2 within 0 to 1',
+                )
+            return UNIFORM, none, float(law.mean), float(law.width)
+        if isinstance(law, ViscoelasticRestitution):
+            return VISCOELASTIC, none, *viscoelastic_scale(law)
+        table = np.atleast_2d(checked_restitutions('restitution', law, self.allow_gain))
+        if table.ndim != 2 or table.shape[0] != table.shape[1] or np.any(table != table.T):
+            raise SimulationError(
+                'restitution',
+                f'not a symmetric table, shape {table.shape}',
+                'give one row and one column for each species',
+            )
+        return CONSTANT, table, 0.0, 0.0
+
+    def _walls(self) -> tuple[float, float, float, float, float, float]:
+        restitutions = checked_restitutions(
+            'wall_restitution', self.wall_restitution, self.allow_gain
+        )
+        if restitutions.shape not in ((), (_WALLS,)):
+            raise SimulationError(
+                'wall_restitution', f'shape {restitutions.shape}', f'give one value or {_WALLS}'
+            )
+        a, b, c, d, e, f = np.broadcast_to(restitutions, _WALLS).tolist()
+        return a, b, c, d, e, f
+
+
+def restitution_table(table: NDArray[np.float64], n_species: int) -> NDArray[np.float64]:
+    """Table of restitutions for `n_species`; a single value holds for all pairs."""
+    if table.shape[0] >= n_species:
+        return table
+    return np.full((n_species, n_species), table[0, 0])
