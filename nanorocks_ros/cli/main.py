@@ -6,6 +6,7 @@ import argparse
 import logging
 import os
 import sys
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import __version__
@@ -19,47 +20,39 @@ EXIT_CALL = 2
 EXIT_INTERRUPTED = 130
 
 
+COMMANDS = {
+    'analyse': 'analyse',
+    'autocorrelation': 'autocorrelation',
+    'calibrate': 'calibration.calibrate',
+    'calibrate-area': 'calibration.calibrate_area',
+    'cluster-curve': 'calibration.cluster_curve',
+    'dashboard': 'dashboard',
+    'doctor': 'doctor',
+    'figure': 'figures.figure',
+    'import': 'recordings.import_video',
+    'info': 'recordings.info',
+    'library': 'calibration.library',
+    'look': 'look',
+    'reproduce': 'reproduce',
+    'salvage': 'recordings.salvage',
+    'simulate': 'simulation.simulate',
+    'speeds': 'speeds',
+    'sweep': 'simulation.sweep',
+    'track': 'track',
+}
+"""Commands and the modules of `nanorocks_ros.cli` that add their parsers, in the order of help."""
+
+
 def build_parser() -> argparse.ArgumentParser:
     """The parser of the whole command; heavy imports wait until a command runs."""
-    from nanorocks_ros.cli import (
-        analyse,
-        autocorrelation,
-        dashboard,
-        doctor,
-        look,
-        reproduce,
-        speeds,
-        track,
-    )
-    from nanorocks_ros.cli.calibration import calibrate, calibrate_area, cluster_curve, library
-    from nanorocks_ros.cli.figures import figure
-    from nanorocks_ros.cli.recordings import import_video, info, salvage
-    from nanorocks_ros.cli.simulation import simulate, sweep
-
     parser = argparse.ArgumentParser(
         prog='nanorocks',
         description='Coefficient of restitution, with its interval, from films of granular gases.',
     )
     parser.add_argument('--version', action='version', version=f'nanorocks {__version__}')
     commands = parser.add_subparsers(dest='command', metavar='COMMAND', required=True)
-    analyse.add_parser(commands)
-    autocorrelation.add_parser(commands)
-    calibrate.add_parser(commands)
-    calibrate_area.add_parser(commands)
-    cluster_curve.add_parser(commands)
-    dashboard.add_parser(commands)
-    doctor.add_parser(commands)
-    figure.add_parser(commands)
-    import_video.add_parser(commands)
-    info.add_parser(commands)
-    library.add_parser(commands)
-    look.add_parser(commands)
-    reproduce.add_parser(commands)
-    salvage.add_parser(commands)
-    simulate.add_parser(commands)
-    speeds.add_parser(commands)
-    sweep.add_parser(commands)
-    track.add_parser(commands)
+    for module in COMMANDS.values():
+        import_module(f'nanorocks_ros.cli.{module}').add_parser(commands)
     return parser
 
 
