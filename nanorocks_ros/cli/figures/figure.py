@@ -5,7 +5,13 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-MODULES = ('figure_cor', 'figure_packing', 'figure_dust', 'figure_long_term', 'figure_decay')
+MODULES = (
+    'figure_cor',
+    'figure_packing',
+    'figure_dust',
+    'figure_long_term',
+    'figure_decay',
+)
 """Modules of `nanorocks_ros.cli.figures` that add their kinds, in the order of the help."""
 
 
