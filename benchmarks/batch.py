@@ -38,7 +38,7 @@ from nanorocks_ros.settings import (
 from nanorocks_ros.studies.batch.batch_analysis import BatchPlan, run_batch
 from nanorocks_ros.studies.batch.batch_files import write_batch
 from nanorocks_ros.studies.batch.campaign_means import combined
-from nanorocks_ros.studies.reproduction.simulated_campaign import plate_settings
+from nanorocks_ros.studies.reproduction.campaign_plan import plate_settings
 from nanorocks_ros.studies.synthetic.film_bag import START_NS, film_into_bag
 from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
 from nanorocks_ros.wire import topics

@@ -40,11 +40,11 @@ COMMANDS = {
     'sweep': 'simulation.sweep',
     'track': 'track',
 }
-"""Commands and the modules of `nanorocks_ros.cli` that add their parsers, in the order of help."""
+"""By command, the module of `nanorocks_ros.cli` that adds its parser; in the order of the help."""
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """The parser of the whole command; heavy imports wait until a command runs."""
+    """The parser of all commands; heavy imports wait until a command runs."""
     parser = argparse.ArgumentParser(
         prog='nanorocks',
         description='Coefficient of restitution, with its interval, from films of granular gases.',
@@ -62,15 +62,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 when the work was done, 2 for a wrong call, 1 for input that cannot be used, 130
-        when interrupted.
+        0 after success, 1 for unusable input, 2 for a wrong call, 130 when interrupted.
     """
-    # Before numpy is loaded: no array here is worth a second thread.
+    # Set before numpy is loaded: arrays here are too small for a second thread.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-    # What the core has to say while it works; of others, warnings only.
+    # Progress messages of the package; of other packages only warnings.
     logging.basicConfig(format='nanorocks: %(message)s')
     logging.getLogger('nanorocks_ros').setLevel(logging.INFO)
-    # Which fonts of its own it did not find is no concern of who asked for a figure.
+    # Its messages about missing fonts are of no use to the user.
     logging.getLogger('matplotlib.font_manager').setLevel(logging.ERROR)
     try:
         options = build_parser().parse_args(arguments)
@@ -82,18 +81,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'nanorocks: {error}', file=sys.stderr)
         return EXIT_INPUT
     except KeyboardInterrupt as interruption:
-        what = str(interruption) or 'what was written until now can be read'
-        print(f'nanorocks: interrupted; {what}', file=sys.stderr)
+        message = str(interruption) or 'files written so far can be read'
+        print(f'nanorocks: interrupted; {message}', file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
-        # Whoever read our output has enough of it.
+        # The reader of the output closed the pipe.
         sys.stderr.close()
         return 0
     except OSError as error:
         from nanorocks_ros.outputs.safe_text import shown
 
         where = '' if error.filename is None else f'{shown(str(error.filename))}: '
-        what = f'{where}{error.strerror or error}'
-        print(f'nanorocks: {what}; make room, or write elsewhere', file=sys.stderr)
+        message = f'{where}{error.strerror or error}'
+        print(f'nanorocks: {message}; free some space, or write elsewhere', file=sys.stderr)
         return EXIT_INPUT
     return code

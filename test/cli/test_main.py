@@ -29,6 +29,6 @@ def test_a_fault_of_the_system_is_one_line_that_names_the_file(
     monkeypatch.setattr(command, 'build_parser', lambda: parser)
     assert command.main([]) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert line == f'nanorocks: {said}make room, or write elsewhere'
+    assert line == f'nanorocks: {said}free some space, or write elsewhere'
     # So that any terminal takes it.
     assert os.fsencode(line) == line.encode('utf-8')

@@ -1,4 +1,4 @@
-"""``nanorocks cluster-curve``: simulated clusters, by which autocorrelations are calibrated."""
+"""``nanorocks cluster-curve``: calibration of cluster sizes by films of simulated clusters."""
 
 from __future__ import annotations
 
@@ -13,21 +13,26 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.inference.cluster_size.size_from_width import ClusterCurve
 
-_STRONGEST = 2.0
+_MAX_STRENGTH = 2.0
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
     parser = commands.add_parser(
-        'cluster-curve', help='film simulated clusters that sizes are read from'
+        'cluster-curve', help='calibrate cluster sizes with films of simulated clusters'
     )
     parser.add_argument(
-        '--tray', type=int, action='append', help='number of a tray, as often as you like'
+        '--tray', type=int, action='append', help='number of a tray; may be repeated; default: all'
     )
     parser.add_argument('-o', '--output', required=True, help='file to write, .npz')
     parser.add_argument('--trays-file', default='', help='YAML file of trays; default: as flown')
-    parser.add_argument('--runs', type=int, default=128, help='films; default 128')
-    parser.add_argument('--level', type=float, default=0.5, help='as clusters.level; default 0.5')
+    parser.add_argument('--runs', type=int, default=128, help='number of films; default 128')
+    parser.add_argument(
+        '--level',
+        type=float,
+        default=0.5,
+        help='level of the contour, as clusters.level; default 0.5',
+    )
     parser.add_argument(
         '--strengths',
         type=float,
@@ -36,16 +41,18 @@ def add_parser(commands: Any) -> None:
         metavar=('LOW', 'HIGH'),
         help='range of the effects of camera, light and dust, relative to flight; default 0 1.5',
     )
-    parser.add_argument('--seed', type=int, default=1, help='of everything random; default 1')
+    parser.add_argument('--seed', type=int, default=1, help='random seed; default 1')
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
-    parser.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
+    parser.add_argument(
+        '--scheduler', metavar='tcp://HOST:PORT', help='scheduler of a Dask cluster'
+    )
     parser.add_argument('--force', action='store_true', help='replace a file that exists')
     parser.add_argument('--json', action='store_true', help='print one JSON object')
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Film, measure, write, print; the exit code."""
+    """Film, measure, write and print, and return the exit code."""
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.errors import ConfigurationError
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
@@ -62,16 +69,18 @@ def run(options: argparse.Namespace) -> int:
     if options.seed < 0:
         raise ConfigurationError('--seed', f'{options.seed}', 'give 0 or more')
     weak, strong = options.strengths
-    if not 0.0 <= weak <= strong <= _STRONGEST:
+    if not 0.0 <= weak <= strong <= _MAX_STRENGTH:
         raise ConfigurationError(
-            '--strengths', f'{weak:g} {strong:g}', f'give two, rising, from 0 to {_STRONGEST:g}'
+            '--strengths',
+            f'{weak:g} {strong:g}',
+            f'give two rising numbers from 0 to {_MAX_STRENGTH:g}',
         )
-    cells = load_trays(options.trays_file or None)
-    numbers = tuple(sorted(set(options.tray or cells)))
+    trays = load_trays(options.trays_file or None)
+    numbers = tuple(sorted(set(options.tray or trays)))
     for number in numbers:
-        tray_by_number(cells, number)
+        tray_by_number(trays, number)
     plan = ClusterPlan(
-        cells=cells,
+        cells=trays,
         trays=numbers,
         runs=options.runs,
         seed=options.seed,
@@ -87,12 +96,16 @@ def run(options: argparse.Namespace) -> int:
             progress.count,
             lambda text: print(f'nanorocks: {text}', file=sys.stderr),
         )
-    found = {number: curves[curve_key(cells[number])] for number in numbers}
+    tray_curves = {number: curves[curve_key(trays[number])] for number in numbers}
     if options.json:
-        shown = {str(number): _values(curve) for number, curve in found.items()}
-        print(json.dumps({'output': str(output), 'trays': shown, **json.loads(plan.question())}))
+        tray_values = {str(number): _values(curve) for number, curve in tray_curves.items()}
+        print(
+            json.dumps(
+                {'output': str(output), 'trays': tray_values, **json.loads(plan.question())}
+            )
+        )
         return 0
-    for number, curve in found.items():
+    for number, curve in tray_curves.items():
         print(f'tray {number}: {_sentence(curve)}')
     return 0
 
@@ -100,7 +113,7 @@ def run(options: argparse.Namespace) -> int:
 def _values(curve: ClusterCurve) -> dict[str, Any]:
     return {
         'largest': None if math.isnan(curve.largest) else curve.largest,
-        'sizes': [math.exp(one) for one in curve.log_size],
+        'sizes': [math.exp(log_size) for log_size in curve.log_size],
         'readings': curve.reading.tolist(),
         'weight': curve.weight,
         'scatter': curve.scatter.tolist(),
@@ -110,5 +123,5 @@ def _values(curve: ClusterCurve) -> dict[str, Any]:
 
 def _sentence(curve: ClusterCurve) -> str:
     if math.isnan(curve.largest):
-        return 'the autocorrelation says nothing of the size of its clusters'
+        return 'the autocorrelation does not depend on the size of its clusters'
     return f'sizes up to {curve.largest:.1f} beads'

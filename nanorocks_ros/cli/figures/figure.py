@@ -1,4 +1,4 @@
-"""``nanorocks figure KIND ...``: figures of measured and simulated gases, as in the paper."""
+"""``nanorocks figure KIND ...``: figures of the paper from measured or simulated data."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ MODULES = (
     'figure_long_term',
     'figure_decay',
 )
-"""Modules of `nanorocks_ros.cli.figures` that add their kinds, in the order of the help."""
+"""Modules of `nanorocks_ros.cli.figures` that add a kind, in the order of the help."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command with all its kinds."""
-    parser = commands.add_parser('figure', help='draw what was measured as the paper does')
+    """Add the command with all its kinds of figure."""
+    parser = commands.add_parser('figure', help='draw a figure of the paper from results')
     kinds = parser.add_subparsers(dest='kind', metavar='KIND', required=True)
     for module in MODULES:
         import_module(f'{__package__}.{module}').add_parser(kinds)

@@ -1,4 +1,4 @@
-"""``nanorocks figure decay | instantaneous SPEEDS``: measured decays (figures 7 and 13)."""
+"""``nanorocks figure decay | instantaneous SPEEDS``: figures 7 and 13 of measured decays."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 _PICTURES = ('.png', '.pdf', '.svg')
 _SPAN = (0.5, 20.0)
 _KINDS = {
-    'decay': "energy of the beads as they cool, with our fit and the paper's (its figure 7)",
-    'instantaneous': 'restitution against speed, and what noise alone makes of it (figure 13)',
+    'decay': "energy of the cooling beads, with our fit and the paper's (figure 7)",
+    'instantaneous': 'restitution against speed, with the effect of noise alone (figure 13)',
 }
 
 
@@ -28,27 +28,35 @@ def add_parser(kinds: Any) -> None:
     for kind, text in _KINDS.items():
         parser = kinds.add_parser(kind, help=text, description=text)
         parser.add_argument(
-            'speeds', help='results of `nanorocks analyse`, or their table of speeds'
+            'speeds', help='folder of results of `nanorocks analyse`, or a table of speeds'
         )
         parser.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
-        parser.add_argument('--tray', type=int, help='where there are several')
         parser.add_argument(
-            '--wall-restitution', type=float, default=0.99, help='taken for known; default 0.99'
+            '--tray', type=int, help='number of the tray; required with several trays'
+        )
+        parser.add_argument(
+            '--wall-restitution',
+            type=float,
+            default=0.99,
+            help='restitution of the walls; default 0.99',
         )
         parser.add_argument(
             '--first',
             type=float,
-            help='[s] since the shaking event; default 0.5, as analysed where the tray swung on',
+            help='[s] start of the fit, since the shaking event; default 0.5, or as analysed '
+            'where the tray kept oscillating',
         )
-        parser.add_argument('--last', type=float, help='[s]; default 20, or as analysed then')
-        parser.add_argument('--trays', default='', help='YAML file of trays; default: those flown')
+        parser.add_argument(
+            '--last', type=float, help='[s] end of the fit; default 20, or as analysed'
+        )
+        parser.add_argument('--trays', default='', help='YAML file of trays; default: as flown')
         parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
         parser.add_argument('--force', action='store_true', help='replace a picture that exists')
         parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read, draw, print; the exit code."""
+    """Read, draw and print, and return the exit code."""
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.decays.cooling_curves import read_cycles, speed_table
@@ -57,22 +65,22 @@ def run(options: argparse.Namespace) -> int:
     check_outputs({'--output': path}, {'--output': _PICTURES}, force=options.force)
     table, number = speed_table(Path(options.speeds), options.tray)
     if number is None:
-        raise ConfigurationError('--tray', 'is not known from the name', 'name the tray')
+        raise ConfigurationError('--tray', 'cannot be read from the file name', 'name the tray')
     tray = tray_by_number(load_trays(options.trays), number)
     cycles = read_cycles(table)
     values = _drawn(options, table, tray, cycles)
     if options.json:
-        shown = {'tray': number, 'cycles': len(cycles), **values}
-        print(json.dumps(shown, allow_nan=False))
-    many = f'{len(cycles)} cycles' if len(cycles) > 1 else 'a cycle'
-    print(f'nanorocks: {many} of tray {number} in {path}', file=sys.stderr)
+        printed = {'tray': number, 'cycles': len(cycles), **values}
+        print(json.dumps(printed, allow_nan=False))
+    cycles_text = f'{len(cycles)} cycles' if len(cycles) > 1 else 'a cycle'
+    print(f'nanorocks: {cycles_text} of tray {number} in {path}', file=sys.stderr)
     return 0
 
 
 def _drawn(
     options: argparse.Namespace, table: Path, tray: Tray, cycles: tuple[CycleSpeeds, ...]
 ) -> dict[str, Any]:
-    """Draw the picture; its numbers."""
+    """Draw the picture, and return its numbers."""
     from nanorocks_ros.studies.decays.cooling_curves import cooling_part, species_cycles
     from nanorocks_ros.studies.decays.cooling_windows import cooling_window, span_of
     from nanorocks_ros.studies.figures.decay_figure import decay_figure
@@ -84,8 +92,8 @@ def _drawn(
     path, walls = Path(options.output), options.wall_restitution
     window = cooling_window(table)
     start = window.start if window else 0.0
-    usual = (window.first, window.last) if window and start > 0.0 else _SPAN
-    span = span_of(options.first, options.last, usual)
+    default_span = (window.first, window.last) if window and start > 0.0 else _SPAN
+    span = span_of(options.first, options.last, default_span)
     if options.kind == 'decay':
         species = species_cycles(table, tray)
         return decay_figure(

@@ -183,10 +183,10 @@ def instantaneous_values(found: InstantaneousCor) -> dict[str, Any]:
         'local_restitution_lower': local.lower,
         'local_restitution_upper': local.upper,
     }
-    return {name: _known(array.tolist()) for name, array in arrays.items()}
+    return {name: _none_for_nan(array.tolist()) for name, array in arrays.items()}
 
 
-def _known(value: Any) -> Any:
+def _none_for_nan(value: Any) -> Any:
     if isinstance(value, list):
-        return [_known(one) for one in value]
+        return [_none_for_nan(one) for one in value]
     return value if math.isfinite(value) else None

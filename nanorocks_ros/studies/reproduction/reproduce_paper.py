@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from nanorocks_ros.jobs.tasks import Workers
-    from nanorocks_ros.studies.reproduction.simulated_campaign import CampaignPlan
+    from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan
 
 # CPU time for a second of film, and its two analyses.
 _SECONDS = 5.0

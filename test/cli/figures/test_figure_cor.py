@@ -186,7 +186,7 @@ def test_a_bag_is_analysed_first(tmp_path, capsys):
     assert all((folder / name).is_file() for name in FIGURES)
     assert (folder / 'results' / 'tray_1_speed.csv').is_file()
     assert draw(SAMPLE, tmp_path / 'other') == 2
-    assert '--tray: is needed with a bag' in capsys.readouterr().err
+    assert '--tray: is required with a bag' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

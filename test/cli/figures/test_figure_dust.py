@@ -48,7 +48,7 @@ def test_elastic_particles_never_collapse(tmp_path, capsys):
     [
         (('--measured', '1'), 'TRAY:SPEED'),
         (('--measured', 'x:0.01'), 'cannot be read'),
-        (('--measured', '1:0.01:0.02'), 'half an interval'),
+        (('--measured', '1:0.01:0.02'), 'one end of an interval'),
         (('--measured', '1:0.01:0.02:0.03'), 'not within'),
         (('--measured', '1:-0.01'), 'positive'),
         (('--measured', '9:0.01'), 'tray 9'),

@@ -214,7 +214,7 @@ def test_ctrl_c_ends_it_and_says_what_is_left(tmp_path):
         process.kill()
     assert process.returncode == 130
     assert said.splitlines()[-1] == (
-        'nanorocks: interrupted; complete: run.npz; what bag holds until now can be read'
+        'nanorocks: interrupted; complete: run.npz; bag can be read up to the last frame written'
     )
     assert len(BagFrames(tmp_path / 'bag').truth(START_NS)[1]) > 0
     assert {path.name for path in tmp_path.iterdir()} == {'run.npz', 'bag'}

@@ -65,15 +65,15 @@ def test_no_effects_is_a_quiet_picture_and_single_effects_can_be_added(capsys, t
 @pytest.mark.parametrize(
     ('arguments', 'code', 'said'),
     [
-        (['--scene'], 2, '--scene: makes nothing but films; name a --bag, --video or --picture'),
+        (['--scene'], 2, '--scene: has no output; name a --bag, --video or --picture'),
         (
             ['--scene', '--bag', 'b', '--tray', '3'],
             2,
-            '--tray: is of one tray alone; use --scene-',
+            '--tray: is a setting of one tray; use --scene-',
         ),
-        (['--scene', '--bag', 'b', '--noise', '3'], 2, '--noise: is of one tray alone; use'),
-        (['--scene', '--bag', 'b', '--runs', '3'], 2, '--runs: is of one tray alone'),
-        (['--scene', '--bag', 'b', '--events', 'e.npz'], 2, '--events: is of one tray alone'),
+        (['--scene', '--bag', 'b', '--noise', '3'], 2, '--noise: is a setting of one tray; use'),
+        (['--scene', '--bag', 'b', '--runs', '3'], 2, '--runs: is a setting of one tray'),
+        (['--scene', '--bag', 'b', '--events', 'e.npz'], 2, '--events: is a setting of one tray'),
         (['--scene', '--bag', 'b', '--duration', '0'], 2, '--duration: 0'),
         (['--scene', '--bag', 'b', '--quality', '0'], 2, '--quality: 0'),
         (['--scene', '--bag', 'b', '--scene-glare', 'much'], 2, '--scene-glare: '),
@@ -87,7 +87,11 @@ def test_no_effects_is_a_quiet_picture_and_single_effects_can_be_added(capsys, t
             2,
             'lies outside a picture of 300 x 1080',
         ),
-        (['--scene-noise', '3', '--bag', 'b'], 2, '--scene-noise: is of the whole plate; add'),
+        (
+            ['--scene-noise', '3', '--bag', 'b'],
+            2,
+            '--scene-noise: is a setting of the whole plate; add',
+        ),
     ],
 )
 def test_a_wrong_call_is_one_line(capsys, tmp_path, monkeypatch, arguments, code, said):

@@ -101,7 +101,7 @@ def test_a_map_is_drawn_against_a_point_or_a_file(tmp_path, capsys):
         (['--workers', '2', '--scheduler', 'tcp://127.0.0.1:1'], 'leave it out with --scheduler'),
         (['--scheduler', 'nowhere'], "--scheduler: 'nowhere' is no address; give tcp://host:port"),
         (['--task-seconds', 'nan'], '--task-seconds: nan; give a time above 0'),
-        (['--figure', 'a.png'], '--figure: goes with --reference; give both or neither'),
+        (['--figure', 'a.png'], '--figure: needs --reference; give both or neither'),
         (['--figure', 'a.xyz', '--reference', '1'], "--figure: 'a.xyz' is no picture; end it in"),
         (['--figure', 'a.png', '--reference', '1'], '--figure: the grid is a single point'),
         ([*GRID, '--figure', 'a.png', '--reference', 'x'], "--reference: 'x' cannot be read"),

@@ -333,7 +333,7 @@ def test_what_is_done_outlives_an_interruption_and_a_full_disk(tiny, films, tmp_
     ('arguments', 'code', 'message'),
     [
         (('{tmp}/none*', '-o', '{tmp}/out'), 1, 'none*: matches nothing'),
-        (('{tiny}', '{tiny}'), 2, '--output: is where results of many recordings are kept'),
+        (('{tiny}', '{tiny}'), 2, '--output: is required for many recordings'),
         (('{tiny}', '--workers', '0', '-o', '{tmp}/out'), 2, '--workers: 0'),
         (('{tiny}', '--workers', '1', '-o', '/proc/out'), 1, '/proc/out: cannot be written'),
         (('{tiny}', '--workers', '1', '-o', '{tmp}'), 1, 'holds no batch of ours'),

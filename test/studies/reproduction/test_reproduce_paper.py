@@ -9,11 +9,10 @@ import pytest
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.tasks import Workers
+from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan, plate_settings
 from nanorocks_ros.studies.reproduction.reproduce_paper import reproduce
 from nanorocks_ros.studies.reproduction.simulated_campaign import (
-    CampaignPlan,
     parts_done,
-    plate_settings,
     prepare_campaign,
     run_campaign,
 )

@@ -153,7 +153,7 @@ def test_an_empty_graph_says_what_to_compare():
 
 @pytest.mark.parametrize(
     ('sent', 'received', 'named'),
-    [(0, 0, 'did not find each other'), (5, 3, '3 of 5 frames')],
+    [(0, 0, 'did not discover each other'), (5, 3, '3 of 5 frames')],
 )
 def test_frames_that_do_not_arrive_are_a_problem(sent, received, named):
     finding = judged(

@@ -26,19 +26,22 @@ from nanorocks_ros.studies.figures.dust_figure import (
 )
 from nanorocks_ros.studies.figures.long_term_figure import long_term_figure
 from nanorocks_ros.studies.figures.packing_figure import packing_figure
+from nanorocks_ros.studies.reproduction.campaign_plan import (
+    FIRST_SHAKE,
+    STICKING,
+    plate_settings,
+)
 from nanorocks_ros.studies.reproduction.chapters.chapter_context import Chapter, Difference
-from nanorocks_ros.studies.reproduction.simulated_campaign import STICKING, plate_settings
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
+    from nanorocks_ros.studies.reproduction.campaign_cycle import CycleFiles
     from nanorocks_ros.studies.reproduction.chapters.chapter_context import Context
-    from nanorocks_ros.studies.reproduction.simulated_campaign import CycleFiles
 
 _MM = 1e3
-_SHAKE = 1.0
 _TRAYS = (1, 3, 5)
 _SHOWN = 3
 _COLUMNS = ('time', 'cycle', 'level_area', 'combined_size', 'cluster_size', 'weighted_size')
@@ -229,7 +232,7 @@ def _true_onset(one: CycleFiles, tray: int) -> float:
     truth = one.tray(tray)['truth']
     bodies = np.array(truth['bodies'])
     fallen = np.flatnonzero(bodies < bodies[0])
-    return float(truth['time'][fallen[0]]) - _SHAKE if fallen.size else math.nan
+    return float(truth['time'][fallen[0]]) - FIRST_SHAKE if fallen.size else math.nan
 
 
 def _table(one: CycleFiles, tray: int) -> dict[str, NDArray[np.float64]]:
@@ -241,10 +244,10 @@ def _paper_onsets(cycles: list[CycleFiles], tray: int) -> tuple[float, float]:
     onsets, speeds = [], []
     for cycle in cycles:
         table = _table(cycle, tray)
-        at = paper_onset(table['time'], table['level_area'], _SHAKE)
+        at = paper_onset(table['time'], table['level_area'], FIRST_SHAKE)
         if math.isnan(at):
             continue
-        onsets.append(at - _SHAKE)
+        onsets.append(at - FIRST_SHAKE)
         found = cycle.tray(tray)
         speeds.append(2.0 * float(np.interp(at, found['time'], found['mean_projected_speed'])))
     return mean_of(onsets)[0], mean_of(speeds)[0]
@@ -267,7 +270,7 @@ def _draw_autocorrelation(context: Context, path: Path) -> None:
     early, late = None, None
     for shot in images.shots(context.count):
         for image in shot.images:
-            age = (image.stamp_ns - images.epoch_ns) / 1e9 - _SHAKE
+            age = (image.stamp_ns - images.epoch_ns) / 1e9 - FIRST_SHAKE
             if early is None and age > 0.5:
                 early = image.gray
             late = image.gray

@@ -17,8 +17,8 @@ from nanorocks_ros.studies.analysis.bag_tracks import track_bag
 from nanorocks_ros.studies.inspection.preprocessing_steps import steps_of_bag
 from nanorocks_ros.studies.inspection.steps_figure import steps_figure
 from nanorocks_ros.studies.inspection.track_overlay import overlay
+from nanorocks_ros.studies.reproduction.campaign_plan import STICKING, plate_settings
 from nanorocks_ros.studies.reproduction.chapters.chapter_context import Chapter, Difference
-from nanorocks_ros.studies.reproduction.simulated_campaign import STICKING, plate_settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable

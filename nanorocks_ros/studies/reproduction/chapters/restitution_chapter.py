@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.studies.reproduction.campaign_cycle import CycleFiles
     from nanorocks_ros.studies.reproduction.chapters.chapter_context import Context
-    from nanorocks_ros.studies.reproduction.simulated_campaign import CycleFiles
 
 _TRAY = 1
 _SPAN = (1.75, 20.0)

@@ -17,15 +17,15 @@ from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table, 
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.studies.inspection.speed_comparison import compare_speeds
 from nanorocks_ros.studies.inspection.speeds_figure import speeds_figure
+from nanorocks_ros.studies.reproduction.campaign_plan import plate_settings
 from nanorocks_ros.studies.reproduction.chapters.chapter_context import Chapter, Difference
-from nanorocks_ros.studies.reproduction.simulated_campaign import plate_settings
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from nanorocks_ros.studies.inspection.speed_comparison import ComparedSpeeds
+    from nanorocks_ros.studies.reproduction.campaign_cycle import CycleFiles
     from nanorocks_ros.studies.reproduction.chapters.chapter_context import Context
-    from nanorocks_ros.studies.reproduction.simulated_campaign import CycleFiles
 
 _MM = 1e3
 _SHOWN = (('tracking', '#30506f', 'o'), ('structure_function', '#2a9d8f', 's'),
