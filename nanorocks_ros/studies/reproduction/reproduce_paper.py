@@ -1,4 +1,4 @@
-"""The paper again, from simulated films: every figure and table, beside what is true."""
+"""The report that reproduces the figures and tables of the paper from simulated films."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan
 
-# CPU time for a second of film, and its two analyses.
-_SECONDS = 5.0
+# CPU time of one second of film with its two analyses, [s].
+_CPU_SECONDS = 5.0
 REPORT, PICTURES = 'report.html', 'pictures'
 _CHAPTERS: dict[str, Callable[[Context], Chapter]] = {
     'experiment': experiment_chapter,
@@ -59,7 +59,7 @@ def reproduce(
 ) -> Path:
     """Simulate, film and analyse a campaign, and write the report.
 
-    What an earlier call left in the folder is taken up again.
+    Finished cycles and searches of an earlier call in the folder are reused.
 
     Parameters
     ----------
@@ -67,23 +67,23 @@ def reproduce(
     plan : CampaignPlan
     workers : Workers
     runs : int
-        At each point of the searches.
+        Simulated runs at each point of a search.
     progress : callable
-        Called with what is being done and the part of it that is done, 0 to 1.
+        Called with the name of a chapter and the part of it that is done, 0 to 1.
     notice : callable
-        Called with what the user should know, one line each.
+        Called with messages for the user, one line each.
 
     Returns
     -------
     Path
-        Of the report.
+        The report.
 
     Raises
     ------
     RecordingError
-        When the folder holds something else, or cannot be written.
+        When the folder holds other files, or cannot be written.
     KeyboardInterrupt
-        Ctrl-C; what is complete is kept.
+        On Ctrl-C; finished cycles are kept.
     """
     prepare_campaign(folder, plan)
     cycles = run_campaign(folder, plan, workers, lambda done: progress('films', done))
@@ -104,7 +104,7 @@ def reproduce(
         try:
             chapters.append(make(context))
         except (FitError, RecordingError) as error:
-            # Too short a campaign for one chapter is none for the others.
+            # A campaign too short for one chapter may be long enough for the others.
             notice(f'{name}: {error}')
             missing = Section(title=name.capitalize(), parts=[f'Could not be made: {error}.'])
             chapters.append(Chapter(section=missing))
@@ -117,8 +117,8 @@ def reproduce(
             Table(
                 head=('', 'the paper', 'its method, on our films', 'ours', 'truth'),
                 rows=differences,
-                caption='What the paper reports of its flight, what its own method makes of our '
-                'films, what our default makes of them, and what was put in.',
+                caption='Values of the flight in the paper; the method of the paper on our films; '
+                'our default method on our films; values of the simulation.',
             )
         ],
     )
@@ -127,7 +127,7 @@ def reproduce(
         path,
         'NanoRocks, reproduced',
         f'nanorocks_ros {__version__}: {plan.cycles} {cycle} without and {plan.cycles} with '
-        f'sticking, {plan.seconds:g} s of film each, seed {plan.seed}; {runs} runs at every '
+        f'sticking, {plan.seconds:g} s of film each, seed {plan.seed}; {runs} runs at each '
         'point of the searches.',
         [first, *(chapter.section for chapter in chapters)],
     )
@@ -135,7 +135,7 @@ def reproduce(
 
 
 def minutes(plan: CampaignPlan, cores: int) -> int:
-    """About how long the films and their analysis take."""
+    """Approximate time of the films and their analysis, [min]."""
     return math.ceil(
-        2 * plan.cycles * plan.seconds * _SECONDS / max(min(cores, 2 * plan.cycles), 1) / 60
+        2 * plan.cycles * plan.seconds * _CPU_SECONDS / max(min(cores, 2 * plan.cycles), 1) / 60
     )

@@ -215,7 +215,7 @@ def test_a_wrong_call_is_named_in_one_line(table, tmp_path, capsys, more, code, 
 def test_a_folder_of_something_else_is_left_alone(table, tmp_path, capsys):
     (tmp_path / 'mine.txt').write_text('mine')
     assert draw(table, tmp_path) == 1
-    assert 'holds no figures of ours' in capsys.readouterr().err
+    assert 'holds no figures of this command' in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ['mine.txt']
 
 

@@ -52,7 +52,7 @@ def test_elastic_particles_never_collapse(tmp_path, capsys):
         (('--measured', '1:0.01:0.02:0.03'), 'not within'),
         (('--measured', '1:-0.01'), 'positive'),
         (('--measured', '9:0.01'), 'tray 9'),
-        (('--no-paper',), 'there is none'),
+        (('--no-paper',), 'there are none'),
         (('--restitution', '2'), 'from 0 to 1'),
         (('--trays', 'nowhere.yaml'), 'nowhere.yaml'),
     ],

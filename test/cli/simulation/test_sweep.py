@@ -102,7 +102,10 @@ def test_a_map_is_drawn_against_a_point_or_a_file(tmp_path, capsys):
         (['--scheduler', 'nowhere'], "--scheduler: 'nowhere' is no address; give tcp://host:port"),
         (['--task-seconds', 'nan'], '--task-seconds: nan; give a time above 0'),
         (['--figure', 'a.png'], '--figure: needs --reference; give both or neither'),
-        (['--figure', 'a.xyz', '--reference', '1'], "--figure: 'a.xyz' is no picture; end it in"),
+        (
+            ['--figure', 'a.xyz', '--reference', '1'],
+            "--figure: 'a.xyz' is no picture file; end it in",
+        ),
         (['--figure', 'a.png', '--reference', '1'], '--figure: the grid is a single point'),
         ([*GRID, '--figure', 'a.png', '--reference', 'x'], "--reference: 'x' cannot be read"),
         ([*GRID, '--figure', 'a.png', '--reference', '0.6,0.5'], 'choose one of 0.9, 0.99'),

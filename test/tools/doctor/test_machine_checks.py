@@ -142,7 +142,7 @@ def test_two_cameras_on_one_topic_are_found():
     }
     (finding,) = examine_graph([topic])
     assert finding.status is Status.WARNING
-    assert 'frames of 2 cameras mix' in finding.found
+    assert 'frames of 2 cameras are mixed' in finding.found
 
 
 def test_an_empty_graph_says_what_to_compare():

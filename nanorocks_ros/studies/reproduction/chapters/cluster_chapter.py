@@ -1,4 +1,4 @@
-"""Clusters, onset of sticking, packing, long-term evolution: Table 3, figures 8 to 10, 14."""
+"""Chapters on clusters, onset, packing and long-term evolution: Table 3, Figures 8 to 10, 14."""
 
 from __future__ import annotations
 
@@ -55,20 +55,22 @@ def cluster_chapter(context: Context) -> Chapter:
     rows, differences = [], []
     for tray in load_trays():
         paper = PAPER_TABLE_3[tray]
-        true = [_end(one.summary['clusters'][str(tray)]) for one in context.sticking]
-        ours = [_last(one, tray) for one in context.sticking]
-        weighted = mean_of([one['weighted_size'] for one in true])[0]
-        sizes = [one.get('cluster_size') for one in ours]
+        true_ends = [
+            _last_values(cycle.summary['clusters'][str(tray)]) for cycle in context.sticking
+        ]
+        our_ends = [_first_cycle(cycle, tray) for cycle in context.sticking]
+        weighted = mean_of([end['weighted_size'] for end in true_ends])[0]
+        sizes = [end.get('cluster_size') for end in our_ends]
         size = mean_of(sizes)[0]
-        bodies = mean_of([one.get('bodies') for one in ours])[0]
+        bodies = mean_of([end.get('bodies') for end in our_ends])[0]
         rows.append(
             (
                 str(tray),
                 f'{paper.clusters:g}',
                 f'{paper.beads_per_cluster:g} ± {paper.deviation:g}',
-                number(mean_of([one['clusters'] for one in true])[0]),
+                number(mean_of([end['clusters'] for end in true_ends])[0]),
                 number(bodies),
-                number(mean_of([one['bodies'] for one in true])[0]),
+                number(mean_of([end['bodies'] for end in true_ends])[0]),
                 number(size),
                 number(weighted),
             )
@@ -86,8 +88,8 @@ def cluster_chapter(context: Context) -> Chapter:
     section.parts += [
         Picture(
             path=path,
-            caption='Figure 8: tray 3 just after shaking and at the end of a cycle in which beads '
-            'stick, and the autocorrelation of both, with contours at 0.3, 0.5 and 0.7.',
+            caption='Figure 8: tray 3 just after shaking and at the end of a cycle with sticking, '
+            'with the autocorrelation of both images and contours at 0.3, 0.5 and 0.7.',
         ),
         Table(
             head=('tray', 'the paper: clusters', 'beads each', 'true clusters here',
@@ -95,13 +97,13 @@ def cluster_chapter(context: Context) -> Chapter:
             rows=rows,
             caption='Table 3: at the end of cycles in which beads stick below '
             f'{_MM * context.plan.sticking_speed:g} mm/s. Sizes are averaged over the beads. The '
-            'paper counted clusters of flight by hand, of beads whose sticking speed is not '
-            'known: its numbers stand beside ours, and need not agree with them.',
+            'paper counted clusters in flight by hand. The sticking speed of its beads is '
+            'unknown, so its numbers need not agree with ours.',
         ),
         Erratum(
             text='A linear calibration of the autocorrelation fails: its area stops growing long '
-            'before the clusters do. Ours is a curve from simulated clusters that says where it '
-            'ends, and tracks count bodies directly.'
+            'before the clusters do. Our calibration is a curve from simulated clusters with a '
+            'known end, and tracks count bodies directly.'
         ),
     ]  # fmt: skip
     return Chapter(section=section, differences=differences)
@@ -113,21 +115,21 @@ def onset_chapter(context: Context) -> Chapter:
     rows, differences, points = [], [], []
     trays = load_trays()
     for tray in _TRAYS:
-        onset = mean_of([_last(one, tray).get('onset') for one in context.sticking])[0]
-        true = mean_of([_true_onset(one, tray) for one in context.sticking])[0]
+        onset = mean_of([_first_cycle(cycle, tray).get('onset') for cycle in context.sticking])[0]
+        true_onset = mean_of([_true_onset(cycle, tray) for cycle in context.sticking])[0]
         paper, threshold = _paper_onsets(context.sticking, tray)
         control, control_threshold = _paper_onsets(context.bouncing, tray)
-        false = [_last(one, tray).get('onset') for one in context.bouncing]
-        alarms = sum(one is not None for one in false)
-        speed, lower, upper = _sticking(context, tray)
-        found = '–' if math.isnan(speed) else number(speed, 3, _MM)
+        false_onsets = [_first_cycle(cycle, tray).get('onset') for cycle in context.bouncing]
+        alarms = sum(onset is not None for onset in false_onsets)
+        speed, lower, upper = _sticking_speed(context, tray)
+        speed_text = '–' if math.isnan(speed) else number(speed, 3, _MM)
         rows.append(
             (
                 str(tray), number(paper), number(control), number(onset),
-                f'{alarms} of {len(false)}', number(true),
+                f'{alarms} of {len(false_onsets)}', number(true_onset),
                 f'{_MM * PAPER_STICKING_SPEEDS[tray]:g}', number(threshold, 3, _MM),
                 number(control_threshold, 3, _MM),
-                f'{found} [{number(lower, 3, _MM)}, {number(upper, 3, _MM)}]',
+                f'{speed_text} [{number(lower, 3, _MM)}, {number(upper, 3, _MM)}]',
             )
         )  # fmt: skip
         differences.append(
@@ -135,7 +137,7 @@ def onset_chapter(context: Context) -> Chapter:
                 f'sticking speed, tray {tray} [mm/s]',
                 f'{_MM * PAPER_STICKING_SPEEDS[tray]:g}',
                 number(threshold, 3, _MM),
-                f'{found} [{number(lower, 3, _MM)}, {number(upper, 3, _MM)}]',
+                f'{speed_text} [{number(lower, 3, _MM)}, {number(upper, 3, _MM)}]',
                 f'{_MM * context.plan.sticking_speed:g}',
             )
         )
@@ -149,13 +151,13 @@ def onset_chapter(context: Context) -> Chapter:
                   'ours, nothing sticks', 'truth [s]', 'the paper: speed [mm/s]',
                   "paper's rule here", 'the same, nothing sticks', 'ours [95 %]'),
             rows=rows,
-            caption='When beads begin to stick, and below which speed; the truth is '
+            caption='Onset of sticking, and sticking speed; the true sticking speed is '
             f'{_MM * context.plan.sticking_speed:g} mm/s along the line of centres.',
         ),
         Erratum(
             text='Its onset is where the derivative of the cluster size becomes positive. '
-            'Whatever fluctuates does that at once: the rule fires where nothing sticks at all '
-            '(third column), and twice the mean speed at that instant is no threshold.'
+            'Any fluctuation meets this rule at once: it finds an onset without sticking as well '
+            '(third column), and twice the mean speed at that time is no threshold.'
         ),
         Picture(
             path=path,
@@ -175,95 +177,101 @@ def packing_chapter(context: Context) -> Chapter:
     long_term = context.picture('long_term.png')
     long_term_figure(long_term, read_campaign([cycle.results for cycle in context.cycles]))
     curves = {
-        tray: [curve for one in context.sticking for curve in measured_packing(one.results, tray)]
+        tray: [
+            curve for cycle in context.sticking for curve in measured_packing(cycle.results, tray)
+        ]
         for tray in _TRAYS
     }
     packing = context.picture('packing.png')
-    found = packing_figure(packing, {tray: trays[tray] for tray in _TRAYS}, curves)
+    values = packing_figure(packing, {tray: trays[tray] for tray in _TRAYS}, curves)
     section.parts += [
         Picture(
             path=long_term,
             caption='Figure 9: cycles of this campaign in order, without and with sticking in '
-            'turn. No wear or change of the beads is simulated, so any trend is chance.',
+            'turn. The simulation has no wear of the beads, so any trend is due to chance.',
         ),
-        Picture(path=packing, caption='Figure 10: level areas over the cycles in which beads '
-                'stick, and the compaction that the paper would read from them.'),
-        _compactions(found),
+        Picture(path=packing, caption='Figure 10: level areas over the cycles with sticking, and '
+                'the compaction by the rule of the paper.'),
+        _compactions(values),
         Erratum(
             text='The height of a cluster of one layer is the diameter of a bead, not its radius: '
-            'the printed filling factors are twice what they are. A hexagonal layer fills 0.605 '
-            'of the space at most, so that agreement with random close packing, 0.64, shows '
-            'nothing. `nanorocks figure packing --simulate` shows the true filling beside it.'
+            'the printed filling factors are too large by a factor of 2. A hexagonal layer has a '
+            'filling factor of at most 0.605, so agreement with random close packing, 0.64, is '
+            'no evidence. `nanorocks figure packing --simulate` adds the true filling factor.'
         ),
     ]  # fmt: skip
     return Chapter(section=section)
 
 
-def _compactions(found: dict[str, Any]) -> Table:
+def _compactions(trays: dict[str, Any]) -> Table:
     rows = [
         (
             tray,
             number(values.get('paper_compaction'), 2, 100.0),
             number(values.get('apparent_compaction'), 2, 100.0),
         )
-        for tray, values in found.items()
+        for tray, values in trays.items()
     ]
     return Table(
         head=('tray', 'the paper [%]', 'its rule, on our films [%]'),
         rows=rows,
         caption='Compaction from the widest autocorrelation to the end of the cycle. Simulated '
-        'clusters are rigid: in truth there is none. The rule takes the maximum of a curve that '
-        'scatters, and finds some wherever it looks.',
+        'clusters are rigid: their true compaction is 0. The rule uses the maximum of a noisy '
+        'curve, and so finds a compaction in any data.',
     )
 
 
-def _last(one: CycleFiles, tray: int) -> dict[str, Any]:
-    """What our analysis says of the clusters of a tray at the end of its first cycle."""
-    cycles = one.tray(tray)['cycles']
+def _first_cycle(cycle: CycleFiles, tray: int) -> dict[str, Any]:
+    """The summary of the first cycle of a tray by our analysis."""
+    cycles = cycle.tray(tray)['cycles']
     return dict(cycles[0]) if cycles else {}
 
 
-def _end(truth: dict[str, list[float]]) -> dict[str, float]:
+def _last_values(truth: dict[str, list[float]]) -> dict[str, float]:
     return {name: values[-1] for name, values in truth.items()}
 
 
-def _true_onset(one: CycleFiles, tray: int) -> float:
+def _true_onset(cycle: CycleFiles, tray: int) -> float:
     """First loss of a body since the shaking event, [s]."""
-    truth = one.tray(tray)['truth']
+    truth = cycle.tray(tray)['truth']
     bodies = np.array(truth['bodies'])
-    fallen = np.flatnonzero(bodies < bodies[0])
-    return float(truth['time'][fallen[0]]) - FIRST_SHAKE if fallen.size else math.nan
+    losses = np.flatnonzero(bodies < bodies[0])
+    return float(truth['time'][losses[0]]) - FIRST_SHAKE if losses.size else math.nan
 
 
-def _table(one: CycleFiles, tray: int) -> dict[str, NDArray[np.float64]]:
-    return read_columns(one.results / f'tray_{tray}_cluster.csv', _COLUMNS)
+def _cluster_table(cycle: CycleFiles, tray: int) -> dict[str, NDArray[np.float64]]:
+    return read_columns(cycle.results / f'tray_{tray}_cluster.csv', _COLUMNS)
 
 
 def _paper_onsets(cycles: list[CycleFiles], tray: int) -> tuple[float, float]:
-    """Onset by the paper's rule, [s], and twice the mean speed then, [m/s]; means of cycles."""
+    """Mean onset by the paper's rule, [s], and mean of twice the mean speed then, [m/s]."""
     onsets, speeds = [], []
     for cycle in cycles:
-        table = _table(cycle, tray)
-        at = paper_onset(table['time'], table['level_area'], FIRST_SHAKE)
-        if math.isnan(at):
+        table = _cluster_table(cycle, tray)
+        onset = paper_onset(table['time'], table['level_area'], FIRST_SHAKE)
+        if math.isnan(onset):
             continue
-        onsets.append(at - FIRST_SHAKE)
-        found = cycle.tray(tray)
-        speeds.append(2.0 * float(np.interp(at, found['time'], found['mean_projected_speed'])))
+        onsets.append(onset - FIRST_SHAKE)
+        results = cycle.tray(tray)
+        speeds.append(
+            2.0 * float(np.interp(onset, results['time'], results['mean_projected_speed']))
+        )
     return mean_of(onsets)[0], mean_of(speeds)[0]
 
 
-def _sticking(context: Context, tray: int) -> tuple[float, float, float]:
-    """Sticking speed and ends of its interval, [m/s]; means of the cycles that tell one."""
-    last = [_last(one, tray) for one in context.sticking]
+def _sticking_speed(context: Context, tray: int) -> tuple[float, float, float]:
+    """Sticking speed and ends of its interval, [m/s]; means over the cycles that have one."""
+    ends = [_first_cycle(cycle, tray) for cycle in context.sticking]
     names = ('sticking_speed', 'sticking_speed_lower', 'sticking_speed_upper')
-    known = [one for one in last if one.get('sticking_speed') is not None]
-    speed, lower, upper = (mean_of([one.get(name) for one in known or last])[0] for name in names)
+    known_ends = [end for end in ends if end.get('sticking_speed') is not None]
+    speed, lower, upper = (
+        mean_of([end.get(name) for end in known_ends or ends])[0] for name in names
+    )
     return speed, lower, upper
 
 
 def _draw_autocorrelation(context: Context, path: Path) -> None:
-    """A tray soon after shaking and at the end, with the autocorrelation of both."""
+    """Draw a tray soon after shaking and at the end, with the autocorrelation of both images."""
     settings = plate_settings(trays=[_SHOWN])
     images = BagImages(context.film(STICKING), settings, '')
     scale = settings.preprocess.pixels_per_metre
@@ -282,13 +290,13 @@ def _draw_autocorrelation(context: Context, path: Path) -> None:
             continue
         axes[row, 0].imshow(gray, cmap='gray')
         axes[row, 0].set_title(name, fontsize=10)
-        seen = correlated(gray, scale)
-        half = min(seen.values.shape) // 4
-        middle = [size // 2 for size in seen.values.shape]
-        near = seen.values[
+        correlation = correlated(gray, scale)
+        half = min(correlation.values.shape) // 4
+        middle = [size // 2 for size in correlation.values.shape]
+        near = correlation.values[
             middle[0] - half : middle[0] + half, middle[1] - half : middle[1] + half
         ]
-        side = _MM * seen.side * half
+        side = _MM * correlation.side * half
         extent = (-side, side, side, -side)
         axes[row, 1].imshow(near, cmap='viridis', vmin=0.0, vmax=1.0, extent=extent)
         axes[row, 1].contour(near, levels=(0.3, 0.5, 0.7), colors='w', linewidths=1,
