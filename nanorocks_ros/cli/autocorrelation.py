@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _print(clusters: BagClusters, *, as_json: bool) -> None:
-    ends = {number: _end(tray) for number, tray in clusters.trays.items()}
+    ends = {number: _last_estimate(tray) for number, tray in clusters.trays.items()}
     if as_json:
         trays = {
             str(number): {name: _none_for_nan(value) for name, value in end.items()}
@@ -100,7 +100,7 @@ def _print(clusters: BagClusters, *, as_json: bool) -> None:
         )
 
 
-def _end(tray: CycleClusters) -> dict[str, Any]:
+def _last_estimate(tray: CycleClusters) -> dict[str, Any]:
     last = tray.estimates[-1]
     return {
         'pictures': len(tray.estimates),

@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the checks and print the findings; 1 where a graph cannot run, else 0."""
     from nanorocks_ros.tools.doctor.findings import Status, worst
 
-    findings = _of_graph(options) if options.graph else _of_machine(options)
+    findings = _graph_findings(options) if options.graph else _machine_findings(options)
     verdict = worst(findings)
     if options.json:
         checks = [
@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     return _EXIT_PROBLEM if verdict is Status.PROBLEM else 0
 
 
-def _of_machine(options: argparse.Namespace) -> list[Finding]:
+def _machine_findings(options: argparse.Namespace) -> list[Finding]:
     from nanorocks_ros.tools.doctor.examination import examine
 
     findings = []
@@ -65,7 +65,7 @@ def _of_machine(options: argparse.Namespace) -> list[Finding]:
     return findings
 
 
-def _of_graph(options: argparse.Namespace) -> list[Finding]:
+def _graph_findings(options: argparse.Namespace) -> list[Finding]:
     from nanorocks_ros.errors import ConfigurationError
     from nanorocks_ros.tools.doctor.examination import examine_graph
     from nanorocks_ros.tools.doctor.ros_probe_client import graph

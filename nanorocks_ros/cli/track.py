@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
         )
     for notice in bag.notices:
         print(f'nanorocks: {notice}', file=sys.stderr)
-    compared = {} if manual is None else _compared(bag, manual, options.first_frame)
+    compared = {} if manual is None else _comparisons(bag, manual, options.first_frame)
     if options.json:
         print(json.dumps(_as_json(bag, compared), allow_nan=False))
     else:
@@ -93,7 +93,7 @@ def _write(options: argparse.Namespace, bag: TrackedBag) -> None:
         print(f'nanorocks: picture in {options.picture}', file=sys.stderr)
 
 
-def _compared(bag: TrackedBag, manual: Any, first_frame: int) -> dict[int, TrackComparison]:
+def _comparisons(bag: TrackedBag, manual: Any, first_frame: int) -> dict[int, TrackComparison]:
     """The comparison for each tray in which the file has positions."""
     from nanorocks_ros.errors import RecordingError
     from nanorocks_ros.studies.calibration.track_comparison import compare_tracks, manual_reference

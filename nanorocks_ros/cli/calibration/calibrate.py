@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
         write_picture,
     )
 
-    _check(options)
+    _check_options(options)
     flown = load_trays(options.trays_file)
     numbers = options.trays or sorted(flown)
     trays = [tray_by_number(flown, number) for number in dict.fromkeys(numbers)]
@@ -90,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _check(options: argparse.Namespace) -> None:
+def _check_options(options: argparse.Namespace) -> None:
     if options.show and options.output:
         raise ConfigurationError('--show', 'cannot be used with --output', 'give one of them')
     low, high = options.scale or (1.0, 2.0)

@@ -94,7 +94,7 @@ def run(options: argparse.Namespace) -> int:
         if options.tray is None:
             raise ConfigurationError('--tray', 'is required with a bag', 'name the tray')
         prepare_folder(folder)
-        source = _analysed(options, source, folder / 'results')
+        source = _analyse_bag(options, source, folder / 'results')
     data = _data(options, source)
     prepare_folder(folder)
     bars: dict[str, RunProgress] = {}
@@ -142,7 +142,7 @@ def _is_bag(path: Path) -> bool:
     )
 
 
-def _analysed(options: argparse.Namespace, bag: Path, folder: Path) -> Path:
+def _analyse_bag(options: argparse.Namespace, bag: Path, folder: Path) -> Path:
     """Analyse a bag into a folder beside the figures."""
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress

@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
         raise ConfigurationError('--tray', 'cannot be read from the file name', 'name the tray')
     tray = tray_by_number(load_trays(options.trays), number)
     cycles = read_cycles(table)
-    values = _drawn(options, table, tray, cycles)
+    values = _draw_figure(options, table, tray, cycles)
     if options.json:
         printed = {'tray': number, 'cycles': len(cycles), **values}
         print(json.dumps(printed, allow_nan=False))
@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _drawn(
+def _draw_figure(
     options: argparse.Namespace, table: Path, tray: Tray, cycles: tuple[CycleSpeeds, ...]
 ) -> dict[str, Any]:
     """Draw the picture, and return its numbers."""

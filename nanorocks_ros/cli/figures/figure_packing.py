@@ -81,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
         numbers = numbers or trays_of(Path(options.results), 'cluster')
     all_trays = load_trays()
     trays = {number: tray_by_number(all_trays, number) for number in numbers}
-    curves = (_simulated if options.simulate else _measured)(options, trays)
+    curves = (_simulate_curves if options.simulate else _read_curves)(options, trays)
 
     from nanorocks_ros.studies.figures.packing_figure import packing_figure
 
@@ -101,7 +101,7 @@ def _numbers(text: str | None) -> tuple[int, ...]:
     return tuple(dict.fromkeys(int(word) for word in words))
 
 
-def _measured(
+def _read_curves(
     options: argparse.Namespace, trays: dict[int, Tray]
 ) -> dict[int, Sequence[PackingCurve]]:
     from nanorocks_ros.studies.analysis.cluster_packing import measured_packing
@@ -109,7 +109,7 @@ def _measured(
     return {number: measured_packing(Path(options.results), number) for number in trays}
 
 
-def _simulated(
+def _simulate_curves(
     options: argparse.Namespace, trays: dict[int, Tray]
 ) -> dict[int, Sequence[PackingCurve]]:
     from nanorocks_ros.cli.progress import Progress

@@ -41,14 +41,14 @@ def add_parser(commands: Any) -> None:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    _add_work(parser)
-    _add_outputs(parser.add_argument_group('files to write, all optional'))
+    _add_run_options(parser)
+    _add_output_options(parser.add_argument_group('files to write, all optional'))
     add_flags(parser, SimulationSettings(), skip=set())
     add_flags(parser, SceneFilmSettings(), skip=set(), title='settings of --scene')
     parser.set_defaults(run=run)
 
 
-def _add_work(parser: argparse.ArgumentParser) -> None:
+def _add_run_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--trays-file',
         help='YAML file of your own trays, numbered 1 to 8; see docs/use/simulate.md',
@@ -77,7 +77,7 @@ def _add_work(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
 
 
-def _add_outputs(group: Any) -> None:
+def _add_output_options(group: Any) -> None:
     group.add_argument(
         '--trajectory',
         metavar='OUT.npz|.parquet',
@@ -116,11 +116,11 @@ def _add_outputs(group: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Simulate, write, film and print, and return the exit code."""
-    from nanorocks_ros.cli.simulation.simulate_scene import check_alone, film_the_scene
+    from nanorocks_ros.cli.simulation.simulate_scene import check_no_scene_flags, film_scene
 
     if options.scene:
-        return film_the_scene(options)
-    check_alone(options)
+        return film_scene(options)
+    check_no_scene_flags(options)
     return _run_tray(options)
 
 
@@ -149,7 +149,7 @@ def _run_tray(options: argparse.Namespace) -> int:
                 filmed.update(files.film_bag(plan, bar.count))
             written.append(str(files.bag))
     except KeyboardInterrupt as interruption:
-        raise KeyboardInterrupt(_left(files, written)) from interruption
+        raise KeyboardInterrupt(_remaining_files(files, written)) from interruption
     _print(options, files, runs, filmed)
     return 0
 
@@ -196,7 +196,7 @@ def _plan(options: argparse.Namespace, files: SimulatedFiles) -> SimulationPlan:
     )
 
 
-def _left(files: SimulatedFiles, written: list[str]) -> str:
+def _remaining_files(files: SimulatedFiles, written: list[str]) -> str:
     """Message about the files that an interruption leaves."""
     messages = []
     if written:

@@ -26,7 +26,7 @@ _SCENE_FLAGS = {
 }
 
 
-def check_alone(options: argparse.Namespace) -> None:
+def check_no_scene_flags(options: argparse.Namespace) -> None:
     """Reject flags of the scene in the simulation of one tray.
 
     Raises
@@ -43,7 +43,7 @@ def check_alone(options: argparse.Namespace) -> None:
             )
 
 
-def film_the_scene(options: argparse.Namespace) -> int:
+def film_scene(options: argparse.Namespace) -> int:
     """Film, write and print, and return the exit code."""
     files = _files(options)
     recorder, filmed, settings = _recorder(options)

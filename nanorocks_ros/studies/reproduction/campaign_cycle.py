@@ -79,6 +79,11 @@ class CycleFiles:
         """The results of one tray, of the analysis ``default`` or ``paper``."""
         return dict(self.summary[analysis]['trays'][str(number)])
 
+    def first_cycle(self, number: int, analysis: str = 'default') -> dict[str, Any]:
+        """The summary of the first cycle of a tray; empty where no cycle was found."""
+        cycles = self.tray(number, analysis)['cycles']
+        return dict(cycles[0]) if cycles else {}
+
 
 def film_and_analyse(task: CycleTask) -> str:
     """Film and analyse a cycle, and return the name of its folder."""

@@ -11,13 +11,13 @@ from nanorocks_ros.outputs.html_report import Section, Table, write_report
 from nanorocks_ros.studies.reproduction.chapters.chapter_context import Chapter, Context
 from nanorocks_ros.studies.reproduction.chapters.cluster_chapter import (
     cluster_chapter,
-    onset_chapter,
     packing_chapter,
 )
 from nanorocks_ros.studies.reproduction.chapters.experiment_chapter import (
     experiment_chapter,
     processing_chapter,
 )
+from nanorocks_ros.studies.reproduction.chapters.onset_chapter import onset_chapter
 from nanorocks_ros.studies.reproduction.chapters.restitution_chapter import (
     restitution_chapter,
     simulation_chapter,

@@ -82,7 +82,7 @@ def _topic_finding(topic: dict[str, Any]) -> Finding:
     name = topic['name']
     senders = [publisher['node'] for publisher in topic['publishers']]
     listeners = [subscription['node'] for subscription in topic['subscriptions']]
-    found = f'{_named(senders)} -> {_named(listeners)}'
+    found = f'{_node_names(senders)} -> {_node_names(listeners)}'
     if topic['mismatches']:
         pairs = '; '.join(
             f'{mismatch["publisher"]} -> {mismatch["subscription"]}: {mismatch["reason"]}'
@@ -112,5 +112,5 @@ def _topic_finding(topic: dict[str, Any]) -> Finding:
     return Finding(name=name, found=found)
 
 
-def _named(nodes: list[str]) -> str:
+def _node_names(nodes: list[str]) -> str:
     return ', '.join(sorted(nodes)) or 'no node'

@@ -17,7 +17,7 @@ _FRAMES = 5
 _LOCAL = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
 
 
-def _started(*task: str, **variables: str) -> subprocess.Popen[str]:
+def _start_probe(*task: str, **variables: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [*_PROBE, *task],
         env={**os.environ, **variables},
@@ -27,7 +27,7 @@ def _started(*task: str, **variables: str) -> subprocess.Popen[str]:
     )
 
 
-def _answer(process: subprocess.Popen[str]) -> dict[str, Any]:
+def _read_answer(process: subprocess.Popen[str]) -> dict[str, Any]:
     """The last line that a probe printed, as JSON.
 
     Raises
@@ -55,7 +55,7 @@ def _answer(process: subprocess.Popen[str]) -> dict[str, Any]:
 def imported() -> tuple[Finding, tuple[str, ...]]:
     """Whether rclpy and the messages can be imported, and the names of the executables."""
     try:
-        answer = _answer(_started('import'))
+        answer = _read_answer(_start_probe('import'))
     except NanorocksError as error:
         found = f'import failed: {error.what}'
         return Finding(name='rclpy', status=Status.PROBLEM, found=found, remedy=error.do), ()
@@ -68,12 +68,12 @@ def loopback() -> Finding:
     name = 'frames over loopback'
     # A name that no graph uses, so that running nodes are not disturbed.
     topic = f'/nanorocks_doctor_{os.getpid()}/image'
-    receiver = _started('receive', topic, str(_FRAMES), **_LOCAL)
+    receiver = _start_probe('receive', topic, str(_FRAMES), **_LOCAL)
     sender = None
     try:
         _wait_for_line(receiver.stdout)
-        sender = _started('send', topic, str(_FRAMES), **_LOCAL)
-        sent, received = _answer(sender), _answer(receiver)
+        sender = _start_probe('send', topic, str(_FRAMES), **_LOCAL)
+        sent, received = _read_answer(sender), _read_answer(receiver)
     except NanorocksError as error:
         return Finding(name=name, status=Status.PROBLEM, found=error.what, remedy=error.do)
     finally:
@@ -81,16 +81,16 @@ def loopback() -> Finding:
             if process is not None and process.poll() is None:
                 process.kill()
                 process.communicate()
-    return judged(name, sent, received)
+    return loopback_finding(name, sent, received)
 
 
 def _wait_for_line(stream: IO[str] | None) -> None:
-    """Wait until the probe listens; `_answer` reports a probe that ended."""
+    """Wait until the probe listens; `_read_answer` reports a probe that ended."""
     if stream is not None:
         stream.readline()
 
 
-def judged(name: str, sent: dict[str, Any], received: dict[str, Any]) -> Finding:
+def loopback_finding(name: str, sent: dict[str, Any], received: dict[str, Any]) -> Finding:
     """The finding from the counts of the sender and the receiver."""
     size, arrived, seconds = sent['frame_bytes'], received['received'], received['seconds']
     whole = arrived == _FRAMES and received['bytes'] == _FRAMES * size
@@ -117,5 +117,5 @@ def graph(seconds: float) -> list[dict[str, Any]]:
     NanorocksError
         When the probe fails.
     """
-    topics: list[dict[str, Any]] = _answer(_started('graph', f'{seconds:g}'))['topics']
+    topics: list[dict[str, Any]] = _read_answer(_start_probe('graph', f'{seconds:g}'))['topics']
     return topics

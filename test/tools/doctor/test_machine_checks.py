@@ -11,7 +11,7 @@ import pytest
 from nanorocks_ros.tools.doctor import machine_checks, package_checks, ros_checks
 from nanorocks_ros.tools.doctor.examination import examine_graph
 from nanorocks_ros.tools.doctor.findings import Finding, Status, worst
-from nanorocks_ros.tools.doctor.ros_probe_client import judged
+from nanorocks_ros.tools.doctor.ros_probe_client import loopback_finding
 
 GB = 10**9
 RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
@@ -156,7 +156,7 @@ def test_an_empty_graph_names_the_variables_to_compare():
     [(0, 0, 'did not discover each other'), (5, 3, '3 of 5 frames')],
 )
 def test_frames_that_do_not_arrive_are_a_problem(sent, received, named):
-    finding = judged(
+    finding = loopback_finding(
         'frames',
         {'sent': sent, 'frame_bytes': 100},
         {'received': received, 'bytes': 100 * received, 'seconds': 0.1},

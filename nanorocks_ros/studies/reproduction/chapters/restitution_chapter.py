@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.studies.reproduction.campaign_cycle import CycleFiles
     from nanorocks_ros.studies.reproduction.chapters.chapter_context import Context
 
 _TRAY = 1
@@ -160,8 +159,8 @@ def _by_tray(context: Context) -> tuple[list[Sequence[str]], list[Difference]]:
     rows: list[Sequence[str]] = []
     differences = []
     for tray in load_trays():
-        ours = [_first_cycle(cycle, tray, 'default') for cycle in context.bouncing]
-        paper = [_first_cycle(cycle, tray, 'paper') for cycle in context.bouncing]
+        ours = [cycle.first_cycle(tray, 'default') for cycle in context.bouncing]
+        paper = [cycle.first_cycle(tray, 'paper') for cycle in context.bouncing]
         paper_method = number(mean_of([cycle.get('restitution') for cycle in paper])[0])
         paper_formula = number(mean_of([cycle.get('paper_restitution') for cycle in ours])[0])
         known = [cycle for cycle in ours if cycle.get('restitution') is not None]
@@ -182,11 +181,6 @@ def _by_tray(context: Context) -> tuple[list[Sequence[str]], list[Difference]]:
                 )
             )
     return rows, differences
-
-
-def _first_cycle(cycle: CycleFiles, tray: int, analysis: str) -> dict[str, Any]:
-    cycles = cycle.tray(tray, analysis)['cycles']
-    return dict(cycles[0]) if cycles else {}
 
 
 def _with_interval(cycles: Sequence[dict[str, Any]], name: str) -> str:
