@@ -176,7 +176,7 @@ def test_the_same_command_again_does_only_what_failed(done, capsys):
     assert main([*call, '--workers', '1']) == 1
     printed = capsys.readouterr()
     assert json.loads(printed.out)['trays'] == found['trays']
-    assert '4 of 7 recordings are done already' in printed.err
+    assert '4 of 7 recordings are finished and unchanged' in printed.err
     assert before == {path: path.stat().st_mtime_ns for path in results.glob('bags/*/bag.json')}
     table = parquet.read_table(results / 'trays.parquet')
     assert table['restitution'].to_pylist() == [found['trays']['1']['restitution']]
