@@ -40,7 +40,7 @@ def add_parser(commands: Any) -> None:
 
     parser = commands.add_parser(
         'analyse',
-        help='analyse one bag or many, faster than real time',
+        help='analyse one bag or many offline',
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

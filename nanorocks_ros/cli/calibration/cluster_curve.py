@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     import argparse
 
     from nanorocks_ros.inference.cluster_size.size_from_width import ClusterCurve
+    from nanorocks_ros.studies.libraries.cluster_films import ClusterPlan
 
 _MAX_STRENGTH = 2.0
 
@@ -54,17 +55,39 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Film, measure, write and print, and return the exit code."""
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.errors import ConfigurationError
-    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.inference.cluster_size.cluster_curve import curve_key
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.outputs.atomic_files import check_outputs
-    from nanorocks_ros.settings import PipelineSettings, with_values
-    from nanorocks_ros.studies.libraries.cluster_films import ClusterPlan
     from nanorocks_ros.studies.libraries.cluster_simulations import build_curves
 
     output = Path(options.output)
     check_outputs({'--output': output}, {'--output': ('.npz',)}, force=options.force)
+    plan = _plan(options)
+    workers = Workers(processes=options.workers, scheduler=options.scheduler)
+    with Progress('films of clusters') as progress:
+        curves = build_curves(
+            plan,
+            output,
+            workers,
+            progress.count,
+            lambda text: print(f'nanorocks: {text}', file=sys.stderr),
+        )
+    tray_curves = {number: curves[curve_key(plan.cells[number])] for number in plan.trays}
+    if options.json:
+        values = {str(number): _values(curve) for number, curve in tray_curves.items()}
+        print(json.dumps({'output': str(output), 'trays': values, **json.loads(plan.question())}))
+        return 0
+    for number, curve in tray_curves.items():
+        print(f'tray {number}: {_sentence(curve)}')
+    return 0
+
+
+def _plan(options: argparse.Namespace) -> ClusterPlan:
+    from nanorocks_ros.errors import ConfigurationError
+    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+    from nanorocks_ros.settings import PipelineSettings, with_values
+    from nanorocks_ros.studies.libraries.cluster_films import ClusterPlan
+
     with_values(PipelineSettings(), {'clusters.level': options.level}, '--level')
     if options.seed < 0:
         raise ConfigurationError('--seed', f'{options.seed}', 'give 0 or more')
@@ -79,7 +102,7 @@ def run(options: argparse.Namespace) -> int:
     numbers = tuple(sorted(set(options.tray or trays)))
     for number in numbers:
         tray_by_number(trays, number)
-    plan = ClusterPlan(
+    return ClusterPlan(
         cells=trays,
         trays=numbers,
         runs=options.runs,
@@ -87,27 +110,6 @@ def run(options: argparse.Namespace) -> int:
         level=options.level,
         strengths=(weak, strong),
     )
-    workers = Workers(processes=options.workers, scheduler=options.scheduler)
-    with Progress('films of clusters') as progress:
-        curves = build_curves(
-            plan,
-            output,
-            workers,
-            progress.count,
-            lambda text: print(f'nanorocks: {text}', file=sys.stderr),
-        )
-    tray_curves = {number: curves[curve_key(trays[number])] for number in numbers}
-    if options.json:
-        tray_values = {str(number): _values(curve) for number, curve in tray_curves.items()}
-        print(
-            json.dumps(
-                {'output': str(output), 'trays': tray_values, **json.loads(plan.question())}
-            )
-        )
-        return 0
-    for number, curve in tray_curves.items():
-        print(f'tray {number}: {_sentence(curve)}')
-    return 0
 
 
 def _values(curve: ClusterCurve) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import __version__
@@ -27,7 +28,7 @@ from nanorocks_ros.studies.reproduction.chapters.speed_chapter import speed_chap
 from nanorocks_ros.studies.reproduction.simulated_campaign import prepare_campaign, run_campaign
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from nanorocks_ros.jobs.tasks import Workers
@@ -90,7 +91,7 @@ def reproduce(
     pictures = folder / PICTURES
     pictures.mkdir(exist_ok=True)
     chapters = []
-    for name, make in _CHAPTERS.items():
+    for name in _CHAPTERS:
         context = Context(
             folder=pictures,
             plan=plan,
@@ -98,30 +99,10 @@ def reproduce(
             workers=workers,
             runs=runs,
             notice=notice,
-            progress=lambda done, name=name: progress(name, done),  # type: ignore[misc]
+            progress=partial(progress, name),
         )
-        progress(name, 0.0)
-        try:
-            chapters.append(make(context))
-        except (FitError, RecordingError) as error:
-            # A campaign too short for one chapter may be long enough for the others.
-            notice(f'{name}: {error}')
-            missing = Section(title=name.capitalize(), parts=[f'Could not be made: {error}.'])
-            chapters.append(Chapter(section=missing))
-        progress(name, 1.0)
+        chapters.append(_make_chapter(name, context))
     path = folder / REPORT
-    differences = [row for chapter in chapters for row in chapter.differences]
-    first = Section(
-        title='Differences to the paper',
-        parts=[
-            Table(
-                head=('', 'the paper', 'its method, on our films', 'ours', 'truth'),
-                rows=differences,
-                caption='Values of the flight in the paper; the method of the paper on our films; '
-                'our default method on our films; values of the simulation.',
-            )
-        ],
-    )
     cycle = 'cycle' if plan.cycles == 1 else 'cycles'
     write_report(
         path,
@@ -129,9 +110,38 @@ def reproduce(
         f'nanorocks_ros {__version__}: {plan.cycles} {cycle} without and {plan.cycles} with '
         f'sticking, {plan.seconds:g} s of film each, seed {plan.seed}; {runs} runs at each '
         'point of the searches.',
-        [first, *(chapter.section for chapter in chapters)],
+        [_differences(chapters), *(chapter.section for chapter in chapters)],
     )
     return path
+
+
+def _make_chapter(name: str, context: Context) -> Chapter:
+    """A chapter of the report; a note instead where the campaign is too short for it."""
+    context.progress(0.0)
+    try:
+        chapter = _CHAPTERS[name](context)
+    except (FitError, RecordingError) as error:
+        # The campaign may still be long enough for the other chapters.
+        context.notice(f'{name}: {error}')
+        missing = Section(title=name.capitalize(), parts=[f'Could not be made: {error}.'])
+        chapter = Chapter(section=missing)
+    context.progress(1.0)
+    return chapter
+
+
+def _differences(chapters: Sequence[Chapter]) -> Section:
+    rows = [row for chapter in chapters for row in chapter.differences]
+    return Section(
+        title='Differences to the paper',
+        parts=[
+            Table(
+                head=('', 'the paper', 'its method, on our films', 'ours', 'truth'),
+                rows=rows,
+                caption='Values of the flight in the paper; the method of the paper on our films; '
+                'our default method on our films; values of the simulation.',
+            )
+        ],
+    )
 
 
 def minutes(plan: CampaignPlan, cores: int) -> int:
