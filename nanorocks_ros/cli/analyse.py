@@ -1,4 +1,7 @@
-"""``nanorocks analyse BAG...``: the coefficient of restitution from recordings."""
+"""``nanorocks analyse BAG...``: the coefficient of restitution from recordings.
+
+Tested by ``test/studies/analysis/test_offline_analysis.py``.
+"""
 
 from __future__ import annotations
 

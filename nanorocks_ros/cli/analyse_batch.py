@@ -1,4 +1,7 @@
-"""``nanorocks analyse BAG... -o RESULTS``: many recordings, combined in one report."""
+"""``nanorocks analyse BAG... -o RESULTS``: many recordings, combined in one report.
+
+Tested by ``test/studies/batch/test_batch_analysis.py``.
+"""
 
 from __future__ import annotations
 

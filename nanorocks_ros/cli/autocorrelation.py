@@ -1,4 +1,7 @@
-"""``nanorocks autocorrelation BAG``: cluster sizes from the width of the autocorrelation."""
+"""``nanorocks autocorrelation BAG``: cluster sizes from the width of the autocorrelation.
+
+Tested by ``test/studies/inspection/test_autocorrelations.py``.
+"""
 
 from __future__ import annotations
 

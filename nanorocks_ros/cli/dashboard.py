@@ -1,4 +1,7 @@
-"""``nanorocks dashboard``: the live page of a running ROS graph."""
+"""``nanorocks dashboard``: the live page of a running ROS graph.
+
+Tested by ``test/nodes/test_dashboard.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Settings as command-line flags and parameter files."""
+"""Settings as command-line flags and parameter files.
+
+Tested by ``test/cli/simulation/test_simulate.py``.
+"""
 
 from __future__ import annotations
 

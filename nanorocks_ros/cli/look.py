@@ -1,4 +1,7 @@
-"""``nanorocks look BAG``: the steps of the preprocessing of one frame."""
+"""``nanorocks look BAG``: the steps of the preprocessing of one frame.
+
+Tested by ``test/studies/inspection/test_preprocessing_steps.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Progress bars of the commands, shown on a terminal only."""
+"""Progress bars of the commands, shown on a terminal only.
+
+Tested by ``test/cli/simulation/test_sweep.py``.
+"""
 
 from __future__ import annotations
 

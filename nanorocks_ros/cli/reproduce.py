@@ -1,4 +1,7 @@
-"""``nanorocks reproduce``: the figures and tables of the paper from simulated films."""
+"""``nanorocks reproduce``: the figures and tables of the paper from simulated films.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""``nanorocks speeds BAG``: mean speeds by each method, compared with the truth."""
+"""``nanorocks speeds BAG``: mean speeds by each method, compared with the truth.
+
+Tested by ``test/studies/inspection/test_speed_comparison.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""``nanorocks track BAG``: tracks of all beads of a recording."""
+"""``nanorocks track BAG``: tracks of all beads of a recording.
+
+Tested by ``test/studies/analysis/test_bag_tracks.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""``nanorocks calibrate RECORDING``: lens and tray regions from the edges of the trays."""
+"""``nanorocks calibrate RECORDING``: lens and tray regions from the edges of the trays.
+
+Tested by ``test/studies/calibration/test_camera_calibration.py``.
+"""
 
 from __future__ import annotations
 

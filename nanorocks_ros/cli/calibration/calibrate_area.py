@@ -1,4 +1,7 @@
-"""``nanorocks calibrate-area BAG TRACKS``: calibration of the binarised area by manual tracks."""
+"""``nanorocks calibrate-area BAG TRACKS``: calibration of the binarised area by manual tracks.
+
+Tested by ``test/studies/calibration/test_area_calibration.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""``nanorocks cluster-curve``: calibration of cluster sizes by films of simulated clusters."""
+"""``nanorocks cluster-curve``: calibration of cluster sizes by films of simulated clusters.
+
+Tested by ``test/studies/libraries/test_cluster_simulations.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""``nanorocks library``: simulated decays of a tray, to compare measured decays with."""
+"""``nanorocks library``: simulated decays of a tray, to compare measured decays with.
+
+Tested by ``test/cli/calibration/test_library.py``.
+"""
 
 from __future__ import annotations
 

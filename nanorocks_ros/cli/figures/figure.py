@@ -1,4 +1,7 @@
-"""``nanorocks figure KIND ...``: figures of the paper from measured or simulated data."""
+"""``nanorocks figure KIND ...``: figures of the paper from measured or simulated data.
+
+Tested by ``test/cli/figures/test_figure_decay.py``.
+"""
 
 from __future__ import annotations
 

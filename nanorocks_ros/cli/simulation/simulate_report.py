@@ -1,4 +1,7 @@
-"""Report of ``nanorocks simulate``: one JSON object, or a table."""
+"""Report of ``nanorocks simulate``: one JSON object, or a table.
+
+Tested by ``test/cli/simulation/test_simulate.py``.
+"""
 
 from __future__ import annotations
 

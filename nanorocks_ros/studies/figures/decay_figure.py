@@ -1,4 +1,7 @@
-"""The figure of a measured decay, after figure 7 of the paper."""
+"""The figure of a measured decay, after figure 7 of the paper.
+
+Tested by ``test/cli/figures/test_figure_decay.py``.
+"""
 
 from __future__ import annotations
 

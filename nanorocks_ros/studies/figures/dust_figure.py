@@ -1,4 +1,7 @@
-"""The figure of sticking thresholds and published collision models, after figure 14."""
+"""The figure of sticking thresholds and published collision models, after figure 14.
+
+Tested by ``test/cli/figures/test_figure_dust.py``.
+"""
 
 from __future__ import annotations
 

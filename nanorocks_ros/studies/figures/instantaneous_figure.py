@@ -1,4 +1,7 @@
-"""The figure of restitution against speed, after figure 13 of the paper."""
+"""The figure of restitution against speed, after figure 13 of the paper.
+
+Tested by ``test/cli/figures/test_figure_decay.py``.
+"""
 
 from __future__ import annotations
 

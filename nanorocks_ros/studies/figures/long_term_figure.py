@@ -1,4 +1,7 @@
-"""The figure of the cycles of a campaign, after figure 9 of the paper."""
+"""The figure of the cycles of a campaign, after figure 9 of the paper.
+
+Tested by ``test/cli/figures/test_figure_long_term.py``.
+"""
 
 from __future__ import annotations
 

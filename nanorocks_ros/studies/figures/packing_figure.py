@@ -1,4 +1,7 @@
-"""The figure of the packing of clusters, after figure 10 of the paper."""
+"""The figure of the packing of clusters, after figure 10 of the paper.
+
+Tested by ``test/cli/figures/test_figure_packing.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The figure of a sweep over two settings: a map of the deviation from a decay."""
+"""The figure of a sweep over two settings: a map of the deviation from a decay.
+
+Tested by ``test/cli/simulation/test_sweep.py``.
+"""
 
 from __future__ import annotations
 

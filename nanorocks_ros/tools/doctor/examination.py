@@ -1,4 +1,7 @@
-"""The checks of the machine, its ROS and a running graph, in their order."""
+"""The checks of the machine, its ROS and a running graph, in their order.
+
+Tested by ``test/tools/doctor/test_machine_checks.py``.
+"""
 
 from __future__ import annotations
 

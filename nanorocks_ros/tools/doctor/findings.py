@@ -1,4 +1,7 @@
-"""Findings of the checks of this machine."""
+"""Findings of the checks of this machine.
+
+Tested by ``test/tools/doctor/test_machine_checks.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Checks of Python and of the required libraries."""
+"""Checks of Python and of the required libraries.
+
+Tested by ``test/tools/doctor/test_machine_checks.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Checks of ROS 2: its installation, its variables, its executables; without importing it."""
+"""Checks of ROS 2: its installation, its variables, its executables; without importing it.
+
+Tested by ``test/tools/doctor/test_machine_checks.py``.
+"""
 
 from __future__ import annotations
 

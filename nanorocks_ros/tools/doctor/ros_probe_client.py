@@ -1,4 +1,7 @@
-"""Checks that need ROS, run in processes of `nanorocks_ros.nodes.probe`."""
+"""Checks that need ROS, run in processes of `nanorocks_ros.nodes.probe`.
+
+Tested by ``test/tools/doctor/test_machine_checks.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Input and result of the chapters of the report."""
+"""Input and result of the chapters of the report.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Chapters on clusters, their packing and long-term evolution: Table 3, Figures 8 to 10."""
+"""Chapters on clusters, their packing and long-term evolution: Table 3, Figures 8 to 10.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 

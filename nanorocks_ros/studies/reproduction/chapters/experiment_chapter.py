@@ -1,4 +1,7 @@
-"""Chapters on the experiment and its processing: Tables 1 and 2, Figures 1, 3 and 4."""
+"""Chapters on the experiment and its processing: Tables 1 and 2, Figures 1, 3 and 4.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 

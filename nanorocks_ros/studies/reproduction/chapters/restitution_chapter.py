@@ -1,4 +1,7 @@
-"""Chapters on the restitution and its simulation: Figures 7, 11, 12 and 13, closed forms."""
+"""Chapters on the restitution and its simulation: Figures 7, 11, 12 and 13, closed forms.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Chapter on rotation: whether rotation or noise widens the restitutions below 5 mm/s."""
+"""Chapter on rotation: whether rotation or noise widens the restitutions below 5 mm/s.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 

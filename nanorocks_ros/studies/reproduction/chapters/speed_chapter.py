@@ -1,4 +1,7 @@
-"""Chapter on the speeds of the beads: Figures 2, 5 and 6."""
+"""Chapter on the speeds of the beads: Figures 2, 5 and 6.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 
