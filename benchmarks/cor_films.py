@@ -29,8 +29,10 @@ from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.posterior import Posterior, posterior_of
 from nanorocks_ros.jobs.tasks import Workers
-from nanorocks_ros.records import CorEstimate, CorStatus
+from nanorocks_ros.records import CorEstimate, CorStatus, PairCollision
 from nanorocks_ros.settings import PipelineSettings, PriorSettings, with_values
+from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 from nanorocks_ros.stages.restitution.restitution_methods import Decay
 
 # Films by truth; the goals refer to the first truth.
