@@ -1,7 +1,4 @@
-"""Settings as command-line flags and parameter files.
-
-Tested by ``test/cli/simulation/test_simulate.py``.
-"""
+"""Settings as command-line flags and parameter files."""
 
 from __future__ import annotations
 

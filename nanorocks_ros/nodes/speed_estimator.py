@@ -1,6 +1,6 @@
 """Node: tray images in, mean projected speeds, contacts, bodies and motion masks out.
 
-Tested by test/nodes/test_graph.py.
+Tested by ``test/nodes/test_graph.py``.
 """
 
 from __future__ import annotations

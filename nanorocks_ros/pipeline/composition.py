@@ -1,4 +1,7 @@
-"""The only composition of the stages: from a frame to the coefficients of restitution."""
+"""The only composition of the stages: from a frame to the coefficients of restitution.
+
+Tested by ``test/pipeline/test_parallel_pipeline.py``.
+"""
 
 from __future__ import annotations
 

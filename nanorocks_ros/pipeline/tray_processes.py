@@ -1,4 +1,7 @@
-"""Processes beside this one that follow the trays: what each gets, does and hands back."""
+"""Processes beside this one that follow the trays: what each gets, does and hands back.
+
+Tested by ``test/pipeline/test_parallel_pipeline.py``.
+"""
 
 from __future__ import annotations
 

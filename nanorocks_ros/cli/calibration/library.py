@@ -1,7 +1,4 @@
-"""``nanorocks library``: simulated decays of a tray, to compare measured decays with.
-
-Tested by ``test/cli/calibration/test_library.py``.
-"""
+"""``nanorocks library``: simulated decays of a tray, to compare measured decays with."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Rebounds and collisions of the current cooling cycle, summed for the restitution fit."""
+"""Rebounds and collisions of the current cooling cycle, summed for the restitution fit.
+
+Tested by ``test/stages/restitution/test_restitution_estimator.py``.
+"""
 
 from __future__ import annotations
 

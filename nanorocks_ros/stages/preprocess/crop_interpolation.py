@@ -1,4 +1,7 @@
-"""Bilinear interpolation of whole crops in integers, in compiled functions."""
+"""Bilinear interpolation of whole crops in integers, in compiled functions.
+
+Tested by ``test/stages/preprocess/test_rectify.py``.
+"""
 
 from __future__ import annotations
 

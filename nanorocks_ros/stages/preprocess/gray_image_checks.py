@@ -1,4 +1,7 @@
-"""Checks of the gray image of a tray: saturation, low contrast and glare."""
+"""Checks of the gray image of a tray: saturation, low contrast and glare.
+
+Tested by ``test/stages/preprocess/test_preprocessor.py``.
+"""
 
 from __future__ import annotations
 

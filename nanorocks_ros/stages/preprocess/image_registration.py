@@ -3,6 +3,8 @@
 Gauss-Newton on the squared differences (Lucas and Kanade 1981; Baker and Matthews 2004,
 IJCV 56, 221, "inverse compositional"), with the light's gain and offset as two more unknowns and
 outliers bounded (Huber).
+
+Tested by ``test/stages/preprocess/test_stabilise.py``.
 """
 
 from __future__ import annotations

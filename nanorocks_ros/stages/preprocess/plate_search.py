@@ -1,4 +1,7 @@
-"""Rough position of the plate in a picture, from the slopes along the sides of its trays."""
+"""Rough position of the plate in a picture, from the slopes along the sides of its trays.
+
+Tested by ``test/studies/calibration/test_plate_fit.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The crop of one tray: its region, its motion and its pixels at rest."""
+"""The crop of one tray: its region, its motion and its pixels at rest.
+
+Tested by ``test/stages/preprocess/test_preprocessor.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Edges of the trays in a picture, to a fraction of a pixel."""
+"""Edges of the trays in a picture, to a fraction of a pixel.
+
+Tested by ``test/studies/calibration/test_plate_fit.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Check of the tray positions in a frame against the settings."""
+"""Check of the tray positions in a frame against the settings.
+
+Tested by ``test/stages/preprocess/test_preprocessor.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The two methods that turn a decay into a restitution: simulated decays, or the paper's form."""
+"""The two methods that turn a decay into a restitution: simulated decays, or the paper's form.
+
+Tested by ``test/stages/restitution/test_restitution_estimator.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Mean projected speed from the area that changed: the paper's recipe ([B19] section 3.2)."""
+"""Mean projected speed from the area that changed: the paper's recipe ([B19] section 3.2).
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
+"""
 
 from __future__ import annotations
 

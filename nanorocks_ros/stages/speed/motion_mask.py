@@ -2,6 +2,8 @@
 
 The paper's words allow several interpretations of "averaged over 10 frames, then each subtracted
 from the next"; `averaging` and `time_step` of the settings select one.
+
+Tested by ``test/studies/inspection/test_preprocessing_steps.py``.
 """
 
 from __future__ import annotations

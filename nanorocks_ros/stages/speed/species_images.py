@@ -4,6 +4,8 @@ Shading darkens a bead and keeps the proportions of its colour, and a highlight 
 species are separated by hue, the direction in which blue and red differ from green. Grains without
 a hue are darker than the floor. Hues are learnt from one image of the tray, starting from the
 colour of the material; a table over all colours then holds how much of each species a pixel shows.
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
 """
 
 from __future__ import annotations

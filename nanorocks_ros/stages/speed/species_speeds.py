@@ -1,4 +1,7 @@
-"""Mean speeds of the species of a tray, and of all its beads, from images of each species."""
+"""Mean speeds of the species of a tray, and of all its beads, from images of each species.
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
+"""
 
 from __future__ import annotations
 

@@ -5,6 +5,8 @@ beads, the autocovariance of their appearance: D(d) = 2 [C(0) - C(d)]. The diffe
 images far enough apart in time holds every bead twice, in unrelated places, and nothing that
 stands still, so its autocovariance is 2 C(d): neither a background, nor the number of beads,
 nor their shading has to be known.
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ S(L), the sum of the squared differences of two images L apart in time less that
 grows with the mean displacement of the beads in that time. The largest lag still well below the
 plateau is used, and the curve that turns S into a displacement is learnt from the same recording
 (:mod:`nanorocks_ros.stages.speed.structure_calibration`).
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Mean projected speed from the structure function, for each species that a colour tells apart."""
+"""Mean projected speed from the structure function, for each species that a colour tells apart.
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
+"""
 
 from __future__ import annotations
 

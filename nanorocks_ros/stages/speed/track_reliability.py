@@ -1,4 +1,7 @@
-"""Whether the tracks of a tray are good enough for speeds and contacts."""
+"""Whether the tracks of a tray are good enough for speeds and contacts.
+
+Tested by ``test/stages/speed/test_speed_selector.py``.
+"""
 
 from __future__ import annotations
 

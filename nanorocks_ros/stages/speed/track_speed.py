@@ -1,4 +1,7 @@
-"""Mean projected speed from tracks, where most beads are tracked."""
+"""Mean projected speed from tracks, where most beads are tracked.
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
+"""
 
 from __future__ import annotations
 

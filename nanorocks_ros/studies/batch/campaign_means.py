@@ -1,4 +1,7 @@
-"""Means and posteriors over all cycles of all recordings of a batch, per tray."""
+"""Means and posteriors over all cycles of all recordings of a batch, per tray.
+
+Tested by ``test/studies/batch/test_batch_analysis.py``.
+"""
 
 from __future__ import annotations
 

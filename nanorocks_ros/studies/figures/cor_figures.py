@@ -2,6 +2,7 @@
 
 The decay with its fits (figure 7), the maps of the search over simulated runs (figure 12), and the
 restitution against speed (figure 13).
+
 Tested by ``test/cli/figures/test_figure_cor.py``.
 """
 

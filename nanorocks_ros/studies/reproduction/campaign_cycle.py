@@ -1,6 +1,7 @@
 """One cycle of a simulated campaign: its film, its analyses, and the summary of both.
 
 The folder of a cycle gets its name when all files in it are complete.
+
 Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
 """
 

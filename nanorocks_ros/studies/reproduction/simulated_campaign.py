@@ -2,6 +2,7 @@
 
 Each cycle is a task with its own folder. An interrupted campaign continues with the next cycle;
 several cores make several cycles at once.
+
 Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
 """
 
