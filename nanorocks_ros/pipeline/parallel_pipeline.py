@@ -49,11 +49,11 @@ def shares_of(trays: Sequence[Tray], workers: int) -> tuple[tuple[Tray, ...], ..
     """The trays that each of some workers follows: about as many beads each."""
     shares: list[list[Tray]] = [[] for _ in range(workers)]
     loads = np.zeros(workers)
-    for tray in sorted(trays, key=lambda one: -one.count):
+    for tray in sorted(trays, key=lambda tray: -tray.count):
         least = int(np.argmin(loads))
         shares[least].append(tray)
         loads[least] += tray.count + _EMPTY
-    return tuple(tuple(one) for one in shares)
+    return tuple(tuple(share) for share in shares)
 
 
 class SharedPipeline(Pipeline):
@@ -95,20 +95,20 @@ class SharedPipeline(Pipeline):
     ) -> tuple[Result, ...]:
         """See `Pipeline.follow`; raises NanorocksError when a process has ended."""
         images = [record for record in records if isinstance(record, TrayImage)]
-        found = self._ask(images, wanted) if images else {}
+        results_by_tray = self._ask(images, wanted) if images else {}
         results: list[Result] = []
         for record in records:
             results.append(record)
             if isinstance(record, TrayImage):
-                results += found[record.tray]
+                results += results_by_tray[record.tray]
         return tuple(results)
 
     def flush(self) -> tuple[CorEstimate | ClusterEstimate, ...]:
         """See `Pipeline.flush`."""
         if not self._begun:
             return super().flush()
-        found = self._ask((), None, flush=True)
-        return tuple(record for number in self.trays for record in found[number])  # type: ignore[misc]
+        results_by_tray = self._ask((), None, flush=True)
+        return tuple(record for number in self.trays for record in results_by_tray[number])  # type: ignore[misc]
 
     def _ask(
         self,
@@ -123,22 +123,26 @@ class SharedPipeline(Pipeline):
             numbers = {tray.number for tray in share}
             worker.send(
                 [image for image in images if image.tray in numbers],
-                {number: one for number, one in (wanted or {}).items() if number in numbers},
+                {
+                    number: outputs
+                    for number, outputs in (wanted or {}).items()
+                    if number in numbers
+                },
                 begin=(self._settings, share) if begin else None,
                 flush=flush,
             )
             busy.append(worker)
-        found: Found = {}
+        results_by_tray: Found = {}
         # All are asked, also when one has met an error: none may be left with an answer.
         errors = []
         for worker in busy:
             try:
-                found |= worker.answer()
+                results_by_tray |= worker.answer()
             except Exception as error:
                 errors.append(error)
         if errors:
             raise errors[0]
-        return found
+        return results_by_tray
 
 
 def started(workers: int) -> tuple[TrayProcess, ...]:

@@ -135,10 +135,10 @@ class TrayProcess:
 
     def answer(self) -> Found:
         """What followed from the job; an error that it met is raised here."""
-        found, error = self._answer()
+        results_by_tray, error = self._answer()
         if error is not None:
             raise error
-        return found
+        return results_by_tray
 
     def close(self) -> None:
         """End it; what it is doing is not done."""
@@ -152,10 +152,10 @@ class TrayProcess:
 
     def _answer(self) -> tuple[Found, Exception | None]:
         try:
-            found: tuple[Found, Exception | None] = self._connection.recv()
+            answer: tuple[Found, Exception | None] = self._connection.recv()
         except (EOFError, OSError) as error:
             raise self._ended() from error
-        return found
+        return answer
 
     def _ended(self) -> NanorocksError:
         self._process.join(1.0)
@@ -166,10 +166,13 @@ class TrayProcess:
         )
 
     def _packed(self, images: Sequence[TrayImage]) -> list[_Sent]:
-        pictures = [
-            one for image in images for one in (image.gray, image.color) if one is not None
+        pixel_arrays = [
+            pixels
+            for image in images
+            for pixels in (image.gray, image.color)
+            if pixels is not None
         ]
-        self._make_room(sum(picture.nbytes for picture in pictures))
+        self._make_room(sum(pixels.nbytes for pixels in pixel_arrays))
         offset, packed = 0, []
         for image in images:
             gray, offset = self._written(image.gray, offset)
@@ -250,17 +253,17 @@ class _Worker:
             self._trays = {tray.number: TrayStages(settings, tray) for tray in trays}
         for number, wanted in job.wanted.items():
             self._trays[number].emit(wanted)
-        found: Found = {}
+        results_by_tray: Found = {}
         for image, gray, color in job.images:
             whole = replace(
                 image,
                 gray=self._pixels(gray),
                 color=None if color is None else self._pixels(color),
             )
-            found[image.tray] = self._trays[image.tray].push(whole)
+            results_by_tray[image.tray] = self._trays[image.tray].push(whole)
         if job.flush:
-            found = {number: tray.flush() for number, tray in self._trays.items()}
-        return found
+            results_by_tray = {number: tray.flush() for number, tray in self._trays.items()}
+        return results_by_tray
 
     def _pixels(self, place: _Place) -> NDArray[np.uint8]:
         """A copy: stages keep images, and the next ones will be written to the same place."""

@@ -198,7 +198,9 @@ class BatchStore:
         entry.outcome = outcome
         if outcome.folder:
             entry.folder = outcome.folder
-            gone = [path for path, known in self._known.items() if known.folder == outcome.folder]
+            gone = [
+                path for path, previous in self._known.items() if previous.folder == outcome.folder
+            ]
             for path in gone:
                 del self._known[path]
 

@@ -172,10 +172,13 @@ def _analysed(task: BagTask) -> BagOutcome:
     files = file_states(task.path)
     content = content_hash(task.path)
     for folder in (task.folder, *task.earlier):
-        known = read_summary(folder)
-        if known is not None and (known['content'], known['question']) == (content, task.question):
+        summary = read_summary(folder)
+        if summary is not None and (summary['content'], summary['question']) == (
+            content,
+            task.question,
+        ):
             other = '' if folder == task.folder else folder.name
-            return replace(_outcome(known, files), folder=other)
+            return replace(_outcome(summary, files), folder=other)
     analysis = analyse(
         task.path,
         task.settings,

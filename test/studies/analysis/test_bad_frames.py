@@ -88,8 +88,8 @@ def test_without_a_lens_the_picture_is_taken_as_straight_and_that_is_said(tmp_pa
     without = analyse(bag_of(tmp_path / 'without', pictures), PipelineSettings())
     with_one = analyse(bag_of(tmp_path / 'with', pictures, info=lens()), PipelineSettings())
     said = [
-        [notice for notice in found.notices if 'straight' in notice]
-        for found in (without, with_one)
+        [notice for notice in analysis.notices if 'straight' in notice]
+        for analysis in (without, with_one)
     ]
     assert len(said[0]) == 1
     assert 'no camera_info and no calibration file' in said[0][0]

@@ -22,8 +22,8 @@ pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 def restitutions(events, masses):
     """What each pair collision of smooth beads left of the normal speed, from its impulse."""
     pairs = events[events['kind'] == 'pair']
-    one, other = masses[pairs['bead']], masses[pairs['partner']]
-    reduced = one * other / (one + other)
+    mass, partner_mass = masses[pairs['bead']], masses[pairs['partner']]
+    reduced = mass * partner_mass / (mass + partner_mass)
     return pairs['impulse'] / (reduced * pairs['normal_speed']) - 1.0
 
 
@@ -53,8 +53,10 @@ def test_an_array_of_a_table_and_one_number_for_all_are_the_same(kernel):
     rules = CollisionRules(box=BOX, restitution=0.7)
     beads = replace(mixture(1, 8, rules), species=np.arange(8) % 3)
     table = replace(rules, restitution=np.full((3, 3), 0.7))
-    one, other = (HardSphereGas(beads, it, kernel).follow(9.0, [9.0]) for it in (rules, table))
-    np.testing.assert_array_equal(one.positions, other.positions)
+    by_number, by_table = (
+        HardSphereGas(beads, it, kernel).follow(9.0, [9.0]) for it in (rules, table)
+    )
+    np.testing.assert_array_equal(by_number.positions, by_table.positions)
 
 
 def test_a_random_restitution_is_uniform_in_its_range(kernel):
