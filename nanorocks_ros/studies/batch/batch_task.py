@@ -172,13 +172,13 @@ def _analysed(task: BagTask) -> BagOutcome:
     files = file_states(task.path)
     content = content_hash(task.path)
     for folder in (task.folder, *task.earlier):
-        summary = read_summary(folder)
-        if summary is not None and (summary['content'], summary['question']) == (
+        stored = read_summary(folder)
+        if stored is not None and (stored['content'], stored['question']) == (
             content,
             task.question,
         ):
             other = '' if folder == task.folder else folder.name
-            return replace(_outcome(summary, files), folder=other)
+            return replace(_outcome(stored, files), folder=other)
     analysis = analyse(
         task.path,
         task.settings,
