@@ -206,9 +206,9 @@ def test_everything_is_reached_by_the_tabulator_and_focus_is_seen(look, full):
 def test_changes_are_said_to_those_who_listen(look, full, results):
     page = look(full.url)
     text_is(page, '#cor', 'final')
-    said = page.locator('#said')
-    assert said.get_attribute('aria-live') == 'polite'
-    assert f'restitution {results.cors[-1].restitution.value:.3f}' in said.text_content()
+    announcement = page.locator('#said')
+    assert announcement.get_attribute('aria-live') == 'polite'
+    assert f'restitution {results.cors[-1].restitution.value:.3f}' in announcement.text_content()
     assert page.locator('#link').get_attribute('role') == 'status'
 
 

@@ -51,9 +51,9 @@ async def step(connection):
         if message.type is aiohttp.WSMsgType.BINARY:
             pictures.append(message.data)
             continue
-        said = json.loads(message.data)
-        await connection.send_json({'seen': said['n']})
-        return said, pictures
+        answer = json.loads(message.data)
+        await connection.send_json({'seen': answer['n']})
+        return answer, pictures
 
 
 async def seen(connection, server, *looks):
@@ -191,8 +191,8 @@ def test_whoever_comes_late_gets_the_whole_cycle_at_once(serve, results):
 
     async def check():
         async with live(server) as connection:
-            said, _ = await step(connection)
-            tray = said['trays']['1']
+            answer, _ = await step(connection)
+            tray = answer['trays']['1']
             assert len(tray['cor']['rows']) == len(results.cors)
             of_cycle = [speed for speed in results.speeds if speed.cycle == tray['cycle']]
             assert len(tray['speed']['rows']) == len(of_cycle)
@@ -259,8 +259,8 @@ def raw_client(server):
     return client
 
 
-def _text_frame(said):
-    content = json.dumps(said).encode()
+def _text_frame(message):
+    content = json.dumps(message).encode()
     assert len(content) < 126
     return bytes((0x81, 0x80 | len(content))) + bytes(4) + content  # masked with zeros
 
@@ -293,11 +293,10 @@ def test_a_client_that_does_not_read_holds_up_nobody_and_piles_up_nothing(serve,
                 server.take(replace(results.speeds[-1], mean_projected_speed=Measured(0.001 * k)))
                 if claims:
                     slow.sendall(_text_frame({'seen': k}))
-                said, pictures = await step(quick)
+                answer, pictures = await step(quick)
                 assert pictures in ([], [b'\x01\x00' + picture])
-            assert said['trays']['1']['latest']['speed']['mean_projected_speed'] == pytest.approx(
-                0.001 * (rounds - 1)
-            )
+            speed = answer['trays']['1']['latest']['speed']
+            assert speed['mean_projected_speed'] == pytest.approx(0.001 * (rounds - 1))
 
     asyncio.run(check())
     # Two steps; or, of one who lies, what the system itself keeps for a connection.

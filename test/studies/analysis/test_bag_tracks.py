@@ -99,9 +99,9 @@ def test_parquet_in_many_groups_of_rows_reads_the_same(bag_tracks, tmp_path, mon
 def test_without_pyarrow_the_command_refuses_before_it_tracks(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, 'pyarrow', None)
     assert main(['track', 'no_such_bag', '-o', str(tmp_path / 'tracks.parquet')]) == 2
-    said = capsys.readouterr().err
-    assert said.count('\n') == 1
-    assert "choose another ending, or run: pip install 'nanorocks_ros[parquet]'" in said
+    errors = capsys.readouterr().err
+    assert errors.count('\n') == 1
+    assert "choose another ending, or run: pip install 'nanorocks_ros[parquet]'" in errors
 
 
 def test_the_overlay_draws_a_ring_around_each_bead_and_leaves_the_rest(bag_tracks):

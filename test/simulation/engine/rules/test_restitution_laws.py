@@ -54,7 +54,7 @@ def test_an_array_of_a_table_and_one_number_for_all_are_the_same(kernel):
     beads = replace(mixture(1, 8, rules), species=np.arange(8) % 3)
     table = replace(rules, restitution=np.full((3, 3), 0.7))
     by_number, by_table = (
-        HardSphereGas(beads, it, kernel).follow(9.0, [9.0]) for it in (rules, table)
+        HardSphereGas(beads, law, kernel).follow(9.0, [9.0]) for law in (rules, table)
     )
     np.testing.assert_array_equal(by_number.positions, by_table.positions)
 
@@ -153,10 +153,10 @@ def test_a_gas_of_viscoelastic_beads_becomes_more_elastic_as_it_cools(kernel):
 def test_a_restitution_above_1_heats_the_gas(kernel, rule):
     rules = CollisionRules(box=BOX, allow_gain=True, **{rule: 1.05})
     gas = HardSphereGas(mixture(1, 8, rules), rules, kernel)
-    had = energy(gas.beads())
+    energy_before = energy(gas.beads())
     gas.run_until(10.0)
-    assert energy(gas.beads()) > 1.2 * had
-    assert gas.ledger[:3].sum() == pytest.approx(had - energy(gas.beads()), rel=1e-12)
+    assert energy(gas.beads()) > 1.2 * energy_before
+    assert gas.ledger[:3].sum() == pytest.approx(energy_before - energy(gas.beads()), rel=1e-12)
 
 
 def test_walls_may_have_another_restitution_than_beads(kernel):
