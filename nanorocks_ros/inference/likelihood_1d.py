@@ -61,15 +61,15 @@ def _smeared(
     """Logarithm of the convolution of exp(logs) on an even grid with a Gaussian, at each node."""
     smeared = np.empty(nodes.size)
     part = np.empty(fine.size)
-    most = logs.max()
+    max_log = logs.max()
     step = fine[1] - fine[0]
     for i in range(nodes.size):
         near = min(max(int((nodes[i] - fine[0]) / step + 0.5), 0), fine.size - 1)
-        least = logs[near] - 0.5 * ((fine[near] - nodes[i]) / spread) ** 2
+        lower_log = logs[near] - 0.5 * ((fine[near] - nodes[i]) / spread) ** 2
         # Farther away the Gaussian makes even the maximum negligible.
-        reach = int(spread * math.sqrt(2.0 * (most - least + _LOST)) / step) + 2
+        reach = int(spread * math.sqrt(2.0 * (max_log - lower_log + _LOST)) / step) + 2
         start, end = max(near - reach, 0), min(near + reach + 1, fine.size)
-        best = least
+        best = lower_log
         for k in range(start, end):
             part[k] = logs[k] - 0.5 * ((fine[k] - nodes[i]) / spread) ** 2
             best = max(best, part[k])

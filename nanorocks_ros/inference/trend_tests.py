@@ -64,8 +64,8 @@ def robust_trend(cycles: NDArray[np.float64], values: NDArray[np.float64]) -> Tr
     Theil 1950; Sen 1968, J. Am. Stat. Assoc. 63, 1379, whose interval, at 68 %, is the error.
     """
     x, y = np.asarray(cycles, dtype=np.float64), np.asarray(values, dtype=np.float64)
-    known = np.isfinite(x) & np.isfinite(y)
-    x, y = x[known], y[known]
+    is_finite = np.isfinite(x) & np.isfinite(y)
+    x, y = x[is_finite], y[is_finite]
     if x.size < _FEWEST or np.ptp(x) == 0.0:
         middle = float(np.median(y)) if y.size else math.nan
         return Trend(slope=math.nan, slope_error=math.nan, middle=middle, samples=int(x.size))
@@ -187,11 +187,11 @@ def combined_series(sizes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _scaled(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    known = values[np.isfinite(values)]
-    if known.size == 0:
+    finite_values = values[np.isfinite(values)]
+    if finite_values.size == 0:
         return values
-    middle = float(np.median(known))
-    scatter = _MAD * float(np.median(np.abs(known - middle)))
+    middle = float(np.median(finite_values))
+    scatter = _MAD * float(np.median(np.abs(finite_values - middle)))
     return np.asarray(
         (values - middle) / scatter if scatter > 0.0 else np.full_like(values, np.nan)
     )

@@ -113,8 +113,8 @@ def test_the_estimate_tightens_while_one_looks(look, serve, results):
     for record in results.speeds:
         server.take(record)
     text_is(page, '#cor', 'no estimate yet')
-    told = [cor for cor in results.cors if cor.status.name == 'COOLING']
-    for record in (told[0], told[len(told) // 2], told[-1]):
+    estimates = [cor for cor in results.cors if cor.status.name == 'COOLING']
+    for record in (estimates[0], estimates[len(estimates) // 2], estimates[-1]):
         server.take(record)
         text_is(page, '#cor', shown(record)[0])
         text_is(page, '#cor', 'provisional')
@@ -206,9 +206,9 @@ def test_everything_is_reached_by_the_tabulator_and_focus_is_seen(look, full):
 def test_changes_are_said_to_those_who_listen(look, full, results):
     page = look(full.url)
     text_is(page, '#cor', 'final')
-    said = page.locator('#said')
-    assert said.get_attribute('aria-live') == 'polite'
-    assert f'restitution {results.cors[-1].restitution.value:.3f}' in said.text_content()
+    announcement = page.locator('#said')
+    assert announcement.get_attribute('aria-live') == 'polite'
+    assert f'restitution {results.cors[-1].restitution.value:.3f}' in announcement.text_content()
     assert page.locator('#link').get_attribute('role') == 'status'
 
 
@@ -260,10 +260,10 @@ def test_tracks_and_motion_lie_over_the_tray(look, full):
     full.show((1, 'motion'), encoded('motion', mask))
     page.wait_for_selector('#canvas:not([hidden])')
     still, moving = pixel(page, 40), pixel(page, 120)
-    assert max(abs(one - 128) for one in still) < 6
+    assert max(abs(level - 128) for level in still) < 6
     assert moving[0] > moving[2] + 30
     page.locator('#motion').click()
-    assert max(abs(one - 128) for one in pixel(page, 120)) < 6
+    assert max(abs(level - 128) for level in pixel(page, 120)) < 6
     page.locator('#tracks').click()
     wait_for_looks(page, full, {(1, 'tray')})
 

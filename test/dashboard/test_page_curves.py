@@ -20,7 +20,7 @@ def test_what_is_measured_from_the_middle_of_a_run_is_shown_beside_its_truth(loo
     for speed in results.speeds[::10]:
         server.take(truth_at(speed.stamp_ns))
     text_is(page, '#state', 'nothing measured yet')
-    joined = [replace(one, cycle=0, cycle_start_ns=None) for one in results.speeds[20:60]]
+    joined = [replace(speed, cycle=0, cycle_start_ns=None) for speed in results.speeds[20:60]]
     for speed in joined:
         server.take(truth_at(speed.stamp_ns))
         server.take(speed)
@@ -50,14 +50,14 @@ def test_a_logarithmic_axis_has_round_numbers(look, serve, results):
         server.take(speed)
     page = look(server.url)
     page.wait_for_selector('#speed-chart canvas')
-    found = page.evaluate(
+    labels = page.evaluate(
         """async () => {
           const { roundNumbers } = await import('./words.js');
           return [[1.659, 9.3], [2.1, 3.9], [0.4, 30], [0.012, 800]].map(
             ([low, high]) => roundNumbers(low, high));
         }"""
     )
-    assert found == [
+    assert labels == [
         [2, 3, 4, 5, 7],
         [2.5, 3, 3.5],
         [0.5, 1, 2, 5, 10, 20],

@@ -24,18 +24,21 @@ async def session(server):
     address = f'http://127.0.0.1:{server.port}'
     timeout = aiohttp.ClientTimeout(total=_PATIENCE_S)
     jar = aiohttp.CookieJar(unsafe=True)  # of addresses in numbers, too
-    async with aiohttp.ClientSession(address, timeout=timeout, cookie_jar=jar) as one:
-        yield one
+    async with aiohttp.ClientSession(address, timeout=timeout, cookie_jar=jar) as client:
+        yield client
 
 
 async def status(server, path='/', **options):
-    async with session(server) as one, one.get(path, allow_redirects=False, **options) as answer:
+    async with (
+        session(server) as client,
+        client.get(path, allow_redirects=False, **options) as answer,
+    ):
         return answer.status
 
 
 @asynccontextmanager
 async def live(server, **options):
-    async with session(server) as one, one.ws_connect('/live', **options) as connection:
+    async with session(server) as client, client.ws_connect('/live', **options) as connection:
         assert (await connection.receive_json())['namespace'] == '/nanorocks'
         yield connection
 
@@ -48,9 +51,9 @@ async def step(connection):
         if message.type is aiohttp.WSMsgType.BINARY:
             pictures.append(message.data)
             continue
-        said = json.loads(message.data)
-        await connection.send_json({'seen': said['n']})
-        return said, pictures
+        answer = json.loads(message.data)
+        await connection.send_json({'seen': answer['n']})
+        return answer, pictures
 
 
 async def seen(connection, server, *looks):
@@ -66,9 +69,9 @@ def test_every_answer_keeps_other_pages_and_scripts_out(serve):
     server = serve()
 
     async def check():
-        async with session(server) as one:
+        async with session(server) as client:
             for path in ('/', '/app.js', '/style.css', '/nothing', '/login'):
-                async with one.get(path) as answer:
+                async with client.get(path) as answer:
                     policy = answer.headers['Content-Security-Policy']
                     assert "default-src 'none'" in policy
                     assert 'unsafe' not in policy
@@ -82,20 +85,20 @@ def test_only_files_of_the_page_are_served(serve):
     server = serve()
 
     for path in ('/../server.py', '/%2e%2e/server.py', '/page/app.js', '//etc/passwd'):
-        one = http.client.HTTPConnection('127.0.0.1', server.port, timeout=_PATIENCE_S)
-        one.request('GET', path)
-        assert one.getresponse().status == 404
-        one.close()
+        connection = http.client.HTTPConnection('127.0.0.1', server.port, timeout=_PATIENCE_S)
+        connection.request('GET', path)
+        assert connection.getresponse().status == 404
+        connection.close()
 
 
 def test_a_file_that_a_browser_has_is_not_sent_again(serve):
     server = serve()
 
     async def check():
-        async with session(server) as one:
-            async with one.get('/app.js') as answer:
+        async with session(server) as client:
+            async with client.get('/app.js') as answer:
                 tag = answer.headers['ETag']
-            async with one.get('/app.js', headers={'If-None-Match': tag}) as answer:
+            async with client.get('/app.js', headers={'If-None-Match': tag}) as answer:
                 assert answer.status == 304
 
     asyncio.run(check())
@@ -138,16 +141,16 @@ def test_the_token_in_the_address_becomes_a_cookie_that_scripts_cannot_read(serv
     assert server.url == f'http://127.0.0.1:{server.port}/?token={TOKEN}'
 
     async def check():
-        async with session(server) as one:
-            async with one.get(f'/?token={TOKEN}', allow_redirects=False) as answer:
+        async with session(server) as client:
+            async with client.get(f'/?token={TOKEN}', allow_redirects=False) as answer:
                 cookie = answer.headers['Set-Cookie']
                 assert answer.headers['Location'] == '/'
             assert 'HttpOnly' in cookie
             assert 'SameSite=Strict' in cookie
             assert TOKEN not in cookie
-            async with one.get('/') as answer:
+            async with client.get('/') as answer:
                 assert answer.status == 200
-            async with one.ws_connect('/live') as connection:
+            async with client.ws_connect('/live') as connection:
                 assert 'namespace' in await connection.receive_json()
 
     asyncio.run(check())
@@ -188,8 +191,8 @@ def test_whoever_comes_late_gets_the_whole_cycle_at_once(serve, results):
 
     async def check():
         async with live(server) as connection:
-            said, _ = await step(connection)
-            tray = said['trays']['1']
+            answer, _ = await step(connection)
+            tray = answer['trays']['1']
             assert len(tray['cor']['rows']) == len(results.cors)
             of_cycle = [speed for speed in results.speeds if speed.cycle == tray['cycle']]
             assert len(tray['speed']['rows']) == len(of_cycle)
@@ -204,15 +207,15 @@ def test_a_picture_goes_to_those_who_look_at_it(serve):
     server = serve()
 
     async def check():
-        async with live(server) as one, live(server) as other:
-            await one.send_json({'look': {'tray': 2, 'layers': ['tracks']}})
-            await seen(one, server, (2, 'tracks'))
+        async with live(server) as viewer, live(server) as other_viewer:
+            await viewer.send_json({'look': {'tray': 2, 'layers': ['tracks']}})
+            await seen(viewer, server, (2, 'tracks'))
             server.show((2, 'tracks'), b'jpeg')
             server.diagnose([('/n', 0, '', [])])
-            assert (await step(one))[1] == [b'\x02\x01jpeg']
-            assert (await step(other))[1] == []
-            await one.send_json({'look': None})
-            await seen(one, server)
+            assert (await step(viewer))[1] == [b'\x02\x01jpeg']
+            assert (await step(other_viewer))[1] == []
+            await viewer.send_json({'look': None})
+            await seen(viewer, server)
         for _ in range(100):
             if server.clients == 0:
                 return
@@ -244,31 +247,31 @@ def test_whoever_says_what_the_page_does_not_is_sent_away(serve, said):
 
 def raw_client(server):
     """A client that opens the live connection and reads nothing."""
-    one = socket.socket()
-    one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65536)
-    one.settimeout(_PATIENCE_S)
-    one.connect(('127.0.0.1', server.port))
-    one.sendall(
+    client = socket.socket()
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65536)
+    client.settimeout(_PATIENCE_S)
+    client.connect(('127.0.0.1', server.port))
+    client.sendall(
         b'GET /live HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
         b'Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n'
     )
-    one.sendall(_text_frame({'look': {'tray': 1, 'layers': ['tray']}}))
-    return one
+    client.sendall(_text_frame({'look': {'tray': 1, 'layers': ['tray']}}))
+    return client
 
 
-def _text_frame(said):
-    content = json.dumps(said).encode()
+def _text_frame(message):
+    content = json.dumps(message).encode()
     assert len(content) < 126
     return bytes((0x81, 0x80 | len(content))) + bytes(4) + content  # masked with zeros
 
 
-def drained(one):
+def drained(client):
     """All that was sent to a client and is still on the way."""
-    one.settimeout(0.5)
+    client.settimeout(0.5)
     size = 0
     try:
-        while found := one.recv(1 << 20):
-            size += len(found)
+        while received := client.recv(1 << 20):
+            size += len(received)
     except TimeoutError:
         return size
     return size
@@ -290,11 +293,10 @@ def test_a_client_that_does_not_read_holds_up_nobody_and_piles_up_nothing(serve,
                 server.take(replace(results.speeds[-1], mean_projected_speed=Measured(0.001 * k)))
                 if claims:
                     slow.sendall(_text_frame({'seen': k}))
-                said, pictures = await step(quick)
+                answer, pictures = await step(quick)
                 assert pictures in ([], [b'\x01\x00' + picture])
-            assert said['trays']['1']['latest']['speed']['mean_projected_speed'] == pytest.approx(
-                0.001 * (rounds - 1)
-            )
+            speed = answer['trays']['1']['latest']['speed']
+            assert speed['mean_projected_speed'] == pytest.approx(0.001 * (rounds - 1))
 
     asyncio.run(check())
     # Two steps; or, of one who lies, what the system itself keeps for a connection.
@@ -307,10 +309,10 @@ def test_browsers_beyond_the_most_are_told(serve):
     server = serve()
 
     async def check():
-        async with session(server) as one:
-            open_ones = [await one.ws_connect('/live') for _ in range(64)]
+        async with session(server) as client:
+            open_ones = [await client.ws_connect('/live') for _ in range(64)]
             with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
-                await one.ws_connect('/live')
+                await client.ws_connect('/live')
             assert refused.value.status == 503
             for connection in open_ones:
                 await connection.close()

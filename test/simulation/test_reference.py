@@ -74,7 +74,11 @@ def test_rough_pair_reverses_the_slip_and_keeps_the_angular_momentum():
         turning = gas.beads.radii @ gas.spins
         return u - np.cross(turning, normal)
 
-    turned, moved, had = angular_momentum(gas), momentum(gas), energy(gas)
+    angular_momentum_before, momentum_before, energy_before = (
+        angular_momentum(gas),
+        momentum(gas),
+        energy(gas),
+    )
     time = gas.step().time
     after = gas.positions[1] - gas.positions[0]
     normal = after / np.linalg.norm(after)
@@ -86,9 +90,9 @@ def test_rough_pair_reverses_the_slip_and_keeps_the_angular_momentum():
     came = u - np.cross(turning, normal)
     assert left @ normal == near(-0.6 * (came @ normal))
     assert np.cross(left, normal) == near(-beta * np.cross(came, normal))
-    assert angular_momentum(gas) == near(turned)
-    assert momentum(gas) == near(moved)
-    assert energy(gas) + gas.ledger.energy_lost_in_pairs == near(had)
+    assert angular_momentum(gas) == near(angular_momentum_before)
+    assert momentum(gas) == near(momentum_before)
+    assert energy(gas) + gas.ledger.energy_lost_in_pairs == near(energy_before)
 
 
 def test_restitution_of_species_uniform_and_viscoelastic():
@@ -143,16 +147,16 @@ def test_slow_pairs_merge_and_keep_their_momentum(kind, rules):
         rules=Rules(**rules, tangential_restitution=0.0),
         spins=[(1, 0, 0), (0, 2, 0)],
     )
-    had, moved = energy(gas), momentum(gas)
+    energy_before, momentum_before = energy(gas), momentum(gas)
     event = gas.step()
     assert (event.kind, event.speed) == (kind, near(math.sqrt(3.0)))
-    assert momentum(gas) == near(moved)
+    assert momentum(gas) == near(momentum_before)
     if kind == 'merge':
         assert gas.body.tolist() == [0, 0]
         assert gas.velocities == near(np.array([(0.5, 0, 0)] * 2))
         assert not gas.spins.any()
         assert event.impulse == near(1.5)
-        assert gas.ledger.energy_lost_in_merges == near(had - 0.5)
+        assert gas.ledger.energy_lost_in_merges == near(energy_before - 0.5)
 
 
 def test_a_merged_body_bounces_as_one_and_counts_for_all():

@@ -71,7 +71,7 @@ GASES = {
 @pytest.mark.parametrize('name', GASES)
 def test_the_ledger_balances_and_nothing_overlaps(name):
     gas = shaken_gas(Rules(**GASES[name]))
-    had, moved = energy(gas), momentum(gas)
+    energy_before, momentum_before = energy(gas), momentum(gas)
     kinds, time = set(), 0.0
     for _ in range(200):
         event = gas.step()
@@ -83,9 +83,9 @@ def test_the_ledger_balances_and_nothing_overlaps(name):
         assert smallest_gap(gas) > -1e-11
     ledger = gas.ledger
     lost = ledger.energy_lost_in_pairs + ledger.energy_lost_at_walls + ledger.energy_lost_in_merges
-    assert energy(gas) + lost == pytest.approx(had, rel=1e-12)
+    assert energy(gas) + lost == pytest.approx(energy_before, rel=1e-12)
     given = ledger.wall_impulse.sum(axis=0) + ledger.fixed_impulse
-    assert momentum(gas) + given == pytest.approx(moved, rel=1e-12, abs=1e-11)
+    assert momentum(gas) + given == pytest.approx(momentum_before, rel=1e-12, abs=1e-11)
     if 'motion' in GASES[name]:
         assert ledger.energy_lost_at_walls < 0.0
     else:

@@ -95,12 +95,12 @@ def _eliminate_row(
     factor: NDArray[np.float64],
     width: int,
     j: int,
-    known: range,
+    solved_rows: range,
     forward: bool,
 ) -> None:
-    """Row j of a solution, from the rows `known` that are solved already."""
+    """Row j of a solution, from `solved_rows`."""
     row = np.uint64(j * width)
-    for k in known:
+    for k in solved_rows:
         multiplier, other = factor[k, j] if forward else factor[j, k], np.uint64(k * width)
         for i in range(width):
             flat[row + np.uint64(i)] -= multiplier * flat[other + np.uint64(i)]

@@ -126,9 +126,9 @@ def _cost_and_slope(
         parameters, growth, time, starts, counts, variance, inner_distance
     )
     factor = smooth + rough
-    known = columns.copy()
-    log_determinant = whiten(factor, white, known)
-    cost, log_v0, i00, i01, i11 = _summed(parameters, known, log_determinant, usual)
+    whitened = columns.copy()
+    log_determinant = whiten(factor, white, whitened)
+    cost, log_v0, i00, i01, i11 = _summed(parameters, whitened, log_determinant, usual)
     solved = inverse_with_columns(factor, columns)
     slope[1], slope[2], slope[3] = 0.0, 0.0, 0.0
     determinant = i00 * i11 - i01 * i01
@@ -236,13 +236,13 @@ def _summed(
     usual: NDArray[np.float64],
 ) -> tuple[float, float, float, float, float]:
     """Cost, ln v0 and information from whitened columns."""
-    i00, i01, i11, known = 0.0, 0.0, 0.0, 0.0
+    i00, i01, i11, weighted_log_speeds = 0.0, 0.0, 0.0, 0.0
     for i in range(columns.shape[1]):
         i00 += columns[0, i] * columns[0, i]
         i01 += columns[0, i] * columns[1, i]
         i11 += columns[1, i] * columns[1, i]
-        known += columns[0, i] * columns[2, i]
-    log_v0 = known / i00
+        weighted_log_speeds += columns[0, i] * columns[2, i]
+    log_v0 = weighted_log_speeds / i00
     cost = log_determinant
     for i in range(columns.shape[1]):
         residual = columns[2, i] - log_v0 * columns[0, i]

@@ -27,14 +27,14 @@ _BOX = 8.0 / math.pi
 # without sticking show, restitutions 0.5 to 0.95 (`python -m benchmarks sticking`).
 _PEAKED = 7.0
 # Collisions that part two neighbours, with each other and with others, per encounter of a bead
-# and relative way: 2 in simulated trays 3, 1 in trays 5.
+# and relative path: 2 in simulated trays 3, 1 in trays 5.
 _DISTURBED = 1.3
 # Way of a bead between two shaking events, [m]: 58 s after a shake at 10 mm/s it was 0.03 to 0.12.
 _CYCLE = 0.1
 
 
 def encounter_rate(tray: Tray) -> float:
-    """Encounters of a bead with others in the picture per way that it goes, [1/m].
+    """Encounters of a bead with others in the image per path length, [1/m].
 
     Discs that move at random over the floor; passing above counts as much as a collision.
     """
@@ -45,12 +45,12 @@ def encounter_rate(tray: Tray) -> float:
     return float(2.0 * math.sqrt(2.0) * reach * max(counts.sum() - 1.0, 0.0) / room)
 
 
-def chance_probability(way: ArrayLike, tolerance: ArrayLike, rate: float) -> NDArray[np.float64]:
+def chance_probability(path: ArrayLike, tolerance: ArrayLike, rate: float) -> NDArray[np.float64]:
     """Probability that an encounter of two free beads looks like a body of two.
 
     Parameters
     ----------
-    way : array_like, [m]
+    path : array_like, [m]
         Standard deviation of a component of their relative velocity, summed over the time in
         which they stayed beside each other.
     tolerance : array_like, [m]
@@ -62,10 +62,10 @@ def chance_probability(way: ArrayLike, tolerance: ArrayLike, rate: float) -> NDA
     -------
     ndarray, 0 to 1
     """
-    gone = np.asarray(way, dtype=np.float64)
-    ratio = np.asarray(tolerance, dtype=np.float64) / np.maximum(gone, 1e-12)
+    path_length = np.asarray(path, dtype=np.float64)
+    ratio = np.asarray(tolerance, dtype=np.float64) / np.maximum(path_length, 1e-12)
     slow = np.minimum(1.0, _PEAKED * _BOX * ratio**2)
-    return np.asarray(slow * np.exp(-_DISTURBED * rate * gone))
+    return np.asarray(slow * np.exp(-_DISTURBED * rate * path_length))
 
 
 def expected_encounters(tray: Tray) -> float:

@@ -65,14 +65,14 @@ def sticking_cycle(
     end = (int(stamps_ns[-1]) - start_ns) / _NS
     merge_times = sorted((merge.stamp_ns - start_ns) / _NS for merge in merges if merge.joins)
     inside = np.array([max(time, 0.0) for time in merge_times if time <= end])
-    known = np.concatenate([[0.0], (stamps_ns - start_ns) / _NS])
+    sample_times = np.concatenate([[0.0], (stamps_ns - start_ns) / _NS])
     # The number of bodies is constant between merges: the values just before and after each
     # merge are nodes of the integral.
-    times = np.sort(np.concatenate([known, inside, np.nextafter(inside, np.inf)]))
+    times = np.sort(np.concatenate([sample_times, inside, np.nextafter(inside, np.inf)]))
     merged = np.searchsorted(inside, times, side='left')
     return StickingCycle(
         times=times,
-        speeds=np.interp(times, known[1:], speeds),
+        speeds=np.interp(times, sample_times[1:], speeds),
         bodies=beads - merged.astype(np.float64),
         merges=inside,
     )

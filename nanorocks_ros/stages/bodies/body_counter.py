@@ -135,7 +135,7 @@ class BodyCounter:
         if self._first_merge is None or not self._comoving.due(time):
             return []
         frame = self._frames.last
-        body_of = bodies_of(frame.known, [*self._bonds, *frame.attached])
+        body_of = bodies_of(frame.known_ids, [*self._bonds, *frame.attached])
         sizes = Counter(body_of.values())
         # Equipartition: free bodies have the same mean energy, whatever their size.
         mean_size = len(body_of) / len(sizes)
@@ -228,10 +228,10 @@ class BodyCounter:
         if ids is not self._known_beads[0] or self._occluded.hidden != self._known_beads[1]:
             hidden = self._occluded.hidden
             self._known_beads = ids, hidden, frozenset(ids.tolist()) | hidden
-        known = self._known_beads[2]
+        known_ids = self._known_beads[2]
         members = {bead for pair in self._bonds for bead in pair}
         attached = self._reappearing.push(tracks, ids, members)
-        frame = BodyFrame(time, tracks.stamp_ns, beads.ids, beads.positions, known, attached)
+        frame = BodyFrame(time, tracks.stamp_ns, beads.ids, beads.positions, known_ids, attached)
         self._frames.push(frame)
         if self._next_due_ns is None or tracks.stamp_ns >= self._next_due_ns:
             self._next_due_ns = tracks.stamp_ns + round(self._settings.interval * _NS)
@@ -271,7 +271,7 @@ class BodyCounter:
     def _max_bodies(self) -> int:
         """Largest number of bodies now: unknown beads count as single ones."""
         frame = self._frames.last
-        body_of = bodies_of(frame.known, [*self._bonds, *frame.attached])
+        body_of = bodies_of(frame.known_ids, [*self._bonds, *frame.attached])
         return len(set(body_of.values())) + max(self._tray.count - len(body_of), 0)
 
     def _due_estimates(self, stamp_ns: int) -> tuple[BodyEstimate, ...]:
@@ -283,7 +283,7 @@ class BodyCounter:
 
     def _estimate(self, frame: BodyFrame) -> BodyEstimate:
         bonds = [ids for ids, bond in self._bonds.items() if bond.start <= frame.time]
-        body_of = bodies_of(frame.known, [*bonds, *frame.attached])
+        body_of = bodies_of(frame.known_ids, [*bonds, *frame.attached])
         sizes = Counter(body_of.values())
         first = self._first_merge
         return BodyEstimate(
@@ -291,7 +291,7 @@ class BodyCounter:
             tray=self._tray.number,
             cycle=self._cycle,
             beads=self._tray.count,
-            followed=len(frame.known),
+            followed=len(frame.known_ids),
             first_merge_ns=first if first is not None and first <= frame.stamp_ns else None,
             **size_fields(
                 np.array(list(sizes.values()), dtype=np.int64),

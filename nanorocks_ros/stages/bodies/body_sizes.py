@@ -86,22 +86,22 @@ def size_fields(
     merges : sequence of (size, size, probability)
         Bodies that may have merged, and the probability of it.
     """
-    known = int(sizes.sum())
-    if known == 0:
+    counted = int(sizes.sum())
+    if counted == 0:
         return dict.fromkeys(_NUMBERS, math.nan) | {'sizes': np.full(5, math.nan)}
-    scale = beads / known
-    share_single = np.count_nonzero(sizes == 1) / known
+    scale = beads / counted
+    share_single = np.count_nonzero(sizes == 1) / counted
     values = {
         'bodies': scale * sizes.size,
-        'mean_size': known / sizes.size,
+        'mean_size': counted / sizes.size,
         # Beads detected twice make bodies too large; missing beads are taken for single ones.
-        'weighted_size': float(np.sum(sizes**2)) / known * min(scale, 1.0),
+        'weighted_size': float(np.sum(sizes**2)) / counted * min(scale, 1.0),
         'clustered_share': 1.0 - share_single,
         'clusters': scale * np.count_nonzero(sizes > 1),
     }
     edges = (*(0, *_SIZE_CLASSES), np.inf)
     counts = [np.count_nonzero((sizes > low) & (sizes <= high)) for low, high in pairwise(edges)]
-    errors = _errors(values, sizes.size, known, beads, merges)
+    errors = _errors(values, sizes.size, counted, beads, merges)
     return values | errors | {'sizes': scale * np.array(counts, dtype=np.float64)}
 
 
@@ -112,7 +112,7 @@ _NUMBERS = (*_VALUES, *(f'{value}_error' for value in _VALUES))
 def _errors(
     values: dict[str, float],
     bodies: int,
-    known: int,
+    counted: int,
     beads: int,
     merges: Sequence[tuple[int, int, float]],
 ) -> dict[str, float]:
@@ -121,18 +121,18 @@ def _errors(
     pairs = np.array([(a, b) for a, b, _ in merges], dtype=np.float64).reshape(-1, 2)
     effects = {
         'bodies': np.ones(len(pairs)),
-        'mean_size': np.full(len(pairs), known / bodies**2),
-        'weighted_size': 2.0 * pairs.prod(axis=1) / known,
-        'clustered_share': (np.where(pairs == 1.0, 1.0, 0.0).sum(axis=1)) / known,
+        'mean_size': np.full(len(pairs), counted / bodies**2),
+        'weighted_size': 2.0 * pairs.prod(axis=1) / counted,
+        'clustered_share': (np.where(pairs == 1.0, 1.0, 0.0).sum(axis=1)) / counted,
         'clusters': np.abs(1.0 - np.sum(pairs > 1.0, axis=1)),
     }
     # An unknown bead is a body of its own, part of a known body, or a double detection.
-    missing = abs(beads - known)
+    missing = abs(beads - counted)
     unseen = {
         'bodies': missing * math.sqrt(1.0 / 12.0),
         'mean_size': values['mean_size'] * missing / (math.sqrt(12.0) * bodies),
-        'weighted_size': 2.0 * values['weighted_size'] * missing / (math.sqrt(12.0) * known),
-        'clustered_share': missing / (math.sqrt(12.0) * known),
+        'weighted_size': 2.0 * values['weighted_size'] * missing / (math.sqrt(12.0) * counted),
+        'clustered_share': missing / (math.sqrt(12.0) * counted),
         'clusters': missing / (math.sqrt(12.0) * 2.0),
     }
     errors = {}

@@ -28,7 +28,7 @@ class BodyFrame(NamedTuple):
     ids : ndarray of int64, (n,)
         Numbers of the visible beads, ascending.
     positions : ndarray (n, 2), [m]
-    known : frozenset of int
+    known_ids : frozenset of int
         Numbers of the visible and of the occluded beads.
     attached : tuple of (int, int)
         Reappearing beads, each with the nearest bead of its body.
@@ -38,7 +38,7 @@ class BodyFrame(NamedTuple):
     stamp_ns: int
     ids: NDArray[np.int64]
     positions: NDArray[np.float64]
-    known: frozenset[int]
+    known_ids: frozenset[int]
     attached: tuple[tuple[int, int], ...]
 
 

@@ -129,13 +129,13 @@ def compaction(curve: PackingCurve) -> Compaction:
     then = curve.filling[widest * step : (widest + 1) * step]
     now = curve.filling[-last * step :]
     middle = (curve.times >= _SETTLED[0]) & (curve.times <= _SETTLED[1])
-    known = np.isfinite(then).any() and np.isfinite(now).any()
+    has_values = np.isfinite(then).any() and np.isfinite(now).any()
     return Compaction(
         widest=float(areas[widest]),
         end=end,
         apparent=max(float(areas[widest]), end) / end - 1.0,
         settled=float(np.mean(curve.level_area[middle])) / end - 1.0 if middle.any() else math.nan,
-        true=float(np.nanmean(now) / np.nanmean(then)) - 1.0 if known else math.nan,
+        true=float(np.nanmean(now) / np.nanmean(then)) - 1.0 if has_values else math.nan,
     )
 
 
@@ -161,8 +161,8 @@ def paper_filling_of_level_area(
     if beads is None:
         return None
     radius = 0.5 * tray.diameter
-    squares = sum(one.count * one.diameter**2 for one in tray.species) / tray.count
-    volume = sum(one.count * one.diameter**3 for one in tray.species) / tray.count
+    squares = sum(species.count * species.diameter**2 for species in tray.species) / tray.count
+    volume = sum(species.count * species.diameter**3 for species in tray.species) / tray.count
     area = level_area / single_level_area * 0.25 * math.pi * squares
     return paper_cluster_filling(beads, math.pi / 6.0 * volume, area, radius)
 
@@ -177,8 +177,8 @@ def measured_packing(folder: Path, tray: int) -> tuple[PackingCurve, ...]:
     """
     table = read_columns(folder / f'tray_{tray}_cluster.csv', ('time', 'cycle', 'level_area'))
     speeds = read_columns(folder / f'tray_{tray}_speed.csv', ('cycle', 'cycle_start'))
-    known = np.isfinite(speeds['cycle_start'])
-    starts = dict(zip(speeds['cycle'][known], speeds['cycle_start'][known], strict=True))
+    has_start = np.isfinite(speeds['cycle_start'])
+    starts = dict(zip(speeds['cycle'][has_start], speeds['cycle_start'][has_start], strict=True))
     curves = []
     for cycle, start in starts.items():
         own = (table['cycle'] == cycle) & (table['time'] >= start)

@@ -129,9 +129,9 @@ def cycles_of(folder: Path, tray: int, measure: SizeMeasure) -> list[CycleSummar
         (measure.error,),
     )
     summaries = []
-    known = np.isfinite(speeds['cycle_start']) & (speeds['cycle'] > 0.0)
-    for cycle in np.unique(speeds['cycle'][known]):
-        own = known & (speeds['cycle'] == cycle)
+    has_cycle = np.isfinite(speeds['cycle_start']) & (speeds['cycle'] > 0.0)
+    for cycle in np.unique(speeds['cycle'][has_cycle]):
+        own = has_cycle & (speeds['cycle'] == cycle)
         start = float(speeds['cycle_start'][own][0])
         # If a recording was played twice, the first pass is used.
         own &= speeds['cycle_start'] == start

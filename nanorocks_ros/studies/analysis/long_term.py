@@ -131,13 +131,13 @@ def campaign_of(
     places = 0
     for recording in recordings:
         # Trays are filmed together, but a shaking event may be missed in one of them.
-        known = sorted({summary.cycle for own in recording.values() for summary in own})
+        cycle_numbers = sorted({summary.cycle for own in recording.values() for summary in own})
         cycles += [
-            _placed(summary, places + known.index(summary.cycle))
+            _placed(summary, places + cycle_numbers.index(summary.cycle))
             for own in recording.values()
             for summary in own
         ]
-        places += len(known)
+        places += len(cycle_numbers)
     cycles.sort(key=lambda summary: (summary.place, summary.tray))
     campaign = Campaign(
         cycles=tuple(cycles), places=places, measure=measure, trends={}, periods=()

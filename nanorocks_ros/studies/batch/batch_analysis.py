@@ -238,8 +238,8 @@ def _gathered(plan: BatchPlan, store: BatchStore) -> Batch:
     analysed: list[tuple[Entry, BagSummary]] = []
     for entry in entries:
         outcome = entry.outcome
-        there = outcome.state in (DONE, PARTIAL)
-        summary = read_summary(store.place(entry)) if there else None
+        has_results = outcome.state in (DONE, PARTIAL)
+        summary = read_summary(store.place(entry)) if has_results else None
         if summary is not None:
             analysed.append((entry, summary))
         if outcome.state != DONE or summary is None:

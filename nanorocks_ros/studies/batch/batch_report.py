@@ -306,8 +306,10 @@ def _metadata(results: Sequence[BagResults]) -> list[tuple[str, str]]:
         for key, value in result.summary['metadata'].items():
             values.setdefault(key, []).append(value)
     entries = []
-    for key, own in values.items():
-        usual = max(set(own), key=own.count)
-        others = len(results) - own.count(usual)
-        entries.append((key, f'{usual} (other or none in {others})' if others else usual))
+    for key, recorded in values.items():
+        usual = max(set(recorded), key=recorded.count)
+        other_count = len(results) - recorded.count(usual)
+        entries.append(
+            (key, f'{usual} (other or none in {other_count})' if other_count else usual)
+        )
     return entries

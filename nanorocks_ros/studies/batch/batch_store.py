@@ -110,12 +110,12 @@ class BatchStore:
 
     def _check_place(self) -> None:
         try:
-            others = self.folder.exists() and any(self.folder.iterdir())
+            has_files = self.folder.exists() and any(self.folder.iterdir())
         except OSError as error:
             raise RecordingError(
                 str(self.folder), f'cannot be read ({error.strerror})', 'pass another --output'
             ) from error
-        if others and not (self.folder / _MARK).is_file():
+        if has_files and not (self.folder / _MARK).is_file():
             raise RecordingError(
                 str(self.folder), 'exists and holds no batch of ours', 'pass another --output'
             )
@@ -189,11 +189,11 @@ class BatchStore:
         if summary is None:
             return False
         try:
-            same = file_states(before.path) == outcome.files
+            is_unchanged = file_states(before.path) == outcome.files
         except OSError:
             return False
-        there = summary['content'], summary['question']
-        return same and there == (outcome.content, self._question)
+        stored = summary['content'], summary['question']
+        return is_unchanged and stored == (outcome.content, self._question)
 
     def finish(self, name: str, outcome: BagOutcome) -> None:
         """Note the outcome of a recording."""
@@ -201,8 +201,10 @@ class BatchStore:
         entry.outcome = outcome
         if outcome.folder:
             entry.folder = outcome.folder
-            gone = [path for path, known in self._known.items() if known.folder == outcome.folder]
-            for path in gone:
+            stale_paths = [
+                path for path, previous in self._known.items() if previous.folder == outcome.folder
+            ]
+            for path in stale_paths:
                 del self._known[path]
 
     def under_way(self) -> dict[str, tuple[int, int]]:

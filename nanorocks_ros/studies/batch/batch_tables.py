@@ -97,10 +97,10 @@ def _unit(column: str, size: str) -> str:
     if column in _TEXTS:
         return 'name'
     base = column.removeprefix('mean_').removesuffix('_scatter').removesuffix('_error')
-    known = {field.name: field.unit for field in layout(CorEstimate).fields}
+    units = {field.name: field.unit for field in layout(CorEstimate).fields}
     if base == 'cluster_size':
         return size
-    return _UNITS.get(base) or known.get(base) or '1'
+    return _UNITS.get(base) or units.get(base) or '1'
 
 
 def _cell(value: Any) -> Any:

@@ -175,10 +175,13 @@ def _analysed(task: BagTask) -> BagOutcome:
     files = file_states(task.path)
     content = content_hash(task.path)
     for folder in (task.folder, *task.earlier):
-        known = read_summary(folder)
-        if known is not None and (known['content'], known['question']) == (content, task.question):
+        stored = read_summary(folder)
+        if stored is not None and (stored['content'], stored['question']) == (
+            content,
+            task.question,
+        ):
             other = '' if folder == task.folder else folder.name
-            return replace(_outcome(known, files), folder=other)
+            return replace(_outcome(stored, files), folder=other)
     analysis = analyse(
         task.path,
         task.settings,

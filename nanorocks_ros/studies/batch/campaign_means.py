@@ -181,8 +181,8 @@ def _measure(results: Sequence[BagResults]) -> tuple[str, str]:
     return last.column, last.unit
 
 
-def _rows(one: BagResults, column: str) -> Iterable[CycleRow]:
-    for number, tray in one.summary['trays'].items():
+def _rows(result: BagResults, column: str) -> Iterable[CycleRow]:
+    for number, tray in result.summary['trays'].items():
         by_cycle = {own['cycle']: own for own in tray['by_cycle'].get(column, [])}
         for cycle in tray['cycles']:
             own = by_cycle.get(cycle['cycle'], {})
@@ -194,7 +194,7 @@ def _rows(one: BagResults, column: str) -> Iterable[CycleRow]:
                 'cluster_size': own.get('cluster_size'),
                 'cluster_size_error': own.get('cluster_size_error'),
             }
-            yield CycleRow(one.name, int(number), values)
+            yield CycleRow(result.name, int(number), values)
 
 
 def _mean(rows: Sequence[CycleRow], name: str) -> Mean:
@@ -225,8 +225,10 @@ def _added_up(
             for number in map(int, result.summary['trays']):
                 own = _below(arrays, f'{number}/cor/')
                 if own:
-                    found = CycleLikelihoods.from_arrays(own, str(result.folder / EVIDENCE))
-                    evidence[number] = evidence[number] + found if number in evidence else found
+                    likelihoods = CycleLikelihoods.from_arrays(own, str(result.folder / EVIDENCE))
+                    evidence[number] = (
+                        evidence[number] + likelihoods if number in evidence else likelihoods
+                    )
                 sticking.setdefault(number, []).extend(_sticking(arrays, number))
         except (RecordingError, FitError, ValueError) as error:
             notices.append(
@@ -243,16 +245,20 @@ def _below(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray
 
 
 def _sticking(arrays: Mapping[str, NDArray[Any]], number: int) -> list[StickingCycle]:
-    found: dict[str, dict[str, NDArray[Any]]] = {}
+    by_cycle: dict[str, dict[str, NDArray[Any]]] = {}
     for name, values in _below(arrays, f'{number}/sticking/').items():
-        cycle, _, what = name.partition('/')
-        found.setdefault(cycle, {})[what] = values
+        cycle, _, field_name = name.partition('/')
+        by_cycle.setdefault(cycle, {})[field_name] = values
     names = {field.name for field in fields(StickingCycle)}
-    return [StickingCycle(**found[cycle]) for cycle in sorted(found) if names == {*found[cycle]}]
+    return [
+        StickingCycle(**by_cycle[cycle])
+        for cycle in sorted(by_cycle)
+        if names == {*by_cycle[cycle]}
+    ]
 
 
 def _campaign(results: Sequence[BagResults], column: str) -> Campaign | None:
-    measure = next(one for one in SIZE_MEASURES if one.column == column)
+    measure = next(measure for measure in SIZE_MEASURES if measure.column == column)
     recordings = []
     for result in results:
         own = {
@@ -269,17 +275,17 @@ def _campaign(results: Sequence[BagResults], column: str) -> Campaign | None:
 
 
 def _cycle(values: Mapping[str, Any]) -> CycleSummary:
-    found: dict[str, Any] = {k: math.nan if v is None else v for k, v in values.items()}
-    return CycleSummary(**found)
+    summary: dict[str, Any] = {k: math.nan if v is None else v for k, v in values.items()}
+    return CycleSummary(**summary)
 
 
-def means_as_json(one: TrayMeans) -> dict[str, Any]:
+def means_as_json(tray: TrayMeans) -> dict[str, Any]:
     """Results of all cycles of a tray, in SI; None where not known.
 
     A restitution that is hardly known has an interval, but no value.
     """
-    found: dict[str, Any] = {'recordings': one.recordings, 'cycles': one.cycles}
-    mean = one.restitution
+    fields_of_tray: dict[str, Any] = {'recordings': tray.recordings, 'cycles': tray.cycles}
+    mean = tray.restitution
     vague = mean is None or not mean.restitution_error <= _LEAST_KNOWN
     names = [
         f'{which}{part}'
@@ -289,26 +295,26 @@ def means_as_json(one: TrayMeans) -> dict[str, Any]:
     values = asdict(mean) if mean is not None else {}
     for name in names:
         unknown = mean is None or (vague and name in ('restitution', 'restitution_error'))
-        found[name] = None if unknown else finite_or_none(float(values[name]))
-    found |= {
+        fields_of_tray[name] = None if unknown else finite_or_none(float(values[name]))
+    fields_of_tray |= {
         'cycles_read': mean.cycles if mean else 0,
         'tension': finite_or_none(mean.tension) if mean else None,
         'rebounds': mean.rebounds if mean else 0,
         'collisions': mean.collisions if mean else 0,
     }
-    sticking = one.sticking
-    found |= {
+    sticking = tray.sticking
+    fields_of_tray |= {
         'sticking_status': sticking.status.name.lower() if sticking else None,
         'sticking_speed': finite_or_none(sticking.sticking_speed) if sticking else None,
         'sticking_speed_lower': finite_or_none(sticking.lower) if sticking else None,
         'sticking_speed_upper': finite_or_none(sticking.upper) if sticking else None,
         'merges': sticking.merges if sticking else None,
     }
-    for name, value in one.means.items():
-        found |= {
+    for name, value in tray.means.items():
+        fields_of_tray |= {
             f'mean_{name}': finite_or_none(value.mean),
             f'mean_{name}_error': finite_or_none(value.error),
             f'{name}_scatter': finite_or_none(value.scatter),
             f'{name}_cycles': value.cycles,
         }
-    return found
+    return fields_of_tray

@@ -127,15 +127,15 @@ def test_a_run_of_very_many_epochs_keeps_energy_and_gaps(kernel, periodic):
         wall_tangential_restitution=1.0,
     )
     gas, often = pair_of_gases(mixture(9, 10, rules), rules, kernel, 2.0**-6)
-    had, turned = energy(often.beads()), angular_momentum(often.beads())
+    energy_before, angular_momentum_before = energy(often.beads()), angular_momentum(often.beads())
     for run in (gas, often):
         record = run.follow(300.0, np.linspace(0.0, 300.0, 301))
         assert run.counts.pair > 500
-        assert abs(energy(run.beads()) / had - 1.0) < 1e-12
+        assert abs(energy(run.beads()) / energy_before - 1.0) < 1e-12
         assert smallest_gap(record.positions, run.radii, rules) > -1e-10
     if not periodic:
         total = angular_momentum(often.beads()) + often.ledger[12:15]
-        assert total == pytest.approx(turned, abs=1e-9)
+        assert total == pytest.approx(angular_momentum_before, abs=1e-9)
     # Observables of the two, which are different gases by now, are of one equilibrium.
     rates = [run.counts.pair for run in (gas, often)]
     assert rates[1] == pytest.approx(rates[0], rel=0.2)

@@ -25,7 +25,7 @@ def _history(separation, n_frames):
             stamp_ns=round(k * STEP * 1e9),
             ids=np.array(ids, dtype=np.int64),
             positions=np.array(positions),
-            known=frozenset((2, 5)),
+            known_ids=frozenset((2, 5)),
             attached=(),
         )
         history.push(frame)

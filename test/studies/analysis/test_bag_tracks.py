@@ -40,7 +40,7 @@ def bag(tmp_path_factory):
 
 
 @pytest.fixture(scope='module')
-def found(bag):
+def bag_tracks(bag):
     return track_bag(bag, PipelineSettings())
 
 
@@ -50,18 +50,18 @@ def _rows(path):
         return list(csv.DictReader(stream))
 
 
-def test_every_frame_of_the_bag_has_tracks_of_all_beads(found):
-    assert found.frames == FRAMES
-    assert found.numbers[1] == list(range(FRAMES))
-    assert [one.ids.size for one in found.tracks[1]] == [15] * FRAMES
+def test_every_frame_of_the_bag_has_tracks_of_all_beads(bag_tracks):
+    assert bag_tracks.frames == FRAMES
+    assert bag_tracks.numbers[1] == list(range(FRAMES))
+    assert [tracks.ids.size for tracks in bag_tracks.tracks[1]] == [15] * FRAMES
 
 
-def test_a_table_holds_what_was_tracked(found, tmp_path):
-    write_tracks(tmp_path / 'tracks.csv', found)
+def test_a_table_holds_what_was_tracked(bag_tracks, tmp_path):
+    write_tracks(tmp_path / 'tracks.csv', bag_tracks)
     rows = _rows(tmp_path / 'tracks.csv')
     assert list(rows[0]) == [column.name for column in COLUMNS]
     assert len(rows) == 15 * FRAMES
-    last = found.tracks[1][-1]
+    last = bag_tracks.tracks[1][-1]
     shown = [(float(row['x']), float(row['y'])) for row in rows if int(row['frame']) == FRAMES - 1]
     np.testing.assert_allclose(shown, last.positions, rtol=1e-6)
     assert rows[0]['vx'] == ''
@@ -69,13 +69,13 @@ def test_a_table_holds_what_was_tracked(found, tmp_path):
     assert float(rows[-1]['time']) == pytest.approx((FRAMES - 1) / 30.0, abs=1e-6)
 
 
-def test_parquet_and_csv_hold_the_same(found, tmp_path):
+def test_parquet_and_csv_hold_the_same(bag_tracks, tmp_path):
     parquet = pytest.importorskip('pyarrow.parquet')
-    write_tracks(tmp_path / 'tracks.csv', found)
-    write_tracks(tmp_path / 'tracks.parquet', found)
+    write_tracks(tmp_path / 'tracks.csv', bag_tracks)
+    write_tracks(tmp_path / 'tracks.parquet', bag_tracks)
     table = parquet.read_table(tmp_path / 'tracks.parquet').to_pydict()
     rows = _rows(tmp_path / 'tracks.csv')
-    assert [str(one) for one in table['id']] == [row['id'] for row in rows]
+    assert [str(bead) for bead in table['id']] == [row['id'] for row in rows]
     np.testing.assert_allclose(table['radius'], [float(row['radius']) for row in rows], rtol=1e-6)
     assert table['species'] == [row['species'] for row in rows]
     # Where CSV leaves a field empty.
@@ -84,48 +84,48 @@ def test_parquet_and_csv_hold_the_same(found, tmp_path):
     assert parquet.ParquetFile(tmp_path / 'tracks.parquet').num_row_groups == 1
 
 
-def test_parquet_in_many_groups_of_rows_reads_the_same(found, tmp_path, monkeypatch):
+def test_parquet_in_many_groups_of_rows_reads_the_same(bag_tracks, tmp_path, monkeypatch):
     parquet = pytest.importorskip('pyarrow.parquet')
-    write_tracks(tmp_path / 'one.parquet', found)
+    write_tracks(tmp_path / 'one.parquet', bag_tracks)
     monkeypatch.setattr(parquet_files, '_GROUP_ROWS', 100)
-    write_tracks(tmp_path / 'many.parquet', found)
+    write_tracks(tmp_path / 'many.parquet', bag_tracks)
     # Seven frames of 15 beads are the first 100 rows.
     assert parquet.ParquetFile(tmp_path / 'many.parquet').num_row_groups == -(-FRAMES // 7)
-    one, many = (parquet.read_table(tmp_path / f'{name}.parquet') for name in ('one', 'many'))
-    assert one['id'].to_pylist() == many['id'].to_pylist()
-    assert one['species'].to_pylist() == many['species'].to_pylist()
+    whole, many = (parquet.read_table(tmp_path / f'{name}.parquet') for name in ('one', 'many'))
+    assert whole['id'].to_pylist() == many['id'].to_pylist()
+    assert whole['species'].to_pylist() == many['species'].to_pylist()
 
 
 def test_without_pyarrow_the_command_refuses_before_it_tracks(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, 'pyarrow', None)
     assert main(['track', 'no_such_bag', '-o', str(tmp_path / 'tracks.parquet')]) == 2
-    said = capsys.readouterr().err
-    assert said.count('\n') == 1
-    assert "choose another ending, or run: pip install 'nanorocks_ros[parquet]'" in said
+    errors = capsys.readouterr().err
+    assert errors.count('\n') == 1
+    assert "choose another ending, or run: pip install 'nanorocks_ros[parquet]'" in errors
 
 
-def test_the_overlay_draws_a_ring_around_each_bead_and_leaves_the_rest(found):
-    image, tracks = found.pictures[1], found.tracks[1]
-    bare = overlay(image, [], found.pixels_per_metre)
-    drawn = overlay(image, tracks[-1:], found.pixels_per_metre)
+def test_the_overlay_draws_a_ring_around_each_bead_and_leaves_the_rest(bag_tracks):
+    image, tracks = bag_tracks.pictures[1], bag_tracks.tracks[1]
+    bare = overlay(image, [], bag_tracks.pixels_per_metre)
+    drawn = overlay(image, tracks[-1:], bag_tracks.pixels_per_metre)
     changed = (bare != drawn).any(axis=2)
     rows, columns = np.nonzero(changed)
-    places = tracks[-1].positions * found.pixels_per_metre * 3
-    radii = tracks[-1].radii * found.pixels_per_metre * 3
+    places = tracks[-1].positions * bag_tracks.pixels_per_metre * 3
+    radii = tracks[-1].radii * bag_tracks.pixels_per_metre * 3
     apart = np.hypot(columns[:, None] + 0.5 - places[:, 0], rows[:, None] + 0.5 - places[:, 1])
     assert np.abs(apart - radii).min(axis=1).max() < 2.5
     for k in range(15):
         assert np.count_nonzero(np.abs(apart[:, k] - radii[k]) < 2.0) > 0.8 * 2 * np.pi * radii[k]
     hidden = replace(tracks[-1], seen=np.zeros(15, dtype=bool))
-    assert (overlay(image, [hidden], found.pixels_per_metre)[changed] != drawn[changed]).any()
+    assert (overlay(image, [hidden], bag_tracks.pixels_per_metre)[changed] != drawn[changed]).any()
 
 
-def test_the_command_prints_compares_and_writes(bag, tmp_path, capsys, found):
-    region = found.regions[1]
+def test_the_command_prints_compares_and_writes(bag, tmp_path, capsys, bag_tracks):
+    region = bag_tracks.regions[1]
     marks = ['frame,id,x,y']
-    for number, one in zip(found.numbers[1], found.tracks[1], strict=True):
-        places = (one.positions + one.displacement) * found.pixels_per_metre
-        for bead, (x, y) in zip(one.ids.tolist(), places.tolist(), strict=True):
+    for number, tracks in zip(bag_tracks.numbers[1], bag_tracks.tracks[1], strict=True):
+        places = (tracks.positions + tracks.displacement) * bag_tracks.pixels_per_metre
+        for bead, (x, y) in zip(tracks.ids.tolist(), places.tolist(), strict=True):
             marks.append(f'{number},{bead},{x + region.x},{y + region.y}')
     (tmp_path / 'hand.csv').write_text('\n'.join(marks), encoding='utf-8')
     table, picture = tmp_path / 'out.csv', tmp_path / 'out.png'

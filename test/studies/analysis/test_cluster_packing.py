@@ -51,9 +51,9 @@ def test_compaction_is_that_of_the_widest_against_the_end():
     areas = np.full(40, 1.0)
     areas[:4], areas[10:14] = 0.5, 1.066
     fillings = np.linspace(0.3, 0.6, 40)
-    found = compaction(curve(areas, fillings))
-    assert found.apparent == pytest.approx(0.066)
-    assert 0.3 < found.true < 0.8
+    result = compaction(curve(areas, fillings))
+    assert result.apparent == pytest.approx(0.066)
+    assert 0.3 < result.true < 0.8
 
 
 def test_a_width_that_only_grows_is_no_compaction():
@@ -62,8 +62,8 @@ def test_a_width_that_only_grows_is_no_compaction():
 
 def test_values_that_scatter_alone_look_like_compaction():
     rng = np.random.default_rng(1)
-    found = [compaction(curve(1 + 0.05 * rng.normal(size=60))).apparent for _ in range(40)]
-    assert np.mean(found) > 0.04
+    compactions = [compaction(curve(1 + 0.05 * rng.normal(size=60))).apparent for _ in range(40)]
+    assert np.mean(compactions) > 0.04
 
 
 def test_a_cycle_that_is_too_short_is_refused():
@@ -77,23 +77,23 @@ def test_pictures_without_content_are_refused():
 
 
 def test_rigid_clusters_seem_to_become_compact_but_do_not(simulated):
-    assert [one.cycle for one in simulated] == [1, 2]
-    for one in simulated:
-        found = compaction(one)
-        assert one.beads[-1] == 15
+    assert [packing.cycle for packing in simulated] == [1, 2]
+    for packing in simulated:
+        result = compaction(packing)
+        assert packing.beads[-1] == 15
         # Merges make them more open, and nothing makes them closer.
-        assert found.true < 0.02
-        assert found.apparent > 0.01
+        assert result.true < 0.02
+        assert result.apparent > 0.01
         # The formula of the paper is twice that of a layer, which is more than that in space.
-        assert one.paper[-1] == pytest.approx(2 * one.filling[-1])
-        assert one.in_space[-1] < one.filling[-1] < 0.6046
+        assert packing.paper[-1] == pytest.approx(2 * packing.filling[-1])
+        assert packing.in_space[-1] < packing.filling[-1] < 0.6046
 
 
 def test_a_shaking_event_sets_beads_apart_and_pictures_know_it(simulated):
-    for one in simulated:
-        assert one.times[0] == 0.0
-        assert not one.beads[0] > 3
-        assert one.level_area[0] < one.level_area[-1]
+    for packing in simulated:
+        assert packing.times[0] == 0.0
+        assert not packing.beads[0] > 3
+        assert packing.level_area[0] < packing.level_area[-1]
 
 
 def test_the_same_seed_gives_the_same_numbers(simulated):
@@ -116,7 +116,7 @@ def test_a_gas_that_does_not_stick_has_no_filling_factor():
 def test_results_of_an_analysis_are_read_by_cycle(tmp_path):
     areas = 1e-6 * np.linspace(1.0, 2.0, 60)
     curves = measured_packing(write_results(tmp_path / 'r', areas), 1)
-    assert [one.cycle for one in curves] == [1, 2]
+    assert [packing.cycle for packing in curves] == [1, 2]
     assert curves[1].times[:2].tolist() == [0.0, 1.0]
     assert curves[1].level_area == pytest.approx(areas)
 
@@ -128,6 +128,6 @@ def test_results_without_a_shaking_event_are_refused(tmp_path):
 
 def test_a_level_area_becomes_that_of_beads_by_what_single_beads_have():
     # As wide as single beads: the area of one bead, and in it as many as were counted by hand.
-    found = paper_filling_of_level_area(TRAY, 1e-6, 1e-6)
-    assert found == pytest.approx(PAPER_CLUSTER_SIZES[1] * 4 / 3)
+    filling = paper_filling_of_level_area(TRAY, 1e-6, 1e-6)
+    assert filling == pytest.approx(PAPER_CLUSTER_SIZES[1] * 4 / 3)
     assert paper_filling_of_level_area(load_trays()[8], 1e-6, 1e-6) is None

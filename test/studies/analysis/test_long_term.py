@@ -61,8 +61,8 @@ def test_peak_restitution_and_size_are_those_of_the_tables(folders):
 
 def test_the_period_of_larger_clusters_is_found(folders):
     campaign = read_campaign(folders)
-    (one,) = campaign.periods
-    assert (one.first, one.last) == (18, 23)
+    (period,) = campaign.periods
+    assert (period.first, period.last) == (18, 23)
     assert in_period(campaign, 20)
     assert not in_period(campaign, 30)
 

@@ -63,11 +63,11 @@ def at_30_hz(count):
 
 
 def test_the_sample_bag_gives_one_cycle_with_its_truth(analysis):
-    found = as_json(analysis)
-    assert found['frames'] > 600
-    assert found['frames_lost'] == 0
-    assert found['complete']
-    tray = found['trays']['1']
+    results = as_json(analysis)
+    assert results['frames'] > 600
+    assert results['frames_lost'] == 0
+    assert results['complete']
+    tray = results['trays']['1']
     (cycle,) = tray['cycles']
     assert cycle['status'] == 'final'
     assert cycle['relation'] == 'library'
@@ -82,8 +82,8 @@ def test_the_sample_bag_gives_one_cycle_with_its_truth(analysis):
 
 def test_the_speeds_from_the_frames_are_those_of_the_truth(analysis):
     results = analysis.trays[1]
-    stamps = np.array([one.stamp_ns for one in results.truth])
-    true = np.array([one.mean_projected_speed for one in results.truth])
+    stamps = np.array([speed.stamp_ns for speed in results.truth])
+    true = np.array([speed.mean_projected_speed for speed in results.truth])
     ratios = [
         speed.mean_projected_speed.value / np.interp(speed.stamp_ns, stamps, true)
         for speed in results.speeds
@@ -145,23 +145,25 @@ def test_earlier_results_are_replaced_and_anything_else_is_left_alone(analysis, 
 
 
 def test_missing_frames_are_counted(tmp_path):
-    stamps = [one for k, one in enumerate(at_30_hz(90)) if not 40 <= k < 47]
+    stamps = [stamp for k, stamp in enumerate(at_30_hz(90)) if not 40 <= k < 47]
     assert analyse(raw_bag(tmp_path / 'bag', stamps), PipelineSettings()).frames_lost == 7
 
 
 def test_a_late_frame_is_dropped_and_told(tmp_path):
     stamps = at_30_hz(60)
     stamps[30], stamps[31] = stamps[31], stamps[30]
-    found = analyse(raw_bag(tmp_path / 'bag', stamps), PipelineSettings())
-    assert found.frames == 59
-    assert any('came 0.033 s late and was dropped' in notice for notice in found.notices)
+    analysis = analyse(raw_bag(tmp_path / 'bag', stamps), PipelineSettings())
+    assert analysis.frames == 59
+    assert any('came 0.033 s late and was dropped' in notice for notice in analysis.notices)
 
 
 def test_time_that_goes_back_starts_afresh_and_is_told(tmp_path):
     stamps = at_30_hz(60)
-    found = analyse(raw_bag(tmp_path / 'bag', stamps + stamps), PipelineSettings())
-    assert found.frames == 120
-    assert any('time went back by 1.967 s; starting afresh' in notice for notice in found.notices)
+    analysis = analyse(raw_bag(tmp_path / 'bag', stamps + stamps), PipelineSettings())
+    assert analysis.frames == 120
+    assert any(
+        'time went back by 1.967 s; starting afresh' in notice for notice in analysis.notices
+    )
 
 
 def test_a_scene_in_which_nothing_moves_gives_no_restitution(tmp_path):
@@ -171,9 +173,9 @@ def test_a_scene_in_which_nothing_moves_gives_no_restitution(tmp_path):
     def picture(_):
         return (still + rng.normal(0, 2, still.shape)).astype(np.uint8)
 
-    found = analyse(raw_bag(tmp_path / 'bag', at_30_hz(120), picture), PipelineSettings())
-    assert found.trays[1].cors == []
-    assert all(cluster.cycle == 0 for cluster in found.trays[1].clusters)
+    analysis = analyse(raw_bag(tmp_path / 'bag', at_30_hz(120), picture), PipelineSettings())
+    assert analysis.trays[1].cors == []
+    assert all(cluster.cycle == 0 for cluster in analysis.trays[1].clusters)
 
 
 def run(*arguments):
@@ -188,14 +190,14 @@ def error_of(capsys):
 
 def test_the_command_prints_one_json_object(capsys, tmp_path):
     assert run('analyse', SAMPLE, '--json', '-o', tmp_path / 'out') == 0
-    found = json.loads(capsys.readouterr().out)
-    assert set(found) >= {'frames', 'frames_lost', 'seconds', 'trays'}
-    tray = found['trays']['1']
+    results = json.loads(capsys.readouterr().out)
+    assert set(results) >= {'frames', 'frames_lost', 'seconds', 'trays'}
+    tray = results['trays']['1']
     assert len(tray['time']) == len(tray['mean_projected_speed'])
     assert len(tray['time']) == len(tray['method']) == len(tray['quality'])
     assert set(tray['method']) == {'tracking'}
     assert not any(tray['quality'])
-    assert all(one > 0.0 for one in tray['first_species_speed'][-5:])
+    assert all(speed > 0.0 for speed in tray['first_species_speed'][-5:])
     assert set(tray['second_species_speed']) == {None}
     assert set(tray['cycles'][0]) >= {
         'start',
@@ -226,10 +228,10 @@ def test_a_parameter_file_for_the_nodes_does_for_the_command(capsys, tmp_path):
     path = tmp_path / 'mine.yaml'
     path.write_text('/**:\n  ros__parameters:\n    cooling: {probability: 0.5}\n')
     wide, narrow = [], []
-    for found, extra in ((wide, ()), (narrow, ('--parameters', path))):
+    for widths, extra in ((wide, ()), (narrow, ('--parameters', path))):
         assert run('analyse', SAMPLE, '--json', '--no-output', *extra) == 0
         cycle = json.loads(capsys.readouterr().out)['trays']['1']['cycles'][0]
-        found.append(cycle['restitution_upper'] - cycle['restitution_lower'])
+        widths.append(cycle['restitution_upper'] - cycle['restitution_lower'])
     assert narrow[0] < 0.5 * wide[0]
 
 
@@ -312,10 +314,10 @@ def test_a_bag_cut_short_is_analysed_up_to_the_cut(capsys, tmp_path):
     storage.write_bytes(content[: len(content) * 3 // 5])
     assert run('analyse', path, '--json', '--no-output') == 0
     printed = capsys.readouterr()
-    found = json.loads(printed.out)
+    results = json.loads(printed.out)
     whole = analyse(SAMPLE, PipelineSettings()).frames
-    assert 0.4 * whole < found['frames'] < 0.8 * whole
-    assert not found['complete']
+    assert 0.4 * whole < results['frames'] < 0.8 * whole
+    assert not results['complete']
     assert any('is cut short' in line for line in printed.err.splitlines())
 
 
@@ -324,10 +326,10 @@ def test_of_a_bag_whose_making_was_interrupted_it_is_said(capsys, tmp_path, key)
     path = raw_bag(tmp_path / 'bag', at_30_hz(60), metadata={key: 'unfinished'})
     assert run('analyse', path, '--json', '--no-output') == 0
     printed = capsys.readouterr()
-    found = json.loads(printed.out)
-    assert found['frames'] == 60
-    assert not found['complete']
-    assert 'holds only part of' in found['notices'][0]
+    results = json.loads(printed.out)
+    assert results['frames'] == 60
+    assert not results['complete']
+    assert 'holds only part of' in results['notices'][0]
     assert 'holds only part of' in printed.err
 
 

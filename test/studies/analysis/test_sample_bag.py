@@ -24,7 +24,7 @@ def test_the_checksum_is_that_of_the_bag():
 
 
 def test_the_command_makes_the_same_frames(tmp_path):
-    (line,) = [one.strip() for one in TEXT.splitlines() if 'nanorocks simulate' in one]
+    (line,) = [line.strip() for line in TEXT.splitlines() if 'nanorocks simulate' in line]
     command = shlex.split(line)[1:]
     path = tmp_path / 'again'
     command[command.index('--bag') + 1] = str(path)
@@ -38,7 +38,7 @@ def test_the_command_makes_the_same_frames(tmp_path):
         # JPEGs of another release of OpenCV may differ in the last digit.
         assert np.abs(shipped.image.astype(int) - made.image).max() <= 6
     assert count == 60
-    kept, again = (BagFrames(one).truth(START_NS)[1] for one in (BAGS / 'tray_1_sample', path))
+    kept, again = (BagFrames(bag).truth(START_NS)[1] for bag in (BAGS / 'tray_1_sample', path))
     assert kept[:60] == again
 
 
@@ -64,7 +64,7 @@ def test_a_bag_that_exists_is_left_alone(capsys, tmp_path):
     path = tmp_path / 'bag'
     arguments = ['simulate', '--bag', str(path), '--duration', '0.2', '--width-px', '208']
     assert main(arguments) == 0
-    before = {one.name: one.read_bytes() for one in path.iterdir()}
+    before = {file.name: file.read_bytes() for file in path.iterdir()}
     assert main(arguments) == 1
     assert str(path) in capsys.readouterr().err.strip().splitlines()[-1]
-    assert {one.name: one.read_bytes() for one in path.iterdir()} == before
+    assert {file.name: file.read_bytes() for file in path.iterdir()} == before

@@ -75,7 +75,7 @@ def tiny(tmp_path_factory):
 
 def batch_of(folder, *inputs, watcher=None, workers=1, settings=None):
     plan = BatchPlan(
-        bags=find_bags([str(one) for one in inputs]),
+        bags=find_bags([str(path) for path in inputs]),
         folder=folder,
         settings=settings or PipelineSettings(),
     )
@@ -99,10 +99,10 @@ def done(films, tmp_path_factory):
 
 
 def test_bad_bags_are_told_in_the_end_with_their_reasons(done):
-    results, found, errors, code = done
+    results, report, errors, code = done
     assert code == 1
     assert 'Traceback' not in errors
-    failed = {Path(one['bag']).name: one['reason'] for one in found['failed']}
+    failed = {Path(failure['bag']).name: failure['reason'] for failure in report['failed']}
     assert set(failed) == {'empty.mcap', 'wrong_magic.mcap', 'no_camera'}
     assert 'is empty (0 bytes)' in failed['empty.mcap']
     assert 'is not an MCAP file' in failed['wrong_magic.mcap']
@@ -110,7 +110,7 @@ def test_bad_bags_are_told_in_the_end_with_their_reasons(done):
     last = errors.strip().splitlines()[-1]
     assert '3 of 7 recordings failed' in last
     assert 'run the same command again' in last
-    bags = {Path(bag['bag']).name: bag for bag in found['bags']}
+    bags = {Path(bag['bag']).name: bag for bag in report['bags']}
     assert set(bags) == {'run_1', 'run_2', 'truncated.mcap', 'flipped.mcap'}
     for name in ('truncated.mcap', 'flipped.mcap'):
         assert not bags[name]['complete']
@@ -123,9 +123,9 @@ def test_bad_bags_are_told_in_the_end_with_their_reasons(done):
 
 
 def test_each_bag_has_the_results_it_has_alone_and_a_tray_what_all_cycles_say(done, films):
-    results, found, _, _ = done
+    results, report, _, _ = done
     alone = analyse(films[1], PipelineSettings())
-    (own,) = (Path(bag['results']) for bag in found['bags'] if bag['bag'].endswith('/run_2'))
+    (own,) = (Path(bag['results']) for bag in report['bags'] if bag['bag'].endswith('/run_2'))
     speeds = read_columns(own / 'tray_1_speed.csv', ('mean_projected_speed',))
     expected = [speed.mean_projected_speed.value for speed in alone.trays[1].speeds]
     assert speeds['mean_projected_speed'] == pytest.approx(expected, rel=1e-6)
@@ -143,20 +143,20 @@ def test_each_bag_has_the_results_it_has_alone_and_a_tray_what_all_cycles_say(do
         cycle['quality'] |= Quality.WRONG_SCALE
     sizes = wrong['trays']['1']['by_cycle']
     wrong['trays']['1']['by_cycle'] = {'correlation_length': sizes['correlation_length']}
-    both = combined([*batch, replace(batch[0], summary=wrong)], PipelineSettings())
-    assert both.size_unit == combined(batch, PipelineSettings()).size_unit == '1'
-    tray = found['trays']['1']
-    cycles = [cycle for bag in found['bags'] for cycle in bag['trays']['1']['cycles']]
+    with_wrong_scale = combined([*batch, replace(batch[0], summary=wrong)], PipelineSettings())
+    assert with_wrong_scale.size_unit == combined(batch, PipelineSettings()).size_unit == '1'
+    tray = report['trays']['1']
+    cycles = [cycle for bag in report['bags'] for cycle in bag['trays']['1']['cycles']]
     assert tray['cycles'] == len(cycles) >= tray['cycles_read'] == 2
     assert tray['restitution_lower'] < 0.89 < tray['restitution_upper']
     widths = [cycle['restitution_upper'] - cycle['restitution_lower'] for cycle in cycles]
-    known = [width for width in widths if width < 1.0]
-    assert tray['restitution_upper'] - tray['restitution_lower'] < max(known)
+    narrow_widths = [width for width in widths if width < 1.0]
+    assert tray['restitution_upper'] - tray['restitution_lower'] < max(narrow_widths)
     assert tray['collisions'] == sum(cycle['collisions'] for cycle in cycles)
     peaks = read_columns(results / 'cycles.csv', ('peak_speed', 'initial_speed'))
-    known = peaks['peak_speed'][np.isfinite(peaks['peak_speed'])]
+    finite_peaks = peaks['peak_speed'][np.isfinite(peaks['peak_speed'])]
     assert len(peaks['peak_speed']) == len(cycles)
-    assert tray['mean_peak_speed'] == pytest.approx(known.mean())
+    assert tray['mean_peak_speed'] == pytest.approx(finite_peaks.mean())
     # What a fit to a stump of a decay says is no part of a mean.
     fitted = [
         cycle['initial_speed']
@@ -170,23 +170,23 @@ def test_each_bag_has_the_results_it_has_alone_and_a_tray_what_all_cycles_say(do
 
 def test_the_same_command_again_does_only_what_failed(done, capsys):
     parquet = pytest.importorskip('pyarrow.parquet')
-    results, found, _, _ = done
-    bags = Path(found['bags'][0]['bag']).parent
+    results, report, _, _ = done
+    bags = Path(report['bags'][0]['bag']).parent
     before = {path: path.stat().st_mtime_ns for path in results.glob('bags/*/bag.json')}
     call = ['analyse', str(bags), '-o', str(results), '--json', '--format', 'parquet']
     assert main([*call, '--workers', '1']) == 1
     printed = capsys.readouterr()
-    assert json.loads(printed.out)['trays'] == found['trays']
+    assert json.loads(printed.out)['trays'] == report['trays']
     assert '4 of 7 recordings are finished and unchanged' in printed.err
     assert before == {path: path.stat().st_mtime_ns for path in results.glob('bags/*/bag.json')}
     table = parquet.read_table(results / 'trays.parquet')
-    assert table['restitution'].to_pylist() == [found['trays']['1']['restitution']]
+    assert table['restitution'].to_pylist() == [report['trays']['1']['restitution']]
     cycles = parquet.read_table(results / 'cycles.parquet')
     assert set(cycles['tray'].to_pylist()) == {1}
 
 
 def test_the_report_shows_what_was_analysed_and_what_failed(done):
-    results, found, _, _ = done
+    results, report, _, _ = done
     page = (results / 'report.html').read_text()
     for text in ('What failed', 'is not an MCAP file', 'Restitution of all cycles together'):
         assert text in page
@@ -194,15 +194,15 @@ def test_the_report_shows_what_was_analysed_and_what_failed(done):
     # A colon is in no picture.
     assert 'http:' not in page
     assert 'https:' not in page
-    assert found['report'] == str(results / 'report.html')
+    assert report['report'] == str(results / 'report.html')
 
 
 def test_names_and_metadata_that_are_hostile_are_shown_not_obeyed(tiny, tmp_path, capsys):
     bags = tmp_path / 'bags'
-    one = shutil.copytree(tiny, bags / HOSTILE)
-    text = (one / 'metadata.yaml').read_text()
+    bag = shutil.copytree(tiny, bags / HOSTILE)
+    text = (bag / 'metadata.yaml').read_text()
     assert 'custom_data:' in text
-    (one / 'metadata.yaml').write_text(
+    (bag / 'metadata.yaml').write_text(
         text.replace('custom_data:', f"custom_data:\n    '{HOSTILE}': '<script>alert(2)</script>'")
     )
     shutil.copytree(tiny, bags / 'line\nend \x1b[31m größe')

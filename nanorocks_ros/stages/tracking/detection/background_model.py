@@ -113,9 +113,9 @@ def _local_mean(
         sums = cv2.blur(
             image * is_background[:, :, None], (side, side), borderType=cv2.BORDER_REFLECT
         )
-        known = missing & (weights > 0.02)
-        means[known] = (sums / np.maximum(weights, 1e-6)[:, :, None])[known]
-        missing &= ~known
+        has_mean = missing & (weights > 0.02)
+        means[has_mean] = (sums / np.maximum(weights, 1e-6)[:, :, None])[has_mean]
+        missing &= ~has_mean
         if side > 2 * max(is_background.shape):
             means[missing] = image[is_background].mean(axis=0)
             break

@@ -71,7 +71,7 @@ class DetectedBeads(NamedTuple):
 
 @compiled
 def link_detections(
-    known: KnownBeads, detected: DetectedBeads, velocity_change: float, max_speed: float
+    known_beads: KnownBeads, detected: DetectedBeads, velocity_change: float, max_speed: float
 ) -> NDArray[np.int64]:
     """Link known beads with detections: index of the detection of each bead, or -1.
 
@@ -79,7 +79,7 @@ def link_detections(
 
     Parameters
     ----------
-    known, detected : KnownBeads, DetectedBeads
+    known_beads, detected : KnownBeads, DetectedBeads
     velocity_change : float, [px/s]
         Standard deviation of the change of a velocity component in a collision.
     max_speed : float, [px/s]
@@ -88,16 +88,16 @@ def link_detections(
     -------
     ndarray of int64, (n,)
     """
-    n, m = known.elapsed.size, detected.radii.size
+    n, m = known_beads.elapsed.size, detected.radii.size
     starts = np.zeros(n + 1, dtype=np.int64)
     costs = Costs(starts, np.empty(n * m, dtype=np.int64), np.empty(n * m))
     squares = np.empty(m)
     largest_cost = _write_link_costs(
-        known, detected, velocity_change, max_speed, False, squares, costs
+        known_beads, detected, velocity_change, max_speed, False, squares, costs
     )
-    if _detect_shaking(known.elapsed, starts):
+    if _detect_shaking(known_beads.elapsed, starts):
         largest_cost = _write_link_costs(
-            known, detected, velocity_change, max_speed, True, squares, costs
+            known_beads, detected, velocity_change, max_speed, True, squares, costs
         )
     # Any link within reach costs less than none.
     return assign(costs, m, largest_cost + 1.0)
@@ -119,7 +119,7 @@ def _detect_shaking(elapsed: NDArray[np.float64], starts: NDArray[np.int64]) -> 
 
 @kernel
 def _write_link_costs(
-    known: KnownBeads,
+    known_beads: KnownBeads,
     detected: DetectedBeads,
     velocity_change: float,
     max_speed: float,
@@ -131,7 +131,7 @@ def _write_link_costs(
 
     Parameters
     ----------
-    known, detected, velocity_change, max_speed
+    known_beads, detected, velocity_change, max_speed
         See `link_detections`.
     is_shaken : bool
         Whether beads may have any speed up to `max_speed`.
@@ -149,8 +149,12 @@ def _write_link_costs(
     for j in range(detected.errors.size):
         largest_error = max(largest_error, detected.errors[j])
     largest_cost, count = -math.inf, 0
-    for i in range(known.elapsed.size):
-        dt, variance, radius = known.elapsed[i], known.variances[i], known.expected_radii[i]
+    for i in range(known_beads.elapsed.size):
+        dt, variance, radius = (
+            known_beads.elapsed[i],
+            known_beads.variances[i],
+            known_beads.expected_radii[i],
+        )
         reach = max_speed * dt
         max_square = _MAX_SQUARED_SIGMAS * (
             variance + largest_error * largest_error + (velocity_change * dt) ** 2
@@ -158,7 +162,7 @@ def _write_link_costs(
         max_square = max(max_square, radius * radius)
         if is_shaken:
             max_square = max(max_square, reach * reach)
-        x, y = known.predicted[i, 0], known.predicted[i, 1]
+        x, y = known_beads.predicted[i, 0], known_beads.predicted[i, 1]
         # Most are far away: no branch in this loop, so that it is vectorised.
         for j in range(squares.size):
             dx, dy = detected.positions[j, 0] - x, detected.positions[j, 1] - y
@@ -168,7 +172,7 @@ def _write_link_costs(
             if squares[j] > max_square:
                 continue
             cost = _link_cost(
-                known, detected, (i, j), squares[j], velocity_change * dt, reach, is_shaken
+                known_beads, detected, (i, j), squares[j], velocity_change * dt, reach, is_shaken
             )
             if cost < math.inf:
                 costs.columns[count], costs.values[count] = j, cost
@@ -188,7 +192,7 @@ def _write_link_costs(
 
 @inlined
 def _link_cost(
-    known: KnownBeads,
+    known_beads: KnownBeads,
     detected: DetectedBeads,
     pair: tuple[int, int],
     square: float,
@@ -198,14 +202,14 @@ def _link_cost(
 ) -> float:
     """Cost of one link, apart by the square root of `square`; infinite out of reach."""
     i, j = pair
-    radius = known.expected_radii[i]
-    variance = known.variances[i] + detected.errors[j] * detected.errors[j]
+    radius = known_beads.expected_radii[i]
+    variance = known_beads.variances[i] + detected.errors[j] * detected.errors[j]
     # The collision may have been at any time since: at the middle on average.
     collision_dx = detected.positions[j, 0] - 0.5 * (
-        known.predicted[i, 0] + known.last_positions[i, 0]
+        known_beads.predicted[i, 0] + known_beads.last_positions[i, 0]
     )
     collision_dy = detected.positions[j, 1] - 0.5 * (
-        known.predicted[i, 1] + known.last_positions[i, 1]
+        known_beads.predicted[i, 1] + known_beads.last_positions[i, 1]
     )
     collision_square = collision_dx * collision_dx + collision_dy * collision_dy
     collision_variance = variance + _COLLISION_VARIANCE_FACTOR * deflection**2

@@ -39,17 +39,17 @@ def test_slow_pairs_merge_by_the_chosen_speed_measure(kernel, kind, rules):
         kernel=kernel,
         **rules,
     )
-    had, moved = energy(gas.beads()), momentum(gas.beads())
+    energy_before, momentum_before = energy(gas.beads()), momentum(gas.beads())
     record = gas.follow(2.0, [0.5, 2.0], log=True)
     assert record.events[0]['kind'] == kind
     assert record.events[0]['normal_speed'] == near(math.sqrt(3.0))
-    assert momentum(gas.beads()) == near(moved)
+    assert momentum(gas.beads()) == near(momentum_before)
     if kind == 'merge':
         assert record.bodies.tolist() == [[0, 1], [0, 0]]
         assert record.velocities[1] == near(np.array([(0.5, 0, 0)] * 2))
         assert not record.spins[1].any()
         assert record.events[0]['impulse'] == near(0.75 * 2)
-        assert gas.ledger[:3] == near([0, 0, had - 0.5])
+        assert gas.ledger[:3] == near([0, 0, energy_before - 0.5])
 
 
 def test_beads_meet_once_for_all_and_sticking_goes_before_the_contact_duration(kernel):

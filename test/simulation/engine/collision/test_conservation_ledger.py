@@ -44,14 +44,14 @@ def states(gas):
 def test_energy_and_momentum_of_beads_and_ledger_are_conserved(name, kernel):
     gas, rules = gas_and_rules(name, kernel)
     start = gas.beads()
-    had, moved = energy(start), momentum(start)
+    energy_before, momentum_before = energy(start), momentum(start)
     scale = np.sum(start.masses * np.linalg.norm(start.velocities, axis=1))
     for beads in states(gas):
-        exchanged = max(had, np.abs(gas.ledger[:3]).sum())
-        assert abs(energy(beads) + gas.ledger[:3].sum() - had) <= PRECISION * exchanged
+        exchanged = max(energy_before, np.abs(gas.ledger[:3]).sum())
+        assert abs(energy(beads) + gas.ledger[:3].sum() - energy_before) <= PRECISION * exchanged
         given = np.abs(gas.ledger[3:12]).max()
         total = momentum(beads) + gas.ledger[MOMENTUM]
-        assert np.abs(total - moved).max() <= PRECISION * max(scale, given)
+        assert np.abs(total - momentum_before).max() <= PRECISION * max(scale, given)
     assert gas.counts.pair > 100
     assert (gas.counts.wall > 100) == (not all(rules.periodic))
     assert (gas.counts.merge > 0) == (rules.sticking_speed > 0)
@@ -87,10 +87,10 @@ def test_energy_drifts_by_rounding_alone_over_tens_of_thousands_of_elastic_event
     spinning = {'tangential_restitution': 1.0, 'wall_tangential_restitution': 1.0}
     rules = CollisionRules(box=BOX, **(spinning if rough else {}))
     gas = HardSphereGas(mixture(2, BEADS, rules), rules, kernel)
-    had = energy(gas.beads())
+    energy_before = energy(gas.beads())
     gas.run_until(600.0)
     assert gas.counts.pair + gas.counts.wall > 15_000
-    assert abs(energy(gas.beads()) / had - 1.0) <= PRECISION
+    assert abs(energy(gas.beads()) / energy_before - 1.0) <= PRECISION
     assert smallest_gap(gas.beads().positions, gas.radii, rules) > -1e-10
 
 
@@ -111,7 +111,7 @@ def test_momentum_given_to_walls_is_that_of_the_reversed_normal_velocities(kerne
 @pytest.mark.parametrize('kernel', KERNELS)
 def test_a_shaken_tray_gains_what_its_walls_give(kernel):
     gas, _ = gas_and_rules('shaken', kernel)
-    had = energy(gas.beads())
+    energy_before = energy(gas.beads())
     gas.run_until(5.0)
     assert gas.ledger[1] < 0.0
-    assert energy(gas.beads()) > had
+    assert energy(gas.beads()) > energy_before

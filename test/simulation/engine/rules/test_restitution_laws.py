@@ -22,8 +22,8 @@ pytestmark = pytest.mark.parametrize('kernel', KERNELS)
 def restitutions(events, masses):
     """What each pair collision of smooth beads left of the normal speed, from its impulse."""
     pairs = events[events['kind'] == 'pair']
-    one, other = masses[pairs['bead']], masses[pairs['partner']]
-    reduced = one * other / (one + other)
+    mass, partner_mass = masses[pairs['bead']], masses[pairs['partner']]
+    reduced = mass * partner_mass / (mass + partner_mass)
     return pairs['impulse'] / (reduced * pairs['normal_speed']) - 1.0
 
 
@@ -53,8 +53,10 @@ def test_an_array_of_a_table_and_one_number_for_all_are_the_same(kernel):
     rules = CollisionRules(box=BOX, restitution=0.7)
     beads = replace(mixture(1, 8, rules), species=np.arange(8) % 3)
     table = replace(rules, restitution=np.full((3, 3), 0.7))
-    one, other = (HardSphereGas(beads, it, kernel).follow(9.0, [9.0]) for it in (rules, table))
-    np.testing.assert_array_equal(one.positions, other.positions)
+    by_number, by_table = (
+        HardSphereGas(beads, law, kernel).follow(9.0, [9.0]) for law in (rules, table)
+    )
+    np.testing.assert_array_equal(by_number.positions, by_table.positions)
 
 
 def test_a_random_restitution_is_uniform_in_its_range(kernel):
@@ -151,10 +153,10 @@ def test_a_gas_of_viscoelastic_beads_becomes_more_elastic_as_it_cools(kernel):
 def test_a_restitution_above_1_heats_the_gas(kernel, rule):
     rules = CollisionRules(box=BOX, allow_gain=True, **{rule: 1.05})
     gas = HardSphereGas(mixture(1, 8, rules), rules, kernel)
-    had = energy(gas.beads())
+    energy_before = energy(gas.beads())
     gas.run_until(10.0)
-    assert energy(gas.beads()) > 1.2 * had
-    assert gas.ledger[:3].sum() == pytest.approx(had - energy(gas.beads()), rel=1e-12)
+    assert energy(gas.beads()) > 1.2 * energy_before
+    assert gas.ledger[:3].sum() == pytest.approx(energy_before - energy(gas.beads()), rel=1e-12)
 
 
 def test_walls_may_have_another_restitution_than_beads(kernel):
