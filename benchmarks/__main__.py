@@ -1,6 +1,7 @@
 """``python -m benchmarks [NAME ...]``: run the benchmarks, all or those named.
 
 ``python -m benchmarks golden [OPTION ...]`` is a check, not a measurement; see its ``--help``.
+``python -m benchmarks structure [COMMIT]`` counts modules and lines.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 
-from benchmarks import golden
+from benchmarks import golden, structure
 
 ALL = (
     'offline',
@@ -44,9 +45,12 @@ ALL = (
 
 
 def main() -> int:
-    """Run each benchmark and print its report, or run the golden check."""
+    """Run each benchmark and print its report, or one of the two checks."""
     if sys.argv[1:2] == ['golden']:
         return golden.main(sys.argv[2:])
+    if sys.argv[1:2] == ['structure']:
+        structure.report(*sys.argv[2:3])
+        return 0
     names = sys.argv[1:] or ALL
     unknown = [name for name in names if name not in ALL]
     if unknown:
