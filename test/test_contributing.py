@@ -2,37 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from recipes import apply_block, code_blocks, run_python, section_of
 
 ROOT = Path(__file__).resolve().parent.parent
-TEXT = (ROOT / 'CONTRIBUTING.md').read_text(encoding='utf-8')
-BLOCK = re.compile(r'^```(python|diff)\n(.*?)^```$', re.MULTILINE | re.DOTALL)
-
-
-def changed(text, lines):
-    """A file with the lines that a block adds and without those that it removes, at one place."""
-    before = ''.join(f'{line[1:]}\n' for line in lines if not line.startswith('+'))
-    after = ''.join(f'{line[1:]}\n' for line in lines if not line.startswith('-'))
-    assert text.count(before) == 1, f'{text.count(before)} places for:\n{before}'
-    return text.replace(before, after)
-
-
-def apply_block(block, tree):
-    first, *lines = block.splitlines()
-    path = tree / re.sub(r'^(\+\+\+|#) ', '', first)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if first.startswith('+++'):
-        path.write_text(changed(path.read_text(encoding='utf-8'), lines), encoding='utf-8')
-    else:
-        assert not path.exists(), path
-        path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+TEXT = section_of((ROOT / 'CONTRIBUTING.md').read_text('utf-8'), 'Recipe: add a stage')
+BLOCKS = code_blocks(TEXT, ('python', 'diff'))
 
 
 @pytest.fixture(scope='module')
@@ -41,27 +19,13 @@ def tree(source_copy, tmp_path_factory):
     shutil.copytree(source_copy, copy, symlinks=True)
     for name in ('docs', 'test/stages', 'test/wire'):
         shutil.copytree(ROOT / name, copy / name)
-    for _, block in BLOCK.findall(TEXT):
+    for block in BLOCKS:
         apply_block(block, copy)
     return copy
 
 
-def run(tree, *command):
-    environment = {**os.environ, 'PYTHONPATH': str(tree), 'OPENBLAS_NUM_THREADS': '1'}
-    finished = subprocess.run(
-        [sys.executable, *command],
-        cwd=tree,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert finished.returncode == 0, finished.stdout + finished.stderr
-    return finished.stdout
-
-
 def test_the_recipe_takes_as_few_changes_as_it_says():
-    paths = [block.splitlines()[0] for _, block in BLOCK.findall(TEXT)]
+    paths = [block.splitlines()[0] for block in BLOCKS]
     hunks = [path for path in paths if path.startswith('+++')]
     print(f'hunks in existing files: {len(hunks)}, in {len(set(hunks))} files')
     assert len(hunks) <= 8
@@ -77,7 +41,7 @@ def test_the_new_record_is_in_the_register(tree):
         'from nanorocks_ros.wire.products import ARRAY_TOPICS, MEASURED;'
         'print(ARRAY_TOPICS[record].of(1), TrayResults().of(record), MEASURED[-1].name)'
     )
-    assert run(tree, '-c', code).split() == ['tray_1/brightness', '[]', 'brightness']
+    assert run_python(tree, '-c', code).split() == ['tray_1/brightness', '[]', 'brightness']
 
 
 def test_the_composition_measures_the_brightness(tree):
@@ -92,18 +56,18 @@ def test_the_composition_measures_the_brightness(tree):
         'results = TrayStages(PipelineSettings(), load_trays()[1]).push(image);'
         'print([one.brightness for one in results if isinstance(one, BrightnessEstimate)])'
     )
-    assert run(tree, '-c', code).strip() == '[90.0]'
+    assert run_python(tree, '-c', code).strip() == '[90.0]'
 
 
 def test_the_tests_of_the_recipe_pass(tree):
     files = ('test/stages/test_brightness.py', 'test/wire/test_array_layouts.py')
     options = ('-q', '--noconftest', '--import-mode=importlib')
-    passed = run(tree, '-m', 'pytest', *options, *files, 'test/wire/test_products.py')
+    passed = run_python(tree, '-m', 'pytest', *options, *files, 'test/wire/test_products.py')
     assert ' passed' in passed
 
 
 def test_the_stage_is_documented_on_the_wire(tree):
-    run(tree, '-m', 'nanorocks_ros.tools.docs_pages.wire_pages')
+    run_python(tree, '-m', 'nanorocks_ros.tools.docs_pages.wire_pages')
     page = (tree / 'docs/reference/topics.md').read_text(encoding='utf-8')
     assert '`tray_K/brightness`' in page
     assert '| 2 | `brightness` | gray levels |' in page

@@ -13,7 +13,7 @@ RUN = 'import sys; from nanorocks_ros.cli.main import main; sys.exit(main())'
 @pytest.fixture(scope='module')
 def blocks(root):
     text = (root / 'CONTRIBUTING.md').read_text(encoding='utf-8')
-    return code_blocks(section_of(text, 'Recipe: add a figure and a command'), ('py', 'patch'))
+    return code_blocks(section_of(text, 'Recipe: add a figure and a command'), ('python', 'diff'))
 
 
 @pytest.fixture(scope='module')

@@ -21,10 +21,10 @@ def code_blocks(text, languages):
     return re.findall(fence, text, re.MULTILINE | re.DOTALL)
 
 
-def with_added_lines(text, lines):
-    """A text with the lines marked ``+``, at the one place that has the lines around them."""
+def patched(text, lines):
+    """A text with the lines marked ``+`` and without those marked ``-``, at the one place."""
     before = ''.join(f'{line[1:]}\n' for line in lines if not line.startswith('+'))
-    after = ''.join(f'{line[1:]}\n' for line in lines)
+    after = ''.join(f'{line[1:]}\n' for line in lines if not line.startswith('-'))
     assert text.count(before) == 1, f'{text.count(before)} places for:\n{before}'
     return text.replace(before, after)
 
@@ -35,7 +35,7 @@ def apply_block(block, tree):
     path = tree / re.sub(r'^(\+\+\+|#) ', '', first)
     path.parent.mkdir(parents=True, exist_ok=True)
     if first.startswith('+++'):
-        text = with_added_lines(path.read_text(encoding='utf-8'), lines)
+        text = patched(path.read_text(encoding='utf-8'), lines)
     else:
         assert not path.exists(), path
         text = '\n'.join(lines) + '\n'
