@@ -1,1 +1,1 @@
-"""Ratios measured in one run, printed by ``make bench``."""
+"""Benchmarks: ratios measured in one run, printed by ``make bench``."""

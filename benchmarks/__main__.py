@@ -1,6 +1,6 @@
 """``python -m benchmarks [NAME ...]``: run the benchmarks, all or those named.
 
-``python -m benchmarks golden [OPTION ...]`` is no measurement but a check; see its ``--help``.
+``python -m benchmarks golden [OPTION ...]`` is a check, not a measurement; see its ``--help``.
 """
 
 from __future__ import annotations
@@ -50,7 +50,10 @@ def main() -> int:
     names = sys.argv[1:] or ALL
     unknown = [name for name in names if name not in ALL]
     if unknown:
-        print(f'benchmarks: no {", ".join(unknown)}; choose of {", ".join(ALL)}', file=sys.stderr)
+        print(
+            f'benchmarks: unknown {", ".join(unknown)}; choose from {", ".join(ALL)}',
+            file=sys.stderr,
+        )
         return 2
     for name in names:
         module = import_module(f'benchmarks.{name}')

@@ -1,8 +1,8 @@
-"""The binarised area over the truth, before and after it is calibrated by marks of ten beads.
+"""The binarised area over the truth, before and after calibration by marks of ten beads.
 
 One cycle of the whole plate with all effects (JPEG 85), from 7 mm/s down. The marks are true
-places of ten beads in every third frame, off by 0.7 px as those of a hand are; what they make of
-the area holds for the film that they were made in.
+positions of ten beads in every third frame with an error of 0.7 px, as in manual marks. The
+calibration holds for the film with these marks.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 from benchmarks.scene_bag import SCALE, film_scene, settings
 from nanorocks_ros.experiment.plate import regions_on_plate
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import SpeedEstimate
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 from nanorocks_ros.studies.analysis.bag_images import BagImages
 from nanorocks_ros.studies.calibration.area_calibration import calibrate_area
@@ -28,7 +28,7 @@ from nanorocks_ros.wire.bead_truth import beads_from_array
 if TYPE_CHECKING:
     from nanorocks_ros.studies.calibration.area_fit import AreaFit
 
-# A tray, and a reading of the recipe.
+# A tray, and a variant of the recipe.
 _Case = tuple[int, str]
 _TRAYS = (1, 3, 5, 7)
 _READINGS = {
@@ -73,11 +73,11 @@ def table(bag: Path) -> list[str]:
 
 
 def _ratios(path: Path, cases: dict[_Case, dict[str, float]]) -> dict[_Case, str]:
-    """Speed by the area over the truth, in each case, after the shaking event."""
+    """Ratio of the speed by the area to the truth after the shaking event, for each case."""
     images = BagImages(path, settings(_TRAYS))
     truth = images.bag.truth(images.epoch_ns)
     estimators = {
-        case: SpeedEstimator(
+        case: TrayMeasurement(
             settings(_TRAYS, method='binarised_area', **speed), images.trays[case[0]]
         )
         for case, speed in cases.items()
@@ -93,21 +93,23 @@ def _ratios(path: Path, cases: dict[_Case, dict[str, float]]) -> dict[_Case, str
                     ]
     return {
         case: _cell(
-            ComparedSpeeds(tray=images.trays[case[0]], speeds={'': found}, truth=truth[case[0]])
+            ComparedSpeeds(
+                tray=images.trays[case[0]], speeds={'': estimates}, truth=truth[case[0]]
+            )
         )
-        for case, found in speeds.items()
+        for case, estimates in speeds.items()
     }
 
 
 def _cell(compared: ComparedSpeeds) -> str:
     ratios = compared.ratios('', 1)
     share = ratios.size / sum(estimate.cycle == 1 for estimate in compared.speeds[''])
-    known = '' if share > _NEARLY_ALL else f', {share:.0%} known'
-    return f'{ratios.mean():.2f} ({ratios.std():.2f}){known}' if ratios.size else 'unknown'
+    share_text = '' if share > _NEARLY_ALL else f', {share:.0%} known'
+    return f'{ratios.mean():.2f} ({ratios.std():.2f}){share_text}' if ratios.size else 'unknown'
 
 
 def _marks(path: Path) -> ManualTracks:
-    """Where somebody would mark beads in the frames of the bag."""
+    """Simulated manual marks of beads in the frames of the bag."""
     bag = BagFrames(path)
     epoch_ns, view = bag.epoch_ns(), bag.view()
     trays = load_trays()
@@ -123,11 +125,11 @@ def _marks(path: Path) -> ManualTracks:
                 continue
             data = bag.reader.deserialize(message).data
             beads = beads_from_array(data, tray=number, epoch_ns=epoch_ns, where=topic)
-            past_the_camera = beads.positions[chosen[number], :2] + beads.displacement
-            seen = view.source(past_the_camera * SCALE + corner)
+            positions = beads.positions[chosen[number], :2] + beads.displacement
+            image_positions = view.source(positions * SCALE + corner)
             frames.append(np.full(_MARKED, frame))
             ids.append(number * _MARKED + np.arange(_MARKED))
-            places.append(seen + rng.normal(0.0, _JITTER_PX, seen.shape))
+            places.append(image_positions + rng.normal(0.0, _JITTER_PX, image_positions.shape))
     return ManualTracks(np.concatenate(frames), np.concatenate(ids), np.concatenate(places))
 
 

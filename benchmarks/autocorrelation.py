@@ -1,7 +1,7 @@
-"""The autocorrelation: cost beside scipy, sizes against the truth, what they depend on, controls.
+"""The autocorrelation: cost against scipy, sizes against the truth, systematics, controls.
 
-Films of the whole plate with all effects and JPEG 85, through the preprocessing; other gases than
-those of the calibration.
+Preprocessed films of the whole plate with all effects and JPEG 85, of gases that are not in the
+calibration.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _FLIGHT = dict.fromkeys(EFFECTS, 1.0)
 
 @dataclass(frozen=True)
 class _Film:
-    """A task: one film."""
+    """The task of one film."""
 
     trays: tuple[int, ...]
     run: int
@@ -60,11 +60,11 @@ def report() -> None:
     """Print the tables."""
     _cost()
     films = _films()
-    found = dict(zip(films, run_tasks(_filmed, films, Workers()), strict=True))
-    _sizes(found)
-    _fillings(found)
+    samples = dict(zip(films, run_tasks(_filmed, films, Workers()), strict=True))
+    _sizes(samples)
+    _fillings(samples)
     _effects()
-    _controls(found)
+    _controls(samples)
 
 
 def _films() -> dict[str, _Film]:
@@ -112,8 +112,8 @@ def _by_scipy(image: np.ndarray) -> np.ndarray:
 
 
 def _measured(image: np.ndarray, scale: float) -> None:
-    seen = correlated(image, scale)
-    seen.width(seen.region(_LEVEL).area)
+    correlation = correlated(image, scale)
+    correlation.width(correlation.region(_LEVEL).area)
 
 
 def _cost() -> None:
@@ -121,53 +121,54 @@ def _cost() -> None:
     images = [image.gray for image in shots[-1].images.values()]
     fine = [tray_contrast(image, halve=False) for image in images]
     half = [tray_contrast(image, halve=True) for image in images]
-    scipy_fine = _milliseconds(_by_scipy, [one.astype(np.float64) for one in fine])
+    scipy_fine = _milliseconds(_by_scipy, [image.astype(np.float64) for image in fine])
     rows = {
         'scipy.signal.fftconvolve, float64': scipy_fine,
         'the same, float32': _milliseconds(_by_scipy, fine),
         'ours': _milliseconds(autocorrelation, fine),
         'ours, half the resolution': _milliseconds(autocorrelation, half),
         'ours, whole stage: contrast, autocorrelation, areas, axes': _milliseconds(
-            lambda one: _measured(one, _SCALE), images
+            lambda image: _measured(image, _SCALE), images
         ),
-        'the same without halving': _milliseconds(lambda one: _measured(one, 8000.0), images),
+        'the same without halving': _milliseconds(lambda image: _measured(image, 8000.0), images),
     }
     print(
         '| eight trays of a 1080p frame, one core | ms | fftconvolve / it |\n| --- | --- | --- |'
     )
-    for name, spent in rows.items():
-        print(f'| {name} | {spent:.2f} | {scipy_fine / spent:.1f} |')
-    off, wide = [], []
-    for one, small in zip(fine, half, strict=True):
-        whole = _by_scipy(one.astype(np.float64))
-        rows_, columns = one.shape
+    for name, milliseconds in rows.items():
+        print(f'| {name} | {milliseconds:.2f} | {scipy_fine / milliseconds:.1f} |')
+    deviations, area_ratios = [], []
+    for image, small in zip(fine, half, strict=True):
+        full = _by_scipy(image.astype(np.float64))
+        rows_, columns = image.shape
         top, left = rows_ - 1 - rows_ // 2, columns - 1 - columns // 2
-        exact = whole[top : top + rows_, left : left + columns] / whole[rows_ - 1, columns - 1]
-        values = autocorrelation(one)
-        off.append(np.abs(values - exact).max())
+        exact = full[top : top + rows_, left : left + columns] / full[rows_ - 1, columns - 1]
+        values = autocorrelation(image)
+        deviations.append(np.abs(values - exact).max())
         area = level_region(values, _LEVEL).area
-        wide.append(4.0 * level_region(autocorrelation(small), _LEVEL).area / area)
-    print(f'\nlargest difference from fftconvolve: {max(off):.1e}')
+        area_ratios.append(4.0 * level_region(autocorrelation(small), _LEVEL).area / area)
+    print(f'\nlargest difference from fftconvolve: {max(deviations):.1e}')
     print(
         'level area at half the resolution over that at all of it: '
-        f'{min(wide):.3f} to {max(wide):.3f} (the calibration is made at half, too)\n'
+        f'{min(area_ratios):.3f} to {max(area_ratios):.3f} '
+        '(the calibration is made at half, too)\n'
     )
 
 
 def _read(curve, rows: np.ndarray):
-    """Estimates of rows of samples: size, lower, upper, and whether there is a size."""
-    found = [curve.size_of(Width(*one)) for one in rows[:, 4:8]]
-    sizes = np.array([[one.size, one.lower, one.upper] for one in found]).T
-    return *sizes, np.array([one.status for one in found])
+    """Estimates of rows of samples: size, lower and upper limit, status."""
+    estimates = [curve.size_of(Width(*row)) for row in rows[:, 4:8]]
+    sizes = np.array([[estimate.size, estimate.lower, estimate.upper] for estimate in estimates]).T
+    return *sizes, np.array([estimate.status for estimate in estimates])
 
 
-def _of(found: dict[str, np.ndarray], start: str, tray: int) -> list[np.ndarray]:
+def _of(samples: dict[str, np.ndarray], start: str, tray: int) -> list[np.ndarray]:
     return [
-        rows[rows[:, 0] == tray] for name, rows in found.items() if name.startswith(f'{start} ')
+        rows[rows[:, 0] == tray] for name, rows in samples.items() if name.startswith(f'{start} ')
     ]
 
 
-def _sizes(found: dict[str, np.ndarray]) -> None:
+def _sizes(samples: dict[str, np.ndarray]) -> None:
     flown = load_trays()
     print('weight-averaged cluster size, single pictures from 0.4 to 32 s after shaking\n')
     print(
@@ -178,16 +179,16 @@ def _sizes(found: dict[str, np.ndarray]) -> None:
     for tray in _ALL:
         curve = curve_of(flown[tray])
         for speed in _SPEEDS:
-            runs = _of(found, f'{speed}', tray)
+            runs = _of(samples, f'{speed}', tray)
             rows = np.concatenate(runs)
             size, lower, upper, status = _read(curve, rows)
             paper = _by_paper(runs)
             true = rows[:, 3]
-            told = np.isfinite(size)
+            known = np.isfinite(size)
             limited = np.isfinite(lower)
             ratio = '-'
-            if told.any():
-                low, middle, high = np.percentile(size[told] / true[told], (16, 50, 84))
+            if known.any():
+                low, middle, high = np.percentile(size[known] / true[known], (16, 50, 84))
                 ratio = f'{middle:.2f} ({low:.2f} to {high:.2f})'
             covered = '-'
             if limited.any():
@@ -196,7 +197,7 @@ def _sizes(found: dict[str, np.ndarray]) -> None:
             first, last = (np.mean([run[k, 3] for run in runs]) for k in (0, -1))
             beyond = np.mean(status == SizeStatus.BEYOND)
             print(
-                f'| {tray} | {1e3 * speed:g} | {first:.1f} to {last:.1f} | {told.mean():.2f} | '
+                f'| {tray} | {1e3 * speed:g} | {first:.1f} to {last:.1f} | {known.mean():.2f} | '
                 f'{ratio} | {covered} | {beyond:.2f} | {np.mean(~limited):.2f} | '
                 f'{np.median(paper / true):.2f} ({np.percentile(paper / true, 84):.2f}) |'
             )
@@ -207,13 +208,13 @@ def _sizes(found: dict[str, np.ndarray]) -> None:
 
 
 def _by_paper(runs: list[np.ndarray]) -> np.ndarray:
-    """Sizes by the paper's straight line, counted at the end of the same runs."""
+    """Sizes by the paper's linear calibration at the end of the same runs."""
     ends = np.array([run[-1] for run in runs])
     line = paper_calibration(ends[:, 4], float(ends[:, 3].mean()))
     return line.size(np.concatenate(runs)[:, 4])
 
 
-def _fillings(found: dict[str, np.ndarray]) -> None:
+def _fillings(samples: dict[str, np.ndarray]) -> None:
     flown = load_trays()
     print(
         'with another number of beads than the calibration: share of pictures with a size, median '
@@ -226,23 +227,27 @@ def _fillings(found: dict[str, np.ndarray]) -> None:
         cells = []
         for part in _FILLINGS:
             rows = np.concatenate(
-                [one for speed in (1e-3, 3e-3) for one in _of(found, f'{part} {speed}', tray)]
+                [
+                    samples_of_run
+                    for speed in (1e-3, 3e-3)
+                    for samples_of_run in _of(samples, f'{part} {speed}', tray)
+                ]
             )
             size, lower, upper, _ = _read(curve, rows)
-            told = np.isfinite(size)
-            known = np.isfinite(lower)
-            inside = ((lower <= rows[:, 3]) & (rows[:, 3] <= upper))[known]
-            inside = inside if known.any() else np.array([np.nan])
-            ratio = np.median(size[told] / rows[told, 3]) if told.any() else np.nan
+            measured = np.isfinite(size)
+            limited = np.isfinite(lower)
+            inside = ((lower <= rows[:, 3]) & (rows[:, 3] <= upper))[limited]
+            inside = inside if limited.any() else np.array([np.nan])
+            ratio = np.median(size[measured] / rows[measured, 3]) if measured.any() else np.nan
             cells.append(
-                f'{told.mean():.2f} measured, {ratio:.2f}, in the interval {inside.mean():.2f}'
+                f'{measured.mean():.2f} measured, {ratio:.2f}, in the interval {inside.mean():.2f}'
             )
         print(f'| {tray} | ' + ' | '.join(cells) + ' |')
     print()
 
 
 def _effects() -> None:
-    """What strengths of effects do to the reading, from the samples of the calibration."""
+    """Print the effect of the strengths on the width, from the samples of the calibration."""
     flown = load_trays()
     print('reading of the calibration, in its own scatter, for each effect from none to flight')
     print('(ln(breadth) + weight ln(area)); beside it the same for ln(area) alone\n')
@@ -266,23 +271,25 @@ def _effects() -> None:
             slopes, share = _slopes(np.log(rows[:, 2]), read, strengths[runs], runs)
             cells.append(slopes)
             shares.append(share)
-        pairs = ' | '.join(f'{one:+.2f}, {other:+.2f}' for one, other in zip(*cells, strict=True))
+        pairs = ' | '.join(
+            f'{slope:+.2f}, {area_slope:+.2f}' for slope, area_slope in zip(*cells, strict=True)
+        )
         print(f'| {tray} | {pairs} | {shares[0]:.2f}, {shares[1]:.2f} |')
     print()
 
 
 def _slopes(log_size, read, strengths, runs):
-    """Slopes to strengths in units of the scatter, and the share of it that is between runs."""
+    """Slopes against strengths in units of the scatter, and the scatter between runs."""
     terms = np.polynomial.polynomial.polyvander(log_size, 4)
-    rest = read - terms @ np.linalg.lstsq(terms, read, rcond=None)[0]
-    sd = rest.std()
+    residual = read - terms @ np.linalg.lstsq(terms, read, rcond=None)[0]
+    sd = residual.std()
     centred = strengths - strengths.mean(axis=0)
-    slopes = np.linalg.lstsq(centred, rest, rcond=None)[0] / sd
-    means = np.array([rest[runs == run].mean() for run in np.unique(runs)])
+    slopes = np.linalg.lstsq(centred, residual, rcond=None)[0] / sd
+    means = np.array([residual[runs == run].mean() for run in np.unique(runs)])
     return slopes, means.std() / sd
 
 
-def _controls(found: dict[str, np.ndarray]) -> None:
+def _controls(samples: dict[str, np.ndarray]) -> None:
     flown = load_trays()
     print('controls, in which nothing sticks: 4 s after shaking, five pictures a second\n')
     print(
@@ -290,7 +297,7 @@ def _controls(found: dict[str, np.ndarray]) -> None:
         'beads, lower limit |\n| --- | --- | --- | --- | --- |'
     )
     for tray in _TRAYS:
-        runs = _of(found, 'control', tray)
+        runs = _of(samples, 'control', tray)
         onsets = np.array([paper_onset(run[:, 2], run[:, 4]) for run in runs])
         _, lower, _, _ = _read(curve_of(flown[tray]), np.concatenate(runs))
         fired = np.isfinite(onsets)

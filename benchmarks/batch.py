@@ -1,7 +1,7 @@
-"""Many bags: two cores against one, memory against length, and a campaign with broken bags.
+"""Many bags: speed-up of two cores, memory against length, and a campaign with damaged bags.
 
-Films of one tray, looped and copied, so that making them takes no longer than analysing them; the
-whole plate once, for the memory of a worker with all eight trays.
+Films of one tray are looped and copied, which is faster than filming. The whole plate is filmed
+once, for the memory of a worker with all eight trays.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from nanorocks_ros.settings import (
 from nanorocks_ros.studies.batch.batch_analysis import BatchPlan, run_batch
 from nanorocks_ros.studies.batch.batch_files import write_batch
 from nanorocks_ros.studies.batch.campaign_means import combined
-from nanorocks_ros.studies.reproduction.simulated_campaign import plate_settings
+from nanorocks_ros.studies.reproduction.campaign_plan import plate_settings
 from nanorocks_ros.studies.synthetic.film_bag import START_NS, film_into_bag
 from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
 from nanorocks_ros.wire import topics
@@ -46,18 +46,18 @@ from nanorocks_ros.wire import topics
 _SECONDS = 20.0
 _NS = 1_000_000_000
 _CAMERA = topics.RAW_COMPRESSED.absolute()
-# Bags on each number of cores, of how many films one after the other; rounds.
+# Bags, films in a bag, and rounds for each number of cores.
 _BAGS, _LOOPS, _ROUNDS = 8, 1, 2
-# What two cores do over one where nothing is shared: for so long.
+# Duration of independent decoding, for the speed-up of two cores without shared work, [s].
 _DECODE_S = 3.0
-# Lengths of which memory is compared, in films.
+# Lengths of the bags for the comparison of memory, in films.
 _SHORT, _LONG = 3, 30
 _PLATE_SECONDS = 5.0
 _CAMPAIGN, _FILMS, _SHORT_SECONDS = 178, 4, 3.5
 
 
-class _Quiet:
-    """Told how a batch goes, keeps the largest memory of its workers, [MB]."""
+class _PeakMemory:
+    """Progress callback of a batch that records the peak memory of its workers, [MB]."""
 
     def __init__(self) -> None:
         self.peak = 0.0
@@ -100,37 +100,38 @@ def short_film(path: Path, seed: int, seconds: float) -> Path:
 
 
 def _looped(path: Path, film: Path, loops: int) -> Path:
-    """A bag of the same film again and again, shaken every time."""
-    bag = open_bag(film)
+    """A bag that repeats a film, with a shaking event each time."""
+    source = open_bag(film)
     frames = [
-        (one.log_time_ns, bytes(bag.deserialize(one).data)) for one in bag.messages([_CAMERA])
+        (message.log_time_ns, bytes(source.deserialize(message).data))
+        for message in source.messages([_CAMERA])
     ]
     length = frames[-1][0] - frames[0][0] + _NS // 30
     epoch = topics.EPOCH.absolute()
     table = {epoch: offered_topic(topics.EPOCH), _CAMERA: offered_topic(topics.RAW_COMPRESSED)}
-    with BagWriter(path, table, metadata={}) as written:
-        written.write(epoch, START_NS, time_message(START_NS))
+    with BagWriter(path, table, metadata={}) as bag:
+        bag.write(epoch, START_NS, time_message(START_NS))
         for loop in range(loops):
             for stamp_ns, jpeg in frames:
-                at = stamp_ns + loop * length
+                time_ns = stamp_ns + loop * length
                 message = compressed_image_message(
-                    at, 'camera', 'bgr8; jpeg compressed bgr8', jpeg
+                    time_ns, 'camera', 'bgr8; jpeg compressed bgr8', jpeg
                 )
-                written.write(_CAMERA, at, message)
+                bag.write(_CAMERA, time_ns, message)
     return path
 
 
 def _run(folder: Path, bags: Path, settings=None, workers=None):
-    """A batch, how long it took [s], and the largest memory of a worker [MB]."""
+    """A batch, its duration [s], and the peak memory of a worker [MB]."""
     plan = BatchPlan(
         bags=find_bags([str(bags)]), folder=folder, settings=settings or PipelineSettings()
     )
-    quiet = _Quiet()
+    memory = _PeakMemory()
     start = time.perf_counter()
-    batch = run_batch(plan, Workers(processes=workers), quiet)
+    batch = run_batch(plan, Workers(processes=workers), memory)
     seconds = time.perf_counter() - start
-    quiet.stop()
-    return batch, seconds, quiet.peak
+    memory.stop()
+    return batch, seconds, memory.peak
 
 
 def _cores(folder: Path, film: Path) -> None:
@@ -155,13 +156,13 @@ def _cores(folder: Path, film: Path) -> None:
     print('| --- | --- | --- | --- |')
     for count, seconds in best.items():
         print(f'| {count} | {seconds:.1f} | {frames / seconds:.0f} | {best[1] / seconds:.2f} |')
-    alone = max(_decoded_by(1, film) for _ in range(_ROUNDS))
-    both = max(_decoded_by(2, film) for _ in range(_ROUNDS))
-    print(f'\ntwo processes that only decode, over one: {both / alone:.2f}', flush=True)
+    single = max(_decoded_by(1, film) for _ in range(_ROUNDS))
+    two = max(_decoded_by(2, film) for _ in range(_ROUNDS))
+    print(f'\ntwo processes that only decode, over one: {two / single:.2f}', flush=True)
 
 
-def _decoding(film: str, barrier, found) -> None:
-    """Decode the film for some seconds, beginning with the others; frames a second."""
+def _decoding(film: str, barrier, rates) -> None:
+    """Decode the film for some seconds, starting with the other processes; puts frames/s."""
     cv2.setNumThreads(1)
     bag = open_bag(film)
     jpegs = [bytes(bag.deserialize(message).data) for message in bag.messages([_CAMERA])]
@@ -171,18 +172,18 @@ def _decoding(film: str, barrier, found) -> None:
     while time.perf_counter() - start < _DECODE_S:
         cv2.imdecode(frames[done % len(frames)], cv2.IMREAD_COLOR)
         done += 1
-    found.put(done / (time.perf_counter() - start))
+    rates.put(done / (time.perf_counter() - start))
 
 
 def _decoded_by(count: int, film: Path) -> float:
-    """Frames a second that some processes decode, which have nothing to do with each other."""
+    """Total frames per second that independent processes decode."""
     context = multiprocessing.get_context('spawn')
-    barrier, found = context.Barrier(count), context.Queue()
-    arguments = (str(film), barrier, found)
+    barrier, rates = context.Barrier(count), context.Queue()
+    arguments = (str(film), barrier, rates)
     processes = [context.Process(target=_decoding, args=arguments) for _ in range(count)]
     for process in processes:
         process.start()
-    total = sum(found.get() for _ in processes)
+    total = sum(rates.get() for _ in processes)
     for process in processes:
         process.join()
     return total
@@ -215,7 +216,7 @@ def _memory(folder: Path, film: Path) -> None:
 
 
 def broken_bags(folder: Path, film: Path) -> None:
-    """One of each kind; those cut short and with flipped bits can be analysed in part."""
+    """Write one damaged bag of each kind; two of them are partly readable."""
     content = next(film.glob('*.mcap')).read_bytes()
     (folder / 'truncated.mcap').write_bytes(content[: len(content) * 3 // 5])
     (folder / 'empty.mcap').touch()
@@ -238,20 +239,21 @@ def _campaign(folder: Path) -> None:
     broken_bags(bags, films[0])
     settings = PipelineSettings()
     batch, seconds, peak = _run(folder / 'results', bags)
-    # Copies count here as if they were recordings of their own.
+    # Copies count here as separate recordings.
     batch.results = [replace(result, twin='') for result in batch.results]
     start = time.perf_counter()
-    together = combined(batch.counted, settings)
-    write_batch(folder / 'results', batch, together, settings, 'csv')
+    combined_results = combined(batch.counted, settings)
+    write_batch(folder / 'results', batch, combined_results, settings, 'csv')
     report = time.perf_counter() - start
     _, again, _ = _run(folder / 'results', bags)
     frames = sum(result.summary['frames'] for result in batch.results)
     print(f'\n{_CAMPAIGN} bags, 5 of them broken: {len(batch.results)} analysed, {frames} frames')
     print(f'on all cores: {seconds:.0f} s, at most {peak:.0f} MB a worker')
-    print(f'means, tables and report of {len(together.cycles)} cycles: {report:.1f} s')
+    print(f'means, tables and report of {len(combined_results.cycles)} cycles: {report:.1f} s')
     print(f'the same again, with what failed: {again:.1f} s\n')
-    for one in batch.failed:
-        print(f'failed: {Path(one.name).name}: {one.reason.partition(": ")[2].partition(";")[0]}')
+    for failure in batch.failed:
+        reason = failure.reason.partition(': ')[2].partition(';')[0]
+        print(f'failed: {Path(failure.name).name}: {reason}')
     for result in batch.results:
         if not result.summary['complete']:
             print(f'in part: {Path(result.name).name}: {result.summary["frames"]} frames')
@@ -260,7 +262,7 @@ def _campaign(folder: Path) -> None:
 
 
 def report() -> None:
-    """Print all of it."""
+    """Print all tables."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         film = short_film(folder / 'film', 1, _SECONDS)

@@ -1,8 +1,8 @@
 """``python -m benchmarks.campaign_pictures FOLDER``: pictures of packing, dust and a campaign.
 
 The campaign is simulated: 60 cycles of trays 1, 3 and 5 in recordings of 10, shaken to 10 mm/s.
-Beads that meet at less than 0.2 mm/s stick, in cycles 18 to 25 at less than 3 mm/s: that stands
-for a quiet time. Speeds get an error of 0.1 mm/s; restitutions are those of the confined theory.
+Beads stick below 0.2 mm/s, and below 3 mm/s in cycles 18 to 25, which is a quiet period. Speeds
+have an error of 0.1 mm/s; restitutions are those of the confined theory.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ def _write_recording(folder, number, cycles, seed):
     speeds, sizes, cors = [], [], []
     for k, cycle in enumerate(cycles):
         sticking = 0.003 if cycle in _QUIET else 0.0002
-        seen = decays[k] + rng.normal(0.0, _ERROR, _TIMES.size)
+        measured = decays[k] + rng.normal(0.0, _ERROR, _TIMES.size)
         speeds += [
             (60.0 * k + t, k + 1, 60.0 * k, v, _ERROR)
-            for t, v in zip(_TIMES.tolist(), seen.tolist(), strict=True)
+            for t, v in zip(_TIMES.tolist(), measured.tolist(), strict=True)
         ]
-        # The whole cycle, so that its end is where it belongs.
+        # One more speed marks the end of the cycle.
         speeds.append((60.0 * k + 59.0, k + 1, 60.0 * k, _ERROR, _ERROR))
         (curve,) = simulated_packing(
             tray, replace(settings, sticking_speed=sticking, seed=seed + cycle), 1
@@ -55,7 +55,7 @@ def _write_recording(folder, number, cycles, seed):
             for t, area in zip(curve.times.tolist(), curve.level_area.tolist(), strict=True)
         ]
         late = _TIMES > 2.0
-        fit = fit_haff(_TIMES[late], seen[late], np.full(late.sum(), _ERROR), tray.count)
+        fit = fit_haff(_TIMES[late], measured[late], np.full(late.sum(), _ERROR), tray.count)
         rate = Estimate(value=fit.decay_rate, error=fit.decay_rate * fit.log_decay_rate_error)
         try:
             cor = confined_restitution(tray, rate, _WALLS)

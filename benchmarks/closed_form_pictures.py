@@ -1,7 +1,7 @@
 """Pictures of docs/method/theory.md and restitution.md and of docs/use/sweeps.md, by commands.
 
-``python -m benchmarks.closed_form_pictures FOLDER`` writes them: some minutes of one core. Cycles
-are simulated, without rotation, and their mean speeds have random errors put on them.
+``python -m benchmarks.closed_form_pictures FOLDER`` writes them, in some minutes of one core.
+Cycles are simulated without rotation, and random errors are added to their mean speeds.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FIELDS = {
     'mean_projected_speed': 'm/s',
     'mean_projected_speed_error': 'm/s',
 }
-# As many runs at a point as the paper has.
+# Runs at each point, as in the paper.
 SWEEP = ('--runs', '178', '--times', '0:30:31', '--seed', '7')
 
 
@@ -51,7 +51,7 @@ def measured_cycles(path, cycles, error, *, tray=1, restitution=0.89, walls=0.99
 
 
 def measured_mixture(path, cycles, error, *, tray=5, restitution=0.89, walls=0.97, seed=4):
-    """The same with the speeds of both species of a mixture, 5 a second, started at 10 mm/s."""
+    """A table with the speeds of both species of a mixture, at 5 Hz, started at 10 mm/s."""
     settings = SimulationSettings(
         tray=tray,
         restitution=restitution,
@@ -61,20 +61,26 @@ def measured_mixture(path, cycles, error, *, tray=5, restitution=0.89, walls=0.9
         frame_rate=5.0,
         seed=seed,
     )
-    counts = [one.count for one in load_trays()[tray].species]
+    counts = [bead_species.count for bead_species in load_trays()[tray].species]
     species = np.repeat(np.arange(2), counts)
     rng = np.random.default_rng(seed)
     rows = []
     for run in range(cycles):
         start = run * PERIOD
         for k, moment in enumerate(ShakenTray(settings, load_trays()[tray], run).moments(126)):
-            each = np.hypot(*moment.velocities[:, :2].T)
-            own = [each[species == one].mean() + error * rng.normal() for one in (0, 1)]
-            mean = np.average(own, weights=counts)
+            bead_speeds = np.hypot(*moment.velocities[:, :2].T)
+            species_speeds = [
+                bead_speeds[species == index].mean() + error * rng.normal() for index in (0, 1)
+            ]
+            mean = np.average(species_speeds, weights=counts)
             if k:
-                speeds = (mean, error, own[0], error, own[1], error)
+                speeds = (mean, error, species_speeds[0], error, species_speeds[1], error)
                 rows.append((start + 0.2 * k, run + 1, start, *speeds))
-    names = [f'{one}_species_speed{end}' for one in ('first', 'second') for end in ('', '_error')]
+    names = [
+        f'{name}_species_speed{suffix}'
+        for name in ('first', 'second')
+        for suffix in ('', '_error')
+    ]
     write_csv(path, [*FIELDS, *names], [*FIELDS.values(), *['m/s'] * 4], rows)
 
 
@@ -100,7 +106,7 @@ def _draw(folder, scratch):
 
 
 def main(folder):
-    """Write the pictures; the first exit code that is not 0, or 0."""
+    """Write the pictures, and return the first exit code that is not 0, or 0."""
     with TemporaryDirectory() as scratch:
         for arguments in _draw(Path(folder), Path(scratch)):
             code = nanorocks(arguments)

@@ -1,8 +1,8 @@
-"""Closed forms of the cooling against simulation: decay rates, and the restitutions they return.
+"""Closed forms of the cooling against simulation: decay rates and inferred restitutions.
 
-The simulated gas starts with Maxwell's speeds, even in all directions, a mean of 7 mm/s. To the
-mean over runs of the mean projected speed Haff's law is fitted, in ln v, from 2 to 30 s. In
-brackets the standard error, from eight groups of runs.
+The simulated gas starts with an isotropic Maxwell distribution, with a mean speed of 7 mm/s.
+Haff's law is fitted to ln v of the mean projected speed, averaged over the runs, from 2 to 30 s.
+Brackets give the standard error, from eight groups of runs.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ RUNS = {1: 400, 3: 120, 5: 64, 6: 8, 7: 24, 8: 8}
 TEMPERATURES = {1: 100, 3: 40, 5: 20, 7: 6}
 RESTITUTIONS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.98)
 WALLS = (0.9, 0.95, 0.99, 1.0)
-# In trays of many grains.
+# For trays with many grains.
 FEW_RESTITUTIONS, FEW_WALLS = (0.8, 0.9, 0.98), (0.95, 0.99)
 TIMES = np.linspace(0.0, 30.0, 121)
 WINDOW = 2.0
@@ -41,7 +41,7 @@ GROUPS = 8
 
 
 def simulated(tray, restitution, walls, runs, speeds='maxwellian'):
-    """Mean projected speed run by run, (n_runs, n_times)."""
+    """Mean projected speed of each run, (n_runs, n_times)."""
     settings = SimulationSettings(
         tray=tray.number, restitution=restitution, wall_restitution=walls, speeds=speeds
     )
@@ -60,33 +60,33 @@ def fitted_rate(speed):
 
 
 def decay_rate(speeds):
-    """Of the mean over runs, and its standard error."""
-    groups = [fitted_rate(one.mean(axis=0)) for one in np.array_split(speeds, GROUPS)]
+    """Decay rate of the mean over runs, and its standard error."""
+    groups = [fitted_rate(group.mean(axis=0)) for group in np.array_split(speeds, GROUPS)]
     return fitted_rate(speeds.mean(axis=0)), float(np.std(groups, ddof=1) / math.sqrt(GROUPS))
 
 
 def one_temperature(tray):
-    """Coefficients of (1 - ep^2) and (1 - ew^2) with one temperature for all, [1/m].
+    """Coefficients of (1 - ep^2) and (1 - ew^2) with one temperature for all directions, [1/m].
 
-    The walls crowd no beads, and beads crowd as in a gas of the same filling factor.
+    The contact value is that of a bulk gas with the same filling factor, without layers at walls.
     """
     d = tray.diameter
     room = np.array(tray.dimensions) - d
     k = np.random.default_rng(1).normal(size=(200_000, 3))
     k = np.abs(k) / np.linalg.norm(k, axis=1)[:, np.newaxis]
-    seen = math.pi * d * d * np.clip(1.0 - d * k / room, 0.0, None).prod(axis=1).mean()
+    cross_section = math.pi * d * d * np.clip(1.0 - d * k / room, 0.0, None).prod(axis=1).mean()
     crowding = contact_value(tray.count * math.pi / 6.0 * d**3 / tray.volume)
     beads = math.sqrt(2.0 / math.pi) * 2.0 / (3.0 * math.sqrt(math.pi))
-    beads *= (tray.count - 1) / room.prod() * seen * crowding
+    beads *= (tray.count - 1) / room.prod() * cross_section * crowding
     return beads, 2.0 / (3.0 * math.pi) * (1.0 / room).sum()
 
 
 def _or_none(relation, *values):
     try:
-        found = relation(*values)
+        restitution = relation(*values)
     except FitError:
         return '-'
-    return f'{getattr(found, "value", found):.3f}'
+    return f'{getattr(restitution, "value", restitution):.3f}'
 
 
 def report():
@@ -101,7 +101,7 @@ def report():
     for number, runs in RUNS.items():
         tray = trays[number]
         forms = _Forms(tray)
-        many = 'JSC-1' in {one.material for one in tray.species}
+        many = 'JSC-1' in {species.material for species in tray.species}
         for restitution in FEW_RESTITUTIONS if many else RESTITUTIONS:
             for walls in FEW_WALLS if many else WALLS:
                 speeds = simulated(tray, restitution, walls, runs)
@@ -115,14 +115,14 @@ def temperatures(tray, restitution, walls, runs, span=(8.0, 25.0)):
     settings = SimulationSettings(
         tray=tray.number, restitution=restitution, wall_restitution=walls, speeds='maxwellian'
     )
-    found = []
+    ratios = []
     for run in range(runs):
         rules = rules_of(settings, tray, run)
         beads = after_shaking(settings, rules, resting_beads(settings, tray, run), run, 0)
-        course = HardSphereGas(beads, rules).follow(span[1], (), np.linspace(*span, 35))
-        squares = course.observations.granular_temperature
-        found.append((squares / squares[:, :, :2].mean(axis=(1, 2), keepdims=True)).mean(axis=0))
-    return np.mean(found, axis=0)
+        record = HardSphereGas(beads, rules).follow(span[1], (), np.linspace(*span, 35))
+        squares = record.observations.granular_temperature
+        ratios.append((squares / squares[:, :, :2].mean(axis=(1, 2), keepdims=True)).mean(axis=0))
+    return np.mean(ratios, axis=0)
 
 
 def _report_temperatures(trays):
@@ -132,18 +132,22 @@ def _report_temperatures(trays):
         gas = confined_gas(trays[number])
         for restitution, walls in ((0.9, 0.95), (0.8, 0.9)):
             simulated = temperatures(trays[number], restitution, walls, runs)
-            each = gas.cooling(restitution, walls).granular_temperature
+            class_temperatures = gas.cooling(restitution, walls).granular_temperature
             species = gas.beads.species
             theory = np.array(
                 [
-                    np.average(each[species == k], axis=0, weights=gas.beads.counts[species == k])
+                    np.average(
+                        class_temperatures[species == k],
+                        axis=0,
+                        weights=gas.beads.counts[species == k],
+                    )
                     for k in range(len(simulated))
                 ]
             )
             theory /= theory[:, :2].mean()
-            for k, one in enumerate(trays[number].species):
+            for k, bead_species in enumerate(trays[number].species):
                 print(
-                    f'| {number} | {one.material} | {restitution:g}, {walls:g} | '
+                    f'| {number} | {bead_species.material} | {restitution:g}, {walls:g} | '
                     f'{_shown(simulated[k])} | {_shown(theory[k])} |',
                     flush=True,
                 )

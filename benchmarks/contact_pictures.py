@@ -1,6 +1,6 @@
-"""Draw a rebound and a collision as found: ``python -m benchmarks.contact_pictures [FOLDER]``.
+"""Draw a detected rebound and a collision: ``python -m benchmarks.contact_pictures [FOLDER]``.
 
-Writes rebounds.png, for the documentation, into docs/pictures or the folder given.
+Writes rebounds.png for the documentation into docs/pictures or the given folder.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from matplotlib.figure import Figure
 
 _PAIRS, _WALLS = 0.89, 0.97
 _SECONDS = 25.0
-# Pictures shown on each side of a contact, and what is drawn around it, [px].
+# Frames shown before and after a contact, and the half width of the picture, [px].
 _SHOWN = 10
 _AROUND = 46
-# How far places may lie off the lines, [px].
+# Largest distance of positions from the lines, [px].
 _STRAIGHT = 0.5
 _COLOURS = '#14406b', '#7a1f8a'
 
@@ -41,12 +41,12 @@ def _shown(frames: Film, stamp_ns: int) -> Film:
 def _flights(
     frames: Film, track: int, stamp_ns: int
 ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Times since the contact, places [px] past the camera as the tray was then, and lines."""
-    middle = min(frames, key=lambda one: abs(one[0].stamp_ns - stamp_ns))[1]
+    """Times since the contact, positions [px] in the frame of the tray, and fitted lines."""
+    middle = min(frames, key=lambda frame: abs(frame[0].stamp_ns - stamp_ns))[1]
     rows = [
-        (one.stamp_ns, *(one.positions[one.ids == track][0] + one.displacement))
-        for _, one in frames
-        if (one.ids == track).any()
+        (tracks.stamp_ns, *(tracks.positions[tracks.ids == track][0] + tracks.displacement))
+        for _, tracks in frames
+        if (tracks.ids == track).any()
     ]
     table = np.array(rows)
     table[:, 1:] = (table[:, 1:] - middle.displacement) * METRE_PX - 0.5
@@ -57,19 +57,19 @@ def _flights(
     return parts
 
 
-def _bend(frames: Film, tracks: Sequence[int], stamp_ns: int) -> float:
-    """How far off straight lines the places shown lie at most, [px]."""
-    shown = _shown(frames, stamp_ns)
+def _deviation(frames: Film, tracks: Sequence[int], stamp_ns: int) -> float:
+    """Largest distance of the positions from straight lines, [px]."""
+    frames_shown = _shown(frames, stamp_ns)
     return max(
         float(np.abs(places - np.outer(times, line[0]) - line[1]).max())
         for track in tracks
-        for times, places, line in _flights(shown, track, stamp_ns)
+        for times, places, line in _flights(frames_shown, track, stamp_ns)
     )
 
 
-def _draw_way(axes: Axes, frames: Film, track: int, stamp_ns: int, colour: str) -> None:
-    both = _flights(frames, track, stamp_ns)
-    for (times, places, line), filled in zip(both, (True, False), strict=True):
+def _draw_path(axes: Axes, frames: Film, track: int, stamp_ns: int, colour: str) -> None:
+    flights = _flights(frames, track, stamp_ns)
+    for (times, places, line), filled in zip(flights, (True, False), strict=True):
         ends = np.array([times.min(), times.max()])
         ends[np.argmin(np.abs(ends))] = 0.0
         axes.plot(*(np.outer(ends, line[0]) + line[1]).T, '-', color=colour, lw=1.2)
@@ -77,12 +77,12 @@ def _draw_way(axes: Axes, frames: Film, track: int, stamp_ns: int, colour: str) 
 
 
 def _draw(axes: Axes, frames: Film, contact: Rebound | PairCollision, centre: np.ndarray) -> None:
-    shown = _shown(frames, contact.stamp_ns)
-    # The darkest of all pictures: beads where they were.
-    strobe = np.min([image.color for image, _ in shown[::3]], axis=0)[:, :, ::-1]
+    frames_shown = _shown(frames, contact.stamp_ns)
+    # The minimum over the images shows all positions of the beads.
+    strobe = np.min([image.color for image, _ in frames_shown[::3]], axis=0)[:, :, ::-1]
     axes.imshow(strobe, alpha=0.75)
     for track, colour in zip(_tracks(contact), _COLOURS, strict=False):
-        _draw_way(axes, shown, track, contact.stamp_ns, colour)
+        _draw_path(axes, frames_shown, track, contact.stamp_ns, colour)
     x, y = centre * METRE_PX
     rows, columns = strobe.shape[:2]
     axes.set_xlim(max(x - _AROUND, -4.0), min(x + _AROUND, columns))
@@ -95,26 +95,31 @@ def _tracks(contact: Rebound | PairCollision) -> list[int]:
     return contact.tracks.tolist() if isinstance(contact, PairCollision) else [contact.track]
 
 
-def _best(found: list, frames: Film) -> tuple[Rebound, PairCollision]:
-    """Fast ones that go straight on for long enough to be looked at."""
+def _best(contacts: list, frames: Film) -> tuple[Rebound, PairCollision]:
+    """The fastest rebound and collision with straight paths."""
     first, last = frames[_SHOWN][0].stamp_ns, frames[-_SHOWN][0].stamp_ns
     straight = [
-        one
-        for one in found
-        if first < one.stamp_ns < last and _bend(frames, _tracks(one), one.stamp_ns) < _STRAIGHT
+        contact
+        for contact in contacts
+        if first < contact.stamp_ns < last
+        and _deviation(frames, _tracks(contact), contact.stamp_ns) < _STRAIGHT
     ]
-    rebounds = [one for one in straight if isinstance(one, Rebound) and one.wall == 0]
-    pairs = [one for one in straight if isinstance(one, PairCollision)]
+    rebounds = [
+        contact for contact in straight if isinstance(contact, Rebound) and contact.wall == 0
+    ]
+    pairs = [contact for contact in straight if isinstance(contact, PairCollision)]
     return (
-        max(rebounds, key=lambda one: one.incoming + abs(one.tangential_incoming)),
-        max(pairs, key=lambda one: float(np.hypot(*(one.before[1] - one.before[0])))),
+        max(rebounds, key=lambda contact: contact.incoming + abs(contact.tangential_incoming)),
+        max(pairs, key=lambda contact: float(np.hypot(*(contact.before[1] - contact.before[0])))),
     )
 
 
 def write(folder: Path) -> None:
     """Write the picture."""
     frames = list(film((1,), _PAIRS, _WALLS, _SECONDS, 1))
-    rebound, pair = _best(list(contacts_of(load_trays()[1], (one for _, one in frames))), frames)
+    rebound, pair = _best(
+        list(contacts_of(load_trays()[1], (tracks for _, tracks in frames))), frames
+    )
     figure = Figure(figsize=(9.0, 4.9), layout='constrained')
     left, right = figure.subplots(1, 2)
     _draw(left, frames, rebound, rebound.place)
@@ -127,11 +132,14 @@ def write(folder: Path) -> None:
         fontsize=10,
     )
     _draw(right, frames, pair, pair.place + 0.5 * pair.separation)
-    here, there = pair.place, pair.place + pair.separation
-    right.plot(*(np.array([here, there]) * METRE_PX - 0.5).T, '-', color='black', lw=1.5)
+    first_centre, second_centre = pair.place, pair.place + pair.separation
+    right.plot(
+        *(np.array([first_centre, second_centre]) * METRE_PX - 0.5).T, '-', color='black', lw=1.5
+    )
     normal = pair.separation / np.hypot(*pair.separation)
     approach, parting = (
-        1e3 * abs(float((one[1] - one[0]) @ normal)) for one in (pair.before, pair.after)
+        1e3 * abs(float((velocity[1] - velocity[0]) @ normal))
+        for velocity in (pair.before, pair.after)
     )
     right.set_title(
         f'A collision: {approach:.2f} and {parting:.2f} mm/s along the line of centres (black),\n'

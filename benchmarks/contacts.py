@@ -1,9 +1,8 @@
 """Restitutions of walls and beads from single rebounds and collisions, against the truth.
 
-First from true places at 30 pictures a second with errors like those of tracking (0.05 px of
-jitter, 0.09 px that change from place to place), then from tracks of films with all effects of
-the camera. A cycle is 58 s after a shaking event at 10 mm/s; "covered" is by the 68 % interval
-of one cycle.
+First from true positions at 30 Hz with errors as in tracking (0.05 px of noise, 0.09 px that vary
+with position), then from tracks of films with all effects of the camera. A cycle lasts 58 s after
+a shaking event at 10 mm/s; "covered" refers to the 68 % interval of one cycle.
 """
 
 from __future__ import annotations
@@ -38,9 +37,9 @@ _SECONDS = 58.0
 _SPEED = 0.010
 METRE_PX = 12500.0
 _JITTER, _SHARED = 0.05 / METRE_PX, 0.09 / METRE_PX
-# Over which the error that a bead keeps for a while goes through all its values.
+# Wavelength of the position-dependent error of a bead, [m].
 _WAVE = 20.0 / METRE_PX
-# So many cycles of each truth that coverage is judged by more than a hundred in tray 1.
+# Cycles of each truth; all truths together give more than a hundred for the coverage in tray 1.
 _CYCLES = {1: 18, 3: 9}
 _TRUTHS = [(pairs, walls) for pairs in (0.7, 0.89, 0.95) for walls in (0.9, 0.97)]
 _FILMED = ((0.89, 0.97), (0.7, 0.9))
@@ -65,7 +64,7 @@ def _settings(pairs: float, walls: float, seed: int) -> SimulationSettings:
 def true_tracks(
     tray: Tray, settings: SimulationSettings, run: int, frames: int, jitter: float = _JITTER
 ) -> Iterator[Tracks]:
-    """Tracks of a gas as a tracker would give them that never loses a bead."""
+    """Tracks of a gas by a tracker that never loses a bead."""
     gas = ShakenTray(settings, tray, run)
     return tracks_of(gas, tray, np.random.default_rng([settings.seed, run]), frames, jitter)
 
@@ -77,16 +76,17 @@ def tracks_of(
     frames: int,
     jitter: float = _JITTER,
 ) -> Iterator[Tracks]:
-    """The same of a gas of one's own, which is where it is drawn each time."""
+    """Tracks of a given gas; each step of the iterator advances the gas."""
     species = np.repeat(
-        np.arange(len(tray.species), dtype=np.int32), [one.count for one in tray.species]
+        np.arange(len(tray.species), dtype=np.int32),
+        [bead_species.count for bead_species in tray.species],
     )
     n = species.size
     wave = rng.normal(0.0, 2.0 * np.pi / _WAVE, (2, n, 2))
     phase = rng.uniform(0.0, 2.0 * np.pi, (2, n))
     for moment in gas.moments(frames):
         places = moment.positions[:, :2]
-        # Each bead is misplaced by its own amount, another some pixels further on.
+        # The error differs between beads and changes over some pixels.
         waves = np.sin(np.einsum('cnk,nk->cn', wave, places) + phase)
         misplaced = np.sqrt(2.0) * _SHARED * waves.T
         yield Tracks(
@@ -102,36 +102,42 @@ def tracks_of(
             radii=gas.radii,
             radius_errors=np.full(n, jitter),
             seen=np.ones(n, dtype=bool),
-            expected=np.array([one.count for one in tray.species], dtype=np.int32),
+            expected=np.array(
+                [bead_species.count for bead_species in tray.species], dtype=np.int32
+            ),
         )
 
 
 def contacts_of(tray: Tray, tracks: Iterator[Tracks]) -> Contacts:
-    """All contacts found in some tracks."""
+    """All contacts that are detected in tracks."""
     finder = ContactFinder(tray)
-    found = [one for record in tracks for one in finder.push(record)]
-    return (*found, *finder.flush())
+    contacts = [contact for record in tracks for contact in finder.push(record)]
+    return (*contacts, *finder.flush())
 
 
-def _likelihoods(found: Contacts) -> tuple[np.ndarray, np.ndarray]:
+def _likelihoods(contacts: Contacts) -> tuple[np.ndarray, np.ndarray]:
     return (
-        rebound_log_likelihood([one for one in found if isinstance(one, Rebound)], _WALLS),
-        pair_log_likelihood([one for one in found if isinstance(one, PairCollision)], _PAIRS),
+        rebound_log_likelihood(
+            [contact for contact in contacts if isinstance(contact, Rebound)], _WALLS
+        ),
+        pair_log_likelihood(
+            [contact for contact in contacts if isinstance(contact, PairCollision)], _PAIRS
+        ),
     )
 
 
 def _row(name: str, truth: float, grid: np.ndarray, cycles: Sequence[np.ndarray]) -> float:
-    """Print a row; returns how many cycles covered the truth."""
-    each = [contact_estimate(grid, cycle) for cycle in cycles]
-    values = np.array([estimate.restitution for estimate in each])
-    covered = sum(estimate.lower <= truth <= estimate.upper for estimate in each)
-    all_of_them = contact_estimate(grid, np.sum(cycles, axis=0))
-    together = f'{all_of_them.restitution - truth:+.4f} ± {all_of_them.restitution_error:.4f}'
-    stated = np.median([estimate.restitution_error for estimate in each])
+    """Print a row, and return the number of cycles whose interval covers the truth."""
+    estimates = [contact_estimate(grid, cycle) for cycle in cycles]
+    values = np.array([estimate.restitution for estimate in estimates])
+    covered = sum(estimate.lower <= truth <= estimate.upper for estimate in estimates)
+    combined = contact_estimate(grid, np.sum(cycles, axis=0))
+    together = f'{combined.restitution - truth:+.4f} ± {combined.restitution_error:.4f}'
+    stated = np.median([estimate.restitution_error for estimate in estimates])
     scatter = f'{values.std(ddof=1):.4f}' if values.size > 1 else ''
     print(
         f'| {name} | {values.mean() - truth:+.4f} | {scatter} | {stated:.4f} | '
-        f'{covered}/{len(each)} | {together} |',
+        f'{covered}/{len(estimates)} | {together} |',
         flush=True,
     )
     return covered
@@ -153,19 +159,26 @@ def _report_true() -> None:
     for number, runs in _CYCLES.items():
         tray = load_trays()[number]
         for pairs, walls in _TRUTHS:
-            found = [
+            contacts_by_run = [
                 contacts_of(tray, true_tracks(tray, _settings(pairs, walls, 5), run, frames))
                 for run in range(runs)
             ]
-            rebounds = np.mean([sum(isinstance(one, Rebound) for one in a) for a in found])
-            both = [_likelihoods(one) for one in found]
+            rebounds = np.mean(
+                [sum(isinstance(contact, Rebound) for contact in a) for a in contacts_by_run]
+            )
+            likelihoods = [_likelihoods(contact) for contact in contacts_by_run]
             name = f'{number}, {pairs:g} / {walls:g}'
-            counts = f'{rebounds:.0f}', f'{np.mean([len(a) for a in found]) - rebounds:.0f}'
+            counts = (
+                f'{rebounds:.0f}',
+                f'{np.mean([len(a) for a in contacts_by_run]) - rebounds:.0f}',
+            )
             for kind, truth, grid, column in (
                 (f'walls ({counts[0]} rebounds)', walls, _WALLS, 0),
                 (f'pairs ({counts[1]} collisions)', pairs, _PAIRS, 1),
             ):
-                covered = _row(f'{name}, {kind}', truth, grid, [one[column] for one in both])
+                covered = _row(
+                    f'{name}, {kind}', truth, grid, [contact[column] for contact in likelihoods]
+                )
                 key = number, kind.split()[0]
                 totals[key] = totals.get(key, 0.0) + covered
     for (number, kind), covered in totals.items():
@@ -184,7 +197,7 @@ def film(
 def filmed_tracks(
     numbers: tuple[int, ...], simulation: SimulationSettings, seconds: float
 ) -> Iterator[tuple[TrayImage, Tracks, BeadsTruth]]:
-    """The same of any gas, with the truth about the beads."""
+    """Images, tracks and true beads, from a film of any gas."""
     scene = SceneFilm(simulation, SceneSettings(trays=numbers))
     names = {
         'trays': list(numbers),
@@ -214,12 +227,14 @@ def _report_filmed() -> None:
         for _, tracks in film(tuple(_CYCLES), pairs, walls, _FILM_SECONDS, seed):
             films[tracks.tray].append(tracks)
         for number, tracks in films.items():
-            found = contacts_of(load_trays()[number], iter(tracks))
-            rebounds = sum(isinstance(one, Rebound) for one in found)
-            of_walls, of_pairs = _likelihoods(found)
+            contacts = contacts_of(load_trays()[number], iter(tracks))
+            rebounds = sum(isinstance(contact, Rebound) for contact in contacts)
+            of_walls, of_pairs = _likelihoods(contacts)
             name = f'{number}, {pairs:g} / {walls:g}'
             _row(f'{name}, walls ({rebounds} rebounds)', walls, _WALLS, [of_walls])
-            _row(f'{name}, pairs ({len(found) - rebounds} collisions)', pairs, _PAIRS, [of_pairs])
+            _row(
+                f'{name}, pairs ({len(contacts) - rebounds} collisions)', pairs, _PAIRS, [of_pairs]
+            )
 
 
 def report() -> None:

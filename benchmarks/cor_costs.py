@@ -1,4 +1,4 @@
-"""What restitutions cost: a fit, a node of a library, a search of the paper's size."""
+"""Costs of restitutions: a fit, a node of a library, a search of the size in the paper."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nanorocks_ros.inference.decay.haff_fit import fit_haff
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
-from nanorocks_ros.stages.restitution.restitution_methods import Decay, LibraryReading
+from nanorocks_ros.stages.restitution.restitution_methods import Decay, DecayLibraryMethod
 from nanorocks_ros.studies.libraries.decay_simulations import LibraryPlan, cool_node
 from nanorocks_ros.studies.sweeps.sweep_plan import sweep_plan
 from nanorocks_ros.studies.sweeps.sweep_runs import sweep
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 _TIMES = np.arange(1.75, 20.0, 0.25)
 _ERROR = 0.02
 _REPEATS = 50
-# Of the library of tray 1 in the package.
+# Nodes measured, and runs and seed of the library of tray 1.
 _NODES, _RUNS_OF_NODE, _SEED = 40, 24, 1
-# The paper's search: points along each axis and runs at each; and the part that is measured.
+# Search of the paper: points along each axis and runs at each point; and the measured part.
 _POINTS, _RUNS = 40, 178
 _SOME_POINTS, _SOME_RUNS = 10, 40
 
 
 def print_costs() -> None:
-    """Print them; times of one machine, to be held against one another."""
+    """Print the costs; times of one machine, for ratios."""
     fit, law = _fits()
     print(f"one update: {1e3 * fit:.1f} ms of CPU, {fit / law:.1f} fits of Haff's law")
     node = _library_node()
@@ -51,25 +51,25 @@ def print_costs() -> None:
 
 
 def _cost(work: Callable[[], object], repeats: int) -> float:
-    """CPU time of one, once it is compiled, [s]."""
+    """CPU time of one call after compilation, [s]."""
     work()
-    begin = process_time()
+    start = process_time()
     for _ in range(repeats):
         work()
-    return (process_time() - begin) / repeats
+    return (process_time() - start) / repeats
 
 
 def _fits() -> tuple[float, float]:
-    """One live update, and a fit of Haff's law to the same speeds, [s]."""
+    """CPU times of one live update and of a fit of Haff's law to the same speeds, [s]."""
     tray = load_trays()[1]
     settings = SimulationSettings(
         restitution=0.89, wall_restitution=0.97, seed=4242, mean_speed=0.01
     )
     (speed,) = cooling_runs(settings, tray, _TIMES, [0]).mean_projected_speed
     decay = Decay(time=_TIMES, speed=speed, error=_ERROR * speed)
-    reading, none = LibraryReading(PipelineSettings(), tray), ContactTerms.of(())
+    method, none = DecayLibraryMethod(PipelineSettings(), tray), ContactTerms.of(())
     return (
-        _cost(lambda: reading.read(decay, none, final=False), _REPEATS),
+        _cost(lambda: method.estimate(decay, none, final=False), _REPEATS),
         _cost(lambda: fit_haff(_TIMES, speed, _ERROR * speed, tray.count), _REPEATS),
     )
 
@@ -77,14 +77,14 @@ def _fits() -> tuple[float, float]:
 def _library_node() -> float:
     plan = LibraryPlan(tray=load_trays()[1], nodes=_NODES, runs=_RUNS_OF_NODE, seed=_SEED)
     cool_node(plan, 0)
-    begin = process_time()
+    start = process_time()
     for number in range(_NODES):
         cool_node(plan, number)
-    return (process_time() - begin) / _NODES
+    return (process_time() - start) / _NODES
 
 
 def _search() -> float:
-    """A part of the search, evenly over the grid, [s]."""
+    """CPU time of a part of the search, spread evenly over the grid, [s]."""
     plan = sweep_plan(
         SimulationSettings(tray=1, seed=1, mean_speed=0.01),
         {

@@ -1,16 +1,15 @@
 """Restitutions from films of whole cycles against their truth: bias, scatter and coverage.
 
 Trays 1 and 3, filmed with all effects (lens, defocus, noise, uneven and flickering light, shadows,
-glare on the plate, JPEG 85, and a plate that swings on its springs and knocks the beads) for
-33 s after a shaking event that leaves a mean speed of 10 mm/s, by the stages as the pipeline
-composes them. Each truth is filmed as the trays are in the books; "drawn" are films in which
-each cell has restitutions (beads 0.7 to 0.95), floor and lid, height, diameter, count and start of
-its own, from the defaults of `prior.`, of which the stages know nothing: there intervals should
-cover as often as they say. "All": decay, rebounds and collisions, as published by default.
-"Tray known": floor and lid, height, diameter, count and anisotropy are as in the books, and that
-is known. "True speeds": the same windows, but with the true mean projected speeds, whose errors
-are those that were stated. Films are kept (`filmed_cycles`), so that a second look takes a
-minute; NANOROCKS_FILMS names the folder. One film takes about a minute.
+glare on the plate, JPEG 85, and a plate that oscillates on its springs and hits the beads) for
+33 s after a shaking event with a mean speed of 10 mm/s, by the stages of the pipeline. In most
+films the trays have their nominal values. In the films "drawn" each cell has its own restitutions
+(beads 0.7 to 0.95), floor and lid, height, diameter, count and initial speeds, drawn from the
+defaults of `prior.` and unknown to the stages: there the coverage should equal the nominal one.
+"All": decay, rebounds and collisions, as published by default. "Tray known": floor and lid,
+height, diameter, count and anisotropy have their nominal values without uncertainty. "True
+speeds": the same windows with the true mean projected speeds and the stated errors. Films are
+kept (`filmed_cycles`) in the folder NANOROCKS_FILMS; one film takes about a minute.
 """
 
 from __future__ import annotations
@@ -30,13 +29,13 @@ from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.posterior import Posterior, posterior_of
 from nanorocks_ros.jobs.tasks import Workers
-from nanorocks_ros.records import CorEstimate, CorStatus
+from nanorocks_ros.records import CorEstimate, CorStatus, PairCollision
 from nanorocks_ros.settings import PipelineSettings, PriorSettings, with_values
-from nanorocks_ros.stages.contacts.contact_finder import LATEST_NS
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 from nanorocks_ros.stages.restitution.restitution_methods import Decay
 
-# Films of each: the first truth is what the goals are about.
+# Films by truth; the goals refer to the first truth.
 _FILMS = {
     '0.89 / 0.97': [Film(pairs=0.89, walls=0.97, number=number) for number in range(12)],
     'drawn': [Film(number=number) for number in range(11)],
@@ -46,7 +45,7 @@ _FILMS = {
 _TOGETHER = 18
 _LEVELS = np.array([0.025, 0.16, 0.5, 0.84, 0.975])
 _NS = 1e9
-# Parts of the window of which the ratio of speeds to the truth is printed, [s].
+# Parts of the window for the ratio of speeds to the truth, [s].
 _PARTS = ((0.0, 4.0), (4.0, 8.0), (8.0, 14.0), (14.0, 21.0))
 _DELAY_NS = 1_750_000_000
 _ALONE = {'cooling.rebounds': False, 'cooling.collisions': False}
@@ -62,15 +61,15 @@ _TRAY_KNOWN = replace(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _From:
-    """A row of the table: what is used, and what is known.
+class _Row:
+    """A row of the table: the data and the assumptions.
 
     Parameters
     ----------
     name : str
     true_speeds, tray_known, walls_known : bool
     contacts : str
-        Those of the 'window', 'all' since the shaking was over, or 'none'.
+        Contacts in the 'window', 'all' since the end of the shaking, or 'none'.
     """
 
     name: str
@@ -81,28 +80,28 @@ class _From:
 
 
 _ROWS = (
-    _From(name='decay of true speeds', true_speeds=True),
-    _From(name='decay'),
-    _From(name='decay, walls known', walls_known=True),
-    _From(name='decay, walls and tray known', walls_known=True, tray_known=True),
-    _From(name='all, contacts of the window', contacts='window'),
-    _From(name='all', contacts='all'),
+    _Row(name='decay of true speeds', true_speeds=True),
+    _Row(name='decay'),
+    _Row(name='decay, walls known', walls_known=True),
+    _Row(name='decay, walls and tray known', walls_known=True, tray_known=True),
+    _Row(name='all, contacts of the window', contacts='window'),
+    _Row(name='all', contacts='all'),
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Said:
-    """What the stages made of one cycle.
+class _MeasuredCycle:
+    """Results of the stages for one cycle.
 
     Parameters
     ----------
     cycle : Cycle
     final : CorEstimate
-        Of the fitter, without contacts.
+        Estimate of the fitter, without contacts.
     decay, true_decay : Decay
-        Of its window.
+        Speeds in its window.
     contacts : dict of str to ContactTerms
-        By `_From.contacts`.
+        By `_Row.contacts`.
     """
 
     cycle: Cycle
@@ -112,60 +111,72 @@ class _Said:
     contacts: dict[str, ContactTerms]
 
 
-_All = dict[tuple[int, str], list[_Said]]
+_Measurements = dict[tuple[int, str], list[_MeasuredCycle]]
 
 
 def report() -> None:
-    """Make the films that are missing and print the tables."""
+    """Make missing films and print the tables."""
     for films in _FILMS.values():
         make(films, Workers())
     print_tables(_FILMS)
 
 
 def print_tables(films: dict[str, list[Film]]) -> None:
-    """Print the tables of those films that there are."""
-    said: _All = {}
+    """Print the tables of the films that exist."""
+    measured: _Measurements = {}
     for truth, some in films.items():
         for number, cycles in load(some).items():
             tray = load_trays()[number]
-            found = [one for one in (_said(tray, cycle) for cycle in cycles) if one]
-            print(f'tray {number}, {truth}: {len(cycles)} cycles, {len(found)} with an estimate')
-            if found:
-                said[number, truth] = found
-    _print_speeds(said)
-    _print_single(said)
-    _print_together(said)
+            results = [_measured_cycle(tray, cycle) for cycle in cycles]
+            estimates = [result for result in results if result]
+            print(
+                f'tray {number}, {truth}: {len(cycles)} cycles, {len(estimates)} with an estimate'
+            )
+            if estimates:
+                measured[number, truth] = estimates
+    _print_speeds(measured)
+    _print_single(measured)
+    _print_together(measured)
 
 
-def _said(tray: Tray, cycle: Cycle) -> _Said | None:
+def _measured_cycle(tray: Tray, cycle: Cycle) -> _MeasuredCycle | None:
     names = {'cooling.update_interval': 60.0, **_ALONE}
-    fitter = HaffFitter(with_values(PipelineSettings(), names, 'benchmark'), tray)
-    made = [estimate for speed in cycle.speeds for estimate in fitter.push(speed)]
-    # An estimate that is not yet known is not marked as cooling, so the last one it is.
-    *_, final = (None, *made, *fitter.flush())
+    fitter = RestitutionEstimator(with_values(PipelineSettings(), names, 'benchmark'), tray)
+    estimates = [estimate for speed in cycle.speeds for estimate in fitter.push(speed)]
+    # An undetermined estimate has no status COOLING, so the last estimate is used.
+    *_, final = (None, *estimates, *fitter.flush())
     if final is None or final.status is CorStatus.COOLING:
         return None
-    shake_ns = next(one.cycle_start_ns for one in cycle.speeds if one.cycle_start_ns)
+    shake_ns = next(speed.cycle_start_ns for speed in cycle.speeds if speed.cycle_start_ns)
     first_ns, last_ns = (
-        shake_ns + round(one * _NS) for one in (final.window_start, final.window_end)
+        shake_ns + round(end * _NS) for end in (final.window_start, final.window_end)
     )
-    used = [one for one in cycle.speeds if first_ns - 1000 <= one.stamp_ns <= last_ns + 1000]
+    used = [
+        estimate
+        for estimate in cycle.speeds
+        if first_ns - 1000 <= estimate.stamp_ns <= last_ns + 1000
+    ]
     time = np.array(
         [(estimate.stamp_ns - shake_ns) / _NS - final.cooling_start for estimate in used]
     )
     speed = np.array([estimate.mean_projected_speed.value for estimate in used])
     error = np.array([estimate.mean_projected_speed.error for estimate in used])
     true = np.array([_truth(cycle, estimate.stamp_ns / _NS, estimate.window) for estimate in used])
-    ripe = [contact for contact in cycle.contacts if contact.stamp_ns <= last_ns - LATEST_NS]
-    return _Said(
+    known_ns = last_ns - KNOWN_AFTER_NS[PairCollision]
+    complete = [contact for contact in cycle.contacts if contact.stamp_ns <= known_ns]
+    return _MeasuredCycle(
         cycle=cycle,
         final=final,
         decay=Decay(time=time, speed=speed, error=error),
         true_decay=Decay(time=time, speed=true, error=error),
         contacts={
             'none': ContactTerms.of(()),
-            'window': ContactTerms.of(one for one in ripe if one.stamp_ns >= first_ns),
-            'all': ContactTerms.of(one for one in ripe if one.stamp_ns >= shake_ns + _DELAY_NS),
+            'window': ContactTerms.of(
+                contact for contact in complete if contact.stamp_ns >= first_ns
+            ),
+            'all': ContactTerms.of(
+                contact for contact in complete if contact.stamp_ns >= shake_ns + _DELAY_NS
+            ),
         },
     )
 
@@ -175,37 +186,37 @@ def _truth(cycle: Cycle, middle: float, window: float) -> float:
     return float(cycle.true_speed[inside].mean())
 
 
-def _posterior(cycles: list[_Said], how: _From) -> Posterior:
-    """What `LibraryReading` makes of some cycles of a tray."""
+def _posterior(cycles: list[_MeasuredCycle], row: _Row) -> Posterior:
+    """Posterior of some cycles of a tray, as in `LibraryReading`."""
     tray = load_trays()[cycles[0].cycle.tray]
     library = library_of(tray)
-    prior = _TRAY_KNOWN if how.tray_known else _PRIOR
+    prior = _TRAY_KNOWN if row.tray_known else _PRIOR
     tables = tables_of(library, tray, prior)
     camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
-    decays = [cycle.true_decay if how.true_speeds else cycle.decay for cycle in cycles]
+    decays = [cycle.true_decay if row.true_speeds else cycle.decay for cycle in cycles]
     likelihoods = (
         decay_likelihood(tables, decay.time, decay.speed, decay.error, camera) for decay in decays
     )
-    contacts = reduce(add, (cycle.contacts[how.contacts] for cycle in cycles))
+    contacts = reduce(add, (cycle.contacts[row.contacts] for cycle in cycles))
     walls = cycles[0].cycle.walls
     return posterior_of(
         tables,
         reduce(add, likelihoods).integrated(),
         (walls, walls)
-        if how.walls_known
+        if row.walls_known
         else (prior.min_wall_restitution, prior.max_wall_restitution),
         bead_likelihood=contacts.bead_likelihood(prior.collision_bias),
         wall_likelihood=contacts.wall_likelihood(prior.rebound_bias),
     )
 
 
-def _print_speeds(said: _All) -> None:
+def _print_speeds(measured: _Measurements) -> None:
     print('\nMeasured over true speed, and spread of the deviations in stated errors,')
     print('by the age of the window\n')
     titles = ' | '.join(f'{low:g} to {high:g} s' for low, high in _PARTS)
     print(f'| tray, beads / walls | window begins | contacts: of it | all | {titles} |')
     print('| --- ' * (4 + len(_PARTS)) + '|')
-    for (number, truth), cycles in said.items():
+    for (number, truth), cycles in measured.items():
         start = np.median([cycle.final.window_start for cycle in cycles])
         row = f'| {number}, {truth} | {start:.1f} s '
         for kind in ('window', 'all'):
@@ -225,34 +236,39 @@ def _print_speeds(said: _All) -> None:
         print(row + '|', flush=True)
 
 
-def _print_single(said: _All) -> None:
+def _print_single(measured: _Measurements) -> None:
     print('\nOne cycle\n')
     head = '| tray, truth | from | cycles | beads: bias | sd | covered 68 % | 95 % | half '
     print(head + '| walls: bias | sd | covered 68 % | 95 % | half |')
     print('| --- ' * 13 + '|')
-    for (number, truth), cycles in said.items():
-        begin = f'| {number}, {truth} '
-        for how in _ROWS:
-            posteriors = [_posterior([cycle], how) for cycle in cycles]
-            row = f'{begin}| {how.name} | {len(cycles)} '
+    for (number, truth), cycles in measured.items():
+        label = f'| {number}, {truth} '
+        for row_case in _ROWS:
+            posteriors = [_posterior([cycle], row_case) for cycle in cycles]
+            row = f'{label}| {row_case.name} | {len(cycles)} '
             row += _judged(
                 [posterior.quantiles(_LEVELS) for posterior in posteriors],
-                [one.cycle.pairs for one in cycles],
+                [cycle.cycle.pairs for cycle in cycles],
             )
-            if how.walls_known:
+            if row_case.walls_known:
                 row += '| | | | | '
             else:
                 row += _judged(
                     [posterior.wall_quantiles(_LEVELS) for posterior in posteriors],
-                    [one.cycle.walls for one in cycles],
+                    [cycle.cycle.walls for cycle in cycles],
                 )
             print(row + '|', flush=True)
-        off = np.array([one.final.paper_restitution - one.cycle.pairs for one in cycles])
-        print(f'{begin}| paper | {off.size} | {off.mean():+.3f} | {_sd(off):.3f} ' + '| ' * 9)
+        deviations = np.array(
+            [cycle.final.paper_restitution - cycle.cycle.pairs for cycle in cycles]
+        )
+        print(
+            f'{label}| paper | {deviations.size} | {deviations.mean():+.3f} '
+            f'| {_sd(deviations):.3f} ' + '| ' * 9
+        )
 
 
-def _judged(found: list[np.ndarray], truth: list[float]) -> str:
-    quantiles = np.array(found) - np.array(truth)[:, np.newaxis]
+def _judged(estimates: list[np.ndarray], truth: list[float]) -> str:
+    quantiles = np.array(estimates) - np.array(truth)[:, np.newaxis]
     middle = quantiles[:, 2]
     covered = [
         float(np.mean((quantiles[:, low] <= 0.0) & (quantiles[:, high] >= 0.0)))
@@ -263,17 +279,17 @@ def _judged(found: list[np.ndarray], truth: list[float]) -> str:
     return row + f'| {covered[0]:.2f} | {covered[1]:.2f} | {half:.3f} '
 
 
-def _print_together(said: _All) -> None:
+def _print_together(measured: _Measurements) -> None:
     print(f'\n{_TOGETHER} cycles together: off by, stated standard deviation; each group\n')
     print('| tray, truth | from | beads | walls |\n| --- | --- | --- | --- |')
-    for (number, truth), cycles in said.items():
+    for (number, truth), cycles in measured.items():
         if truth == 'drawn':
             continue
-        for how in _ROWS:
+        for row_case in _ROWS:
             groups = [
                 cycles[k : k + _TOGETHER] for k in range(0, len(cycles) - _TOGETHER + 1, _TOGETHER)
             ]
-            posteriors = [_posterior(one, how) for one in groups]
+            posteriors = [_posterior(group, row_case) for group in groups]
             beads, walls = (
                 ', '.join(
                     f'{posterior.mean[k] - true:+.4f}'
@@ -283,8 +299,10 @@ def _print_together(said: _All) -> None:
                 for k, true in enumerate((cycles[0].cycle.pairs, cycles[0].cycle.walls))
             )
             if posteriors:
-                known = '' if how.walls_known else walls
-                print(f'| {number}, {truth} | {how.name} | {beads} | {known} |', flush=True)
+                walls_text = '' if row_case.walls_known else walls
+                print(
+                    f'| {number}, {truth} | {row_case.name} | {beads} | {walls_text} |', flush=True
+                )
 
 
 def _sd(values: np.ndarray) -> float:

@@ -2,12 +2,12 @@
 
 True mean projected speeds with errors of 2 %, 1.75 to 20 s after a start at a mean speed of
 10 mm/s, of runs that are in no library. "Walls known": the prior gives the restitution of the
-walls, and nothing else is uncertain; an estimate comes from 1 cycle, or from 18 together with what
-the library is off by. "Nothing known but the priors": everything is drawn from the defaults of
-`prior.`, anew for each run: the walls from 0.8 to 1, floor and lid, height, diameter, count and
-start; that is what is said of one cycle when nothing is set. "The law itself": Haff's law alone,
-which is what the relation of the paper stands on; its interval of the decay rate 1/(v0 tau) is
-held against the same fit to the mean decay of all runs.
+walls, and nothing else is uncertain; an estimate uses 1 cycle, or 18 cycles with the misfit of the
+library. "Nothing known but the priors": all values are drawn from the defaults of `prior.` for
+each run: walls from 0.8 to 1, floor and lid, height, diameter, count and initial speeds. This is
+the case of one cycle with default settings. "The law itself": Haff's law alone, on which the
+relation of the paper is based; its interval of the decay rate 1/(v0 tau) is compared with the same
+fit to the mean decay of all runs.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
 _TRAYS = (1, 3, 5)
-# Trays with chalk and with grains, at fewer truths.
+# Trays with chalk and with grains, with fewer truths.
 _MORE_TRAYS = (2, 4, 6, 7)
 _MORE_RESTITUTIONS, _MORE_WALL = (0.7, 0.89), 0.97
 _RUNS = 216
 _TOGETHER = 18
-# As many as the paper has cycles of; groups of them, and truths.
+# Cycles in the paper; groups of cycles, and truths.
 _ALL_CYCLES, _GROUPS = 178, 6
 _ALL_RESTITUTIONS, _ALL_WALL = (0.7, 0.89), 0.97
 _RESTITUTIONS = (0.5, 0.7, 0.8, 0.89, 0.95)
@@ -70,7 +70,7 @@ _EXACT = PriorSettings(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Case:
-    """A place in the space of trays and restitutions."""
+    """A tray with its restitutions."""
 
     tray: int
     restitution: float
@@ -79,7 +79,7 @@ class _Case:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Range:
-    """Restitutions of the beads, any of them as likely."""
+    """A uniform range of restitutions of the beads."""
 
     tray: int
     low: float
@@ -141,8 +141,10 @@ def _known_walls(case: _Case) -> tuple[str, str]:
     likelihood = partial(_likelihood, tables, (0.0, 0.0))
     for number, speed in enumerate(_speeds(case, tray, {}, range(_RUNS))):
         singles.append(posterior_of(tables, likelihood(speed), walls).quantiles(_LEVELS))
-        one = decay_likelihood(tables, _TIMES, speed, _ERROR * speed, (library.misfit, 0.0))
-        total = one if total is None else total + one
+        likelihood_of_cycle = decay_likelihood(
+            tables, _TIMES, speed, _ERROR * speed, (library.misfit, 0.0)
+        )
+        total = likelihood_of_cycle if total is None else total + likelihood_of_cycle
         if number % _TOGETHER == _TOGETHER - 1:
             posterior = posterior_of(tables, total.integrated(), walls)
             together.append(posterior.quantiles(_LEVELS))
@@ -157,7 +159,7 @@ def _known_walls(case: _Case) -> tuple[str, str]:
 
 
 def _many_cycles(case: _Case) -> tuple[str, str]:
-    """As many cycles as the paper has; the intervals are those of the default walls known."""
+    """Groups of as many cycles as in the paper, with known walls."""
     tray = load_trays()[case.tray]
     library = library_of(tray)
     tables = tables_of(library, tray, _EXACT)
@@ -166,8 +168,10 @@ def _many_cycles(case: _Case) -> tuple[str, str]:
         first = 1000 * (group + 1)
         total = None
         for speed in _speeds(case, tray, {}, range(first, first + _ALL_CYCLES)):
-            one = decay_likelihood(tables, _TIMES, speed, _ERROR * speed, (library.misfit, 0.0))
-            total = one if total is None else total + one
+            likelihood_of_cycle = decay_likelihood(
+                tables, _TIMES, speed, _ERROR * speed, (library.misfit, 0.0)
+            )
+            total = likelihood_of_cycle if total is None else total + likelihood_of_cycle
         assert total is not None
         posterior = posterior_of(tables, total.integrated(), (case.wall, case.wall))
         low, middle, high = posterior.quantiles(_LEVELS[1:4])
@@ -181,16 +185,16 @@ def _many_cycles(case: _Case) -> tuple[str, str]:
 
 
 def _by_the_law(case: _Case) -> tuple[str, str]:
-    """Haff's law fitted to single runs, and to their mean."""
+    """Coverage of fits of Haff's law to single runs, against the fit to their mean."""
     tray = load_trays()[case.tray]
     speeds = _speeds(case, tray, {}, range(_RUNS))
     mean = speeds.mean(axis=0)
-    whole = fit_haff(_TIMES, mean, _ERROR * mean, tray.count * _RUNS)
+    mean_fit = fit_haff(_TIMES, mean, _ERROR * mean, tray.count * _RUNS)
     fits = [fit_haff(_TIMES, speed, _ERROR * speed, tray.count) for speed in speeds]
     logs = np.log([fit.decay_rate for fit in fits])
     errors = np.array([fit.log_decay_rate_error for fit in fits])
     freedom = np.array([fit.degrees_of_freedom for fit in fits])
-    pulls = np.abs(logs - math.log(whole.decay_rate)) / errors
+    pulls = np.abs(logs - math.log(mean_fit.decay_rate)) / errors
     shares = [float(np.mean(pulls < special.stdtrit(freedom, p))) for p in (0.84, 0.975)]
     head = '| tray | beads | walls | covered 68 % | 95 % | sd of ln(rate): runs | fits |'
     row = f'| {case.tray} | {case.restitution:g} | {case.wall:g} '
@@ -212,8 +216,8 @@ def _drawn_from_priors(case: _Range) -> tuple[str, str]:
             restitution=random.uniform(case.low, case.high),
             wall=random.uniform(prior.min_wall_restitution, prior.max_wall_restitution),
         )
-        there, values = varied(tray, drawn.wall, prior, random)
-        (speed,) = _speeds(drawn, there, values, range(number, number + 1))
+        varied_tray, values = varied(tray, drawn.wall, prior, random)
+        (speed,) = _speeds(drawn, varied_tray, values, range(number, number + 1))
         likelihood = _likelihood(tables, camera, speed)
         posterior = posterior_of(
             tables, likelihood, (prior.min_wall_restitution, prior.max_wall_restitution)
@@ -231,10 +235,10 @@ def _likelihood(tables: DecayTables, camera: tuple[float, float], speed: np.ndar
     return decay_likelihood(tables, _TIMES, speed, _ERROR * speed, camera).integrated()
 
 
-def _judged(found: np.ndarray, truth: float) -> str:
-    middle = found[:, 2]
+def _judged(estimates: np.ndarray, truth: float) -> str:
+    middle = estimates[:, 2]
     covered = [
-        float(np.mean((found[:, low] <= truth) & (truth <= found[:, high])))
+        float(np.mean((estimates[:, low] <= truth) & (truth <= estimates[:, high])))
         for low, high in ((1, 3), (0, 4))
     ]
     return (

@@ -1,11 +1,11 @@
-"""What the live page costs the graph: frames, latency and CPU with 0, 1, 10 and 10 slow browsers.
+"""Cost of the live page: frames, latency and CPU with 0, 1, 10 and 10 slow browsers.
 
-`pipeline` films and measures a tray of elastic beads, which never cool, at 1080p and 30 Hz; the
-same one all along. `dashboard` and the browsers, which all look at the tray with its tracks and
-what moves, are in processes of their own. A browser takes every step and acknowledges it; a slow
-one opens the connection, asks for pictures, and takes nothing. Everything is measured in one run,
-stage after stage; ratios are to the mean of the first and the last stage, which have no page. CPU
-of the pipeline is told per frame, since a machine with other work makes up for late frames later.
+One `pipeline` films and measures a tray of elastic beads, which never cool, at 1080p and 30 Hz.
+`dashboard` and the browsers, which view the tray with tracks and moving areas, run in separate
+processes. A browser acknowledges every step; a slow one opens the connection, requests images and
+reads nothing. All stages are measured in one run; ratios are relative to the mean of the first and
+the last stage, which have no page. CPU of the pipeline is per frame, since a busy machine
+processes late frames later.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _BROWSERS = 'from benchmarks.dashboard import browse; browse({}, {}, {}, {})'
 
 
 class _Stage(NamedTuple):
-    """What one stage showed."""
+    """Measurements of one stage."""
 
     frames: float
     median_ms: float
@@ -47,7 +47,7 @@ class _Stage(NamedTuple):
 
 
 class _Frames:
-    """When each frame was sent and done."""
+    """Times at which each frame was sent and processed."""
 
     def __init__(self, node) -> None:
         from nanorocks_ros.wire import topics
@@ -58,11 +58,11 @@ class _Frames:
         node.listen(topics.STATE, self._note(self.done), 1, required=False)
 
     @staticmethod
-    def _note(when: dict[float, float]):
-        def note(message) -> None:
-            when[round(message.data[0], 4)] = time.monotonic()
+    def _note(times: dict[float, float]):
+        def record_time(message) -> None:
+            times[round(message.data[0], 4)] = time.monotonic()
 
-        return note
+        return record_time
 
     def clear(self) -> None:
         self.sent.clear()
@@ -70,7 +70,7 @@ class _Frames:
 
 
 def browse(port: int, quick: int, slow: int, seconds: float) -> None:
-    """Be so many browsers for so long; print how many steps and pictures a quick one got."""
+    """Run browsers for some seconds; print the steps and images per second of a quick one."""
     print(json.dumps(asyncio.run(_browse(port, quick, slow, seconds))))
 
 
@@ -81,20 +81,22 @@ async def _browse(port: int, quick: int, slow: int, seconds: float) -> list[floa
         url = f'http://127.0.0.1:{port}/live'
         for _ in range(slow):
             await (await session.ws_connect(url)).send_json(_LOOK)
-        counts = await asyncio.gather(*(_one(session, url, seconds) for _ in range(quick)))
+        counts = await asyncio.gather(*(_browser(session, url, seconds) for _ in range(quick)))
         await asyncio.sleep(0.0 if quick else seconds)
-    return [float(np.mean(one)) for one in zip(*counts, strict=True)] if counts else [0.0, 0.0]
+    return (
+        [float(np.mean(values)) for values in zip(*counts, strict=True)] if counts else [0.0, 0.0]
+    )
 
 
-async def _one(session, url: str, seconds: float) -> tuple[float, float]:
+async def _browser(session, url: str, seconds: float) -> tuple[float, float]:
     import aiohttp
 
     steps = pictures = 0
-    end = time.monotonic() + seconds
+    deadline = time.monotonic() + seconds
     async with session.ws_connect(url) as connection:
         await connection.receive()
         await connection.send_json(_LOOK)
-        while time.monotonic() < end:
+        while time.monotonic() < deadline:
             message = await connection.receive()
             if message.type is aiohttp.WSMsgType.BINARY:
                 pictures += 1
@@ -138,7 +140,7 @@ def _measure(executor, frames, pipeline, page, port, quick, slow) -> _Stage:
 
 
 def report() -> None:
-    """Run all stages and print them beside the first."""
+    """Run all stages and print their table."""
     with listener(_DOMAIN) as (node, executor):
         _print(_stages(node, executor))
 

@@ -1,7 +1,8 @@
 """Take the pictures of the live page: ``python -m benchmarks.dashboard_pictures BAG [FOLDER]``.
 
-Plays a film of the plate, as slowly as all trays of it are followed, and writes dashboard.png and
-dashboard_phone.png, for the documentation, into docs/pictures or the folder given. BAG is made by
+Plays a film of the plate slowly enough for the pipeline to process all frames, and writes
+dashboard.png and dashboard_phone.png for the documentation into docs/pictures or the given folder.
+BAG is made by
 ``nanorocks simulate --scene --duration 32 --first-shake 0.5 --shake-period 20 --bag BAG``.
 """
 
@@ -31,7 +32,7 @@ _PICTURES = (
 
 
 def main() -> None:
-    """Start the graph, wait until the gas has cooled for a while, and take the pictures."""
+    """Start the graph, wait until the gas has cooled, and take the pictures."""
     folder = Path(sys.argv[2] if len(sys.argv) > 2 else 'docs/pictures')
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ['ROS_DOMAIN_ID'] = _DOMAIN
@@ -60,19 +61,19 @@ def _take(url: str, folder: Path) -> None:
         pages = [(name, browser.new_page(**options)) for name, options in _PICTURES]
         for _, page in pages:
             page.goto(url)
-        end = time.monotonic() + _PATIENCE_S
-        while not _cooled(pages[0][1]) and time.monotonic() < end:
+        deadline = time.monotonic() + _PATIENCE_S
+        while not _cooled(pages[0][1]) and time.monotonic() < deadline:
             time.sleep(0.5)
         for name, page in pages:
             page.screenshot(path=folder / name)
-            # Small enough for a repository.
+            # Reduces the size of the file in the repository.
             Image.open(folder / name).quantize(256).save(folder / name, optimize=True)
         browser.close()
 
 
 def _cooled(page) -> bool:
-    found = re.search(r'cooling for (\d+) s', page.locator('#state').text_content())
-    return found is not None and int(found[1]) >= _AFTER_S
+    match = re.search(r'cooling for (\d+) s', page.locator('#state').text_content())
+    return match is not None and int(match[1]) >= _AFTER_S
 
 
 if __name__ == '__main__':

@@ -1,9 +1,9 @@
-"""How often beads are deflected on their way: what the gas does, and what tracks show of it.
+"""Rate of deflections of beads, in the gas and in tracks.
 
-Elastic gases of 7 mm/s in trays 1, 3 and 5, filmed without effects. A kink is a place that lies
-more than 0.75 px off the middle of its neighbours in time; it is looked for in the true places and
-in those of the tracks alike. The share of the path that is lost is 1 - distance / path, over the
-distance in diameters, after the time in which a bead at the mean speed comes one diameter;
+Elastic gases of 7 mm/s in trays 1, 3 and 5, filmed without effects. A kink is a position more than
+0.75 px from the middle of its neighbours in time, in true positions and in tracks. The lost share
+of the path is 1 - distance / path, over the distance in diameters, after the time in which a bead
+at the mean speed moves by one diameter;
 `stages/structure_function.py` takes 0.25 for all.
 """
 
@@ -35,7 +35,7 @@ _WARM_UP = 45
 # Mean speed in the image plane over that in space, of an isotropic gas.
 _PROJECTED = np.pi / 4.0
 _KINK = 0.75 / SCALE
-# Of the mean speed, a change of the velocity in the image plane that is a collision.
+# Smallest change of the velocity in the image plane at a collision, over the mean speed.
 _CHANGE = 0.02
 
 
@@ -49,7 +49,7 @@ def report() -> None:
     trays = load_trays()
     for number in _TRAYS:
         truth = [beads for beads, _ in shots[number]]
-        tracks = [one for _, one in shots[number]]
+        tracks = [record for _, record in shots[number]]
         for index, species in enumerate(trays[number].species):
             true_runs, runs = _true_runs(truth, index), _runs(tracks, index)
             lag = max(1, round(species.diameter / _SPEED * _RATE))
@@ -81,7 +81,7 @@ def _shots() -> dict[int, list[tuple[BeadsTruth, Tracks]]]:
         View(camera=film.camera.geometry.camera),
     )
     trackers = {number: Tracker(settings(_TRAYS), flown[number]) for number in _TRAYS}
-    found: dict[int, list[tuple[BeadsTruth, Tracks]]] = {number: [] for number in _TRAYS}
+    shots: dict[int, list[tuple[BeadsTruth, Tracks]]] = {number: [] for number in _TRAYS}
     for count, moment in enumerate(film.moments(_FRAMES)):
         frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=moment.frame.image)
         truth = {bead.tray: bead for bead in moment.beads}
@@ -89,36 +89,38 @@ def _shots() -> dict[int, list[tuple[BeadsTruth, Tracks]]]:
             if isinstance(image, TrayImage):
                 for tracks in trackers[image.tray].push(image):
                     if count >= _WARM_UP:
-                        found[image.tray].append((truth[image.tray], tracks))
-    return found
+                        shots[image.tray].append((truth[image.tray], tracks))
+    return shots
 
 
 def _true_runs(truth: list[BeadsTruth], index: int) -> list[np.ndarray]:
-    """Places of each bead, (n, 2), past the camera."""
-    own = truth[0].species == index
-    places = np.array([one.positions[own, :2] + one.displacement for one in truth])
+    """Positions of each bead, (n, 2), relative to the camera."""
+    selected = truth[0].species == index
+    places = np.array([beads.positions[selected, :2] + beads.displacement for beads in truth])
     return list(places.transpose(1, 0, 2))
 
 
 def _runs(tracks: list[Tracks], index: int) -> list[np.ndarray]:
-    """The same of each track, as far as the bead is seen in one picture after another."""
-    whole: dict[int, list[tuple[int, np.ndarray]]] = {}
-    for frame, one in enumerate(tracks):
-        shown = one.seen & (one.species == index)
-        for number, place in zip(one.ids[shown].tolist(), one.positions[shown], strict=True):
-            whole.setdefault(number, []).append((frame, place + one.displacement))
+    """Positions of each track, split where the bead is not seen in a frame."""
+    positions_by_track: dict[int, list[tuple[int, np.ndarray]]] = {}
+    for frame, record in enumerate(tracks):
+        selected = record.seen & (record.species == index)
+        for number, place in zip(
+            record.ids[selected].tolist(), record.positions[selected], strict=True
+        ):
+            positions_by_track.setdefault(number, []).append((frame, place + record.displacement))
     runs = []
-    for seen in whole.values():
-        frames = np.array([frame for frame, _ in seen])
-        places = np.array([place for _, place in seen])
+    for samples in positions_by_track.values():
+        frames = np.array([frame for frame, _ in samples])
+        places = np.array([place for _, place in samples])
         runs += np.split(places, np.flatnonzero(np.diff(frames) > 1) + 1)
     return runs
 
 
 def _collisions(truth: list[BeadsTruth], index: int, species: Species) -> float:
     """Changes of the velocity in the image plane, per diameter of path."""
-    own = truth[0].species == index
-    velocities = np.array([one.free_velocities[own, :2] for one in truth])
+    selected = truth[0].species == index
+    velocities = np.array([beads.free_velocities[selected, :2] for beads in truth])
     changes = np.hypot(*np.moveaxis(np.diff(velocities, axis=0), 2, 0)) > _CHANGE * _SPEED
     path = sum(_path(run) for run in _true_runs(truth, index))
     return float(changes.sum()) / (path / species.diameter)
@@ -129,7 +131,7 @@ def _path(run: np.ndarray) -> float:
 
 
 def _kinks(runs: Iterable[np.ndarray], diameter: float) -> float:
-    """Kinks per diameter of path. One collision between two pictures may bend both."""
+    """Kinks per diameter of path. A collision between two frames can bend both positions."""
     kinks, path = 0, 0.0
     for run in runs:
         if len(run) < 3:
@@ -142,12 +144,12 @@ def _kinks(runs: Iterable[np.ndarray], diameter: float) -> float:
 
 
 def _lost(runs: Iterable[np.ndarray], lag: int, diameter: float) -> float:
-    """Share of the path that is lost, per diameter of the distance."""
+    """Lost share of the path, per diameter of the distance."""
     distances, paths = [np.empty(0)], [np.empty(0)]
     for run in runs:
         if len(run) > lag:
-            way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(run, axis=0).T))])
+            path_length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(run, axis=0).T))])
             distances.append(np.hypot(*(run[lag:] - run[:-lag]).T))
-            paths.append(way[lag:] - way[:-lag])
+            paths.append(path_length[lag:] - path_length[:-lag])
     distance = float(np.concatenate(distances).mean())
     return (1.0 - distance / float(np.concatenate(paths).mean())) * diameter / distance

@@ -1,4 +1,4 @@
-"""Trays and starts drawn from what the priors say of them."""
+"""Trays and initial speeds drawn from the priors."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def varied(
     tray: Tray, wall: float, prior: PriorSettings, random: np.random.Generator
 ) -> tuple[Tray, dict[str, float | str]]:
-    """A tray as the priors allow, and settings of its gas.
+    """A tray drawn from the priors, and settings of its gas.
 
     Parameters
     ----------
@@ -27,13 +27,13 @@ def varied(
     random : Generator
     """
     species = list(tray.species)
-    most = max(range(len(species)), key=lambda k: species[k].count)
+    main = max(range(len(species)), key=lambda k: species[k].count)
     size = 1.0 + prior.diameter_error * random.standard_normal()
-    count = species[most].count + round(prior.count_error * random.standard_normal())
-    species[most] = replace(
-        species[most],
-        diameter_low=size * species[most].diameter_low,
-        diameter_high=size * species[most].diameter_high,
+    count = species[main].count + round(prior.count_error * random.standard_normal())
+    species[main] = replace(
+        species[main],
+        diameter_low=size * species[main].diameter_low,
+        diameter_high=size * species[main].diameter_high,
         count=count,
     )
     length, width, height = tray.dimensions

@@ -1,4 +1,4 @@
-"""The event-driven engine: collisions per second, memory, what features cost, and peers."""
+"""The event-driven engine: collisions per second, memory, cost of features, other programs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 from nanorocks_ros.simulation.engine.rules.restitution_laws import UniformRestitution
 from nanorocks_ros.simulation.ensemble import cooling_runs
 
-# Collisions per bead before the clock starts, so that the crystal has melted, and after.
+# Collisions per bead before the measurement, in which the crystal melts.
 MELT = 8
 SIZES = 15, 55, 100, 800, 10_000, 100_000, 1_000_000
 # Collisions that take about a second and a half.
@@ -38,12 +38,12 @@ DILUTE = 0.1 * 6.0 / np.pi
 class Rate:
     n: int
     collisions: float  # per second
-    events: float  # per second, walls and all that was taken
+    events: float  # per second, with collisions at walls
     bytes_per_bead: float
 
 
 def crystal(n: int, density: float) -> tuple[np.ndarray, float]:
-    """A face-centred crystal of n unit spheres, the last cells of it empty; its side."""
+    """Positions of a face-centred crystal of n unit spheres with vacancies, and its side."""
     cells = int(np.ceil((n / 4.0) ** (1.0 / 3.0)))
     side = (n / density) ** (1.0 / 3.0)
     base = np.array([[0, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]])
@@ -74,7 +74,7 @@ def gas_of(
 
 
 def mean_free_time(density: float) -> float:
-    """Of unit spheres at temperature 1 (Enskog, Carnahan-Starling)."""
+    """Mean free time of unit spheres at temperature 1 (Enskog, Carnahan-Starling)."""
     filling = density * np.pi / 6.0
     contact = (1.0 - 0.5 * filling) / (1.0 - filling) ** 3
     return 1.0 / (4.0 * np.sqrt(np.pi) * density * contact)
@@ -115,8 +115,11 @@ def report_sizes() -> None:
     for n in SIZES:
         inside = measured(gas_of(n, DILUTE, periodic=False), DILUTE)
         around = measured(gas_of(n, DENSE, periodic=True), DENSE) if n > 15 else None
-        shown = f'{around.events / 1e6:17.3f}' if around else ' ' * 17
-        print(f'{n:9d}   {shown}   {inside.events / 1e6:20.3f}   {inside.bytes_per_bead:12.0f}')
+        periodic_rate = f'{around.events / 1e6:17.3f}' if around else ' ' * 17
+        print(
+            f'{n:9d}   {periodic_rate}   {inside.events / 1e6:20.3f}   '
+            f'{inside.bytes_per_bead:12.0f}'
+        )
         if around and n >= 100:
             rates.append((n, around.events))
     sizes, events = np.log(np.array(rates)).T
@@ -125,7 +128,7 @@ def report_sizes() -> None:
 
 
 def report_kernels() -> None:
-    """Print where lists become faster than asking everybody."""
+    """Print the number of beads above which neighbour lists are faster than a scan."""
     print('        N   scan / lists, walls   periodic   (events a second, ratio)')
     for n in (15, 30, 40, 55, 80, 120):
         ratios = []
@@ -145,7 +148,7 @@ def report_kernels() -> None:
 
 
 def report_features() -> None:
-    """Print what roughness and sticking cost when they are on and do nothing."""
+    """Print the cost of roughness and sticking that are on without effect."""
     print('time per event with a feature on, over the time with none (median of five pairs)\n')
     features = {
         'rough spheres': {'tangential_restitution': 1.0, 'wall_tangential_restitution': 1.0},
@@ -154,7 +157,7 @@ def report_features() -> None:
         'restitution drawn at random': {'restitution': UniformRestitution(mean=1.0, width=0.0)},
     }
     for name, rules in features.items():
-        found = []
+        medians = []
         for n in (15, 1000):
             ratios = []
             for _ in range(5):
@@ -163,8 +166,8 @@ def report_features() -> None:
                     gas_of(n, DILUTE, periodic=False, **rules), DILUTE, SHORT
                 ).events
                 ratios.append(plain / with_it)
-            found.append(float(np.median(ratios)))
-        print(f'{name:40s} N = 15: {found[0]:.2f}   N = 1000: {found[1]:.2f}')
+            medians.append(float(np.median(ratios)))
+        print(f'{name:40s} N = 15: {medians[0]:.2f}   N = 1000: {medians[1]:.2f}')
     print()
 
 
@@ -200,20 +203,20 @@ def report_search() -> None:
 
 
 def report_shell() -> None:
-    """Print what a reference ahead of the bead saves."""
+    """Print the effect of a shell centre ahead of the bead."""
     print('centre of a new shell ahead of its bead, in radii of the shell; N = 1000\n')
-    kept = list_tuning.AHEAD_OF_BEAD
+    default = list_tuning.AHEAD_OF_BEAD
     for density in (DILUTE, DENSE):
-        found = []
-        for ahead in (0.0, 0.4, kept):
+        results = []
+        for ahead in (0.0, 0.4, default):
             list_tuning.AHEAD_OF_BEAD = ahead
             gas = gas_of(1000, density, periodic=True)
             rate = measured(gas, density, SHORT * 3).collisions
-            found.append((ahead, rate, gas.counts.renewed / gas.counts.pair))
-        list_tuning.AHEAD_OF_BEAD = kept
+            results.append((ahead, rate, gas.counts.renewed / gas.counts.pair))
+        list_tuning.AHEAD_OF_BEAD = default
         text = ', '.join(
-            f'{ahead:.1f}: {renewed:.2f} renewals a collision, rate x {rate / found[0][1]:.2f}'
-            for ahead, rate, renewed in found
+            f'{ahead:.1f}: {renewed:.2f} renewals a collision, rate x {rate / results[0][1]:.2f}'
+            for ahead, rate, renewed in results
         )
         print(f'n d^3 = {density:.2f}   {text}')
     print()

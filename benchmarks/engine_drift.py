@@ -1,6 +1,6 @@
-"""A long run: energy, momentum and overlap after very many events.
+"""A long run: energy, momentum and overlap after many events.
 
-`python -m benchmarks.engine_drift 1e9` runs a billion; the number is 2e7 when none is given.
+`python -m benchmarks.engine_drift 1e9` runs a billion events; the default is 2e7.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The same gas in other event-driven programs, when they are at hand.
+"""The same gas in other event-driven programs, where they are installed.
 
 DynamO: `dynarun` and `dynamod` on PATH or in NANOROCKS_DYNAMO (a folder). FSmallenburg/EDMD: its
 folder `Single` in NANOROCKS_EDMD, built here with gcc and its author's flags.
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-# Whole face-centred crystals, for all programs alike.
+# Complete face-centred crystals, the same for all programs.
 SIZES = 864, 10_976, 97_556
 ROUNDS = 3
 DENSITY = 0.5
@@ -57,7 +57,7 @@ def cpu_seconds(command: list[str], folder: Path) -> float:
 
 
 def smallenburg() -> Callable[[int], float] | None:
-    """Collisions per CPU second of FSmallenburg/EDMD, or None when it is not there."""
+    """Collisions per CPU second of FSmallenburg/EDMD, or None where it is not installed."""
     source = os.environ.get('NANOROCKS_EDMD')
     if not source or not shutil.which('gcc'):
         return None
@@ -73,8 +73,8 @@ def smallenburg() -> Callable[[int], float] | None:
             ('maxtime', repr(span)),
             ('writeinterval', '1e6'),
         ):
-            text, found = re.subn(rf'(\b{name} *= *)[0-9.]+;', rf'\g<1>{value};', text, count=1)
-            if not found:
+            text, replaced = re.subn(rf'(\b{name} *= *)[0-9.]+;', rf'\g<1>{value};', text, count=1)
+            if not replaced:
                 raise SystemExit(f'benchmarks: {source}: no {name}; use another release')
         with tempfile.TemporaryDirectory() as folder:
             shutil.copytree(source, folder, dirs_exist_ok=True)
@@ -88,7 +88,7 @@ def smallenburg() -> Callable[[int], float] | None:
 
 
 def dynamo() -> Callable[[int], float] | None:
-    """Collisions per CPU second of DynamO, or None when it is not there."""
+    """Collisions per CPU second of DynamO, or None where it is not installed."""
     path = os.pathsep.join(filter(None, (os.environ.get('NANOROCKS_DYNAMO'), os.environ['PATH'])))
     run, make = shutil.which('dynarun', path=path), shutil.which('dynamod', path=path)
     if not (run and make):
@@ -112,11 +112,11 @@ def dynamo() -> Callable[[int], float] | None:
 
 
 def dynamo_run(command: list[str], folder: Path) -> tuple[int, float]:
-    """Collisions that DynamO says it has done, and its CPU time."""
+    """Number of collisions that DynamO reports, and its CPU time."""
     seconds = cpu_seconds(
         [*command, '--out-config-file', 'no.xml', '--out-data-file', 'data.xml'], folder
     )
-    found = re.search(r'TwoParticleEvents="(\d+)"', Path(folder, 'data.xml').read_text())
-    if found is None:
+    match = re.search(r'TwoParticleEvents="(\d+)"', Path(folder, 'data.xml').read_text())
+    if match is None:
         raise SystemExit('benchmarks: DynamO wrote no number of collisions; use another release')
-    return int(found[1]), seconds
+    return int(match[1]), seconds

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks import hard_spheres as known
+from benchmarks import hard_spheres as theory
 from benchmarks.hard_sphere_runs import (
     LAGS,
     collision_rate_ratio,
@@ -67,31 +67,31 @@ def _rates():
             lambda seed, n=n: collision_rate_ratio(_RATE_CELLS, n, seed, collisions=400.0),
             range(_RATE_RUNS[n]),
         )
-        enskog = known.collision_rate(n)
+        enskog = theory.collision_rate(n)
         rate = ratio.scaled(enskog)
         yield _row(f'collision rate ({n})', rate, enskog, 'Enskog, Carnahan-Starling 1969')
-        exact = enskog * known.exact_contact_value(n) / known.contact_value(n)
+        exact = enskog * theory.exact_contact_value(n) / theory.contact_value(n)
         yield _row(f'collision rate ({n})', rate, exact, 'Kolafa, Labik, Malijevsky 2004')
         if n == _DENSE:
             time = ratio.scaled(1.0 / ratio.mean**2 / enskog)
-            yield _row(f'mean free time ({n})', time, known.LUE_MEAN_FREE_TIME, 'Lue 2005')
+            yield _row(f'mean free time ({n})', time, theory.LUE_MEAN_FREE_TIME, 'Lue 2005')
 
 
 def _diffusion():
-    enskog = known.enskog_diffusion(_DENSE)
+    enskog = theory.enskog_diffusion(_DENSE)
     for cells, runs in _BOXES:
         beads = 4 * cells**3
         measure = partial(diffusion, cells, _DENSE, duration=150.0)
-        found = over_runs(measure, range(runs))
+        result = over_runs(measure, range(runs))
         if cells == _BOXES[0][0]:
-            speedy = known.speedy_diffusion(_DENSE)
-            yield _row(f'self-diffusion ({_DENSE}), {beads} beads', found, speedy, 'Speedy 1987')
-        missing = known.missing_diffusion(_DENSE, found.mean, beads, LAGS)
-        ratio = found.scaled((1.0 + missing / found.mean) / enskog)
+            speedy = theory.speedy_diffusion(_DENSE)
+            yield _row(f'self-diffusion ({_DENSE}), {beads} beads', result, speedy, 'Speedy 1987')
+        missing = theory.missing_diffusion(_DENSE, result.mean, beads, LAGS)
+        ratio = result.scaled((1.0 + missing / result.mean) / enskog)
         yield _row(
             f'self-diffusion over Enskog ({_DENSE}), {beads} beads to infinity',
             ratio,
-            known.erpenbeck_wood_ratio(_DENSE),
+            theory.erpenbeck_wood_ratio(_DENSE),
             'Erpenbeck, Wood 1991',
         )
 
@@ -102,7 +102,7 @@ def _cooling():
         yield _row(
             f'Haff coefficient ({density}), restitution {restitution}',
             over_runs(measure, range(32)),
-            known.haff_coefficient(restitution),
+            theory.haff_coefficient(restitution),
             'van Noije, Ernst 1998',
         )
 
@@ -123,7 +123,7 @@ def _pressures():
     wall = over_runs(lambda seed: wall_pressure_ratio((8, 6, 6), 0.3, seed), range(24))
     yield _row('pressure on walls (0.31) over CS', wall, 1.0, 'Carnahan, Starling 1969')
     virial = over_runs(lambda seed: virial_pressure_ratio(5, _DENSE, seed), range(24))
-    exact = known.exact_contact_value(_DENSE) / known.contact_value(_DENSE)
+    exact = theory.exact_contact_value(_DENSE) / theory.contact_value(_DENSE)
     yield _row(
         f'excess pressure ({_DENSE}), logged impulses, over CS',
         virial,

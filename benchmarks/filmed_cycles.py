@@ -1,7 +1,7 @@
-"""Cycles of trays filmed with all effects of the camera, and what the stages made of them.
+"""Cycles of trays filmed with all effects of the camera, and the results of the stages.
 
-A film is costly and what is worked out from it is not, so each is kept in a file of its own:
-run again, only the films that are missing are made.
+Films are costly, so the results of each are kept in a file; a second call makes only missing
+films.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.experiment.view import View
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import (
     Frame,
     PairCollision,
@@ -39,13 +40,12 @@ from nanorocks_ros.settings import (
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 
 FOLDER = 'NANOROCKS_FILMS'
-"""Environment variable: where films are kept; without it, below the temporary directory."""
+"""Environment variable with the folder of the films; default: in the temporary directory."""
 
-# The plate holds eight cells: four of tray 1 and four of tray 3, [mm], give as many cycles for
-# the price of one picture.
+# Positions of the eight cells of the plate, four of tray 1 and four of tray 3, [mm]: one film
+# gives eight cycles.
 PLACES = {
     1: ((4.0, 5.0), (23.0, 5.0), (42.0, 5.0), (61.0, 5.0)),
     3: ((42.0, 25.0), (42.0, 41.0), (4.0, 60.0), (42.0, 60.0)),
@@ -54,22 +54,22 @@ _MILLIMETRE = 1e-3
 _RATE = 30.0
 _SPEED = 0.010
 _SHAKE = 0.5
-# The plate swings on for some 13 s before the window, which ends some 32 s after the shake.
+# The plate oscillates for some 13 s before the window, which ends some 32 s after the shake.
 _SECONDS = 33.5
 _SCALE = 12500.0
 _QUALITY = 85
 DRAWN_PAIRS = (0.7, 0.95)
-"""Range of the restitutions of beads that are drawn."""
+"""Range of drawn restitutions of beads."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Film:
-    """What is to be filmed.
+    """Parameters of a film.
 
     Parameters
     ----------
     pairs, walls : float
-        Restitutions; NaN: drawn for each tray, with all else that the priors are about.
+        Restitutions; NaN: drawn for each tray, with all other values of the priors.
     number : int
     """
 
@@ -79,7 +79,7 @@ class Film:
 
     @property
     def name(self) -> str:
-        """Of its file."""
+        """Name of its file."""
         truth = 'drawn' if math.isnan(self.pairs) else f'{self.pairs:g}_{self.walls:g}'
         return f'{truth}_{self.number}.pickle'
 
@@ -91,11 +91,11 @@ class Cycle:
     Parameters
     ----------
     tray : int
-        Whose beads and sides they were.
+        Tray with the same beads and sides.
     speeds : tuple of SpeedEstimate
     contacts : tuple of Rebound or PairCollision
     time : ndarray (n,), [s]
-        Of the frames.
+        Times of the frames.
     true_speed : ndarray (n,), [m/s]
         Mean projected speed of all beads relative to their tray.
     pairs, walls : float
@@ -112,7 +112,7 @@ class Cycle:
 
 
 def folder() -> Path:
-    """Where films are kept."""
+    """Folder of the films."""
     default = Path(tempfile.gettempdir()) / 'nanorocks_films'
     path = Path(os.environ.get(FOLDER, default))
     path.mkdir(parents=True, exist_ok=True)
@@ -120,39 +120,39 @@ def folder() -> Path:
 
 
 def make(films: list[Film], workers: Workers) -> None:
-    """Make the films that are missing."""
+    """Make missing films."""
     missing = {film.name: film for film in films if not (folder() / film.name).exists()}
     run_tasks(_make, missing, workers)
 
 
 def load(films: list[Film]) -> dict[int, list[Cycle]]:
-    """The cycles of each tray, of the films that were made."""
-    found: dict[int, list[Cycle]] = {number: [] for number in PLACES}
+    """The cycles of each tray, from the films that exist."""
+    cycles: dict[int, list[Cycle]] = {number: [] for number in PLACES}
     for film in films:
         path = folder() / film.name
         if path.exists():
             for cycle in pickle.loads(path.read_bytes()):
-                found[cycle.tray].append(cycle)
-    return found
+                cycles[cycle.tray].append(cycle)
+    return cycles
 
 
 def _cells() -> tuple[dict[int, Tray], dict[int, int]]:
-    """The cells of the plate by number, and which tray each of them is like."""
+    """The cells of the plate by number, and the tray of each cell."""
     flown = load_trays()
-    cells, like = {}, {}
+    cells, tray_of_cell = {}, {}
     for tray, places in PLACES.items():
         for x, y in places:
             number = len(cells) + 1
             place = (x * _MILLIMETRE, y * _MILLIMETRE)
             cells[number] = replace(flown[tray], number=number, place=place)
-            like[number] = tray
-    return cells, like
+            tray_of_cell[number] = tray
+    return cells, tray_of_cell
 
 
 def _filled(
     cells: dict[int, Tray], film: Film
 ) -> tuple[dict[int, Tray], dict[int, SimulationSettings]]:
-    """What really is in the cells, of which the stages know no more than the cells."""
+    """The true trays and gases of the cells; the stages use the nominal cells."""
     common = SimulationSettings(
         seed=1000 + film.number, mean_speed=_SPEED, first_shake=_SHAKE, frame_rate=_RATE
     )
@@ -160,23 +160,23 @@ def _filled(
         values = {'restitution': film.pairs, 'wall_restitution': film.walls}
         return cells, dict.fromkeys(cells, with_values(common, values, 'benchmark'))
     prior = PriorSettings()
-    there, gases = {}, {}
+    varied_cells, gases = {}, {}
     for number, cell in cells.items():
         random = np.random.default_rng([film.number, number])
         pairs = random.uniform(*DRAWN_PAIRS)
         walls = random.uniform(prior.min_wall_restitution, prior.max_wall_restitution)
-        there[number], values = varied(cell, walls, prior, random)
+        varied_cells[number], values = varied(cell, walls, prior, random)
         values |= {'restitution': pairs, 'wall_restitution': walls}
         gases[number] = with_values(common, values, 'benchmark')
-    return there, gases
+    return varied_cells, gases
 
 
 def _make(film: Film) -> None:
     cv2.setNumThreads(1)
-    cells, like = _cells()
-    there, gases = _filled(cells, film)
+    cells, tray_of_cell = _cells()
+    varied_cells, gases = _filled(cells, film)
     plate = SceneSettings(trays=tuple(cells))
-    scene = SceneFilm(gases[1], plate, there, gases)
+    scene = SceneFilm(gases[1], plate, varied_cells, gases)
     names = {
         'trays': list(cells),
         'preprocess.layout': 'plate',
@@ -184,28 +184,31 @@ def _make(film: Film) -> None:
     }
     settings = with_values(PipelineSettings(), names, 'benchmark')
     stage = Preprocessor(settings, cells, 'film', View(camera=scene.camera.geometry.camera))
-    follow = {number: _Follower(settings, cell) for number, cell in cells.items()}
+    pipelines = {number: _Follower(settings, cell) for number, cell in cells.items()}
     for moment in scene.moments(round(_SECONDS * _RATE)):
         for beads in moment.beads:
             speed = np.hypot(beads.velocities[:, 0], beads.velocities[:, 1]).mean()
-            follow[beads.tray].truth.append((beads.stamp_ns * 1e-9, float(speed)))
+            pipelines[beads.tray].truth.append((beads.stamp_ns * 1e-9, float(speed)))
         quality = [cv2.IMWRITE_JPEG_QUALITY, _QUALITY]
         jpeg = cv2.imencode('.jpg', moment.frame.image, quality)[1]
         image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR)
         frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
         for record in stage.push(frame):
             if isinstance(record, TrayImage):
-                follow[record.tray].push(record)
-    cycles = [follower.cycle(like[number], gases[number]) for number, follower in follow.items()]
+                pipelines[record.tray].push(record)
+    cycles = [
+        pipeline.cycle(tray_of_cell[number], gases[number])
+        for number, pipeline in pipelines.items()
+    ]
     path = folder() / film.name
     write_bytes(path, pickle.dumps(cycles))
 
 
 class _Follower:
-    """What the stages make of the images of one cell."""
+    """Results of the stages for the images of one cell."""
 
     def __init__(self, settings: PipelineSettings, cell: Tray) -> None:
-        self._speed = SpeedEstimator(settings, cell)
+        self._speed = TrayMeasurement(settings, cell)
         self._speed.emit_tracks = True
         self._finder = ContactFinder(cell)
         self._speeds: list[SpeedEstimate] = []

@@ -1,4 +1,4 @@
-"""Films of the plate that several benchmarks look at."""
+"""Films of the plate for several benchmarks."""
 
 from __future__ import annotations
 
@@ -75,10 +75,12 @@ def filmed(
         jpeg = cv2.imencode('.jpg', moment.frame.image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
         image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR) if effects else moment.frame.image
         frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
-        images = [one for one in stage.push(frame) if isinstance(one, TrayImage)]
+        images = [record for record in stage.push(frame) if isinstance(record, TrayImage)]
         shots.append(
             Shot(
-                jpeg, {one.tray: one for one in images}, {bead.tray: bead for bead in moment.beads}
+                jpeg,
+                {record.tray: record for record in images},
+                {bead.tray: bead for bead in moment.beads},
             )
         )
     return shots, film

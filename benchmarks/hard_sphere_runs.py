@@ -1,8 +1,8 @@
-"""Single runs of the event-driven engine that measure what is known of hard spheres.
+"""Single runs of the event-driven engine that measure known quantities of hard spheres.
 
-Beads have the size, mass and speed of those of tray 1; what is returned is in the units of
-`hard_spheres`. A run begins on a lattice, which melts before anything is measured; runs of
-different seeds are independent.
+Beads have the size, mass and speed of those of tray 1; results are in the units of `hard_spheres`.
+A run starts on a lattice, which melts before the measurement; runs of different seeds are
+independent.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _FCC = np.array([[0.25, 0.25, 0.25], [0.75, 0.75, 0.25], [0.75, 0.25, 0.75], [0.
 _PERIODIC = (True, True, True)
 # In d / v; at a density of 0.5 these are 46 and 92 mean free times.
 LAGS = (6, 12)
-# Layers at a wall have died away at this distance, in diameters, at densities up to 0.3.
+# Distance from a wall beyond which density layers are negligible at densities up to 0.3, [d].
 _LAYERS = 3.0
 
 
@@ -40,12 +40,12 @@ class Measured:
     error: float
 
     def scaled(self, factor):
-        """The same in other units."""
+        """The value and its error, times a factor."""
         return Measured(mean=self.mean * factor, error=self.error * abs(factor))
 
 
 def over_runs(measure, seeds):
-    """Mean and standard error of a measure of one run over runs of some seeds."""
+    """Mean and standard error of a measured value over runs with different seeds."""
     values = np.array([measure(seed) for seed in seeds])
     return Measured(
         mean=float(values.mean()), error=float(values.std(ddof=1) / math.sqrt(values.size))
@@ -60,7 +60,7 @@ def lattice(cells, sides):
 
 
 def thermal_velocities(masses, seed):
-    """Velocities after Maxwell, without momentum, at exactly the energy of kT = m v^2."""
+    """Maxwell-distributed velocities with zero total momentum and energy exactly kT = m v^2."""
     velocities = np.random.default_rng(seed).normal(size=(masses.size, 3))
     velocities /= np.sqrt(masses)[:, np.newaxis]
     velocities -= masses @ velocities / masses.sum()
@@ -69,7 +69,7 @@ def thermal_velocities(masses, seed):
 
 
 def equal_gas(positions, seed, **rules):
-    """A gas of equal beads, thermal."""
+    """A thermal gas of equal beads."""
     masses = np.full(len(positions), MASS)
     beads = Beads(
         radii=np.full(len(positions), 0.5 * DIAMETER),
@@ -88,7 +88,7 @@ def bulk(cells, density, seed, **rules):
 
 
 def collision_rate_ratio(cells, density, seed, *, settle=40.0, collisions=240.0):
-    """Collision rate over Enskog's for so few beads; collisions are those of each bead."""
+    """Collision rate over Enskog's for a finite number of beads; `collisions` are per bead."""
     gas = bulk(cells, density, seed)
     n = gas.radii.size
     rate = collision_rate(density) / TIME
@@ -99,7 +99,7 @@ def collision_rate_ratio(cells, density, seed, *, settle=40.0, collisions=240.0)
 
 
 def virial_pressure_ratio(cells, density, seed, *, settle=40.0, collisions=240.0):
-    """Pressure beyond that of an ideal gas, from the impulses in the log, over that of [CS]."""
+    """Excess pressure over the ideal gas, from logged impulses, relative to that of [CS]."""
     gas = bulk(cells, density, seed)
     rate = collision_rate(density) / TIME
     gas.follow(settle / rate)
@@ -135,31 +135,30 @@ def cooling_coefficient(cells, density, restitution, seed, *, settle=15.0, haff_
 
 
 def wall_pressure_ratio(cells, density, seed, *, settle=20.0, duration=200.0):
-    """Pressure on two walls over that of [CS] at the density that is found between them.
+    """Pressure on two walls over that of [CS] at the bulk density between them.
 
-    The centres of the beads keep off the walls, and they crowd there: the density of the bulk
-    is counted where the layers have died away.
+    Beads form layers at the walls; the bulk density is counted outside these layers.
     """
     sides = DIAMETER * (4.0 / density) ** (1.0 / 3.0) * np.array(cells)
     gas = equal_gas(lattice(cells, sides), seed, box=tuple(sides), periodic=(False, True, True))
     n = gas.radii.size
     times = (settle + np.arange(duration)) * TIME
-    course = gas.follow(times[-1], times, times[[0, -1]])
-    given = np.abs(np.diff(course.observations.wall_impulse, axis=0)[0, :2]).mean()
-    measured = given / (sides[1] * sides[2] * (times[-1] - times[0]))
+    record = gas.follow(times[-1], times, times[[0, -1]])
+    impulse = np.abs(np.diff(record.observations.wall_impulse, axis=0)[0, :2]).mean()
+    measured = impulse / (sides[1] * sides[2] * (times[-1] - times[0]))
     # Momentum towards the walls is not conserved: 3n - 2 directions share the energy.
     energy = MASS * SPEED**2 * (3 * n - 3) / (3 * n - 2)
     side = sides[0] / DIAMETER
-    off_centre = np.abs(course.positions[:, :, 0] / DIAMETER - 0.5 * side)
+    off_centre = np.abs(record.positions[:, :, 0] / DIAMETER - 0.5 * side)
     inside = float(np.mean(off_centre < 0.5 * side - _LAYERS))
     bulk_density = density * inside * side / (side - 2.0 * _LAYERS)
     return measured * DIAMETER**3 / energy / pressure(bulk_density)
 
 
 def mixture_temperature_ratio(seed, *, settle=60.0, duration=300.0):
-    """Temperature of heavy, large beads over that of light ones, which had all the energy.
+    """Temperature of heavy, large beads over that of light beads, which start with all the energy.
 
-    The momentum of all is zero: of its part of the energy a bead lacks its part of the mass.
+    The total momentum is zero, which reduces the energy of a bead by its share of the mass.
     """
     side = 12.0 * DIAMETER
     places = lattice((4, 4, 4), (side, side, side))
@@ -185,28 +184,28 @@ def mixture_temperature_ratio(seed, *, settle=60.0, duration=300.0):
 
 
 def rough_temperature_ratio(seed, *, settle=60.0, duration=300.0):
-    """Temperature of the rotation over that of the translation, which had all the energy.
+    """Temperature of rotation over that of translation, which starts with all the energy.
 
-    Perfectly rough, elastic spheres; 3n directions of rotation and 3n - 3 of translation.
+    Perfectly rough, elastic spheres; 3n degrees of freedom of rotation, 3n - 3 of translation.
     """
     gas = bulk(4, 0.3, seed, tangential_restitution=1.0)
     times = np.arange(settle, settle + duration, 0.5) * TIME
-    course = gas.follow(times[-1], times)
+    record = gas.follow(times[-1], times)
     n = gas.radii.size
     inertia = 0.4 * MASS * (0.5 * DIAMETER) ** 2
-    translation = MASS * np.mean(course.velocities**2) * 3 * n / (3 * n - 3)
-    return inertia * np.mean(course.spins**2) / translation
+    translation = MASS * np.mean(record.velocities**2) * 3 * n / (3 * n - 3)
+    return inertia * np.mean(record.spins**2) / translation
 
 
 def shaken_tray(seed, *, restitution=0.89, frequency=5.0, duration=120.0):
     """Energies [J] of the 15 beads of tray 1 at whole periods of the shaking, (n_periods + 1,).
 
-    Beads lose energy to one another; the walls are elastic, and give energy by moving.
+    Beads lose energy in their collisions; the walls are elastic, and add energy by their motion.
 
     Returns
     -------
     energy, lost_to_beads, gained_at_walls : ndarray
-        Kinetic, and sums since the start.
+        Kinetic energy, and sums since the start.
     """
     count, box = 15, (0.015, 0.015, 0.003)
     places = (np.indices((4, 4)).reshape(2, -1).T[:count] + 0.5) * box[0] / 4.0

@@ -1,4 +1,4 @@
-"""What is known of hard spheres; lengths in diameters d, masses in m, energies in kT = m v^2.
+"""Theory of hard spheres; lengths in diameters d, masses in m, energies in kT = m v^2.
 
 v is the thermal speed, the root mean square of one component of the velocity. A density is a
 number density times d^3.
@@ -29,7 +29,7 @@ LUE_MEAN_FREE_TIME = 0.13031
 
 # Sum over the images of a periodic cube, in units of its side [YH].
 _CUBE = 2.837297
-# What further Sonine polynomials add to the self-diffusion of hard spheres; from memory,
+# Factor of all Sonine polynomials on the self-diffusion of hard spheres; from memory,
 # Chapman, Cowling 1970.
 _ALL_SONINE = 1.01896
 # Powers of phi / (1 - phi) in the compressibility factor, [KLM].
@@ -51,7 +51,7 @@ _STEP = 1e-4
 
 
 def filling(density):
-    """Part of the volume that is filled."""
+    """Filling factor."""
     return math.pi / 6.0 * density
 
 
@@ -108,7 +108,7 @@ def enskog_viscosity(density):
 
 
 def missing_diffusion(density, diffusion, n, lags):
-    """What the self-diffusion of n beads in a periodic cube lacks between two lags.
+    """Finite-size deficit of the self-diffusion of n beads in a periodic cube between two lags.
 
     The velocities of a bead stay correlated through the slow shear of the gas about it, which
     decays at the rate (viscosity / density + diffusion) k^2. A cube has only some of its waves:

@@ -1,8 +1,8 @@
-"""Live graph at 1080p and 30 Hz for 20 s: frames that arrive, latency, CPU.
+"""Live graph at 1080p and 30 Hz for 20 s: received frames, latency, CPU.
 
 `simulator` and `pipeline` (source: topic) run in processes of their own and talk over DDS. A
-third process, this one, listens to the truth (one message a frame sent) and to the gray tray
-image (one message a frame processed) and compares the frame's stamp with the clock.
+third process, this one, receives the truth (one message per frame sent) and the gray tray image
+(one message per frame processed), and compares the stamp of the frame with the clock.
 """
 
 from __future__ import annotations
@@ -44,15 +44,15 @@ def start_node(*arguments: str, **options) -> subprocess.Popen:
 
 
 def spin(executor, seconds: float, stop=lambda: False) -> None:
-    """Listen for so long, or until `stop`."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end and not stop():
+    """Spin for some seconds, or until `stop` returns true."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline and not stop():
         executor.spin_once(timeout_sec=0.1)
 
 
 @contextmanager
 def listener(domain: str):
-    """A node on a domain of its own on this host, and what spins it."""
+    """A node in a separate domain on this host, and its executor."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ['ROS_DOMAIN_ID'] = domain
     import rclpy
@@ -71,7 +71,7 @@ def listener(domain: str):
 
 
 def report() -> None:
-    """Run the graph and print what arrived."""
+    """Run the graph and print the received frames."""
     with listener(_DOMAIN) as (node, executor):
         _measure(node, executor)
 

@@ -1,15 +1,15 @@
-"""Live graph of the whole plate: eight trays, 1080p, 30 Hz: what arrives, and how late.
+"""Live graph of the whole plate: received frames and latency of eight trays, 1080p, 30 Hz.
 
-A film of the plate with all effects is recorded first (LIVE_PLATE_BAG names one that exists:
+A film of the plate with all effects is recorded first (LIVE_PLATE_BAG names an existing one:
 `nanorocks simulate --scene --bag BAG --duration 65 --first-shake 0.5`). `bag_player` and
-`pipeline` run in processes of their own and talk over DDS. A third process, this one, listens to
-the truth of a tray (one message a frame sent) and to the state of each tray (one message a tray
-image processed) and compares when they came.
+`pipeline` run in separate processes and communicate over DDS. A third process, this one, receives
+the truth of a tray (one message per frame sent) and the state of each tray (one message per tray
+image processed), and compares their times of arrival.
 
-The film is played once compressed, once raw, and once compressed with everything on: the pipeline
-records camera and results, and serves the live page to ten browsers that look at a tray each, with
-its tracks and what moves. LIVE_PLATE_RUNS chooses among `compressed raw everything`,
-LIVE_PLATE_SECONDS how long (60), LIVE_PLATE_BROWSERS how many (10).
+The film is played compressed, raw, and compressed with all options: the pipeline records camera
+and results, and serves the live page to ten browsers that view a tray with tracks and moving
+areas. LIVE_PLATE_RUNS selects from `compressed raw everything`, LIVE_PLATE_SECONDS sets the
+duration (60), LIVE_PLATE_BROWSERS the number of browsers (10).
 """
 
 from __future__ import annotations
@@ -45,16 +45,16 @@ PLATE = {
     'preprocess.layout': 'plate',
     'preprocess.pixels_per_metre': 12500.0,
 }
-"""Settings of the plate as it is filmed."""
+"""Settings for films of the plate."""
 _DOMAIN = '53'
 _TICKS = os.sysconf('SC_CLK_TCK')
 _CLI = 'import sys; from nanorocks_ros.cli.main import main; sys.exit(main())'
 
 
 class _Tally:
-    """When each frame was sent and each tray image done, by the number of the frame.
+    """Times at which each frame was sent and each tray image was processed, by frame number.
 
-    Messages are not unpacked but for the time in them: the cores are for those who are measured.
+    Only the time in a message is unpacked, to leave the cores to the measured processes.
     """
 
     def __init__(self, node) -> None:
@@ -77,16 +77,16 @@ class _Tally:
         kind = message_class(topic.type)
         self._node.create_subscription(kind, topic.of(tray), take, qos_of(topic), raw=True)
 
-    def _noted(self, when: dict[int, float], kind):
-        # The values are the last that stands in a message; the time is the first of them.
+    def _noted(self, times: dict[int, float], kind):
+        # A message ends with the values; the time is the first of them.
         values_size = 4 * len(layout(kind).fields)
 
-        def note(cdr: bytes) -> None:
+        def record_time(cdr: bytes) -> None:
             now = self.last = time.monotonic()
             (seconds,) = struct.unpack_from('<f', cdr, len(cdr) - values_size)
-            when[round(seconds * _RATE)] = now
+            times[round(seconds * _RATE)] = now
 
-        return note
+        return record_time
 
     def _counted(self, tray: int, name: str):
         def count(_) -> None:
@@ -95,10 +95,10 @@ class _Tally:
         return count
 
 
-def filmed_plate(folder: str, seconds: float, known: str) -> Path:
-    """A film of the plate with all effects: one that is known, or a new one."""
-    if known:
-        return Path(known)
+def filmed_plate(folder: str, seconds: float, existing: str) -> Path:
+    """A film of the plate with all effects: an existing or a new one."""
+    if existing:
+        return Path(existing)
     bag = Path(folder) / 'plate'
     print(f'filming {seconds:g} s ...', file=sys.stderr, flush=True)
     subprocess.run(
@@ -110,23 +110,23 @@ def filmed_plate(folder: str, seconds: float, known: str) -> Path:
     return bag
 
 
-def _start(left: ExitStack, *arguments: str) -> subprocess.Popen:
+def _start(cleanup: ExitStack, *arguments: str) -> subprocess.Popen:
     command = [sys.executable, '-m', 'nanorocks_ros.nodes', *arguments]
     process = subprocess.Popen(command)
-    # Whatever happens here, nobody goes on playing.
-    left.callback(process.kill)
+    # The process ends even after an exception here.
+    cleanup.callback(process.kill)
     return process
 
 
 def _spin(executor, seconds: float, stop=lambda: False) -> None:
-    end = time.monotonic() + seconds
-    while time.monotonic() < end and not stop():
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline and not stop():
         executor.spin_once(timeout_sec=0.1)
 
 
 def _cpu(process: subprocess.Popen) -> float:
     """Processor time that a process and its children have used, [s]."""
-    return sum(_cpu_of(one) for one in _family(process.pid))
+    return sum(_cpu_of(member) for member in _family(process.pid))
 
 
 def _family(pid: int) -> list[int]:
@@ -134,7 +134,7 @@ def _family(pid: int) -> list[int]:
         children = Path(f'/proc/{pid}/task/{pid}/children').read_text().split()
     except OSError:
         children = []
-    return [pid, *(one for child in children for one in _family(int(child)))]
+    return [pid, *(descendant for child in children for descendant in _family(int(child)))]
 
 
 def _cpu_of(pid: int) -> float:
@@ -146,9 +146,9 @@ def _cpu_of(pid: int) -> float:
 
 
 def _free_port() -> int:
-    with socket.socket() as one:
-        one.bind(('127.0.0.1', 0))
-        return int(one.getsockname()[1])
+    with socket.socket() as server:
+        server.bind(('127.0.0.1', 0))
+        return int(server.getsockname()[1])
 
 
 def _browsers(port: int) -> subprocess.Popen:
@@ -156,7 +156,7 @@ def _browsers(port: int) -> subprocess.Popen:
     return subprocess.Popen([sys.executable, '-c', call], stdout=subprocess.PIPE)
 
 
-def _run(bag: Path, run: str, folder: str, left: ExitStack) -> None:
+def _run(bag: Path, run: str, folder: str, cleanup: ExitStack) -> None:
     import rclpy
     from rclpy.experimental.events_executor import EventsExecutor
 
@@ -170,20 +170,27 @@ def _run(bag: Path, run: str, folder: str, left: ExitStack) -> None:
     tally = _Tally(node)
     everything, record, port = run == 'everything', f'{folder}/recorded', _free_port()
     transport = 'compressed' if everything else run
-    more = ['-p', f'record:={record}', '-p', 'dashboard:=true', '-p', f'dashboard_port:={port}']
+    everything_options = [
+        '-p',
+        f'record:={record}',
+        '-p',
+        'dashboard:=true',
+        '-p',
+        f'dashboard_port:={port}',
+    ]
     pipeline = _start(
-        left, 'pipeline', '--ros-args', '-p', 'source:=topic', '-p', f'transport:={transport}',
+        cleanup, 'pipeline', '--ros-args', '-p', 'source:=topic', '-p', f'transport:={transport}',
         '-p', f'trays:={list(_TRAYS)}', '-p', 'preprocess.layout:=plate',
-        '-p', 'preprocess.pixels_per_metre:=12500.0', *(more if everything else ()),
+        '-p', 'preprocess.pixels_per_metre:=12500.0', *(everything_options if everything else ()),
     )  # fmt: skip
     camera = topics.RAW_COMPRESSED if transport == 'compressed' else topics.RAW
     _spin(executor, _SETTLE_S, lambda: node.count_subscribers(camera.absolute()) > 0)
     browsers = _browsers(port) if everything else None
     player = _start(
-        left, 'bag_player', '--ros-args', '-p', f'bag:={bag}', '-p', 'listeners:=2',
+        cleanup, 'bag_player', '--ros-args', '-p', f'bag:={bag}', '-p', 'listeners:=2',
         '-p', f'duration:={_SECONDS}',
     )  # fmt: skip
-    # The player waits for a second listener, which comes when this node hears the truth.
+    # The player waits for a second subscriber, which is made once the truth is offered.
     _spin(executor, _SETTLE_S, lambda: node.count_publishers(topics.TRUTH.absolute(1)) > 0)
     _spin(executor, 2.0)
     gate = node.create_subscription(
@@ -195,7 +202,7 @@ def _run(bag: Path, run: str, folder: str, left: ExitStack) -> None:
     _spin(executor, _SECONDS - 0.5, lambda: player.poll() is not None)
     used = np.subtract([_cpu(player), _cpu(pipeline)], before) / (time.monotonic() - start)
     _spin(executor, _SETTLE_S, lambda: player.poll() is not None)
-    # What waits is not lost.
+    # Frames in queues still arrive.
     _spin(executor, _SETTLE_S, lambda: time.monotonic() - tally.last > _QUIET_S)
     pipeline.send_signal(2)
     pipeline.wait(20)
@@ -216,7 +223,7 @@ def _print(tally: _Tally, used, run: str) -> None:
     for frame, sent in sorted(tally.sent.items()):
         second = (frame - first) / _RATE
         if all(frame in frames for frames in tally.done.values()):
-            late[second] = 1e3 * (max(one[frame] for one in tally.done.values()) - sent)
+            late[second] = 1e3 * (max(value[frame] for value in tally.done.values()) - sent)
         else:
             lost.append(second)
     counts = ', '.join(f'{tray}: {count}' for tray, count in done.items())
@@ -224,22 +231,22 @@ def _print(tally: _Tally, used, run: str) -> None:
           f'dropped {len(lost)}{_when(lost)}')  # fmt: skip
     print(f'tray images done, by tray: {counts}')
     for name in ('speed', 'cluster', 'cor'):
-        found = ', '.join(f'{tray}: {tally.results[f"{name} {tray}"]}' for tray in _TRAYS)
-        print(f'results, {name}, by tray: {found}')
+        counts_text = ', '.join(f'{tray}: {tally.results[f"{name} {tray}"]}' for tray in _TRAYS)
+        print(f'results, {name}, by tray: {counts_text}')
     if late:
         ms = list(late.values())
         print(
             f'latency of the last tray, median {np.median(ms):.1f} ms, '
             f'p99 {np.quantile(ms, 0.99):.1f} ms, longest {max(ms):.1f} ms'
         )
-        slow = [second for second, one in late.items() if one > _SLOW_MS]
+        slow = [second for second, value in late.items() if value > _SLOW_MS]
         print(f'later than {_SLOW_MS:g} ms: {len(slow)}{_when(slow)}')
     print(f'CPU while playing: bag_player {used[0]:.2f} cores, pipeline {used[1]:.2f} cores',
           flush=True)  # fmt: skip
 
 
 def _when(seconds: list[float]) -> str:
-    """Spans of time in which something happened, less than a second apart."""
+    """Text with the time spans of events less than a second apart."""
     if not seconds:
         return ''
     gaps = np.flatnonzero(np.diff(seconds) > 1.0) + 1
@@ -248,7 +255,7 @@ def _when(seconds: list[float]) -> str:
 
 
 def report() -> None:
-    """Film the plate, play it, and print what arrived."""
+    """Film the plate, play it, and print the received frames."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ['ROS_DOMAIN_ID'] = _DOMAIN
     import rclpy
@@ -257,5 +264,5 @@ def report() -> None:
         bag = filmed_plate(folder, _SECONDS + 5.0, os.environ.get('LIVE_PLATE_BAG', ''))
         for run in _RUNS:
             rclpy.init()
-            with ExitStack() as left:
-                _run(bag, run, folder, left)
+            with ExitStack() as cleanup:
+                _run(bag, run, folder, cleanup)

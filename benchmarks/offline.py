@@ -1,8 +1,8 @@
-"""Frames per second of the offline analyser on one core, beside decoding the same frames alone.
+"""Frames per second of the offline analysis on one core, against decoding the same frames.
 
-1080p JPEG frames, of one tray and of the whole plate with eight trays and everything on; by the
-processor time of one thread, so that what else a machine does counts little. Decode and analysis
-in turn; of one tray the best of three. OFFLINE_PLATE_BAG names a film of the plate that exists:
+1080p JPEG frames of one tray, and of the whole plate with eight trays and all options; in CPU time
+of one thread, which depends little on other work of the machine. Decoding and analysis alternate;
+for one tray the best of three. OFFLINE_PLATE_BAG names an existing film of the plate:
 `nanorocks simulate --scene --bag BAG --duration 60 --first-shake 0.5`.
 """
 
@@ -48,8 +48,8 @@ def _timed(work) -> float:
 
 def _warm() -> None:
     cv2.setNumThreads(1)
-    for one in (warm_up, warm_up_speed, warm_up_clusters, warm_up_cooling):
-        one()
+    for function in (warm_up, warm_up_speed, warm_up_clusters, warm_up_cooling):
+        function()
 
 
 def _peak_mb() -> float:
@@ -57,7 +57,7 @@ def _peak_mb() -> float:
 
 
 def measure_plate(path: str) -> None:
-    """Print what decoding and analysing a film of the plate takes, as JSON."""
+    """Print CPU times and memory of decoding and analysing a film of the plate, as JSON."""
     _warm()
     peaks: dict[int, float] = {}
 
@@ -68,10 +68,10 @@ def measure_plate(path: str) -> None:
     settings = with_values(PipelineSettings(), PLATE, 'benchmark')
     before = _peak_mb()
     folder = Path(path).parent
-    whole = _timed(lambda: analyse(path, settings, progress=note, scratch=folder))
+    analysis = _timed(lambda: analyse(path, settings, progress=note, scratch=folder))
     third = min(at for at in peaks if at >= 1.0)
     frames = BagFrames(path).count
-    print(json.dumps([frames, decode, whole, before, peaks[third], _peak_mb()]))
+    print(json.dumps([frames, decode, analysis, before, peaks[third], _peak_mb()]))
 
 
 def report() -> None:
@@ -92,23 +92,27 @@ def _print_tray(path: Path) -> None:
         for _ in range(_ROUNDS)
     ]
     print('one tray')
-    _print(filmed['frames'], min(one for one, _ in pairs), min(one for _, one in pairs))
+    _print(
+        filmed['frames'],
+        min(seconds for seconds, _ in pairs),
+        min(seconds for _, seconds in pairs),
+    )
 
 
 def _print_plate(bag: Path) -> None:
-    # In a process of its own, whose memory is that of the analysis.
+    # A separate process, so that its memory is that of the analysis.
     call = f'from benchmarks.offline import measure_plate; measure_plate({str(bag)!r})'
     done = subprocess.run([sys.executable, '-c', call], check=True, stdout=subprocess.PIPE)
-    frames, decode, whole, before, third, peak = json.loads(done.stdout)
+    frames, decode, analysis, before, third, peak = json.loads(done.stdout)
     print(f'\neight trays, everything on, {frames / 30.0:.0f} s')
-    _print(frames, decode, whole)
+    _print(frames, decode, analysis)
     print(
         f'peak memory    {peak:7.0f} MB  ({before:.0f} MB before the first frame, {third:.0f} MB '
         'after a third of them)'
     )
 
 
-def _print(frames: int, decode: float, whole: float) -> None:
+def _print(frames: int, decode: float, analysis: float) -> None:
     print(f'decode only    {frames / decode:7.1f} frames/s')
-    print(f'whole analysis {frames / whole:7.1f} frames/s')
-    print(f'ratio          {decode / whole:7.2f}  (1: the analysis costs nothing)')
+    print(f'whole analysis {frames / analysis:7.1f} frames/s')
+    print(f'ratio          {decode / analysis:7.2f}  (1: the analysis costs nothing)')

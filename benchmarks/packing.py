@@ -1,10 +1,10 @@
 """Filling factors and apparent compaction of simulated clusters, which are rigid.
 
-18 cycles a row, 60 s each, shaken to 10 mm/s, restitutions 0.89 and 0.97. Filling factors are
-those of the end of a cycle, from true places; "apparent" is (ff_end - ff_min) / ff_min by the
-paper's rule from the autocorrelation of rendered pictures, one a second, mean and standard error
-over cycles; "from 10 s on" is the same from a fixed time, 6 to 14 s after the shaking event. Rows
-without sticking are controls: nothing in them can become compact.
+18 cycles per row, 60 s each, shaken to 10 mm/s, restitutions 0.89 and 0.97. Filling factors are
+those at the end of a cycle, from true positions; "apparent" is (ff_end - ff_min) / ff_min by the
+paper's rule from the autocorrelation of rendered images at 1 Hz, mean and standard error over
+cycles; "from 10 s on" is the same from a fixed time, 6 to 14 s after the shaking event. Rows
+without sticking are controls, in which no compaction is possible.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from nanorocks_ros.studies.analysis.cluster_packing import compaction, simulated
 
 _SPEEDS = (0.0, 0.001, 0.003, 0.0104)
 _CYCLES = 18
-# From tracks: cycles, pictures at 30 a second, and sticking speeds.
+# Rows from tracks: cycles, frames at 30 Hz, and sticking speeds.
 _TRACKED, _PICTURES, _TRACKED_SPEEDS = 4, 900, (0.001, 0.003)
 
 
@@ -39,19 +39,19 @@ def _settings(speed: float, **more: float) -> SimulationSettings:
 
 
 def _mean(values: list[float], digits: int = 3, percent: bool = False) -> str:
-    known = np.array(values)[np.isfinite(values)] * (100.0 if percent else 1.0)
-    if known.size == 0:
+    finite = np.array(values)[np.isfinite(values)] * (100.0 if percent else 1.0)
+    if finite.size == 0:
         return ''
-    if known.size == 1:
-        return f'{known[0]:.{digits}f}'
-    return f'{known.mean():.{digits}f} ± {known.std(ddof=1) / np.sqrt(known.size):.{digits}f}'
+    if finite.size == 1:
+        return f'{finite[0]:.{digits}f}'
+    return f'{finite.mean():.{digits}f} ± {finite.std(ddof=1) / np.sqrt(finite.size):.{digits}f}'
 
 
 def _from_tracks(number: int, speed: float) -> None:
-    """A row of filling factors 30 s after a shaking event, from tracks, beside the truth."""
+    """Print a row of filling factors 30 s after a shaking event, from tracks and the truth."""
     tray = load_trays()[number]
     settings = _settings(speed, tray=number, first_shake=0.0, frame_rate=30.0)
-    found, true, errors, beads, true_beads = [], [], [], [], []
+    fillings, true, errors, beads, true_beads = [], [], [], [], []
     for run in range(_TRACKED):
         gas, counter, pairs = (
             ShakenTray(settings, tray, run),
@@ -61,23 +61,23 @@ def _from_tracks(number: int, speed: float) -> None:
         moments = gas.moments(_PICTURES)
         for tracks in true_tracks(tray, settings, run, _PICTURES):
             moment = next(moments)
-            merges = [one for one in counter.push(tracks, 1) if isinstance(one, Merge)]
+            merges = [record for record in counter.push(tracks, 1) if isinstance(record, Merge)]
             pairs += [tuple(merge.tracks.tolist()) for merge in merges]
         height = tray.dimensions[2]
         truth = packing_of_clusters(moment.positions[:, :2], gas.radii, gas.bodies, height)
-        seen = packing_of_clusters(
+        packing = packing_of_clusters(
             tracks.positions, tracks.radii, bodies_of_pairs(tracks.ids, pairs), height
         )
-        if truth is None or seen is None:
+        if truth is None or packing is None:
             continue
         true.append(truth.filling)
-        found.append(seen.filling)
-        errors.append(seen.filling / truth.filling - 1.0)
-        beads.append(seen.beads)
+        fillings.append(packing.filling)
+        errors.append(packing.filling / truth.filling - 1.0)
+        beads.append(packing.beads)
         true_beads.append(truth.beads)
     print(
         f'| {number} | {1e3 * speed:g} | {_mean(true_beads, 1)} | {_mean(beads, 1)} | '
-        f'{_mean(true)} | {_mean(found)} | {_mean(errors, 1, True)} |',
+        f'{_mean(true)} | {_mean(fillings)} | {_mean(errors, 1, True)} |',
         flush=True,
     )
 
@@ -99,9 +99,9 @@ def report() -> None:
                 f'{_mean([c.filling[-1] for c in curves])} | '
                 f'{_mean([c.in_space[-1] for c in curves])} | '
                 f'{_mean([c.paper[-1] for c in curves])} | '
-                f'{_mean([end.apparent for end in ends], 1, True)} | '
-                f'{_mean([end.settled for end in ends], 1, True)} | '
-                f'{_mean([end.true for end in ends], 1, True)} | {100 * printed:.1f} |',
+                f'{_mean([result.apparent for result in ends], 1, True)} | '
+                f'{_mean([result.settled for result in ends], 1, True)} | '
+                f'{_mean([result.true for result in ends], 1, True)} | {100 * printed:.1f} |',
                 flush=True,
             )
     print(

@@ -1,4 +1,4 @@
-"""Processor time of everything that happens to a frame of the whole plate, stage by stage.
+"""CPU time of each stage for a frame of the whole plate.
 
 Eight trays, 1080p, all effects, 7 mm/s after shaking, on one core; the live graph with its
 messages is measured by `live_plate`.
@@ -27,7 +27,7 @@ _WARM_UP = 60
 
 
 class _Clock:
-    """Processor time by name, of the frames after the warm-up."""
+    """CPU time by name, for the frames after the warm-up."""
 
     def __init__(self) -> None:
         self.spent: dict[str, float] = defaultdict(float)
@@ -35,10 +35,10 @@ class _Clock:
 
     def timed(self, name: str, work, *arguments):
         start = time.process_time()
-        found = work(*arguments)
+        result = work(*arguments)
         if self.running:
             self.spent[name] += time.process_time() - start
-        return found
+        return result
 
 
 def _push(pipeline: Pipeline, clock: _Clock, frame: Frame) -> list[TrayImage]:
@@ -46,9 +46,9 @@ def _push(pipeline: Pipeline, clock: _Clock, frame: Frame) -> list[TrayImage]:
     images = [record for record in records if isinstance(record, TrayImage)]
     for image in images:
         tray = pipeline.trays[image.tray]
-        for speed in clock.timed('speeds', tray.speed.push, image):
+        for speed in clock.timed('speeds', tray.measurement.push, image):
             if isinstance(speed, SpeedEstimate):
-                clock.timed('fits of the decay', tray.cooling.push, speed)
+                clock.timed('fits of the decay', tray.restitution.push, speed)
         clock.timed('autocorrelations', tray.clusters.push, image)
     return images
 
@@ -75,11 +75,11 @@ def report() -> None:
         image = clock.timed('decoding', cv2.imdecode, shot.jpeg, cv2.IMREAD_COLOR)
         stamp_ns = round(1e9 * number / 30.0)
         frame = Frame(stamp_ns=stamp_ns, encoding='bgr8', image=image)
-        for one in _push(pipeline, clock, frame):
-            if one.tray in trackers:
-                (tracks,) = clock.timed('tracking', trackers[one.tray].push, one)
-                clock.timed('contacts', finders[one.tray].push, tracks)
-                clock.timed('bodies', counters[one.tray].push, tracks, 1)
+        for tray_image in _push(pipeline, clock, frame):
+            if tray_image.tray in trackers:
+                (tracks,) = clock.timed('tracking', trackers[tray_image.tray].push, tray_image)
+                clock.timed('contacts', finders[tray_image.tray].push, tracks)
+                clock.timed('bodies', counters[tray_image.tray].push, tracks, 1)
     cv2.setNumThreads(threads)
     _print(clock, len(shots) - _WARM_UP, sorted(trackers))
 

@@ -1,8 +1,8 @@
-"""Preprocessing of all eight trays at 1080p by stage, beside decoding the same JPEGs.
+"""Preprocessing of all eight trays at 1080p by stage, against decoding the same JPEGs.
 
-Frames of the simulated plate with all effects, while it swings; one thread; each stage alone,
-best of several rounds, in CPU time. Also how far the stabilisation is from the truth, and the
-calibration from the lens that the scene was filmed with.
+Frames of the oscillating simulated plate with all effects; one thread; each stage alone, best of
+several rounds, in CPU time. Also errors of the stabilisation and of the calibration against the
+truth.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from nanorocks_ros.stages.preprocess.plate_search import guess_plate
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.rectify import mix_weights, nodes_of, resample_color
 from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter
-from nanorocks_ros.stages.preprocess.stabilise import TrayFollower
+from nanorocks_ros.stages.preprocess.stabilise import TrayRegistration
 from nanorocks_ros.studies.calibration.plate_fit import fit_plate
 
 _FRAMES = 75
@@ -41,7 +41,7 @@ _SCENE = SceneSettings()
 
 
 def _filmed():
-    # Shaken at the tenth frame: two seconds of the widest swing.
+    # Shaken at the tenth frame: two seconds of the largest oscillation.
     simulation = SimulationSettings(first_shake=0.33)
     film = SceneFilm(simulation, _SCENE)
     moments = []
@@ -95,7 +95,7 @@ def _stages(camera, frames):
     regions = regions_on_plate(load_trays().values(), (1080, 1920), _SCENE.pixels_per_metre)
     mix = np.array(settings.gray_mix)
     wall = settings.wall_width * settings.pixels_per_metre
-    followers = [TrayFollower(region, view, wall, mix) for region in regions.values()]
+    followers = [TrayRegistration(region, view, wall, mix) for region in regions.values()]
     nodes = [nodes_of(region, view) for region in regions.values()]
     crops = [
         (np.empty((region.height, region.width, 3), np.uint8), np.empty(region[:1:-1], np.uint8))
@@ -116,8 +116,8 @@ def _stages(camera, frames):
             resample_color(frame.image, node, (0.3, -0.2), weights, color, gray)
 
     def meter(frame):
-        for one, (_, gray) in zip(meters, crops, strict=True):
-            one.push(frame.stamp_ns, gray)
+        for motion_meter, (_, gray) in zip(meters, crops, strict=True):
+            motion_meter.push(frame.stamp_ns, gray)
 
     def quality(frame):
         for _, gray in crops:
@@ -143,21 +143,21 @@ def _stabilisation(camera, frames, moments) -> None:
     errors: dict[int, list[np.ndarray]] = {}
     stated, lost, cycles = [], 0, []
     for frame, (_, _, displacement, _) in zip(frames, moments, strict=True):
-        for one in stage.push(frame):
-            if not isinstance(one, TrayImage):
+        for tray_image in stage.push(frame):
+            if not isinstance(tray_image, TrayImage):
                 continue
-            off = (np.array(one.displacement) - displacement) * scale
-            lost += int(np.isnan(off).any())
-            errors.setdefault(one.tray, []).append(off)
-            stated.append(one.displacement_error * scale)
-            cycles.append(one.cycle)
+            error = (np.array(tray_image.displacement) - displacement) * scale
+            lost += int(np.isnan(error).any())
+            errors.setdefault(tray_image.tray, []).append(error)
+            stated.append(tray_image.displacement_error * scale)
+            cycles.append(tray_image.cycle)
     speed = max(float(np.hypot(*velocity)) for *_, velocity in moments)
     print(
         f'\nstabilisation, swing up to {1e3 * speed:.1f} mm/s: error [px] along x, y; rms, worst'
     )
-    for tray, found in sorted(errors.items()):
-        rms = np.sqrt(np.nanmean(np.square(found), axis=0))
-        print(f'tray {tray}  {rms[0]:.3f} {rms[1]:.3f}   {np.nanmax(np.abs(found)):.3f}')
+    for tray, tray_errors in sorted(errors.items()):
+        rms = np.sqrt(np.nanmean(np.square(tray_errors), axis=0))
+        print(f'tray {tray}  {rms[0]:.3f} {rms[1]:.3f}   {np.nanmax(np.abs(tray_errors)):.3f}')
     print(f'stated error {np.nanmedian(stated):.3f} px; lost {lost}; cycles {sorted(set(cycles))}')
 
 
@@ -174,19 +174,19 @@ def _calibration(camera, frames) -> None:
     for x, y, width, height in fit.calibration.regions.values():
         a, b = np.meshgrid(np.linspace(x, x + width, 9), np.linspace(y, y + height, 9))
         points.append(np.stack([a.ravel(), b.ravel()], axis=-1))
-    mine = np.concatenate(points)
-    true = camera.rectified(fit.calibration.view.source(mine))
-    one, zero = np.ones(len(mine)), np.zeros(len(mine))
-    x, y = mine.T
-    rows = np.stack([np.stack([x, -y, one, zero], -1), np.stack([y, x, zero, one], -1)], 1)
+    grid_points = np.concatenate(points)
+    true = camera.rectified(fit.calibration.view.source(grid_points))
+    ones, zeros = np.ones(len(grid_points)), np.zeros(len(grid_points))
+    x, y = grid_points.T
+    rows = np.stack([np.stack([x, -y, ones, zeros], -1), np.stack([y, x, zeros, ones], -1)], 1)
     rows = rows.reshape(-1, 4)
     best = np.linalg.lstsq(rows, true.ravel(), rcond=None)[0]
-    away = np.hypot(*((rows @ best).reshape(-1, 2) - true).T)
+    residual = np.hypot(*((rows @ best).reshape(-1, 2) - true).T)
     bend = np.hypot(*(camera.distorted(true) - true).T)
     print(
         f'\ncalibration without a checkerboard: residual {fit.calibration.residual_px:.3f} px; '
         f'in the trays the lens moves points by up to {bend.max():.1f} px, of which '
-        f'{away.max():.2f} px at most are left'
+        f'{residual.max():.2f} px at most are left'
     )
 
 
@@ -203,10 +203,10 @@ def report() -> None:
     _whole(camera, frames[:3])
     parts = _stages(camera, moving)
     decode = _milliseconds(lambda jpeg: cv2.imdecode(jpeg, cv2.IMREAD_COLOR), jpegs)
-    whole = _whole(camera, frames)
+    total = _whole(camera, frames)
     for name, cost in parts.items():
         print(f'{name:48s}{cost:6.2f} ms {cost / decode:6.2f} of decoding')
-    print(f'{"whole preprocessor":48s}{whole:6.2f} ms {whole / decode:6.2f} of decoding')
+    print(f'{"whole preprocessor":48s}{total:6.2f} ms {total / decode:6.2f} of decoding')
     print(f'{"decoding a JPEG":48s}{decode:6.2f} ms')
     _stabilisation(camera, frames, moments)
     _calibration(camera, frames)

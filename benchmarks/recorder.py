@@ -1,4 +1,4 @@
-"""What recording takes: of the thread that hands frames over, and of the one that writes."""
+"""CPU time of recording, in the thread that hands over frames and in the writer thread."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _FORMAT = 'bgr8; jpeg compressed bgr8'
 
 
 def report() -> None:
-    """Record ten seconds of 1080p that come compressed, and that do not, and print the costs."""
+    """Record ten seconds of compressed and of raw 1080p frames, and print the costs."""
     picture = _picture()
     jpeg = encode_jpeg(picture, _QUALITY)
     print(f'{_FRAMES} frames of 1080p, JPEG quality {_QUALITY}: {len(jpeg) / 1e3:.0f} kB each')
@@ -34,7 +34,7 @@ def report() -> None:
 
 
 def _picture() -> np.ndarray:
-    """Noise over a gradient: compresses no better than a film of the plate."""
+    """Noise over a gradient, with the compression of a film of the plate."""
     rng = np.random.default_rng(1)
     gradient = np.linspace(60, 180, 1920)[None, :, None]
     noise = rng.normal(0.0, 3.0, (1080, 1920, 3))
@@ -50,7 +50,7 @@ def _encoded(picture: np.ndarray, stamp_ns: int) -> object:
 
 
 def _run(make, size: int) -> tuple[float, float, float]:
-    """Processor time of who hands over and of the writer, and time until all is on the disk."""
+    """CPU time of handing over and of writing, and time until all is on disk, [s]."""
     table = {_CAMERA: offered_topic(topics.RAW_COMPRESSED)}
     with tempfile.TemporaryDirectory() as folder:
         start, process = time.monotonic(), time.process_time()
@@ -60,15 +60,15 @@ def _run(make, size: int) -> tuple[float, float, float]:
             stamp_ns = round(number * 1e9 / _RATE)
             recorder.advance(stamp_ns)
             recorder.put(_CAMERA, partial(make, stamp_ns), size=size, wait=True)
-        handed = time.thread_time() - thread
+        handover = time.thread_time() - thread
         recorder.close()
-        written = time.process_time() - process - handed
-        return handed, written, time.monotonic() - start
+        writing = time.process_time() - process - handover
+        return handover, writing, time.monotonic() - start
 
 
-def _print(name: str, handed: float, written: float, seconds: float, size: int) -> None:
-    share = (handed + written) / _FRAMES * _RATE
+def _print(name: str, handover: float, writing: float, seconds: float, size: int) -> None:
+    share = (handover + writing) / _FRAMES * _RATE
     print(
-        f'| {name} | {1e3 * handed / _FRAMES:.3f} | {1e3 * written / _FRAMES:.2f} | {share:.3f} | '
-        f'{1e-6 * _FRAMES * size / seconds:.0f} |'
+        f'| {name} | {1e3 * handover / _FRAMES:.3f} | {1e3 * writing / _FRAMES:.2f} '
+        f'| {share:.3f} | {1e-6 * _FRAMES * size / seconds:.0f} |'
     )

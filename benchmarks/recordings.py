@@ -1,7 +1,7 @@
-"""Import, salvage, opening and seeking, beside decoding, copying and the `rosbags` library.
+"""Import, salvage, opening and seeking, against decoding, copying and the `rosbags` library.
 
-Import: a film of 1080p noise over a moving picture, once as Motion JPEG and once as H.264, on the
-cores there are. Opening and seeking: a bag of 10 GB, or of NANOROCKS_BENCHMARK_GB.
+Import: a film of a moving 1080p image with noise, as Motion JPEG and as H.264, on all cores.
+Opening and seeking: a bag of 10 GB, or of NANOROCKS_BENCHMARK_GB.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import shutil
 import statistics
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 
 import av
@@ -69,7 +70,7 @@ def _import(path: Path, bag: Path) -> None:
 
 
 def _imports(folder: Path) -> None:
-    for what, name, codec, form, options in (
+    for label, name, codec, form, options in (
         (
             'remux, MJPEG',
             'a.avi',
@@ -88,15 +89,15 @@ def _imports(folder: Path) -> None:
             )
             for _ in range(_ROUNDS)
         ]
-        decode, whole = (min(column) for column in zip(*pairs, strict=True))
+        decode, total = (min(column) for column in zip(*pairs, strict=True))
         print(
-            f'import, {what:18} {_FRAMES / whole:7.1f} frames/s, decode only '
-            f'{_FRAMES / decode:7.1f}, ratio {decode / whole:5.2f}'
+            f'import, {label:18} {_FRAMES / total:7.1f} frames/s, decode only '
+            f'{_FRAMES / decode:7.1f}, ratio {decode / total:5.2f}'
         )
 
 
 def _bag(path: Path, size: float) -> int:
-    """A bag of pictures that cannot be compressed further; the number of them."""
+    """Write a bag of incompressible images, and return their number."""
     count = int(size / _PICTURE_BYTES)
     pool = [np.random.default_rng(k).bytes(_PICTURE_BYTES) for k in range(8)]
     name = _CAMERA.absolute()
@@ -131,11 +132,11 @@ def _salvages(folder: Path) -> None:
         )
         for _ in range(_ROUNDS)
     ]
-    copy, whole = (min(column) for column in zip(*pairs, strict=True))
+    copy, salvaged = (min(column) for column in zip(*pairs, strict=True))
     size = file.stat().st_size / 1e6
     print(
-        f'salvage, cut short      {size / whole:7.0f} MB/s, plain copy {size / copy:7.0f}, '
-        f'ratio {copy / whole:5.2f}'
+        f'salvage, cut short      {size / salvaged:7.0f} MB/s, plain copy {size / copy:7.0f}, '
+        f'ratio {copy / salvaged:5.2f}'
     )
     for name in ('cut', 'copy', 'new'):
         shutil.rmtree(folder / name)
@@ -160,25 +161,27 @@ def _opening(folder: Path) -> None:
     def seek(stamp_ns: int) -> None:
         next(reader.messages(start_ns=stamp_ns))
 
-    with Reader(path) as theirs:
-        rows = {
-            'open': ([_timed(lambda: open_bag(path)) for _ in stamps], [
-                _timed(lambda: Reader(path).open()) for _ in stamps
-            ]),
+    with Reader(path) as rosbags_reader:
+        calls = {
+            'open': (lambda _: open_bag(path), lambda _: Reader(path).open()),
             'seek, opened': (
-                [_timed(lambda one=stamp: seek(one)) for stamp in stamps],
-                [_timed(lambda one=stamp: next(theirs.messages(start=one))) for stamp in stamps],
+                seek,
+                lambda stamp_ns: next(rosbags_reader.messages(start=stamp_ns)),
             ),
             'open and seek': (
-                [_timed(lambda one=stamp: _first_of_ours(path, one)) for stamp in stamps],
-                [_timed(lambda one=stamp: _first_of_rosbags(path, one)) for stamp in stamps],
+                partial(_first_of_ours, path),
+                partial(_first_of_rosbags, path),
             ),
-        }  # fmt: skip
-    for what, columns in rows.items():
-        ours, other = (statistics.median(column) for column in columns)
+        }
+        rows = {
+            label: [[_timed(partial(call, stamp)) for stamp in stamps] for call in pair]
+            for label, pair in calls.items()
+        }
+    for label, columns in rows.items():
+        ours, rosbags = (statistics.median(column) for column in columns)
         print(
-            f'{_GB:g} GB, {what:14} {1e3 * ours:9.1f} ms, rosbags {1e3 * other:9.1f} ms, '
-            f'ratio {other / ours:6.2f}'
+            f'{_GB:g} GB, {label:14} {1e3 * ours:9.1f} ms, rosbags {1e3 * rosbags:9.1f} ms, '
+            f'ratio {rosbags / ours:6.2f}'
         )
 
 

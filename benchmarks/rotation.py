@@ -1,7 +1,7 @@
-"""Rotation: how rough beads share their energy, and what that does to speeds and restitutions.
+"""Rotation: energy of rough beads, and its effect on speeds and inferred restitutions.
 
-Tangential restitution β, coefficient of friction μ (none given: contacts never slide), at walls
-as between beads unless said otherwise. ``docs/method/rotation.md`` says what follows.
+Tangential restitution β, coefficient of friction μ (without μ contacts never slide); the same at
+walls and between beads unless stated. ``docs/method/rotation.md`` has the conclusions.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ SHARING = {1: 120, 3: 40}
 SHARING_TIMES = np.array([0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0])
 STEP = 0.1
 TIMES = np.arange(0.5, 30.0, STEP)
-# As many cycles in a mean as the paper has.
+# Cycles in a mean, as in the paper.
 TOGETHER = 178
 RUNS = 8 * TOGETHER
 NOISE = 1e-4
 EDGES = np.array([1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 20.0]) * 1e-3
 CASES = (gas.SMOOTH, gas.BEADS, gas.RUBBING, gas.SMOOTH_WALLS)
 CYCLES = 6
-# Of the paper's tray 1: mean projected speed and decay rate by its T0 and tau0.
+# Mean projected speed and decay rate of tray 1, from T0 and tau0 of the paper.
 PAPER_SPEED, PAPER_RATE = 5.25e-3, 117.0
 FRICTIONS = (0.0, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15)
 RATE, PIXELS = 30.0, 12500.0
-# Error of a displacement between two frames, of which texture can be told.
+# Error of a displacement of texture between two frames.
 SEEN_PX = 0.1
 
 
@@ -74,13 +74,19 @@ def _bulk():
     for restitution, tangential in BULK:
         collisions, ratio = energy.bulk_course(restitution, tangential, SEEDS)
         cells = []
-        for at in (10.0, 20.0, 30.0):
-            theory = temperature_ratio_course(np.array([at]), restitution, tangential)[0]
-            seen = np.interp(at, collisions, ratio) if at <= collisions[-1] else math.nan
-            cells += [f'{seen:.3f}', f'{theory:.3f}']
-        end = rough_temperature_ratio(restitution, tangential)
+        for collision_count in (10.0, 20.0, 30.0):
+            theory = temperature_ratio_course(
+                np.array([collision_count]), restitution, tangential
+            )[0]
+            simulated = (
+                np.interp(collision_count, collisions, ratio)
+                if collision_count <= collisions[-1]
+                else math.nan
+            )
+            cells += [f'{simulated:.3f}', f'{theory:.3f}']
+        final = rough_temperature_ratio(restitution, tangential)
         alike = smooth_equivalent(restitution, tangential)
-        _row(f'{restitution:g}, {tangential:g}', *cells, f'{end:.3f}', f'{alike:.3f}')
+        _row(f'{restitution:g}, {tangential:g}', *cells, f'{final:.3f}', f'{alike:.3f}')
 
 
 def _sharing():
@@ -91,15 +97,15 @@ def _sharing():
     )  # fmt: skip
     for number, runs in SHARING.items():
         for rough in gas.ROUGH:
-            found = energy.sharing(number, rough, SHARING_TIMES, runs)
+            shares = energy.sharing(number, rough, SHARING_TIMES, runs)
             shaken = energy.sharing(number, rough, SHARING_TIMES[:1], runs, speeds='shaken')
-            for k, one in enumerate(load_trays()[number].species):
-                values = [*found.ratio[k, 1:], shaken.ratio[k, 0]]
+            for k, species in enumerate(load_trays()[number].species):
+                values = [*shares.ratio[k, 1:], shaken.ratio[k, 0]]
                 name = f'{number}, {rough.name}'
-                _row(name, one.material, *(f'{value:.2f}' for value in values))
-                upright = found.upright_flight[k, 1:], found.upright_spin[k, 1:]
-                shown = [f'{a:.1f}, {b:.2f}' for a, b in zip(*upright, strict=True)]
-                rows.append((name, one.material, *shown))
+                _row(name, species.material, *(f'{value:.2f}' for value in values))
+                upright = shares.upright_flight[k, 1:], shares.upright_spin[k, 1:]
+                cells = [f'{a:.1f}, {b:.2f}' for a, b in zip(*upright, strict=True)]
+                rows.append((name, species.material, *cells))
     _table(
         'Mean square of velocity along z over that along x and y, and part of the rotation that '
         'is about z',
@@ -116,13 +122,18 @@ def _single():
     )  # fmt: skip
     for rough in (gas.SMOOTH, gas.BEADS, gas.RUBBING, gas.HALF):
         for ratio in (0.0, 0.3, 1.0):
-            found = energy.single_collisions(gas.PAIRS, rough, ratio)
-            ends = np.quantile(found, (0.025, 0.16, 0.84, 0.975))
-            _row(rough.name, ratio, *(f'{e:.2f}' for e in ends), f'{np.mean(found > 1.0):.3f}')
+            ratios = energy.single_collisions(gas.PAIRS, rough, ratio)
+            quantiles = np.quantile(ratios, (0.025, 0.16, 0.84, 0.975))
+            _row(
+                rough.name,
+                ratio,
+                *(f'{quantile:.2f}' for quantile in quantiles),
+                f'{np.mean(ratios > 1.0):.3f}',
+            )
 
 
 def estimate_cases():
-    """Name, curves in a mean, noise of each cycle and of the mean [m/s]."""
+    """Name, number of curves in a mean, noise of a cycle and of the mean [m/s]."""
     return (
         ('1 cycle', 1, 0.0, 0.0),
         ('1 cycle, noise', 1, NOISE, 0.0),
@@ -132,11 +143,11 @@ def estimate_cases():
     )
 
 
-def curves(speeds, together, noise, common, seed=1):
-    """Means of so many runs with noise on each and on the mean, (n_curves, n_times)."""
+def curves(speeds, cycles, noise, common, seed=1):
+    """Means over groups of runs, with noise on each run and on the mean, (n_curves, n_times)."""
     random = np.random.default_rng(seed)
     noisy = speeds + noise * random.normal(size=speeds.shape)
-    means = noisy.reshape(-1, together, speeds.shape[1]).mean(axis=1)
+    means = noisy.reshape(-1, cycles, speeds.shape[1]).mean(axis=1)
     return means + common * random.normal(size=means.shape)
 
 
@@ -150,16 +161,16 @@ def _paper_estimate():
     )  # fmt: skip
     for rough in CASES:
         speeds = gas.speeds_of(1, rough, TIMES, RUNS)
-        for name, together, noise, common in estimate_cases():
-            values, speed = gas.paper_values(curves(speeds, together, noise, common), STEP, tray)
+        for name, cycles, noise, common in estimate_cases():
+            values, speed = gas.paper_values(curves(speeds, cycles, noise, common), STEP, tray)
             median, half, above, highest, logs = gas.spread(values, speed, EDGES)
             cells = [
-                f'{one:.2f} ± {wide:.3f} ({many:.2f})' if np.isfinite(one) else ''
-                for one, wide, many in zip(median, half, above, strict=True)
+                f'{value:.2f} ± {half_width:.3f} ({share:.2f})' if np.isfinite(value) else ''
+                for value, half_width, share in zip(median, half, above, strict=True)
             ]
             middle = np.log(EDGES[:-1] * EDGES[1:]) / 2.0
-            known = np.isfinite(logs)
-            power = np.polyfit(middle[known], np.log(logs[known]), 1)[0]
+            finite = np.isfinite(logs)
+            power = np.polyfit(middle[finite], np.log(logs[finite]), 1)[0]
             _row(rough.name, name, *cells, f'{highest[0]:.3g}', f'{power:+.2f}')
 
 
@@ -173,20 +184,26 @@ def _local():
     )  # fmt: skip
     for rough in CASES:
         speeds = gas.speeds_of(1, rough, TIMES, RUNS)
-        # Slower ones are lost in the noise.
+        # Slower speeds are below the noise.
         inside = (TIMES <= 20.0) & (speeds.mean(axis=0) > 5.0 * NOISE)
         for noise in (0.0, NOISE):
-            each = curves(speeds[:, inside], TOGETHER, 0.0, noise)
-            speed, slopes = gas.local_rates(each, TIMES[inside])
+            means_of_cycles = curves(speeds[:, inside], TOGETHER, 0.0, noise)
+            speed, slopes = gas.local_rates(means_of_cycles, TIMES[inside])
             means = slopes.mean(axis=0)
-            shown = [
+            slope_cells = [
                 f'{a:.0f} ± {b:.1f}'
                 for a, b in zip(means, slopes.std(axis=0, ddof=1), strict=True)
             ]
-            at = [f'{2e3 * one:.2g}' for one in speed]
-            read = [_restitution(theory, mean) for mean in means]
+            speed_cells = [f'{2e3 * value:.2g}' for value in speed]
+            restitutions = [_restitution(theory, mean) for mean in means]
             label = '0.1 mm/s' if noise else 'none'
-            _row(rough.name, label, ', '.join(at), ', '.join(shown), ', '.join(read))
+            _row(
+                rough.name,
+                label,
+                ', '.join(speed_cells),
+                ', '.join(slope_cells),
+                ', '.join(restitutions),
+            )
 
 
 def _restitution(theory, rate):
@@ -231,9 +248,9 @@ def _bias():
         for rough in (gas.SMOOTH, *gas.ROUGH):
             read, numbers = gas.read_cycles(number, rough, CYCLES)
             rate, tension, rebounds, collisions, *alone = numbers
-            each = [read['walls known'].mean[0], *read['decay'].mean, *read['all'].mean, *alone]
+            means = [read['walls known'].mean[0], *read['decay'].mean, *read['all'].mean, *alone]
             _row(
-                f'{number}, {rough.name}', f'{rate:.0f}', *(f'{one:.3f}' for one in each),
+                f'{number}, {rough.name}', f'{rate:.0f}', *(f'{mean:.3f}' for mean in means),
                 f'{tension:.1f}, {read["all"].tension:.1f}', f'{rebounds:.0f}, {collisions:.0f}',
             )  # fmt: skip
 

@@ -34,18 +34,18 @@ def main(folder):
     _tray(axes[0, 1])
     _widths(axes[1, 0])
     _readings(axes[1, 1])
-    for one in axes.flat:
-        one.grid(alpha=0.25)
+    for panel in axes.flat:
+        panel.grid(alpha=0.25)
     figure.savefig(Path(folder) / 'rotation.png', dpi=90)
 
 
 def _bulk(axes):
     for tangential, colour in zip((0.5, 0.0, -0.5), COLOURS, strict=False):
         collisions, ratio = energy.bulk_course(gas.PAIRS, tangential, SEEDS)
-        each = np.linspace(0.0, 40.0, 200)
+        collision_counts = np.linspace(0.0, 40.0, 200)
         axes.plot(
-            each,
-            temperature_ratio_course(each, gas.PAIRS, tangential),
+            collision_counts,
+            temperature_ratio_course(collision_counts, gas.PAIRS, tangential),
             color=colour,
             label=f'β = {tangential:g}',
         )
@@ -76,8 +76,8 @@ def _widths(axes):
     for rough, colour in zip(CASES, COLOURS, strict=True):
         speeds = gas.speeds_of(1, rough, TIMES, RUNS)
         for noise, style, name in ((0.0, '-', rough.name), (NOISE, '--', None)):
-            each = curves(speeds, TOGETHER, 0.0, noise)
-            values, speed = gas.paper_values(each, STEP, tray)
+            means = curves(speeds, TOGETHER, 0.0, noise)
+            values, speed = gas.paper_values(means, STEP, tray)
             axes.plot(middle, gas.spread(values, speed, EDGES)[1], style, color=colour, label=name)
     axes.plot([], [], '--', color='gray', label='the same with 0.1 mm/s of noise')
     axes.axvline(5.0, color='black', lw=0.7, ls=':')
@@ -94,16 +94,24 @@ def _widths(axes):
 
 def _readings(axes):
     for number, marker in ((1, 'o'), (3, 's')):
-        found = [
+        readings = [
             gas.read_cycles(
                 number, gas.Roughness(tangential=0.4 if mu else -1.0, friction=mu), CYCLES
             )
             for mu in FRICTIONS
         ]
         for colour, text, values in (
-            (COLOURS[1], 'decay, walls known', [one[0]['walls known'].mean[0] for one in found]),
-            (COLOURS[0], 'decay and contacts', [one[0]['all'].mean[0] for one in found]),
-            (COLOURS[3], 'contacts alone', [one[1][4] for one in found]),
+            (
+                COLOURS[1],
+                'decay, walls known',
+                [reading[0]['walls known'].mean[0] for reading in readings],
+            ),
+            (
+                COLOURS[0],
+                'decay and contacts',
+                [reading[0]['all'].mean[0] for reading in readings],
+            ),
+            (COLOURS[3], 'contacts alone', [reading[1][4] for reading in readings]),
         ):
             axes.plot(
                 FRICTIONS, values, f'{marker}-', color=colour, label=f'tray {number}: {text}'

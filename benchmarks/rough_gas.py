@@ -1,4 +1,4 @@
-"""Cooling gases of rough beads: decays, and what one reads from them.
+"""Cooling gases of rough beads: decays, and the restitutions inferred from them.
 
 Restitutions 0.89 (beads) and 0.97 (walls), started at 10 mm/s without rotation.
 """
@@ -43,7 +43,7 @@ class Roughness:
 
     @property
     def name(self):
-        """In tables."""
+        """Label in tables."""
         if self.tangential <= -1.0:
             return 'smooth'
         slides = f', μ {self.friction:g}' if self.friction < 1e6 else ''
@@ -51,7 +51,7 @@ class Roughness:
 
     @property
     def settings(self):
-        """Of a simulation."""
+        """Settings of a simulation."""
         return {
             'tangential_restitution': self.tangential,
             'wall_tangential_restitution': self.tangential if self.walls else -1.0,
@@ -61,7 +61,7 @@ class Roughness:
 
 
 SMOOTH = Roughness()
-# Like glass and acrylic, and twice as rough: Foerster et al. 1994, Phys. Fluids 6, 1108, and
+# Similar to glass and acrylic, and twice as rough: Foerster et al. 1994, Phys. Fluids 6, 1108, and
 # Lorenz et al. 1997, Exp. Mech. 37, 292; from memory.
 BEADS = Roughness(tangential=0.4, friction=0.1)
 RUBBING = Roughness(tangential=0.4, friction=0.25)
@@ -81,7 +81,7 @@ _NS = 1e9
 
 
 def settings_of(tray, roughness, **values):
-    """Of a simulated tray."""
+    """Settings of a simulated tray."""
     return SimulationSettings(
         **{
             'tray': tray.number,
@@ -105,27 +105,27 @@ def speeds_of(number, roughness, times, runs, **values):
 
 
 def paper_values(speeds, step, tray):
-    """The paper's estimate and the speed it stands at, of curves (n_curves, n_times).
+    """Restitutions by the paper's estimate and their collision speeds, of (n_curves, n_times).
 
-    From speeds 1 s apart; the collision speed is that of the mean over all curves, so that
-    noise moves no value from one speed to another.
+    The estimate uses speeds 1 s apart. The collision speed is that of the mean over all curves,
+    so that noise does not change the speed of a value.
     """
     lag = round(1.0 / step)
-    found = paper_instantaneous_restitution(
+    restitutions = paper_instantaneous_restitution(
         speeds[:, :-lag], speeds[:, lag:], lag * step, tray.diameter, tray.number_density
     )
-    return found, RELATIVE_TO_MEAN_SPEED * speeds.mean(axis=0)[:-lag]
+    return restitutions, RELATIVE_TO_MEAN_SPEED * speeds.mean(axis=0)[:-lag]
 
 
 def spread(values, speed, edges):
-    """How the estimates scatter by speed.
+    """Scatter of the estimates in ranges of speed.
 
     Parameters
     ----------
     values : ndarray (n_curves, n_times)
     speed : ndarray (n_times,)
     edges : sequence of float
-        Of the ranges of speed, [m/s].
+        Edges of the ranges of speed, [m/s].
 
     Returns
     -------
@@ -147,7 +147,7 @@ def spread(values, speed, edges):
 
 
 def local_rates(speeds, times, windows=4):
-    """Slopes of 1/v of one mean over cycles after another, in windows even in ln v.
+    """Slopes of 1/v of each mean over cycles, in windows of equal width in ln v.
 
     Returns
     -------
@@ -157,14 +157,14 @@ def local_rates(speeds, times, windows=4):
     law = speeds.mean(axis=0)
     share = np.log(law[0] / law) / np.log(law[0] / law[-1])
     place = np.clip((share * windows).astype(int), 0, windows - 1)
-    # The mean may rise for a moment, and windows must follow one another.
+    # The mean may rise briefly, but windows have to be consecutive.
     place = np.maximum.accumulate(place)
     middle = [np.exp(np.log(law[place == k]).mean()) for k in range(windows)]
     return np.array(middle), local_slopes(times, speeds, law, place)
 
 
 def haff_rate(times, mean):
-    """Decay rate 1 / (v0 tau) of Haff's law fitted to ln v, all times counting alike, [1/m]."""
+    """Decay rate 1 / (v0 tau) of an unweighted fit of Haff's law to ln v, [1/m]."""
 
     def residual(logs):
         return np.log(mean) - logs[0] + np.log1p(math.exp(logs[0] + logs[1]) * times)
@@ -173,15 +173,15 @@ def haff_rate(times, mean):
 
 
 def read_cycles(number, roughness, cycles):
-    """What decays, contacts and both say of the cycles of a tray, beads taken for smooth.
+    """Restitutions inferred from decays, contacts and both, assuming smooth beads.
 
     Returns
     -------
     posteriors : dict of Posterior
-        'walls known': of the decays alone; 'decay'; 'all': with rebounds and collisions.
+        'walls known' and 'decay': from the decays; 'all': with rebounds and collisions.
     numbers : tuple of 6 floats
-        Decay rate of the mean decay [1/m]; median tension of the cycles one by one; rebounds and
-        collisions found in a cycle; restitutions of beads and walls by these alone.
+        Decay rate of the mean decay [1/m]; median tension of single cycles; rebounds and
+        collisions found in a cycle; restitutions of beads and walls from contacts alone.
     """
     tray = load_trays()[number]
     settings = settings_of(tray, roughness)
@@ -195,52 +195,54 @@ def read_cycles(number, roughness, cycles):
     tables = tables_of(library, tray, prior)
     decays = [decay_likelihood(tables, times, speed, _ERROR * speed, camera) for speed in speeds]
     contacts = [_contacts(tray, settings, run) for run in range(cycles)]
-    together, walls = (
+    all_decays, walls = (
         reduce(add, decays).integrated(),
         (prior.min_wall_restitution, prior.max_wall_restitution),
     )
 
-    def with_contacts(decay, found):
+    def with_contacts(decay, terms):
         return posterior_of(
             tables,
             decay,
             walls,
-            bead_likelihood=found.bead_likelihood(prior.collision_bias),
-            wall_likelihood=found.wall_likelihood(prior.rebound_bias),
+            bead_likelihood=terms.bead_likelihood(prior.collision_bias),
+            wall_likelihood=terms.wall_likelihood(prior.rebound_bias),
         )
 
-    each = [
-        with_contacts(decay.integrated(), found)
-        for decay, found in zip(decays, contacts, strict=True)
+    cycle_posteriors = [
+        with_contacts(decay.integrated(), terms)
+        for decay, terms in zip(decays, contacts, strict=True)
     ]
-    everything = reduce(add, contacts)
+    all_contacts = reduce(add, contacts)
     posteriors = {
-        'walls known': posterior_of(tables, together, (WALLS, WALLS)),
-        'decay': posterior_of(tables, together, walls),
-        'all': with_contacts(together, everything),
+        'walls known': posterior_of(tables, all_decays, (WALLS, WALLS)),
+        'decay': posterior_of(tables, all_decays, walls),
+        'all': with_contacts(all_decays, all_contacts),
     }
     rate = haff_rate(times, speeds.mean(axis=0))
     return posteriors, (
         rate,
-        float(np.median([one.tension for one in each])),
-        everything.rebounds / cycles,
-        everything.collisions / cycles,
-        *_alone(everything),
+        float(np.median([posterior.tension for posterior in cycle_posteriors])),
+        all_contacts.rebounds / cycles,
+        all_contacts.collisions / cycles,
+        *_alone(all_contacts),
     )
 
 
 def _alone(contacts):
-    """Restitutions of beads and walls by contacts alone; NaN without any."""
-    found = []
+    """Restitutions of beads and walls from contacts alone; NaN without contacts."""
+    restitutions = []
     for term in (contacts.bead_likelihood(), contacts.wall_likelihood()):
         if term is None:
-            found.append(math.nan)
+            restitutions.append(math.nan)
         else:
-            found.append(contact_estimate(term.restitution, term.log_likelihood).restitution)
-    return found
+            restitutions.append(
+                contact_estimate(term.restitution, term.log_likelihood).restitution
+            )
+    return restitutions
 
 
 def _contacts(tray, settings, run):
     tracks = true_tracks(tray, settings, run, round(_LAST * _RATE))
-    found = contacts_of(tray, tracks)
-    return ContactTerms.of([one for one in found if one.stamp_ns > _FIRST * _NS])
+    contacts = contacts_of(tray, tracks)
+    return ContactTerms.of([contact for contact in contacts if contact.stamp_ns > _FIRST * _NS])

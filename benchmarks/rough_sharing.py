@@ -1,4 +1,4 @@
-"""Cooling gases of rough beads: how flight and spin share the energy, and its directions."""
+"""Cooling gases of rough beads: energy of translation and rotation by direction."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ BULK_DENSITY = 0.1
 
 
 def bulk_course(restitution, tangential, seeds, duration=600.0):
-    """Collisions of each bead, and rotation over translation, in a periodic box, from no spin."""
+    """Collisions per bead and temperature ratio in a periodic box, started without rotation."""
     rows = []
     for seed in seeds:
         gas = bulk(
@@ -30,11 +30,11 @@ def bulk_course(restitution, tangential, seeds, duration=600.0):
             tangential_restitution=tangential,
         )
         times = np.linspace(0.0, duration, 61) * TIME
-        course = gas.follow(times[-1], times, times)
+        record = gas.follow(times[-1], times, times)
         inertia = SOLID_SPHERE * MASS * (0.5 * DIAMETER) ** 2
-        rotation = inertia * np.mean(course.spins**2, axis=(1, 2))
-        translation = MASS * np.mean(course.velocities**2, axis=(1, 2))
-        collisions = 2.0 * course.observations.pair_collisions / gas.radii.size
+        rotation = inertia * np.mean(record.spins**2, axis=(1, 2))
+        translation = MASS * np.mean(record.velocities**2, axis=(1, 2))
+        collisions = 2.0 * record.observations.pair_collisions / gas.radii.size
         rows.append((collisions, rotation, translation))
     collisions, rotation, translation = np.mean(rows, axis=0)
     return collisions, rotation / translation
@@ -42,7 +42,7 @@ def bulk_course(restitution, tangential, seeds, duration=600.0):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sharing:
-    """Energies of one direction or axis, mean over beads and runs, (n_species, n_times, 3), [J].
+    """Mean energies by direction and axis over beads and runs, (n_species, n_times, 3), [J].
 
     Parameters
     ----------
@@ -65,13 +65,13 @@ class Sharing:
 
     @property
     def upright_spin(self):
-        """Part of the energy of rotation that is about z; 1/3 where all axes are alike."""
+        """Share of the energy of rotation about z; 1/3 for isotropic rotation."""
         total = self.spin.sum(axis=2)
         return self.spin[..., 2] / np.where(total > 0.0, total, np.nan)
 
 
 def sharing(number, roughness, times, runs, **values):
-    """Of a tray at some times since the shaking."""
+    """Energies in a tray at some times since the shaking."""
     tray = load_trays()[number]
     settings = settings_of(tray, roughness, **values)
     flight, spin = [], []
@@ -79,20 +79,20 @@ def sharing(number, roughness, times, runs, **values):
         rules = rules_of(settings, tray, run)
         resting = resting_beads(settings, tray, run)
         beads = after_shaking(settings, rules, resting, run, 0)
-        course = HardSphereGas(beads, rules).follow(times[-1], times)
+        record = HardSphereGas(beads, rules).follow(times[-1], times)
         mass = resting.masses[:, np.newaxis]
         inertia = SOLID_SPHERE * mass * resting.radii[:, np.newaxis] ** 2
-        own = [beads.species == k for k in range(len(tray.species))]
-        for found, each in (
-            (flight, mass * course.velocities**2),
-            (spin, inertia * course.spins**2),
+        masks = [beads.species == k for k in range(len(tray.species))]
+        for totals, energies in (
+            (flight, mass * record.velocities**2),
+            (spin, inertia * record.spins**2),
         ):
-            found.append([each[:, one].mean(axis=1) for one in own])
+            totals.append([energies[:, mask].mean(axis=1) for mask in masks])
     return Sharing(flight=np.mean(flight, axis=0), spin=np.mean(spin, axis=0))
 
 
 def single_collisions(restitution, roughness, ratio, n=400_000, seed=1):
-    """Relative speed after over before single collisions, (n,), weighted as collisions happen.
+    """Ratio of relative speeds after and before single collisions, (n,), weighted by their rate.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def single_collisions(restitution, roughness, ratio, n=400_000, seed=1):
         Temperature of the rotation over that of the translation.
     """
     random = np.random.default_rng(seed)
-    # Along the normal Rayleigh's law, as beads meet the more often the faster; kT = m = r = 1.
+    # Normal speeds follow Rayleigh's law, since fast beads meet more often; kT = m = r = 1.
     normal = math.sqrt(2.0) * random.rayleigh(size=n)
     across = math.sqrt(2.0) * random.normal(size=(n, 2))
     turning = math.sqrt(2.0 * ratio / SOLID_SPHERE) * random.normal(size=(n, 2))

@@ -1,8 +1,8 @@
 """The whole scene at 1080p with all effects: ms of a frame by part, on one core.
 
-Times are those of the processor, medians over the frames of 2 s right after a shaking event,
-when the plate swings and the gas is fast. Compression is stated apart. Ratios are to encoding
-the same frames as bare JPEG (quality 90), which anything that hands on pictures must do.
+CPU times, medians over the frames of the 2 s after a shaking event, when the plate oscillates and
+the gas is fast. Compression is listed separately. Ratios are relative to encoding the same frames
+as JPEG (quality 90).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _QUALITY = 90
 _MEGA = 1e6
 _FLIGHT = 96e6 / 1800.0
 
-# What is timed: label, where it is looked up, its name.
+# Timed functions: label, module or class, name.
 _PARTS = (
     ('gas in eight trays', plate_film.ShakenTray, 'at'),
     ('plate, shifted while it swings', moving_plate.MovingPlate, 'displaced'),
@@ -52,8 +52,8 @@ def report() -> None:
     print('| part | ms | of JPEG encoding |\n| --- | --- | --- |')
     for name, cost in parts.items():
         print(f'| {name} | {cost:.1f} | {cost / jpeg:.2f} |')
-    rest = moving - sum(parts.values())
-    print(f'| everything else | {rest:.1f} | {rest / jpeg:.2f} |')
+    remainder = moving - sum(parts.values())
+    print(f'| everything else | {remainder:.1f} | {remainder / jpeg:.2f} |')
     print(f'| **a frame, all effects** | **{moving:.1f}** | **{moving / jpeg:.2f}** |')
     print(f'\nThat is {1e3 / moving:.0f} frames a second.\n')
     _print_single(jpeg)
@@ -72,7 +72,7 @@ def _run(scene: SceneSettings, spent=None):
         start = time.thread_time()
         moment = filmed.at(number, 0)
         times.append(time.thread_time() - start)
-        # As in use, most pictures are let go, so that memory need not be fetched for each.
+        # Most images are released, as in use, so that their memory is reused.
         if number % _KEPT == 0:
             images.append(moment.frame.image)
         for times_of_part in (spent or {}).values():
@@ -84,29 +84,29 @@ def _run(scene: SceneSettings, spent=None):
 def _timed():
     """Time every call of the parts."""
     spent = {label: [] for label, _, _ in _PARTS}
-    kept = []
+    originals = []
     for label, place, name in _PARTS:
-        kept.append((place, name, getattr(place, name)))
+        originals.append((place, name, getattr(place, name)))
         setattr(place, name, _timing(getattr(place, name), spent[label]))
     try:
         yield spent
     finally:
-        for place, name, function in kept:
+        for place, name, function in originals:
             setattr(place, name, function)
 
 
 def _timing(function, times):
     def timed(*arguments, **named):
         start = time.thread_time()
-        made = function(*arguments, **named)
+        result = function(*arguments, **named)
         times.append(time.thread_time() - start)
-        return made
+        return result
 
     return timed
 
 
 def _print_single(jpeg: float) -> None:
-    """What leaving out one effect saves."""
+    """Print the cost without single effects."""
     everything = SceneSettings()
     print('| scene | ms | of JPEG encoding |\n| --- | --- | --- |')
     cases = {
@@ -136,13 +136,13 @@ def _print_compression(images, jpeg: float, decode: float) -> None:
     except Exception as error:
         print(f'| H.264 | {error} | |')
         return
-    times = [_seconds(lambda one: list(stream.push(one)), image) for image in images]
+    times = [_seconds(lambda image: list(stream.push(image)), image) for image in images]
     rate = 1800 * stream.bytes_written / len(images) / _MEGA
     print(f'| H.264 there and back | {1e3 * np.median(times):.1f} | {rate:.0f} |')
 
 
 def _print_places() -> None:
-    """Red beads of tray 1: found by their colour, against the truth seen by OpenCV's lens."""
+    """Print errors of red beads of tray 1, found by colour, against the truth."""
     print('\n| red beads of tray 1 | found | mean column, row [px] | rms [px] |')
     print('| --- | --- | --- | --- |')
     everything = SceneSettings()
@@ -157,20 +157,20 @@ def _print_places() -> None:
 
 
 def _places(filmed, number):
-    """Centroids of red spots of the size of one bead, less the place of the bead, (n, 2)."""
+    """Centroids of red spots of the size of one bead, minus the position of the bead, (n, 2)."""
     moment = filmed.at(number, 0)
     geometry, beads = filmed.camera.geometry, moment.beads[0]
     lens = geometry.camera
-    past_the_camera = beads.positions[:, :2] + beads.displacement
-    rectified = geometry.rectified(1, past_the_camera) - 0.5
+    positions = beads.positions[:, :2] + beads.displacement
+    rectified = geometry.rectified(1, positions) - 0.5
     flat = (rectified - lens.matrix[:2, 2]) / lens.focal
     expected = cv2.fisheye.distortPoints(flat[None], lens.matrix, np.array(lens.distortion))[0]
     blue, green, red = np.moveaxis(moment.frame.image.astype(float), 2, 0)
     spots, count = ndimage.label(red - 0.5 * (blue + green) > 30.0)
-    every = range(1, count + 1)
-    areas = ndimage.sum(spots > 0, spots, every)
-    centres = np.array(ndimage.center_of_mass(spots > 0, spots, every))[:, ::-1]
-    # Those that hang together are no single beads.
+    labels = range(1, count + 1)
+    areas = ndimage.sum(spots > 0, spots, labels)
+    centres = np.array(ndimage.center_of_mass(spots > 0, spots, labels))[:, ::-1]
+    # Larger spots are several beads in contact.
     single = centres[(areas > 300) & (areas < 500)]
     gaps = single[:, np.newaxis] - expected
     nearest = np.hypot(*np.moveaxis(gaps, 2, 0)).argmin(axis=1)

@@ -1,4 +1,4 @@
-"""A cycle of the whole plate with all effects, as a bag, for benchmarks that start from one."""
+"""A bag with one cycle of the whole plate with all effects, for several benchmarks."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ QUALITY = 85
 
 
 def scenes() -> tuple[SimulationSettings, SceneSettings]:
-    """What is filmed: the default gas and plate, shaken after a second."""
+    """Settings of the film: the default gas and plate, shaken after a second."""
     return SimulationSettings(first_shake=SHAKE), SceneSettings(trays=(1, 2, 3, 4, 5, 6, 7))
 
 
 def film_scene(path: Path) -> None:
-    """Film it."""
+    """Write the film as a bag."""
     simulation, scene = scenes()
     recorder = SceneRecorder(simulation, scene, SECONDS)
     recorder.into_bag(path, CompressionSettings(), QUALITY, lambda done, total: None)
 
 
 def settings(trays: tuple[int, ...], **speed: float | str) -> PipelineSettings:
-    """How it is analysed."""
+    """Settings of its analysis."""
     names = {
         'trays': list(trays),
         'preprocess.layout': 'plate',

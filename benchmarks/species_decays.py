@@ -1,9 +1,9 @@
-"""Decays of the species of a mixture, each by itself, and how they share the energy.
+"""Decays and energies of the species of a mixture.
 
-Mean speeds from true places, 5 a second, with errors of 2 %; walls 0.97, start at 10 mm/s. The
+Mean speeds from true positions at 5 Hz with errors of 2 %; walls 0.97, start at 10 mm/s. The
 reference of a species is Haff's law fitted to its mean decay over all cycles; bias is that of the
-median cycle, "covered" is by one standard error. Energies are true ones, of velocities along the
-picture.
+median cycle, "covered" refers to one standard error. Energies are true ones, of velocities in the
+image plane.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ def cooled(tray: Tray, restitution: float) -> Mixture:
         frame_rate=5.0,
         seed=4,
     )
-    counts = [one.count for one in tray.species]
+    counts = [index.count for index in tray.species]
     species = np.repeat(np.arange(2), counts)
-    density = np.repeat([one.density for one in tray.species], counts)
+    density = np.repeat([index.density for index in tray.species], counts)
     speeds = np.empty((_CYCLES, _TIMES.size, 2))
     energies = np.empty_like(speeds)
     for run in range(_CYCLES):
@@ -57,10 +57,10 @@ def cooled(tray: Tray, restitution: float) -> Mixture:
         for k, moment in enumerate(gas.moments(_TIMES.size + 1)):
             if k:
                 square = (moment.velocities[:, :2] ** 2).sum(axis=1)
-                for one in (0, 1):
-                    own = species == one
-                    speeds[run, k - 1, one] = np.sqrt(square[own]).mean()
-                    energies[run, k - 1, one] = 0.5 * (mass * square)[own].mean()
+                for index in (0, 1):
+                    mask = species == index
+                    speeds[run, k - 1, index] = np.sqrt(square[mask]).mean()
+                    energies[run, k - 1, index] = 0.5 * (mass * square)[mask].mean()
     return Mixture(speeds=speeds, energies=energies)
 
 
@@ -68,25 +68,27 @@ def _fitted(speed: np.ndarray, error: np.ndarray, beads: int) -> HaffFit:
     return fit_haff(_TIMES[_WINDOW], speed[_WINDOW], error[_WINDOW], beads)
 
 
-def _row(tray: Tray, restitution: float, number: int, found: Mixture) -> None:
+def _row(tray: Tray, restitution: float, number: int, mixture: Mixture) -> None:
     species = tray.species[number]
-    each = found.speeds[..., number]
-    mean, scatter = each.mean(axis=0), each.std(axis=0, ddof=1) / np.sqrt(_CYCLES)
-    whole = _fitted(mean, scatter, species.count * _CYCLES)
+    speeds = mixture.speeds[..., number]
+    mean, scatter = speeds.mean(axis=0), speeds.std(axis=0, ddof=1) / np.sqrt(_CYCLES)
+    mean_fit = _fitted(mean, scatter, species.count * _CYCLES)
     rng = np.random.default_rng(1)
     fits = [
-        _fitted(one * (1.0 + _ERROR * rng.normal(size=one.size)), _ERROR * one, species.count)
-        for one in each
+        _fitted(
+            speed * (1.0 + _ERROR * rng.normal(size=speed.size)), _ERROR * speed, species.count
+        )
+        for speed in speeds
     ]
     cells = [f'{tray.number}, beads {restitution:g}', species.material, f'{species.count}']
-    cells += [f'{1e3 * whole.initial_speed:.2f}', f'{whole.haff_time:.2f}']
+    cells += [f'{1e3 * mean_fit.initial_speed:.2f}', f'{mean_fit.haff_time:.2f}']
     for logs, errors in (
         (
-            np.log([fit.haff_time / whole.haff_time for fit in fits]),
+            np.log([fit.haff_time / mean_fit.haff_time for fit in fits]),
             np.array([fit.haff_time_error / fit.haff_time for fit in fits]),
         ),
         (
-            np.log([fit.decay_rate / whole.decay_rate for fit in fits]),
+            np.log([fit.decay_rate / mean_fit.decay_rate for fit in fits]),
             np.array([fit.log_decay_rate_error for fit in fits]),
         ),
     ):
@@ -103,13 +105,13 @@ def report() -> None:
         tray = load_trays()[number]
         for restitution in (0.7, 0.89):
             mixture = cooled(tray, restitution)
-            for one in (0, 1):
-                _row(tray, restitution, one, mixture)
+            for index in (0, 1):
+                _row(tray, restitution, index, mixture)
             shares = mixture.energies.mean(axis=0)
             ratio = shares[:, 0] / shares[:, 1]
-            masses = [one.bead_mass for one in tray.species]
+            masses = [index.bead_mass for index in tray.species]
             squares = mixture.speeds.mean(axis=0) ** 2 * masses
-            names = '/'.join(one.material for one in tray.species)
+            names = '/'.join(index.material for index in tray.species)
             lines.append(
                 f'| {number}, beads {restitution:g} | {names} | {ratio[0]:.2f} '
                 f'| {ratio[_WINDOW].mean():.2f} '

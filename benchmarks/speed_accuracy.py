@@ -1,9 +1,8 @@
 """Mean projected speed from frames over the truth, tray 1, by method and speed.
 
-Four shaken trays a speed, JPEG 85, started at three means so that the range is covered; each
-estimate is compared with the true speed averaged over its own window, and binned by the truth.
-The first row is what the default takes here, the second its own error; readings of the paper's
-recipe are below.
+Four shaken trays per mean speed, JPEG 85; the mean speeds cover the range. Each estimate is
+compared with the true speed averaged over its window, and binned by the truth. The first row is
+the default method, the second its stated error; variants of the paper's recipe follow.
 """
 
 from __future__ import annotations
@@ -16,11 +15,11 @@ import numpy as np
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.pipeline.composition import trays_of
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import Frame, SpeedEstimate, TrayImage
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.tray_camera.tray_film import film
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 
 _NS = 1e9
 _SEEDS = range(1, 5)
@@ -46,12 +45,12 @@ _METHODS = {
 _OWN_ERROR = 'its own error / truth'
 
 
-def _estimators() -> dict[str, SpeedEstimator]:
+def _estimators() -> dict[str, TrayMeasurement]:
     estimators = {}
     for name, values in _METHODS.items():
         recipe = {'speed.method': 'binarised_area', **values}
         settings = with_values(PipelineSettings(), recipe, 'benchmark')
-        estimators[name] = SpeedEstimator(settings, load_trays()[1])
+        estimators[name] = TrayMeasurement(settings, load_trays()[1])
     return estimators
 
 
@@ -61,7 +60,7 @@ def _recompressed(frame: Frame) -> Frame:
     return Frame(stamp_ns=frame.stamp_ns, encoding='bgr8', image=image)
 
 
-def _ratios(seed: int, mean_speed: float, found: dict) -> None:
+def _ratios(seed: int, mean_speed: float, ratios: dict) -> None:
     settings = SimulationSettings(seed=seed, mean_speed=mean_speed, width_px=220, height_px=220)
     estimators = _estimators()
     stages = PipelineSettings()
@@ -74,10 +73,8 @@ def _ratios(seed: int, mean_speed: float, found: dict) -> None:
             if not isinstance(image, TrayImage):
                 continue
             for name, estimator in estimators.items():
-                found_now = estimator.push(image)
-                speeds[name] += [
-                    record for record in found_now if isinstance(record, SpeedEstimate)
-                ]
+                records = estimator.push(image)
+                speeds[name] += [record for record in records if isinstance(record, SpeedEstimate)]
     time, value = np.array(truth).T
     for name, estimates in speeds.items():
         for estimate in estimates:
@@ -86,24 +83,24 @@ def _ratios(seed: int, mean_speed: float, found: dict) -> None:
             inside = np.abs(time - estimate.stamp_ns / _NS) <= 0.5 * estimate.window + 1e-6
             true = value[inside].mean()
             column = int(np.digitize(true, _BINS))
-            found[name, column].append(estimate.mean_projected_speed.value / true)
+            ratios[name, column].append(estimate.mean_projected_speed.value / true)
             if name == _DEFAULT:
-                found[_OWN_ERROR, column].append(estimate.mean_projected_speed.error / true)
+                ratios[_OWN_ERROR, column].append(estimate.mean_projected_speed.error / true)
 
 
 def report() -> None:
     """Print the table."""
-    found: dict[tuple[str, int], list[float]] = defaultdict(list)
+    all_ratios: dict[tuple[str, int], list[float]] = defaultdict(list)
     for mean_speed in _MEAN_SPEEDS:
         for seed in _SEEDS:
-            _ratios(seed, mean_speed, found)
+            _ratios(seed, mean_speed, all_ratios)
     edges = [f'{1e3 * low:g}-{1e3 * high:g}' for low, high in pairwise(_BINS)]
     print('| estimate / truth (sd of one estimate), at v [mm/s] | ' + ' | '.join(edges) + ' |')
     print('| --- |' + ' --- |' * len(edges))
     for name in (_DEFAULT, _OWN_ERROR, *list(_METHODS)[1:]):
         cells = []
         for number in range(1, len(_BINS)):
-            ratios = np.array(found[name, number])
-            known = ratios[np.isfinite(ratios)]
-            cells.append(f'{known.mean():.3f} ({known.std():.3f})' if known.size else 'unknown')
+            ratios = np.array(all_ratios[name, number])
+            finite = ratios[np.isfinite(ratios)]
+            cells.append(f'{finite.mean():.3f} ({finite.std():.3f})' if finite.size else 'unknown')
         print(f'| {name} | ' + ' | '.join(cells) + ' |')

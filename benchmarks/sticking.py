@@ -1,7 +1,7 @@
 """Bodies, sizes, first merges and sticking speeds from tracks, against the truth.
 
-True places at 30 pictures a second with errors like those of tracking, 58 s after a
-shaking event at 10 mm/s. Tracks of films are in `sticking_films`.
+True positions at 30 Hz with errors as in tracking, 58 s after a shaking event at
+10 mm/s. Tracks of films are in `sticking_films`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _NS = 1e9
 
 @dataclass(frozen=True)
 class Course:
-    """A cycle as counted and as it was: the true values are those at the frames.
+    """A cycle with counted and true bodies; true values are those at the frames.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Course:
 
     @property
     def first(self) -> float:
-        """The same as found."""
+        """Time of the first detected merge, [s]; NaN without."""
         return min((merge.stamp_ns / _NS for merge in self.merges), default=np.nan)
 
 
@@ -72,20 +72,20 @@ def course(tray: Tray, pictures: Iterable[tuple[Tracks, np.ndarray, float]]) -> 
     ----------
     tray : Tray
     pictures : iterable of (Tracks, bodies, mean projected speed)
-        With the truth: for each bead the number of its body; [m/s].
+        True number of the body of each bead; speed in [m/s].
     """
     counter = BodyCounter(PipelineSettings(), tray)
-    found: list[BodyEstimate | Merge] = []
+    records: list[BodyEstimate | Merge] = []
     rows = []
     for tracks, bodies, speed in pictures:
-        found += counter.push(tracks, 1)
+        records += counter.push(tracks, 1)
         sizes = np.unique(bodies, return_counts=True)[1]
         rows.append((tracks.stamp_ns / _NS, sizes.size, (sizes**2).sum() / sizes.sum(), speed))
-    found += counter.flush()
+    records += counter.flush()
     times, numbers, sizes, speeds = np.array(rows).T
     return Course(
-        counts=[one for one in found if isinstance(one, BodyEstimate)],
-        merges=[one for one in found if isinstance(one, Merge)],
+        counts=[record for record in records if isinstance(record, BodyEstimate)],
+        merges=[record for record in records if isinstance(record, Merge)],
         times=times,
         bodies=numbers,
         weighted_size=sizes,
@@ -96,7 +96,7 @@ def course(tray: Tray, pictures: Iterable[tuple[Tracks, np.ndarray, float]]) -> 
 def simulated(
     number: int, run: int, seed: int = 5, seconds: float = _SECONDS, **values: float | str
 ) -> Course:
-    """One cycle of a tray with true places."""
+    """One cycle of a tray with true positions."""
     tray = load_trays()[number]
     names = {'restitution': 0.89, 'wall_restitution': 0.97, 'mean_speed': _SPEED, **values}
     settings = SimulationSettings(seed=seed, first_shake=0.0, frame_rate=_RATE, **names)
@@ -119,21 +119,39 @@ def _report_controls() -> None:
         for pairs, walls in _CONTROL_TRUTHS
         for run in range(_CONTROLS)
     }
-    found = run_tasks(_false_alarm, tasks, Workers())
+    alarms = run_tasks(_false_alarm, tasks, Workers())
     for number in _TRAYS:
-        false = [one for (of, *_), one in zip(tasks.values(), found, strict=True) if of == number]
-        print(f'| {number} | {len(false)} | {sum(false)} |', flush=True)
+        tray_alarms = [
+            alarm
+            for (tray_number, *_), alarm in zip(tasks.values(), alarms, strict=True)
+            if tray_number == number
+        ]
+        print(f'| {number} | {len(tray_alarms)} | {sum(tray_alarms)} |', flush=True)
 
 
-def compared(one: Course) -> tuple[np.ndarray, ...]:
-    """Time, bodies, its error, its truth, weighted size, its error, its truth: (7, n)."""
+def compared(cycle: Course) -> tuple[np.ndarray, ...]:
+    """Time, bodies, their error and truth, weighted size, its error and truth: (7, n)."""
     rows = [
-        (c.stamp_ns / _NS, c.bodies, c.bodies_error, c.weighted_size, c.weighted_size_error)
-        for c in one.counts
+        (
+            count.stamp_ns / _NS,
+            count.bodies,
+            count.bodies_error,
+            count.weighted_size,
+            count.weighted_size_error,
+        )
+        for count in cycle.counts
     ]
     times, bodies, error, size, size_error = np.array(rows).T
-    at = np.searchsorted(one.times, times - 1e-6)
-    return times, bodies, error, one.bodies[at], size, size_error, one.weighted_size[at]
+    indices = np.searchsorted(cycle.times, times - 1e-6)
+    return (
+        times,
+        bodies,
+        error,
+        cycle.bodies[indices],
+        size,
+        size_error,
+        cycle.weighted_size[indices],
+    )
 
 
 def size_row(cycles: list[Course]) -> str:
@@ -142,8 +160,10 @@ def size_row(cycles: list[Course]) -> str:
     _, bodies, error, true, size, size_error, true_size = columns
     ratio = size / true_size - 1.0
     onset = np.array([cycle.first - cycle.first_true for cycle in cycles])
-    known = onset[np.isfinite(onset)]
-    delays = [(m.known_ns - m.stamp_ns) / _NS for cycle in cycles for m in cycle.merges]
+    known_onsets = onset[np.isfinite(onset)]
+    delays = [
+        (merge.known_ns - merge.stamp_ns) / _NS for cycle in cycles for merge in cycle.merges
+    ]
     covered = np.mean(np.abs(bodies - true) <= np.maximum(2.0 * error, 0.5))
     covered_size = np.mean(np.abs(size - true_size) <= np.maximum(2.0 * size_error, 0.1))
     lines = [
@@ -152,8 +172,9 @@ def size_row(cycles: list[Course]) -> str:
         f'{ratio.mean():+.1%} ({np.sqrt(np.mean(ratio**2)):.1%})',
         f'{covered:.0%}, {covered_size:.0%}',
         f'{np.mean([cycle.first_true for cycle in cycles]):.2f}',
-        f'{known.mean():+.2f} ({np.abs(known).max():.2f}), {len(known)}/{len(cycles)}'
-        if known.size
+        f'{known_onsets.mean():+.2f} ({np.abs(known_onsets).max():.2f}), '
+        f'{len(known_onsets)}/{len(cycles)}'
+        if known_onsets.size
         else 'none found',
         f'{np.median(delays):.2f}, {np.quantile(delays, 0.9):.2f}' if delays else '',
     ]
@@ -175,37 +196,39 @@ def _report_sizes(courses: dict[tuple[int, float], list[Course]]) -> None:
         print(f'| {number}, {1e3 * speed:g} mm/s | {size_row(cycles)} |', flush=True)
 
 
-def _cycle(one: Course, beads: int, merges: list[Merge]) -> StickingCycle:
-    stamps = np.rint(one.times[1:] * _NS).astype(np.int64)
-    return sticking_cycle(beads, merges, stamps, one.speeds[1:], 0)
+def _cycle(course: Course, beads: int, merges: list[Merge]) -> StickingCycle:
+    stamps = np.rint(course.times[1:] * _NS).astype(np.int64)
+    return sticking_cycle(beads, merges, stamps, course.speeds[1:], 0)
 
 
 def true_merges(times: np.ndarray, bodies: np.ndarray, beads: int) -> list[Merge]:
-    """As if all had been found: of the times and numbers of bodies, (n,)."""
+    """All true merges, from times and numbers of bodies, (n,)."""
     fallen = -np.diff(bodies, prepend=beads)
     stamps = np.rint(np.repeat(times, fallen.astype(np.int64)) * _NS).astype(np.int64)
     fields = {'tray': 0, 'cycle': 1, 'tracks': np.zeros(2, dtype=np.int32), 'joins': True}
-    return [Merge(stamp_ns=int(at), known_ns=int(at), **fields) for at in stamps]
+    return [Merge(stamp_ns=int(stamp_ns), known_ns=int(stamp_ns), **fields) for stamp_ns in stamps]
 
 
 def threshold_row(number: int, speed: float, cycles: list[Course], measure: str) -> str:
     """Cells of the table of sticking speeds."""
     tray = load_trays()[number]
     contacts = slow_contacts(tray)
-    given = [_cycle(cycle, tray.count, cycle.merges) for cycle in cycles]
+    measured = [_cycle(cycle, tray.count, cycle.merges) for cycle in cycles]
     true = [
         _cycle(cycle, tray.count, true_merges(cycle.times, cycle.bodies, tray.count))
         for cycle in cycles
     ]
-    each = [sticking_estimate([cycle], contacts, tray.count, measure=measure) for cycle in given]
-    ratios = np.array([one.sticking_speed for one in each]) / speed
-    covered = sum(one.lower <= speed <= one.upper for one in each)
+    estimates = [
+        sticking_estimate([cycle], contacts, tray.count, measure=measure) for cycle in measured
+    ]
+    ratios = np.array([estimate.sticking_speed for estimate in estimates]) / speed
+    covered = sum(estimate.lower <= speed <= estimate.upper for estimate in estimates)
     cells = [
         f'{np.nanmean(ratios):.2f} ({np.nanstd(ratios):.2f}) of {np.isfinite(ratios).sum()}',
-        f'{covered}/{len(each)}',
+        f'{covered}/{len(estimates)}',
     ]
-    for known in (given, true):
-        estimate = sticking_estimate(known, contacts, tray.count, measure=measure)
+    for sample in (measured, true):
+        estimate = sticking_estimate(sample, contacts, tray.count, measure=measure)
         cells.append(
             f'{estimate.sticking_speed / speed:.2f} '
             f'[{estimate.lower / speed:.2f}, {estimate.upper / speed:.2f}]'
@@ -247,9 +270,9 @@ def report() -> None:
         for run in range(_CYCLES)
     }
     courses: dict[tuple[int, float], list[Course]] = {}
-    found = run_tasks(_cycle_of, tasks, Workers())
-    for (number, speed, _), one in zip(tasks.values(), found, strict=True):
-        courses.setdefault((number, speed), []).append(one)
+    results = run_tasks(_cycle_of, tasks, Workers())
+    for (number, speed, _), result in zip(tasks.values(), results, strict=True):
+        courses.setdefault((number, speed), []).append(result)
     _report_sizes(courses)
     _report_thresholds(courses)
     _report_controls()

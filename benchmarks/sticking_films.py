@@ -1,9 +1,9 @@
 """Clusters, first merges and sticking speeds in films with all effects, against the truth.
 
 Plates of eight cells, four like tray 1 and four like tray 3 or 5, JPEG 85, 26 s after a shaking
-event at 10 mm/s, restitutions 0.89 and 0.97; sizes are by tracks. In a sticking film each of the
-four has its own sticking speed; in a control nothing sticks. Tracks are kept as the films of
-`cor_films` are, and bodies counted in them anew.
+event at 10 mm/s, restitutions 0.89 and 0.97; sizes come from tracks. In a sticking film each of
+the four cells has its own sticking speed; controls are without sticking. Tracks are kept as in
+`cor_films`, and bodies are counted in each run.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ _NS = 1e9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Filmed:
-    """What the stages made of one cell, and what was in it.
+    """Results of the stages for one cell, and its truth.
 
     Parameters
     ----------
     like : int
-        The tray whose beads and sides they were.
+        Tray with the same beads and sides.
     cell : Tray
-        The same under the number of the cell.
+        That tray with the number of the cell.
     sticking : float, [m/s]
     tracks : tuple of (int, Tracks)
         With the number of the cycle.
@@ -93,7 +93,7 @@ class Filmed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Counted:
-    """One cell and the bodies that were counted in it.
+    """One cell and its counted bodies.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def report() -> None:
     missing = {name: film for name, film in films.items() if not (folder() / name).exists()}
     run_tasks(_make, missing, Workers())
     counted = run_tasks(_counted, {name: name for name in films}, Workers())
-    cells = [one for film in counted for one in film]
+    cells = [cell for film in counted for cell in film]
     _report_controls([cell for cell in cells if cell.film.sticking == 0.0])
     print(
         '\n| tray, sticking speed | cells | error of bodies: mean (rms) | of size: mean (rms) '
@@ -126,9 +126,11 @@ def report() -> None:
     print('| --- ' * 10 + '|')
     for tray in (1, 3, 5):
         for speed in _STICKING:
-            own = [cell for cell in cells if (cell.film.like, cell.film.sticking) == (tray, speed)]
-            if own:
-                print(_row(tray, speed, own), flush=True)
+            group = [
+                cell for cell in cells if (cell.film.like, cell.film.sticking) == (tray, speed)
+            ]
+            if group:
+                print(_row(tray, speed, group), flush=True)
 
 
 def _name(number: int, *, sticks: bool) -> str:
@@ -136,20 +138,22 @@ def _name(number: int, *, sticks: bool) -> str:
 
 
 def _counted(name: str) -> list[Counted]:
-    """The bodies in the tracks of a film."""
-    found = []
+    """Count the bodies in the tracks of a film."""
+    cells = []
     for film in pickle.loads((folder() / name).read_bytes()):
         counter = BodyCounter(PipelineSettings(), film.cell)
-        records = [one for cycle, tracks in film.tracks for one in counter.push(tracks, cycle)]
-        own = [one for one in (*records, *counter.flush()) if one.cycle == 1]
-        found.append(
+        records = [
+            record for cycle, tracks in film.tracks for record in counter.push(tracks, cycle)
+        ]
+        first_cycle = [record for record in (*records, *counter.flush()) if record.cycle == 1]
+        cells.append(
             Counted(
                 film=replace(film, tracks=()),
-                counts=tuple(one for one in own if isinstance(one, BodyEstimate)),
-                merges=tuple(one for one in own if isinstance(one, Merge)),
+                counts=tuple(record for record in first_cycle if isinstance(record, BodyEstimate)),
+                merges=tuple(record for record in first_cycle if isinstance(record, Merge)),
             )
         )
-    return found
+    return cells
 
 
 def _report_controls(cells: list[Counted]) -> None:
@@ -159,16 +163,16 @@ def _report_controls(cells: list[Counted]) -> None:
         + '|'
     )
     for tray in (1, 3, 5):
-        own = [cell for cell in cells if cell.film.like == tray]
-        onsets = np.array([_paper_onset(one.film) for one in own])
+        controls = [cell for cell in cells if cell.film.like == tray]
+        onsets = np.array([_paper_onset(cell.film) for cell in controls])
         print(
-            f'| {tray} | {len(own)} | {sum(bool(one.merges) for one in own)} '
+            f'| {tray} | {len(controls)} | {sum(bool(cell.merges) for cell in controls)} '
             f'| {np.isfinite(onsets).sum()} | {np.nanmedian(onsets):.1f} |'
         )
 
 
-def _paper_onset(one: Filmed) -> float:
-    return paper_onset(*one.areas.T, _SHAKE) - _SHAKE
+def _paper_onset(film: Filmed) -> float:
+    return paper_onset(*film.areas.T, _SHAKE) - _SHAKE
 
 
 def _row(tray: int, speed: float, cells: list[Counted]) -> str:
@@ -187,34 +191,36 @@ def _row(tray: int, speed: float, cells: list[Counted]) -> str:
         _cycle(cell.film, true_merges(cell.film.time, cell.film.bodies, beads), beads)
         for cell in cells
     ]
-    each = [sticking_estimate([cycle], contacts, beads) for cycle in cycles]
-    ratio = np.array([estimate.sticking_speed for estimate in each]) / speed
-    held = sum(estimate.lower <= speed <= estimate.upper for estimate in each)
-    both, of_true = (sticking_estimate(some, contacts, beads) for some in (cycles, actual))
+    estimates = [sticking_estimate([cycle], contacts, beads) for cycle in cycles]
+    ratio = np.array([estimate.sticking_speed for estimate in estimates]) / speed
+    covered = sum(estimate.lower <= speed <= estimate.upper for estimate in estimates)
+    combined, by_true_merges = (
+        sticking_estimate(some, contacts, beads) for some in (cycles, actual)
+    )
     return (
         f'| {tray}, {1e3 * speed:g} mm/s | {len(cells)} '
         f'| {bodies.mean():+.2f} ({np.sqrt(np.mean(bodies**2)):.2f}) '
         f'| {100 * sizes.mean():+.0f} % ({100 * np.sqrt(np.mean(sizes**2)):.0f} %) '
         f'| {np.mean(late):+.2f} ({np.abs(late).max():.2f}) | {onset:.1f}, {true:.2f} '
-        f'| {np.nanmean(ratio):.2f} ({np.nanstd(ratio):.2f}) | {held}/{len(cells)} '
-        f'| {both.sticking_speed / speed:.2f} [{both.lower / speed:.2f}, '
-        f'{both.upper / speed:.2f}] | {of_true.sticking_speed / speed:.2f} |'
+        f'| {np.nanmean(ratio):.2f} ({np.nanstd(ratio):.2f}) | {covered}/{len(cells)} '
+        f'| {combined.sticking_speed / speed:.2f} [{combined.lower / speed:.2f}, '
+        f'{combined.upper / speed:.2f}] | {by_true_merges.sticking_speed / speed:.2f} |'
     )
 
 
-def _errors(one: Counted) -> tuple[np.ndarray, np.ndarray]:
-    """Of the number of bodies, and of the size over the true one, where they are told."""
-    known = [count for count in one.counts if math.isfinite(count.bodies)]
-    film = one.film
-    times = np.array([estimate.stamp_ns / _NS for estimate in known])
+def _errors(cell: Counted) -> tuple[np.ndarray, np.ndarray]:
+    """Errors of the number of bodies, and relative errors of the size, where known."""
+    counts = [count for count in cell.counts if math.isfinite(count.bodies)]
+    film = cell.film
+    times = np.array([estimate.stamp_ns / _NS for estimate in counts])
     at = np.searchsorted(film.time, times - 0.5 / _RATE)
-    bodies = np.array([estimate.bodies for estimate in known]) - film.bodies[at]
-    size = np.array([estimate.weighted_size for estimate in known]) / film.weighted_size[at] - 1.0
+    bodies = np.array([estimate.bodies for estimate in counts]) - film.bodies[at]
+    size = np.array([estimate.weighted_size for estimate in counts]) / film.weighted_size[at] - 1.0
     return bodies, size
 
 
-def _cycle(one: Filmed, merges: Sequence[Merge], beads: int) -> StickingCycle:
-    speeds = [speed for speed in one.speeds if speed.cycle == 1]
+def _cycle(film: Filmed, merges: Sequence[Merge], beads: int) -> StickingCycle:
+    speeds = [speed for speed in film.speeds if speed.cycle == 1]
     return sticking_cycle(
         beads,
         merges,
@@ -229,13 +235,13 @@ def _make(task: tuple[int, bool]) -> None:
     number, sticks = task
     flown = load_trays()
     cells: dict[int, Tray] = {}
-    like: dict[int, int] = {}
-    for shown, places in PLACES.items():
-        tray = 5 if shown == 3 and number % 2 else shown
+    tray_of_cell: dict[int, int] = {}
+    for default_tray, places in PLACES.items():
+        tray = 5 if default_tray == 3 and number % 2 else default_tray
         for x, y in places:
             cell = len(cells) + 1
             cells[cell] = replace(flown[tray], number=cell, place=(1e-3 * x, 1e-3 * y))
-            like[cell] = tray
+            tray_of_cell[cell] = tray
     gases = {
         cell: SimulationSettings(
             seed=2000 + 2 * number + int(sticks),
@@ -248,13 +254,18 @@ def _make(task: tuple[int, bool]) -> None:
         )
         for cell in cells
     }
-    found = _film(cells, gases)
-    kept = [
-        Filmed(like=like[cell], cell=cells[cell], sticking=gases[cell].sticking_speed, **values)
-        for cell, values in found.items()
+    results = _film(cells, gases)
+    films = [
+        Filmed(
+            like=tray_of_cell[cell],
+            cell=cells[cell],
+            sticking=gases[cell].sticking_speed,
+            **values,
+        )
+        for cell, values in results.items()
     ]
     path = folder() / _name(number, sticks=sticks)
-    write_bytes(path, pickle.dumps(kept))
+    write_bytes(path, pickle.dumps(films))
 
 
 def _film(cells: dict[int, Tray], gases: dict[int, SimulationSettings]) -> dict[int, dict]:
@@ -263,14 +274,14 @@ def _film(cells: dict[int, Tray], gases: dict[int, SimulationSettings]) -> dict[
         'trays': list(cells),
         'preprocess.layout': 'plate',
         'preprocess.pixels_per_metre': _SCALE,
-        # Cells have other numbers than the trays that libraries were made for.
+        # There are no libraries for the numbers of the cells.
         'cooling.relation': 'paper',
     }
     settings = with_values(PipelineSettings(), names, 'benchmark')
     stage = Preprocessor(settings, cells, 'film', View(camera=scene.camera.geometry.camera))
     stages = {cell: TrayStages(settings, tray) for cell, tray in cells.items()}
-    for each in stages.values():
-        each.speed.emit_tracks = True
+    for tray_stages in stages.values():
+        tray_stages.measurement.emit_tracks = True
     tracks: dict[int, list[tuple[int, Tracks]]] = {cell: [] for cell in cells}
     records: dict[int, list] = {cell: [] for cell in cells}
     truth: dict[int, list[tuple[float, float, float]]] = {cell: [] for cell in cells}
@@ -285,19 +296,19 @@ def _film(cells: dict[int, Tray], gases: dict[int, SimulationSettings]) -> dict[
         frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
         for record in stage.push(frame):
             if isinstance(record, TrayImage):
-                found = stages[record.tray].push(record)
-                followed = [one for one in found if isinstance(one, Tracks)]
-                tracks[record.tray] += [(record.cycle or 0, one) for one in followed]
-                wanted = (ClusterEstimate, SpeedEstimate)
-                records[record.tray] += [one for one in found if isinstance(one, wanted)]
-    kept = {}
+                products = stages[record.tray].push(record)
+                new_tracks = [item for item in products if isinstance(item, Tracks)]
+                tracks[record.tray] += [(record.cycle or 0, item) for item in new_tracks]
+                kinds = (ClusterEstimate, SpeedEstimate)
+                records[record.tray] += [item for item in products if isinstance(item, kinds)]
+    results = {}
     for cell, tray in stages.items():
-        own = [*records[cell], *tray.flush()]
+        cell_records = [*records[cell], *tray.flush()]
         time, bodies, weighted = np.array(truth[cell]).T
-        clusters = [one for one in own if isinstance(one, ClusterEstimate)]
-        kept[cell] = {
+        clusters = [item for item in cell_records if isinstance(item, ClusterEstimate)]
+        results[cell] = {
             'tracks': tuple(tracks[cell]),
-            'speeds': tuple(one for one in own if isinstance(one, SpeedEstimate)),
+            'speeds': tuple(item for item in cell_records if isinstance(item, SpeedEstimate)),
             'areas': np.array(
                 [(cluster.stamp_ns / _NS, cluster.level_area) for cluster in clusters]
             ),
@@ -305,4 +316,4 @@ def _film(cells: dict[int, Tray], gases: dict[int, SimulationSettings]) -> dict[
             'bodies': bodies,
             'weighted_size': weighted,
         }
-    return kept
+    return results

@@ -1,7 +1,7 @@
-"""Tracks against the truth: beads found, links beside trackpy, mean speeds, and the cost.
+"""Tracks against the truth: detected beads, links against trackpy, mean speeds, and cost.
 
-Everything is filmed: the whole plate through the lens with all effects (JPEG 85), or one tray
-after the other without any. A link is a bead in one picture joined to one in the next.
+Films of the whole plate through the lens with all effects (JPEG 85), or of single trays without
+effects. A link joins a bead in one frame to a bead in the next.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _TRAYS = (1, 2, 3, 4, 5, 6, 7)
 _WARM_UP = 45
 _FRAMES = 150
 _SPEEDS = (0.1e-3, 0.5e-3, 2e-3, 7e-3, 15e-3)
-# Gray levels added by a reflection, beyond which a place lies in the glare.
+# Gray levels added by a reflection, above which a position lies in the glare.
 _GLARE_LEVEL = 60.0
 _LEAST_DISTANCE = 1.5 / SCALE
 _NS = 1e9
@@ -51,9 +51,9 @@ def _tracked(shots: list[Shot], tray: int) -> Iterator[tuple[Tracks, BeadsTruth]
 
 
 def _pairs(
-    known: NDArray[np.float64], found: NDArray[np.float64], reach: float
+    references: NDArray[np.float64], positions: NDArray[np.float64], reach: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    apart = cdist(known, found)
+    apart = cdist(references, positions)
     rows, columns = linear_sum_assignment(np.minimum(apart, reach))
     near = apart[rows, columns] < reach
     return rows[near], columns[near]
@@ -71,7 +71,7 @@ def _in_glare(film: SceneFilm, tray: int, places: NDArray[np.float64]) -> NDArra
 
 
 def _report_counts(shots: list[Shot], film: SceneFilm) -> None:
-    """[B19] table 2: tracked over true particles; and what the places are off."""
+    """Print [B19] table 2, tracked over true particles, and errors of the positions."""
     print('\nTracked / true beads, all effects, 7 mm/s; "outside" is outside the glare\n')
     print(
         '| tray | species | true | seen | seen, outside | followed | found and right, outside | '
@@ -91,13 +91,13 @@ def _count_row(
     seen, seen_outside, followed, right, true, outside = [], [], [], [], [], []
     errors, pulls = [np.empty((0, 2))], [np.empty((0, 2))]
     for tracks, truth in records:
-        own = truth.species == index
-        places = truth.positions[own, :2]
+        selected = truth.species == index
+        places = truth.positions[selected, :2]
         clear = ~_in_glare(film, number, places)
         ours = tracks.seen & (tracks.species == index)
         positions = tracks.positions[ours]
-        rows, columns = _pairs(places, positions, 0.6 * float(truth.radii[own].min()))
-        true.append(own.sum())
+        rows, columns = _pairs(places, positions, 0.6 * float(truth.radii[selected].min()))
+        true.append(selected.sum())
         outside.append(clear.sum())
         seen.append(ours.sum())
         seen_outside.append((~_in_glare(film, number, positions)).sum())
@@ -118,7 +118,7 @@ def _count_row(
 
 
 def _report_links() -> None:
-    """Our linker and trackpy on the same detections, in one run."""
+    """Print our linker and trackpy on the same detections, in one run."""
     print('\nLinks, no effects; the same detections for both, made without knowledge of tracks\n')
     print(
         '| tray, species, v | linker | right / possible links | wrong / made links | '
@@ -128,22 +128,25 @@ def _report_links() -> None:
     for number, index, speed in ((1, 0, 7e-3), (3, 0, 15e-3), (3, 1, 7e-3), (5, 0, 15e-3),
                                  (5, 1, 15e-3), (7, 1, 7e-3)):  # fmt: skip
         shots, _ = filmed(speed, effects=False, frames=_FRAMES, trays=(number,))
-        found, beads = _detections(shots, number, index)
+        detections, beads = _detections(shots, number, index)
         name = f'{number}, {load_trays()[number].species[index].material}, {1e3 * speed:g} mm/s'
-        for linker, link in (('ours', _link_ours), *_trackpy_linkers(found, beads, number, index)):
-            link(found, number, index)
+        for linker, link in (
+            ('ours', _link_ours),
+            *_trackpy_linkers(detections, beads, number, index),
+        ):
+            link(detections, number, index)
             start = time.process_time()
-            numbers = link(found, number, index)
-            cost = (time.process_time() - start) / len(found)
+            numbers = link(detections, number, index)
+            cost = (time.process_time() - start) / len(detections)
             right, wrong, switches = _judge(numbers, beads)
             print(f'| {name} | {linker} | {right:.2%} | {wrong:.3%} | {switches:.2f} | '
                   f'{1e3 * cost:.2f} |', flush=True)  # fmt: skip
 
 
 def _trackpy_linkers(
-    found: list[Detections], beads: list[NDArray[np.int64]], number: int, index: int
+    detections: list[Detections], beads: list[NDArray[np.int64]], number: int, index: int
 ) -> list[tuple[str, Callable[..., list[NDArray[np.int64]]]]]:
-    """trackpy with its nearest-velocity prediction, at the range that links best here."""
+    """trackpy with its nearest-velocity prediction, at the search range with most right links."""
     try:
         import trackpy
     except ImportError:
@@ -152,7 +155,7 @@ def _trackpy_linkers(
     best: tuple[float, float] | None = None
     for diameters in (0.5, 0.75, 1.0, 1.5):
         try:
-            numbers = _link_trackpy(found, number, index, diameters)
+            numbers = _link_trackpy(detections, number, index, diameters)
         except trackpy.linking.SubnetOversizeException:
             break
         right = _judge(numbers, beads)[0]
@@ -168,28 +171,30 @@ def _trackpy_linkers(
 def _detections(
     shots: list[Shot], number: int, index: int
 ) -> tuple[list[Detections], list[NDArray[np.int64]]]:
-    """What is seen in each picture, and which bead each of them is; -1 for none."""
+    """Detections in each frame, and the index of the bead of each; -1 for none."""
     tray = load_trays()[number]
     detector = BeadDetector(TrackingSettings(), tray, SCALE)
-    found, beads = [], []
+    detections, beads = [], []
     for shot in shots:
         if number not in shot.images:
-            # Without noise, resting beads are the same picture twice, and left out.
+            # Without noise, frames of resting beads are identical, and duplicates are dropped.
             continue
-        one = detector.detect(shot.images[number].color)[index]
+        detected = detector.detect(shot.images[number].color)[index]
         truth = shot.truth[number]
-        own = np.flatnonzero(truth.species == index)
+        bead_indices = np.flatnonzero(truth.species == index)
         rows, columns = _pairs(
-            truth.positions[own, :2], one.positions / SCALE, 0.6 * float(truth.radii[own].min())
+            truth.positions[bead_indices, :2],
+            detected.positions / SCALE,
+            0.6 * float(truth.radii[bead_indices].min()),
         )
-        bead = np.full(one.radii.size, -1)
-        bead[columns] = own[rows]
-        found.append(one)
+        bead = np.full(detected.radii.size, -1)
+        bead[columns] = bead_indices[rows]
+        detections.append(detected)
         beads.append(bead)
-    return found[_WARM_UP // 3 :], beads[_WARM_UP // 3 :]
+    return detections[_WARM_UP // 3 :], beads[_WARM_UP // 3 :]
 
 
-def _link_ours(found: list[Detections], number: int, index: int) -> list[NDArray[np.int64]]:
+def _link_ours(detections: list[Detections], number: int, index: int) -> list[NDArray[np.int64]]:
     tray, settings = load_trays()[number], TrackingSettings()
     size = (tray.dimensions[0] * SCALE, tray.dimensions[1] * SCALE)
     linker = Linker(
@@ -201,21 +206,21 @@ def _link_ours(found: list[Detections], number: int, index: int) -> list[NDArray
         0.0,
     )
     first, numbers = 0, []
-    for k, one in enumerate(found):
-        first += linker.push(k / RATE, one, np.zeros(2), first)
+    for k, frame_detections in enumerate(detections):
+        first += linker.push(k / RATE, frame_detections, np.zeros(2), first)
         places, _ = linker.positions()
-        here = linker.last_seen == k / RATE
-        row = np.full(one.radii.size, -1)
-        apart = cdist(one.positions, places[here])
+        current = linker.last_seen == k / RATE
+        identities = np.full(frame_detections.radii.size, -1)
+        apart = cdist(frame_detections.positions, places[current])
         nearest = apart.argmin(axis=1)
         same = apart[np.arange(apart.shape[0]), nearest] == 0.0
-        row[same] = linker.ids[here][nearest[same]]
-        numbers.append(row)
+        identities[same] = linker.ids[current][nearest[same]]
+        numbers.append(identities)
     return numbers
 
 
 def _link_trackpy(
-    found: list[Detections], number: int, index: int, diameters: float
+    detections: list[Detections], number: int, index: int, diameters: float
 ) -> list[NDArray[np.int64]]:
     import pandas as pd
     import trackpy
@@ -223,35 +228,40 @@ def _link_trackpy(
     trackpy.quiet()
     tray = load_trays()[number]
     reach = diameters * tray.species[index].diameter * SCALE
-    frames = np.repeat(np.arange(len(found)), [one.radii.size for one in found])
-    places = np.concatenate([one.positions for one in found])
+    frames = np.repeat(
+        np.arange(len(detections)),
+        [frame_detections.radii.size for frame_detections in detections],
+    )
+    places = np.concatenate([frame_detections.positions for frame_detections in detections])
     table = pd.DataFrame({'frame': frames, 'x': places[:, 0], 'y': places[:, 1]})
     predictor = trackpy.predict.NearestVelocityPredict()
     linked = predictor.link_df(table, search_range=reach, memory=int(RATE))
     numbers = linked.sort_index()['particle'].to_numpy()
-    return np.split(numbers, np.cumsum([one.radii.size for one in found])[:-1])
+    return np.split(
+        numbers, np.cumsum([frame_detections.radii.size for frame_detections in detections])[:-1]
+    )
 
 
 def _judge(
     numbers: list[NDArray[np.int64]], beads: list[NDArray[np.int64]]
 ) -> tuple[float, float, float]:
-    """Right links of those possible, wrong ones of those made, switches per bead and minute."""
-    possible = right = made = switches = 0
+    """Right over possible links, wrong over made links, switches per bead and minute."""
+    links_possible = right = links_made = switches = 0
     last_number: dict[int, int] = {}
     before: tuple[dict[int, int], dict[int, int]] = ({}, {})
     for row, bead in zip(numbers, beads, strict=True):
         of_bead = {int(b): int(n) for n, b in zip(row, bead, strict=True) if b >= 0}
         of_number = {int(n): int(b) for n, b in zip(row, bead, strict=True) if n >= 0}
-        possible += len(of_bead.keys() & before[0].keys())
+        links_possible += len(of_bead.keys() & before[0].keys())
         right += sum(
             before[0].get(b) == n and n >= 0 for b, n in of_bead.items() if b in before[0]
         )
-        made += len(of_number.keys() & before[1].keys())
+        links_made += len(of_number.keys() & before[1].keys())
         switches += sum(last_number.get(b, n) != n for b, n in of_bead.items() if n >= 0)
         last_number.update({b: n for b, n in of_bead.items() if n >= 0})
         before = of_bead, of_number
     minutes = len(last_number) * len(numbers) / RATE / 60.0
-    return right / possible, 1.0 - right / max(made, 1), switches / minutes
+    return right / links_possible, 1.0 - right / max(links_made, 1), switches / minutes
 
 
 def _report_speeds() -> None:
@@ -276,18 +286,18 @@ def _report_speeds() -> None:
 
 def _speed_cell(shots: list[Shot], number: int, index: int) -> str:
     records = list(_tracked(shots, number))[12:]
-    stamps = np.array([one.stamp_ns for one, _ in records])
+    stamps = np.array([record.stamp_ns for record, _ in records])
     true = np.array(
         [truth.projected_speeds[truth.species == index].mean() for _, truth in records]
     )
     ratios, reliable = [], []
-    for end in range(40, len(records), 5):
-        tracks = [one for one, _ in records[:end]]
-        found = mean_speed(tracks, least_distance=_LEAST_DISTANCE, species=index)
-        if found is not None:
-            inside = np.abs(stamps - found.stamp_ns) <= 0.5 * found.window * _NS + 1e6
-            ratios.append(found.mean_projected_speed / true[inside].mean())
-            reliable.append(found.reliable)
+    for count in range(40, len(records), 5):
+        tracks = [record for record, _ in records[:count]]
+        speed = mean_speed(tracks, least_distance=_LEAST_DISTANCE, species=index)
+        if speed is not None:
+            inside = np.abs(stamps - speed.stamp_ns) <= 0.5 * speed.window * _NS + 1e6
+            ratios.append(speed.mean_projected_speed / true[inside].mean())
+            reliable.append(speed.reliable)
     if not ratios:
         return 'unknown'
     flag = '' if np.mean(reliable) > 0.5 else ' !'
@@ -295,11 +305,11 @@ def _speed_cell(shots: list[Shot], number: int, index: int) -> str:
 
 
 def _report_cost(shots: list[Shot]) -> None:
-    """Processor time of the trackers, beside that of decoding the same frames."""
+    """Print CPU time of the trackers, against decoding the same frames."""
     start = time.process_time()
     image = None
     for shot in shots:
-        # Held until the next one is there: to get its memory anew takes as long as decoding.
+        # Kept until the next frame: allocating its memory again takes as long as decoding.
         image = cv2.imdecode(shot.jpeg, cv2.IMREAD_COLOR)
     del image
     decoding = (time.process_time() - start) / len(shots)

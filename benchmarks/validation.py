@@ -1,7 +1,7 @@
 """Validation report of camera, tracking and speed, written to docs/validation/validation.md.
 
-What was to be reached, what is reached on one cycle of the simulated plate with all effects, and
-by how much it is missed; beside the numbers of the paper where it has them.
+Goals, results on one cycle of the simulated plate with all effects, and deviations from the goals;
+with the numbers of the paper where they exist.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ _PAGE = _ROOT / 'docs' / 'validation' / 'validation.md'
 _TEXT = Path(__file__).with_name('validation.md')
 _PAPER = _ROOT / 'test' / 'paper_values.json'
 _TRAYS = (1, 2, 3, 4, 5, 6, 7)
-# After the shaking event, until the tracker knows floor and beads.
+# Time after the shaking event in which the tracker learns floor and beads, [s].
 _SETTLED = 0.5
-# Of the smallest radius, within which a place is that of the bead.
+# Largest distance of a position from its bead, over the smallest radius.
 _REACH = 0.6
-# Gray levels added by a reflection, beyond which a place lies in the glare.
+# Gray levels added by a reflection, above which a position lies in the glare.
 _GLARE_LEVEL = 60.0
-# What was to be reached: share of the beads seen, by tray and material; tray 4 outside the glare.
+# Goals: share of the beads seen, by tray and material; tray 4 outside the glare.
 _COUNTS = {
     (1, 'acrylic'): (0.95, 1.05),
     (2, 'acrylic'): (0.95, 1.05),
@@ -55,7 +55,7 @@ _COUNTS = {
     (6, 'glass'): (0.95, 1.05),
     (7, 'acrylic'): (0.95, 1.05),
 }
-# And how far a speed may be off the truth, by tray.
+# Goals: relative error of the speed, by tray.
 _SPEEDS = {1: 0.05, 3: 0.05, 5: 0.10, 7: 0.10}
 _FAR_OFF = 0.2
 _NS = 1e9
@@ -63,7 +63,7 @@ _NS = 1e9
 
 @dataclass
 class _Counts:
-    """Places of the beads of one species, over all frames."""
+    """Numbers of positions of the beads of one species, over all frames."""
 
     true: int = 0
     true_outside: int = 0
@@ -73,7 +73,7 @@ class _Counts:
 
 
 class _Glare:
-    """Where reflections of the LEDs hide what lies under them."""
+    """The glare of the LEDs on the plate."""
 
     def __init__(self) -> None:
         camera = SceneFilm(*scenes()).camera
@@ -89,12 +89,14 @@ class _Glare:
 
 
 def _counts(bag: Path) -> dict[tuple[int, str], _Counts]:
-    found = track_bag(bag, settings(_TRAYS))
+    bag_tracks = track_bag(bag, settings(_TRAYS))
     glare, counts = _Glare(), defaultdict(_Counts)
-    for number, tray in found.trays.items():
-        truth = _beads(bag, number, found.epoch_ns)
-        for tracks, frame in zip(found.tracks[number], found.numbers[number], strict=True):
-            if (tracks.stamp_ns - found.epoch_ns) / _NS < SHAKE + _SETTLED:
+    for number, tray in bag_tracks.trays.items():
+        truth = _beads(bag, number, bag_tracks.epoch_ns)
+        for tracks, frame in zip(
+            bag_tracks.tracks[number], bag_tracks.numbers[number], strict=True
+        ):
+            if (tracks.stamp_ns - bag_tracks.epoch_ns) / _NS < SHAKE + _SETTLED:
                 continue
             for index, species in enumerate(tray.species):
                 _add(counts[number, species.material], tracks, truth[frame], index, glare)
@@ -113,11 +115,11 @@ def _beads(bag: Path, number: int, epoch_ns: int) -> list[BeadsTruth]:
 
 
 def _add(count: _Counts, tracks: Tracks, truth: BeadsTruth, index: int, glare: _Glare) -> None:
-    own = truth.species == index
-    places = truth.positions[own, :2]
+    selected = truth.species == index
+    places = truth.positions[selected, :2]
     clear = ~glare.hides(tracks.tray, places, truth.displacement)
     ours = tracks.positions[tracks.seen & (tracks.species == index)]
-    reach = _REACH * float(truth.radii[own].min())
+    reach = _REACH * float(truth.radii[selected].min())
     apart = cdist(places, ours)
     rows, columns = linear_sum_assignment(np.minimum(apart, reach))
     right = rows[apart[rows, columns] < reach]
@@ -130,7 +132,7 @@ def _add(count: _Counts, tracks: Tracks, truth: BeadsTruth, index: int, glare: _
 
 def _table_2(bag: Path) -> list[str]:
     paper = json.loads(_PAPER.read_text(encoding='utf-8'))['table2_percent_tracked']
-    theirs = {
+    paper_shares = {
         number: f'{share:.0f} ({spread:.0f})'
         for number, share, spread in zip(
             paper['tray'], paper['percent'], paper['mean_abs_dev'], strict=True
@@ -143,30 +145,34 @@ def _table_2(bag: Path) -> list[str]:
         '| --- |' + ' --- |' * 9,
     ]
     trays = load_trays()
-    for (number, material), one in counts.items():
+    for (number, material), species_counts in counts.items():
         true = next(s.count for s in trays[number].species if s.material == material)
-        if not one.seen:
+        if not species_counts.seen:
             lines.append(f'| {number} | {material} | {true} | | not followed | | | | | |')
             continue
         low, high = _COUNTS.get((number, material), (None, None))
-        right = one.right_outside / one.true_outside
-        counted = one.seen_outside / one.true_outside if number == 4 else one.seen / one.true
+        right = species_counts.right_outside / species_counts.true_outside
+        counted = (
+            species_counts.seen_outside / species_counts.true_outside
+            if number == 4
+            else species_counts.seen / species_counts.true
+        )
         cells = [
             str(number),
             material,
             str(true),
-            '' if low is None else theirs[number],
-            _percent(one.seen, one.true),
-            _percent(one.seen_outside, one.true_outside),
-            _percent(one.right_outside, one.true_outside),
+            '' if low is None else paper_shares[number],
+            _percent(species_counts.seen, species_counts.true),
+            _percent(species_counts.seen_outside, species_counts.true_outside),
+            _percent(species_counts.right_outside, species_counts.true_outside),
             _goal(counted, right, low, high),
         ]
         lines.append(f'| {" | ".join(cells)} |')
     return lines
 
 
-def _percent(part: int, whole: int) -> str:
-    return f'{100.0 * part / max(whole, 1):.1f}'
+def _percent(part: int, total: int) -> str:
+    return f'{100.0 * part / max(total, 1):.1f}'
 
 
 def _goal(share: float, right: float, low: float | None, high: float | None) -> str:
@@ -206,7 +212,7 @@ def _ratio(tray: ComparedSpeeds, method: str) -> str:
 
 
 def _silent(tray: ComparedSpeeds) -> float:
-    """Share of the speeds chosen from the data that are far off, and do not say so."""
+    """Share of the speeds chosen from the data with a large error and no flag."""
     estimates = [speed for speed in tray.speeds[AUTO] if speed.cycle == 1]
     ratios = np.array(
         [estimate.mean_projected_speed.value for estimate in estimates]
@@ -216,7 +222,7 @@ def _silent(tray: ComparedSpeeds) -> float:
 
 
 def page(bag: Path) -> str:
-    """The report on a bag of `film_scene`."""
+    """The page for a bag of `film_scene`."""
     return _TEXT.read_text(encoding='utf-8').format(
         quality=QUALITY,
         seconds=SECONDS,

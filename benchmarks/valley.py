@@ -1,8 +1,8 @@
-"""How far rebounds and collisions shrink the valley of the two restitutions.
+"""Reduction of the valley of the two restitutions by rebounds and collisions.
 
-Tray 1 and 3, beads 0.89, walls 0.97: decays of the true mean projected speed (errors of 2 %) and
-contacts found in true places with the errors of tracking, 1.75 to 20 s after a start at 10 mm/s.
-All uncertainties at their defaults, floor and lid among them. "Half": of the 68 % interval.
+Trays 1 and 3, beads 0.89, walls 0.97: decays of the true mean projected speed (errors of 2 %) and
+contacts in true positions with the errors of tracking, 1.75 to 20 s after a start at 10 mm/s. All
+uncertainties have their defaults. "Half" is half the 68 % interval.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ def report() -> None:
             ('all', True, True),
         ):
             judge = partial(_posterior, tray, beads=beads, walls=walls)
-            each = [judge([cycle]) for cycle in cycles]
-            print(f'| {tray} | {name} ' + _row(each, judge(cycles)), flush=True)
+            posteriors = [judge([cycle]) for cycle in cycles]
+            print(f'| {tray} | {name} ' + _row(posteriors, judge(cycles)), flush=True)
 
 
 def _cycle(task: tuple[int, int]) -> _Cycle:
-    """What one cycle says: by its decay, and by its contacts."""
+    """Likelihoods of one cycle: of its decay and of its contacts."""
     number, run = task
     tray = load_trays()[number]
     settings = SimulationSettings(
@@ -75,19 +75,19 @@ def _cycle(task: tuple[int, int]) -> _Cycle:
     camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
     tables = tables_of(library, tray, prior)
     decay = decay_likelihood(tables, times, speed, _ERROR * speed, camera)
-    found = [
+    contacts = [
         contact
         for contact in contacts_of(tray, true_tracks(tray, settings, run, round(_LAST * _RATE)))
         if contact.stamp_ns > _FIRST * _NS
     ]
-    return decay, ContactTerms.of(found)
+    return decay, ContactTerms.of(contacts)
 
 
 def _posterior(tray: int, cycles: list[_Cycle], *, beads: bool, walls: bool) -> Posterior:
     prior = PriorSettings()
     flown = load_trays()[tray]
     tables = tables_of(library_of(flown), flown, prior)
-    decay, contacts = (reduce(add, each) for each in zip(*cycles, strict=True))
+    decay, contacts = (reduce(add, terms) for terms in zip(*cycles, strict=True))
     return posterior_of(
         tables,
         decay.integrated(),
@@ -97,13 +97,13 @@ def _posterior(tray: int, cycles: list[_Cycle], *, beads: bool, walls: bool) -> 
     )
 
 
-def _row(each: list[Posterior], together: Posterior) -> str:
+def _row(posteriors: list[Posterior], combined: Posterior) -> str:
     row = ''
     for index, truth in ((0, _PAIRS), (1, _WALLS)):
-        errors = [posterior.mean[index] - truth for posterior in each]
+        errors = [posterior.mean[index] - truth for posterior in posteriors]
         row += f'| {np.sqrt(np.mean(np.square(errors))):.3f} '
-        row += f'| {np.mean([_half(posterior, index) for posterior in each]):.3f} '
-        row += f'| {together.mean[index] - truth:+.4f} | {_half(together, index):.4f} '
+        row += f'| {np.mean([_half(posterior, index) for posterior in posteriors]):.3f} '
+        row += f'| {combined.mean[index] - truth:+.4f} | {_half(combined, index):.4f} '
     return row + '|'
 
 

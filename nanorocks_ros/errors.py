@@ -1,4 +1,7 @@
-"""One tree of exceptions: each says where, what, and what to do about it, in one line."""
+"""One tree of exceptions: each says where, what, and what to do about it, in one line.
+
+Tested by ``test/nodes/base/test_diagnostics.py``.
+"""
 
 from __future__ import annotations
 

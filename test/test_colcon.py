@@ -14,7 +14,7 @@ pytest.importorskip('ament_index_python', reason='there is no ROS here')
 COLCON = shutil.which('colcon', path=str(Path(sys.executable).parent)) or 'colcon'
 ROOT = Path(__file__).resolve().parent.parent
 EXECUTABLES = sorted(path.name for path in (ROOT / 'scripts').iterdir())
-# What `ros2 run` does to find an executable.
+# The search of `ros2 run` for an executable.
 RESOLVE = """
 import os, sys
 from ament_index_python.packages import get_package_prefix
@@ -35,14 +35,14 @@ for name in sys.argv[1:]:
 
 
 def colcon(*arguments, cwd):
-    """Run colcon on a workspace; what it printed."""
+    """Run colcon on a workspace, and return its output."""
     environment = {
         name: value
         for name, value in os.environ.items()
         if name not in {'AMENT_PREFIX_PATH', 'COLCON_PREFIX_PATH', 'PYTHONPATH'}
     }
     environment['COLCON_HOME'] = str(cwd / 'colcon_home')
-    # The ROS that is sourced, if one is, has to stay in sight.
+    # A sourced ROS has to remain visible.
     if 'ROS_DISTRO' in os.environ:
         environment = {**os.environ, 'COLCON_HOME': environment['COLCON_HOME']}
     result = subprocess.run(
@@ -68,7 +68,7 @@ def in_workspace(command, cwd):
 
 @pytest.fixture(scope='module', params=[(), ('--symlink-install',)], ids=['copied', 'symlinked'])
 def workspace(request, source_copy, tmp_path_factory):
-    """A built copy of the repository, as its users have it."""
+    """A built copy of the repository."""
     path = tmp_path_factory.mktemp('colcon') / 'workspace'
     shutil.copytree(source_copy, path, symlinks=True)
     select = ('--packages-select', 'nanorocks_ros')
@@ -77,8 +77,8 @@ def workspace(request, source_copy, tmp_path_factory):
 
 
 def test_colcon_finds_both_packages(source_copy):
-    found = colcon('list', '--names-only', '--base-paths', '.', 'msg_defs', cwd=source_copy)
-    assert found.split() == ['nanorocks_msgs', 'nanorocks_ros']
+    packages = colcon('list', '--names-only', '--base-paths', '.', 'msg_defs', cwd=source_copy)
+    assert packages.split() == ['nanorocks_msgs', 'nanorocks_ros']
 
 
 def test_ros2_run_finds_every_executable(workspace):
@@ -101,7 +101,7 @@ def test_shared_files_are_installed(workspace):
 
 
 def test_an_executable_runs(workspace):
-    # A remapping without a target: refused after everything was imported, before any topic.
+    # A remapping without a target is rejected after the imports and before any topic.
     path = 'install/nanorocks_ros/lib/nanorocks_ros/haff_fitter'
     result = in_workspace(f'{path} --ros-args --remap nonsense', cwd=workspace)
     assert result.returncode == 2, result.stderr

@@ -17,9 +17,9 @@ BLOCK = re.compile(r'^```(python|diff)\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 
 
 def changed(text, lines):
-    """A file with the lines that a block adds, at the one place with the lines around them."""
+    """A file with the lines that a block adds and without those that it removes, at one place."""
     before = ''.join(f'{line[1:]}\n' for line in lines if not line.startswith('+'))
-    after = ''.join(f'{line[1:]}\n' for line in lines)
+    after = ''.join(f'{line[1:]}\n' for line in lines if not line.startswith('-'))
     assert text.count(before) == 1, f'{text.count(before)} places for:\n{before}'
     return text.replace(before, after)
 

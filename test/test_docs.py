@@ -1,4 +1,4 @@
-"""The documentation says what is there: names, links, commands."""
+"""Names, links and pictures of the documentation."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ def glossary():
 
 
 def root_of(name):
-    """A field without what the glossary explains once for all."""
+    """A field name without the prefixes and suffixes that the glossary explains once."""
     return re.sub(SUFFIXES, '', re.sub(r'^(first|second)_species_', '', name))
 
 
 def test_every_field_of_a_record_is_in_the_glossary():
-    known = glossary()
+    names = glossary()
     kinds = [kind for kind in vars(records).values() if dataclasses.is_dataclass(kind)]
     used = {field.name for kind in kinds for field in dataclasses.fields(kind)}
     assert len(kinds) > 10
-    assert {name for name in used if name not in known and root_of(name) not in known} == set()
+    assert {name for name in used if name not in names and root_of(name) not in names} == set()
 
 
 def test_every_name_in_the_glossary_is_used():
@@ -45,21 +45,21 @@ def test_every_name_in_the_glossary_is_used():
 
 
 def anchors(page):
-    """What a heading is called in a link."""
+    """The anchors of the headings of a page."""
     lines = page.read_text(encoding='utf-8').splitlines()
     headings = [line.lstrip('#').strip().lower() for line in lines if line.startswith('#')]
     return {re.sub(r'[^\w\- ]', '', heading).replace(' ', '-') for heading in headings}
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_links_between_pages_lead_somewhere(page):
+def test_links_between_pages_exist(page):
     dead = []
     for target in LINK.findall(page.read_text(encoding='utf-8')):
         path, _, anchor = target.partition('#')
         if '://' in target:
             continue
-        there = (page.parent / path).resolve() if path else page
-        if not there.exists() or (anchor and anchor not in anchors(there)):
+        target_path = (page.parent / path).resolve() if path else page
+        if not target_path.exists() or (anchor and anchor not in anchors(target_path)):
             dead.append(target)
     assert dead == []
 
@@ -93,6 +93,6 @@ def test_pages_that_code_names_exist():
 
 
 def test_every_picture_is_on_a_page():
-    shown = '\n'.join(page.read_text(encoding='utf-8') for page in PAGES)
+    text = '\n'.join(page.read_text(encoding='utf-8') for page in PAGES)
     pictures = {path.name for path in (ROOT / 'docs/pictures').iterdir()}
-    assert {name for name in pictures if f'pictures/{name})' not in shown} == set()
+    assert {name for name in pictures if f'pictures/{name})' not in text} == set()

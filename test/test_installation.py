@@ -1,4 +1,4 @@
-"""What an installation puts where ROS 2 and Python look for it."""
+"""Files of an installation, for ROS 2 and for Python."""
 
 import ast
 import importlib.metadata
@@ -16,7 +16,7 @@ import nanorocks_ros
 ROOT = Path(__file__).resolve().parent.parent
 EXECUTABLES = sorted(path.name for path in (ROOT / 'scripts').iterdir())
 LAUNCH_FILES = sorted((ROOT / 'launch').glob('*.xml'))
-# Run by a Python that sees the installation, and not the source tree, on its path.
+# Run by a Python with the installation, not the source tree, on its path.
 READ_PACKAGE_DATA = """
 from importlib import resources
 import nanorocks_ros
@@ -27,12 +27,12 @@ from nanorocks_ros.wire.array_layouts import layout
 print(nanorocks_ros.__file__)
 print(len(load_trays()), layout(CorEstimate).fields[0].name)
 page = resources.files('nanorocks_ros.dashboard').joinpath('page')
-print(*sorted(one.name for one in page.iterdir()))
+print(*sorted(path.name for path in page.iterdir()))
 """
 
 
 def installed_prefix(monkeypatch):
-    """Where the index of ROS finds the package, as `ros2 run` asks for it."""
+    """The prefix of the package in the index of ROS, as `ros2 run` finds it."""
     packages = pytest.importorskip('ament_index_python.packages', reason='there is no ROS here')
     monkeypatch.setenv('AMENT_PREFIX_PATH', sys.prefix)
     return Path(packages.get_package_prefix('nanorocks_ros'))
@@ -92,7 +92,7 @@ def test_the_version_is_the_same_everywhere():
 
 
 @pytest.mark.parametrize('path', LAUNCH_FILES, ids=lambda path: path.name)
-def test_a_launch_file_names_what_there_is(path):
+def test_a_launch_file_names_existing_nodes_and_arguments(path):
     launch = ElementTree.parse(path).getroot()
     arguments = {argument.get('name') for argument in launch.iter('arg')}
     used = re.findall(r'\$\(var (\w+)\)', path.read_text())
@@ -105,7 +105,7 @@ def test_a_launch_file_names_what_there_is(path):
         assert (ROOT / shared).is_file()
 
 
-def test_a_plain_installation_holds_its_package_data(source_copy, tmp_path):
+def test_a_plain_installation_has_its_package_data(source_copy, tmp_path):
     pip = [sys.executable, '-m', 'pip', '--disable-pip-version-check', 'install', '--no-deps']
     # Without --ignore-installed pip would remove the installation that runs this test.
     options = ['--no-build-isolation', '--no-index', '--ignore-installed', '--prefix', tmp_path]

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / 'nanorocks_ros'
-TESTED_BY = re.compile(r'Tested by ``(test/[\w/]+\.py)``')
+TESTED_BY = re.compile(r'``(test/[\w/]+\.py)``')
 MODULES = sorted(path for path in PACKAGE.rglob('*.py') if path.name != '__init__.py')
 
 
@@ -27,6 +27,10 @@ def imported_modules(path: Path) -> frozenset[Path]:
     modules = set()
     for node in ast.walk(ast.parse(path.read_text('utf-8'))):
         names = []
+        # The tables of commands and figures name modules beside them, which are imported late.
+        if isinstance(node, ast.Constant) and path.is_relative_to(PACKAGE / 'cli'):
+            listed = path.parent / f'{str(node.value).replace(".", "/")}.py'
+            modules.update({listed} if re.fullmatch(r'[a-z_.]+', str(node.value)) else ())
         if isinstance(node, ast.ImportFrom) and node.module:
             names = [node.module, *(f'{node.module}.{alias.name}' for alias in node.names)]
         elif isinstance(node, ast.Import):
@@ -38,7 +42,7 @@ def imported_modules(path: Path) -> frozenset[Path]:
                 for candidate in (module.with_suffix('.py'), module / '__init__.py')
                 if name.startswith('nanorocks_ros') and candidate.is_file()
             )
-    return frozenset(modules)
+    return frozenset(module for module in modules if module.is_file())
 
 
 def reached_modules(path: Path) -> set[Path]:

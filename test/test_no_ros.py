@@ -1,4 +1,4 @@
-"""The core works where no ROS is installed."""
+"""The package without its nodes works without ROS."""
 
 import subprocess
 import sys
@@ -24,9 +24,9 @@ sys.meta_path.insert(0, NoRos())
 def import_all(name):
     module = importlib.import_module(name)
     print(name)
-    for found in pkgutil.iter_modules(getattr(module, '__path__', ()), name + '.'):
-        if found.name != 'nanorocks_ros.nodes' and not found.name.endswith('.__main__'):
-            import_all(found.name)
+    for child in pkgutil.iter_modules(getattr(module, '__path__', ()), name + '.'):
+        if child.name != 'nanorocks_ros.nodes' and not child.name.endswith('.__main__'):
+            import_all(child.name)
 
 
 import_all('nanorocks_ros')
@@ -43,8 +43,8 @@ def test_every_module_but_the_nodes_imports_without_ros():
     assert not any(name.startswith('nanorocks_ros.nodes') for name in imported)
 
 
-def test_the_nodes_are_what_needs_ros():
-    # Guards the test above: the way it hides ROS has to work.
+def test_an_import_of_ros_fails_when_it_is_hidden():
+    # Checks the method of the test above.
     hidden = IMPORT_THE_CORE.replace("import_all('nanorocks_ros')", "import_all('rclpy')")
     result = subprocess.run([sys.executable, '-c', hidden], capture_output=True, text=True)
     assert result.returncode == 1

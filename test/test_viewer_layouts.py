@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
-from nanorocks_ros.records import CorEstimate, CorRelation, CorStatus
+from nanorocks_ros.records import CorEstimate, CorRelation, CorStatus, Interval
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import to_array
 
@@ -114,9 +114,7 @@ def test_foxglove_draws_the_value_of_the_restitution(foxglove):
         cycle=1,
         status=CorStatus.FINAL,
         relation=CorRelation.LIBRARY,
-        restitution=0.875,
-        restitution_lower=0.75,
-        restitution_upper=0.9375,
+        restitution=Interval(0.875, 0.75, 0.9375),
     )
     values = to_array(record, 0)
     drawn = {

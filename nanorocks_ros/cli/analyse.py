@@ -1,4 +1,7 @@
-"""``nanorocks analyse BAG...``: the coefficient of restitution behind recordings."""
+"""``nanorocks analyse BAG...``: the coefficient of restitution from recordings.
+
+Tested by ``test/studies/analysis/test_offline_analysis.py``.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +23,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
 
 _EPILOG = """\
-Several bags, a pattern, or a folder of bags make a batch: one worker for each core, resumed by the
-same command, bad bags listed in the end (exit code 1), all cycles put together in one report.
+Several bags, a pattern or a folder of bags are a batch. It uses one worker for each core, and the
+same command resumes it. Failed bags are listed at the end (exit code 1). One report combines all
+cycles.
 Examples:
 
   nanorocks analyse flight/run_7
@@ -39,7 +43,7 @@ def add_parser(commands: Any) -> None:
 
     parser = commands.add_parser(
         'analyse',
-        help='analyse a bag, or hundreds, as fast as the machine can',
+        help='analyse one bag or many offline',
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -47,13 +51,13 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         '-o',
         '--output',
-        help='folder for tables and results bag; default BAG_results, needed for many bags',
+        help='folder for tables and results bag; default BAG_results; required for many bags',
     )
     parser.add_argument(
         '--format',
         choices=('csv', 'parquet'),
         default='csv',
-        help='of the tables (of many bags: of those of all cycles); default csv',
+        help='format of the tables (many bags: of the tables of all cycles); default csv',
     )
     parser.add_argument('--no-output', action='store_true', help='write no files')
     add_options(parser)
@@ -61,13 +65,13 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Analyse one bag or many, print, write; the exit code."""
+    """Analyse one bag or many, print and write the results, and return the exit code."""
     from nanorocks_ros.cli.analyse_batch import is_batch, run_many
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.outputs.parquet import check_parquet
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
-    # Before hours of work.
+    # Checked before hours of work.
     check_parquet(Path(f'tables.{options.format}'))
     if is_batch(options):
         return run_many(options, settings)
@@ -81,10 +85,10 @@ def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
     from nanorocks_ros.studies.analysis.results_json import as_json
 
     source = Path(options.bags[0])
-    # `.` has no name of its own.
-    named = source if source.name not in ('', '..') else source.resolve()
-    folder = Path(options.output or f'{named}_results')
-    scratch = _temporary() if options.no_output else check_results_folder(folder)
+    # `.` and `..` have no name of a folder.
+    resolved = source if source.name not in ('', '..') else source.resolve()
+    folder = Path(options.output or f'{resolved}_results')
+    scratch = _scratch_folder() if options.no_output else check_results_folder(folder)
     with Progress('analysing') as progress:
         analysis = analyse(
             source,
@@ -96,7 +100,7 @@ def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
     error: NanorocksError | None = analysis.error
     written = ''
     if not options.no_output:
-        # First: whoever reads what is printed may soon have enough of it.
+        # Files first: the reader of a pipe may close it while this prints.
         try:
             write_results(analysis, folder, source, settings, options.format)
             written = f'nanorocks: results in {folder}'
@@ -115,8 +119,8 @@ def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
     return 0
 
 
-def _temporary() -> Path | None:
-    """Where records may lie meanwhile; in memory where the system has no place for such."""
+def _scratch_folder() -> Path | None:
+    """Folder for records during the analysis; None (memory) where the system has none."""
     try:
         return Path(gettempdir())
     except OSError:
@@ -136,7 +140,7 @@ def _print_cycles(results: TrayResults) -> None:
 
     cycles = last_of_each_cycle(results.cors)
     if not cycles:
-        print('  no COR: no shaking event with a decay after it was found')
+        print('  no COR: no shaking event was followed by a decay')
     for estimate in cycles:
         print(f'  cycle {estimate.cycle}: {_cor_text(estimate)}')
         for name, speed, time in zip(
@@ -162,10 +166,10 @@ def _print_cycles(results: TrayResults) -> None:
 
 def _cor_text(cor: CorEstimate) -> str:
     if cor.status in (CorStatus.NO_DECAY, CorStatus.UNDETERMINED):
-        why = 'the decay tells too little'
+        reason = 'the decay does not determine it'
         if cor.quality & Quality.WRONG_SCALE:
-            why = 'the trays are not where the settings say'
-        return f'COR unknown ({cor.status.name.lower()}: {why})'
+            reason = 'the trays are not at the positions in the settings'
+        return f'COR unknown ({cor.status.name.lower()}: {reason})'
     beads, wall = cor.restitution, cor.wall_restitution
     walls = (
         f', walls {wall.value:.3f} [{wall.lower:.3f}, {wall.upper:.3f}], '

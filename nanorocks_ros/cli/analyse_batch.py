@@ -1,4 +1,7 @@
-"""``nanorocks analyse BAG... -o RESULTS``: many recordings, one result."""
+"""``nanorocks analyse BAG... -o RESULTS``: many recordings, combined in one report.
+
+Tested by ``test/studies/batch/test_batch_analysis.py``.
+"""
 
 from __future__ import annotations
 
@@ -22,30 +25,33 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.batch.batch_task import BagOutcome
     from nanorocks_ros.studies.batch.campaign_means import Combined, TrayMeans
 
-_LOOK = 1.0
-# Where nobody watches a bar, a line is written so often, [s].
-_LINE = 60.0
+# Interval of updates of the progress bar, [s].
+_UPDATE_INTERVAL = 1.0
+# Interval of the lines that replace the bar outside a terminal, [s].
+_LINE_INTERVAL = 60.0
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options for many recordings."""
+    """Add the options for many recordings."""
     group = parser.add_argument_group('many recordings')
     group.add_argument('--workers', type=int, help='processes; default: one for each core')
-    group.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
+    group.add_argument(
+        '--scheduler', metavar='tcp://HOST:PORT', help='scheduler of a Dask cluster'
+    )
 
 
 def is_batch(options: argparse.Namespace) -> bool:
-    """Whether many recordings are meant."""
+    """Whether the arguments name many recordings."""
     from nanorocks_ros.recordings.bag.find_bags import is_collection, is_pattern
 
-    asked = options.workers, options.scheduler
-    if len(options.bags) > 1 or any(one is not None for one in asked):
+    batch_options = options.workers, options.scheduler
+    if len(options.bags) > 1 or any(option is not None for option in batch_options):
         return True
     return is_pattern(options.bags[0]) or is_collection(Path(options.bags[0]))
 
 
 def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
-    """Analyse all, put them together, report; the exit code."""
+    """Analyse all recordings, combine and report them, and return the exit code."""
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.recordings.bag.find_bags import find_bags
     from nanorocks_ros.studies.batch.batch_analysis import BatchPlan, run_batch
@@ -53,56 +59,58 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
     from nanorocks_ros.studies.batch.campaign_means import combined
 
     if options.no_output or not options.output:
-        raise ConfigurationError(
-            '--output', 'is where results of many recordings are kept', 'pass -o RESULTS'
-        )
+        raise ConfigurationError('--output', 'is required for many recordings', 'pass -o RESULTS')
     workers = Workers(processes=options.workers, scheduler=options.scheduler)
     folder = Path(options.output)
-    found = find_bags(options.bags)
-    for text in found.left_out:
+    search = find_bags(options.bags)
+    for text in search.left_out:
         _notice(f'{printable(text)}; left out')
-    for error in found.missing.values():
+    for error in search.missing.values():
         _notice(printable(str(error)))
-    if not found.bags:
+    if not search.bags:
         raise (
             ConfigurationError(
                 ', '.join(printable(bag) for bag in options.bags),
                 'name no recording',
-                'correct them',
+                'correct the paths',
             )
-            if not found.missing
-            else next(iter(found.missing.values()))
+            if not search.missing
+            else next(iter(search.missing.values()))
         )
-    plan = BatchPlan(bags=found, folder=folder, settings=settings, image_topic=options.image_topic)
-    with _Watch() as watch:
-        batch = run_batch(plan, workers, watch)
-    together = combined(batch.counted, settings)
-    for text in together.notices:
+    plan = BatchPlan(
+        bags=search, folder=folder, settings=settings, image_topic=options.image_topic
+    )
+    with _BatchProgress() as progress:
+        batch = run_batch(plan, workers, progress)
+    combined_results = combined(batch.counted, settings)
+    for text in combined_results.notices:
         _notice(text)
-    report = write_batch(folder, batch, together, settings, options.format)
+    report = write_batch(folder, batch, combined_results, settings, options.format)
     if options.json:
-        print(json.dumps(_as_json(batch, together, folder, report), allow_nan=False))
+        print(json.dumps(_as_json(batch, combined_results, folder, report), allow_nan=False))
     else:
-        _print(batch, together)
+        _print(batch, combined_results)
     _notice(f'results in {printable(folder)}, report in {printable(report)}')
-    return _end(batch)
+    return _report_failures(batch)
 
 
-def _end(batch: Batch) -> int:
+def _report_failures(batch: Batch) -> int:
     if not batch.failed:
         return 0
     for failure in batch.failed:
-        part = ' (what could be analysed is among the results)' if failure.analysed else ''
+        part = ' (the part that could be analysed is in the results)' if failure.analysed else ''
         _notice(f'failed: {failure.reason}{part}')
-    whole = len(batch.results) + sum(not failure.analysed for failure in batch.failed)
+    total = len(batch.results) + sum(not failure.analysed for failure in batch.failed)
     _notice(
-        f'{len(batch.failed)} of {whole} recordings failed, as listed; mend or remove them, and '
-        'run the same command again: what is done is kept'
+        f'{len(batch.failed)} of {total} recordings failed, as listed; repair or remove them, '
+        'and run the same command again: finished recordings are kept'
     )
     return 1
 
 
-def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> dict[str, Any]:
+def _as_json(
+    batch: Batch, combined_results: Combined, folder: Path, report: Path
+) -> dict[str, Any]:
     from nanorocks_ros.studies.batch.campaign_means import means_as_json
 
     return {
@@ -124,7 +132,9 @@ def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> di
             }
             for result in batch.results
         ],
-        'trays': {str(number): means_as_json(tray) for number, tray in together.trays.items()},
+        'trays': {
+            str(number): means_as_json(tray) for number, tray in combined_results.trays.items()
+        },
         'failed': [
             {'bag': failure.name, 'reason': failure.reason, 'analysed': failure.analysed}
             for failure in batch.failed
@@ -134,7 +144,7 @@ def _as_json(batch: Batch, together: Combined, folder: Path, report: Path) -> di
     }
 
 
-def _print(batch: Batch, together: Combined) -> None:
+def _print(batch: Batch, combined_results: Combined) -> None:
     from nanorocks_ros.studies.batch.batch_analysis import merged_notes
 
     frames = sum(result.summary['frames'] for result in batch.results)
@@ -142,7 +152,7 @@ def _print(batch: Batch, together: Combined) -> None:
     print(f'{counted(len(batch.results), "recording")}, {frames} frames, {seconds:.0f} s')
     for text in merged_notes(batch.results):
         print(text)
-    for number, tray in sorted(together.trays.items()):
+    for number, tray in sorted(combined_results.trays.items()):
         cycles, recordings = counted(tray.cycles, 'cycle'), counted(tray.recordings, 'recording')
         print(f'tray {number}: {cycles} of {recordings}')
         for text in _tray_lines(tray):
@@ -155,7 +165,7 @@ def _tray_lines(tray: TrayMeans) -> list[str]:
     values = means_as_json(tray)
 
     def text(name: str, factor: float = 1.0, digits: int = 4) -> str:
-        value, low, high = (values[f'{name}{end}'] for end in ('', '_lower', '_upper'))
+        value, low, high = (values[f'{name}{suffix}'] for suffix in ('', '_lower', '_upper'))
         return _interval((value, low, high), factor, digits)
 
     lines = []
@@ -163,7 +173,7 @@ def _tray_lines(tray: TrayMeans) -> list[str]:
         walls = f', walls {text("wall_restitution")}' if values['wall_restitution'] else ''
         count = values['cycles_read']
         lines.append(f'{counted(count, "cycle")} together: COR {text("restitution")}{walls}')
-    for name, what, factor, unit in (
+    for name, label, factor, unit in (
         ('cycle_restitution', 'COR of a cycle', 1.0, ''),
         ('paper_restitution', "COR by the paper's closed form", 1.0, ''),
         ('initial_speed', 'v0', 1e3, ' mm/s'),
@@ -173,7 +183,7 @@ def _tray_lines(tray: TrayMeans) -> list[str]:
         mean = tray.means[name]
         if mean.cycles:
             spread = f', scatter {factor * mean.scatter:.3g}' if mean.cycles > 1 else ''
-            lines.append(f'{what}: mean {factor * mean.mean:.4g}{unit}{spread}')
+            lines.append(f'{label}: mean {factor * mean.mean:.4g}{unit}{spread}')
     if values['sticking_status'] is not None:
         status = values['sticking_status'].replace('_', ' ')
         lines.append(f'sticking speed [mm/s]: {text("sticking_speed", 1e3, 2)} ({status})')
@@ -191,19 +201,19 @@ def _notice(text: str) -> None:
     print(f'nanorocks: {text}', file=sys.stderr)
 
 
-class _Watch:
-    """A bar on a terminal, lines elsewhere: recordings, frames a second, time left."""
+class _BatchProgress:
+    """Recordings, frame rate and time left: a bar on a terminal, lines elsewhere."""
 
     def __init__(self) -> None:
         self._over = Event()
         self._bar: Any = None
         self._watcher: Thread | None = None
 
-    def __enter__(self) -> _Watch:
+    def __enter__(self) -> _BatchProgress:
         return self
 
     def begin(self, store: BatchStore, sizes: dict[str, int], done: int) -> None:
-        """So many bytes of each recording are left to do."""
+        """Start the display; `sizes` are the bytes of each recording left to do."""
         from tqdm import tqdm
 
         self._store, self._left = store, {name: max(size, 1) for name, size in sizes.items()}
@@ -211,7 +221,7 @@ class _Watch:
         self._done, self._all = done, done + len(sizes)
         self._start = time.monotonic()
         if done:
-            _notice(f'{done} of {self._all} recordings are done already, and have not changed')
+            _notice(f'{done} of {self._all} recordings are finished and unchanged')
         self._bar = tqdm(
             total=1.0,
             disable=None,
@@ -222,7 +232,7 @@ class _Watch:
         self._watcher.start()
 
     def finished(self, name: str, outcome: BagOutcome) -> None:
-        """A recording is done, or failed."""
+        """Count a recording that is finished or failed."""
         from tqdm import tqdm
 
         from nanorocks_ros.studies.batch.batch_task import DONE
@@ -236,20 +246,20 @@ class _Watch:
                 _notice(outcome.reason)
 
     def notice(self, text: str) -> None:
-        """One line of what the user should know."""
+        """Print one message for the user."""
         _notice(text)
 
     def _watch(self) -> None:
         last = time.monotonic()
-        while not self._over.wait(_LOOK):
-            part, text = self._standing()
+        while not self._over.wait(_UPDATE_INTERVAL):
+            part, text = self._status()
             self._bar.n = part
             self._bar.set_description_str(text)
-            if self._bar.disable and time.monotonic() - last >= _LINE:
+            if self._bar.disable and time.monotonic() - last >= _LINE_INTERVAL:
                 last = time.monotonic()
                 _notice(text)
 
-    def _standing(self) -> tuple[float, str]:
+    def _status(self) -> tuple[float, str]:
         frames, left = self._frames, dict(self._left)
         for name, (done, total) in self._store.under_way().items():
             if name in left:
@@ -260,8 +270,8 @@ class _Watch:
         left_s = seconds * (1.0 / part - 1.0) if part > 0.0 else math.inf
         when = f'{math.ceil(left_s / 60.0)} min left' if part > 0.0 else 'starting'
         failed = f', {self._failed} failed' if self._failed else ''
-        standing = f'{self._done} of {self._all} recordings'
-        return part, f'{standing}, {frames / seconds:.0f} frames/s, {when}{failed}'
+        counts = f'{self._done} of {self._all} recordings'
+        return part, f'{counts}, {frames / seconds:.0f} frames/s, {when}{failed}'
 
     def __exit__(self, *_: object) -> None:
         self._over.set()

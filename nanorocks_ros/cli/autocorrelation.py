@@ -1,4 +1,7 @@
-"""``nanorocks autocorrelation BAG``: growing clusters by the width of the autocorrelation."""
+"""``nanorocks autocorrelation BAG``: cluster sizes from the width of the autocorrelation.
+
+Tested by ``test/studies/inspection/test_autocorrelations.py``.
+"""
 
 from __future__ import annotations
 
@@ -26,22 +29,27 @@ def add_parser(commands: Any) -> None:
     )
     add_bag(parser)
     parser.add_argument('-o', '--output', help='picture to write: .png, .pdf or .svg')
-    parser.add_argument('--table', help='table of all pictures to write, .csv')
-    parser.add_argument('--cycle', type=int, default=1, help='shaking events so far; default 1')
+    parser.add_argument('--table', help='table of all images to write, .csv')
+    parser.add_argument(
+        '--cycle',
+        type=int,
+        default=1,
+        help='cycle to measure, counted in shaking events; default 1',
+    )
     parser.add_argument('--force', action='store_true', help='replace files that exist')
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure, print, write; the exit code."""
+    """Measure cluster sizes, write and print them, and return the exit code."""
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.autocorrelations import cycle_clusters, write_clusters
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
-    named = {'--output': options.output, '--table': options.table}
-    files = {flag: Path(name) for flag, name in named.items() if name}
+    names = {'--output': options.output, '--table': options.table}
+    files = {flag: Path(name) for flag, name in names.items() if name}
     kinds = {'--output': ('.png', '.pdf', '.svg'), '--table': ('.csv',)}
     check_outputs(files, kinds, force=options.force)
     try:
@@ -69,30 +77,31 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _print(found: BagClusters, *, as_json: bool) -> None:
-    ends = {number: _end(tray) for number, tray in found.trays.items()}
+def _print(clusters: BagClusters, *, as_json: bool) -> None:
+    ends = {number: _last_estimate(tray) for number, tray in clusters.trays.items()}
     if as_json:
-        shown = {str(number): json_values(end) for number, end in ends.items()}
-        print(json.dumps({'cycle': found.cycle, 'trays': shown}, allow_nan=False))
+        trays = {str(number): json_values(end) for number, end in ends.items()}
+        print(json.dumps({'cycle': clusters.cycle, 'trays': trays}, allow_nan=False))
         return
     for number, end in ends.items():
         size = end['cluster_size']
         lower, upper = end['cluster_size_lower'], end['cluster_size_upper']
-        told = f'{size:.1f} beads ({lower:.1f} to {upper:.1f})'
+        size_text = f'{size:.1f} beads ({lower:.1f} to {upper:.1f})'
         if math.isnan(size):
-            told = f'unknown ({end["size_status"].replace("_", " ")})'
+            size_text = f'unknown ({end["size_status"].replace("_", " ")})'
             if math.isfinite(lower):
-                told = f'{lower:.1f} to {upper:.1f} beads'
-        true = end['true_cluster_size']
-        truth = '' if math.isnan(true) else f', true {true:.1f}'
+                size_text = f'{lower:.1f} to {upper:.1f} beads'
+        true_size = end['true_cluster_size']
+        truth = '' if math.isnan(true_size) else f', true {true_size:.1f}'
         print(
-            f'tray {number}: clusters at the end {told}{truth}; area {end["level_area"] * 1e6:.3f}'
+            f'tray {number}: clusters at the end {size_text}{truth}; '
+            f'area {end["level_area"] * 1e6:.3f}'
             f" mm2, axes ratio {end['axes_ratio']:.2f}; onset by the paper's rule "
             f'{end["paper_onset"]:.1f} s'
         )
 
 
-def _end(tray: CycleClusters) -> dict[str, Any]:
+def _last_estimate(tray: CycleClusters) -> dict[str, Any]:
     last = tray.estimates[-1]
     return {
         'pictures': len(tray.estimates),

@@ -1,4 +1,7 @@
-"""``nanorocks dashboard``: the live page of a graph that runs."""
+"""``nanorocks dashboard``: the live page of a running ROS graph.
+
+Tested by ``test/nodes/test_dashboard.py``.
+"""
 
 from __future__ import annotations
 
@@ -17,17 +20,19 @@ def add_parser(commands: Any) -> None:
     """Add the command."""
     from nanorocks_ros.cli.flags import add_flags
 
-    parser = commands.add_parser('dashboard', help='serve the live page of a graph that runs')
+    parser = commands.add_parser('dashboard', help='serve the live page of a running graph')
     parser.add_argument(
-        '--namespace', default='', help='of the graph, such as /lab; default /nanorocks'
+        '--namespace', default='', help='namespace of the graph, such as /lab; default /nanorocks'
     )
-    parser.add_argument('--trays-file', default='', help='YAML file of trays, as the graph has it')
+    parser.add_argument(
+        '--trays-file', default='', help='YAML file of trays, the same as that of the graph'
+    )
     add_flags(parser, DashboardSettings(), skip=set())
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Become the node; does not come back."""
+    """Replace this process by the node; does not return."""
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.dashboard.page_process import full_namespace, node_command, with_token
 
@@ -36,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
     if find_spec('rclpy') is None:
         raise ConfigurationError(
             'nanorocks dashboard',
-            'listens to a ROS graph, and there is no ROS 2 here',
+            'needs ROS 2, which is not installed',
             'source a ROS 2 Jazzy, or install nanorocks_ros[ros]',
         )
     graph = DashboardGraphSettings(trays_file=options.trays_file)

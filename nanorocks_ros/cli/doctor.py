@@ -1,4 +1,4 @@
-"""``nanorocks doctor``: what is wrong with this machine, or with the graph that runs, and why."""
+"""``nanorocks doctor``: problems of this machine or of the running graph, with remedies."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.tools.doctor.findings import Finding
 
-_CODE_OF_A_PROBLEM = 1
+_EXIT_PROBLEM = 1
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
     parser = commands.add_parser(
-        'doctor', help='examine this machine, its ROS and its libraries, and say what to do'
+        'doctor', help='check this machine, its ROS and its libraries, and name remedies'
     )
     parser.add_argument(
         '--graph',
         action='store_true',
-        help='examine the nodes that run instead: who hears whom, and who cannot',
+        help='check the running nodes instead: their topics and incompatible connections',
     )
     parser.add_argument(
         '--seconds', type=float, default=5.0, help='with --graph: time to listen; default 5'
@@ -32,10 +32,10 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Examine and print; 1 where the graph cannot be used."""
+    """Run the checks and print the findings; 1 where a graph cannot run, else 0."""
     from nanorocks_ros.tools.doctor.findings import Status, worst
 
-    findings = _of_graph(options) if options.graph else _of_machine(options)
+    findings = _graph_findings(options) if options.graph else _machine_findings(options)
     verdict = worst(findings)
     if options.json:
         checks = [
@@ -51,10 +51,10 @@ def run(options: argparse.Namespace) -> int:
     else:
         counts = [sum(finding.status is status for finding in findings) for status in Status]
         print(f'{counts[0]} ok, {counts[1]} warnings, {counts[2]} problems')
-    return _CODE_OF_A_PROBLEM if verdict is Status.PROBLEM else 0
+    return _EXIT_PROBLEM if verdict is Status.PROBLEM else 0
 
 
-def _of_machine(options: argparse.Namespace) -> list[Finding]:
+def _machine_findings(options: argparse.Namespace) -> list[Finding]:
     from nanorocks_ros.tools.doctor.examination import examine
 
     findings = []
@@ -65,7 +65,7 @@ def _of_machine(options: argparse.Namespace) -> list[Finding]:
     return findings
 
 
-def _of_graph(options: argparse.Namespace) -> list[Finding]:
+def _graph_findings(options: argparse.Namespace) -> list[Finding]:
     from nanorocks_ros.errors import ConfigurationError
     from nanorocks_ros.tools.doctor.examination import examine_graph
     from nanorocks_ros.tools.doctor.ros_probe_client import graph

@@ -25,7 +25,7 @@ _LOGGER = logging.getLogger(__name__)
 def add_flags(
     parser: argparse.ArgumentParser, settings: Any, skip: set[str], title: str = 'settings'
 ) -> None:
-    """A flag for every setting: ``speed.method`` becomes ``--speed-method``."""
+    """Add a flag for each setting: ``speed.method`` becomes ``--speed-method``."""
     group = parser.add_argument_group(title)
     for row in rows(settings):
         if row.name in skip:
@@ -37,7 +37,7 @@ def add_flags(
             dest=row.name,
             metavar='V',
             nargs=nargs,
-            help=f'{row.doc}{unit}; default {_shown(row)}'.replace('%', '%%'),
+            help=f'{row.doc}{unit}; default {_default_text(row)}'.replace('%', '%%'),
         )
         if row.deprecated:
             group.add_argument(
@@ -48,7 +48,7 @@ def add_flags(
 def add_bag(
     parser: argparse.ArgumentParser, skip: set[str] | None = None, *, many: bool = False
 ) -> None:
-    """What every command that takes a bag through the stages asks for, settings included."""
+    """Add the arguments of commands that process a bag, with a flag for each setting."""
     kind = 'rosbag2 folder or .mcap file'
     if many:
         parser.add_argument(
@@ -57,8 +57,10 @@ def add_bag(
     else:
         parser.add_argument('bag', help=kind)
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
-    parser.add_argument('--image-topic', default='', help="the camera topic, if it isn't ours")
-    parser.add_argument('--parameters', help='ROS parameter file, as the nodes take it')
+    parser.add_argument(
+        '--image-topic', default='', help='camera topic; default: that of our nodes'
+    )
+    parser.add_argument('--parameters', help='ROS parameter file, as for the nodes')
     add_flags(parser, PipelineSettings(), skip=skip or set())
 
 
@@ -67,21 +69,21 @@ def flag_of(name: str) -> str:
     return '--' + name.replace('.', '-').replace('_', '-')
 
 
-def _shown(row: SettingRow) -> str:
+def _default_text(row: SettingRow) -> str:
     if isinstance(row.default, tuple):
-        return ' '.join(str(one) for one in row.default) or 'empty'
+        return ' '.join(str(value) for value in row.default) or 'empty'
     return str(row.default) if row.default != '' else 'empty'
 
 
 def settings_from(
     options: argparse.Namespace, settings: SettingsType, parameters: str | None = None
 ) -> SettingsType:
-    """The settings with what a parameter file and the flags say, the flags last.
+    """The settings with the values of a parameter file and of flags; flags take precedence.
 
     Raises
     ------
     ConfigurationError
-        For a file that cannot be read, an unknown name, or a value that cannot be used.
+        For an unreadable file, an unknown name or an invalid value.
     """
     if parameters:
         settings = _replaced(settings, _from_file(Path(parameters)), parameters)
@@ -133,15 +135,15 @@ def _from_file(path: Path) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         reason = getattr(error, 'strerror', None) or 'is not YAML'
         raise ConfigurationError(str(path), reason, 'name a ROS parameter file') from error
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for node in content.values() if isinstance(content, dict) else ():
         if isinstance(node, dict) and isinstance(node.get('ros__parameters'), dict):
-            found.update(_flattened(node['ros__parameters']))
-    if not found:
+            values.update(_flattened(node['ros__parameters']))
+    if not values:
         raise ConfigurationError(
-            str(path), 'holds no ros__parameters', 'see config/parameters.yaml for the form'
+            str(path), 'holds no ros__parameters', 'use the form of config/parameters.yaml'
         )
-    return found
+    return values
 
 
 def _flattened(block: dict[str, Any], prefix: str = '') -> dict[str, Any]:

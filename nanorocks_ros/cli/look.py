@@ -1,4 +1,7 @@
-"""``nanorocks look BAG``: what the preprocessing makes of one frame, step by step."""
+"""``nanorocks look BAG``: the steps of the preprocessing of one frame.
+
+Tested by ``test/studies/inspection/test_preprocessing_steps.py``.
+"""
 
 from __future__ import annotations
 
@@ -24,16 +27,17 @@ def add_parser(commands: Any) -> None:
     """Add the command."""
     from nanorocks_ros.cli.flags import add_bag
 
-    parser = commands.add_parser(
-        'look', help='show what the preprocessing makes of one frame, step by step'
-    )
+    parser = commands.add_parser('look', help='show the preprocessing of one frame, step by step')
     add_bag(parser)
     moment = parser.add_mutually_exclusive_group()
     moment.add_argument(
         '--frame', type=int, metavar='N', help='frame to show, counted from 0; default: the middle'
     )
     moment.add_argument(
-        '--at', type=float, metavar='SECONDS', help='show the first frame so long after the first'
+        '--at',
+        type=float,
+        metavar='SECONDS',
+        help='time of the frame since the first frame of the bag',
     )
     parser.add_argument('-o', '--output', help='picture of the steps to write, .png')
     parser.add_argument('--force', action='store_true', help='replace a file that exists')
@@ -41,14 +45,14 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Follow the bag to the frame, print, draw; the exit code."""
+    """Process the bag up to the frame, print and draw it, and return the exit code."""
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.preprocessing_steps import steps_of_bag
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
-    _check_moment(options)
+    _check_time(options)
     if options.output:
         check_outputs(
             {'--output': Path(options.output)}, {'--output': ('.png',)}, force=options.force
@@ -79,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _check_moment(options: argparse.Namespace) -> None:
+def _check_time(options: argparse.Namespace) -> None:
     for flag, value in (('--frame', options.frame), ('--at', options.at)):
         if value is not None and not (math.isfinite(value) and value >= 0):
             raise ConfigurationError(flag, f'{value:g}', 'count from 0')
@@ -97,7 +101,7 @@ def _tray_as_json(steps: TraySteps) -> dict[str, Any]:
     image, tracks = steps.image, steps.tracks
     return {
         'cycle': image.cycle,
-        'displacement': [finite_or_none(value) for value in image.displacement],
+        'displacement': [finite_or_none(component) for component in image.displacement],
         'displacement_error': finite_or_none(image.displacement_error),
         'noise_power': finite_or_none(image.noise_power),
         'glare': finite_or_none(image.glare),
@@ -110,13 +114,13 @@ def _tray_as_json(steps: TraySteps) -> dict[str, Any]:
 
 def _print(steps: FrameSteps) -> None:
     print(f'frame {steps.number} at {steps.time:.3f} s')
-    for number, one in steps.trays.items():
-        flags = ', '.join(one.image.quality.names()) or 'none'
-        print(f'tray {number}: cycle {one.image.cycle}, flags: {flags}')
-        x, y = (_MM * value for value in one.image.displacement)
-        followed = f'{x:+.3f}, {y:+.3f} mm from its place'
-        print(f'  the tray is {followed if math.isfinite(x) else "not followed: no walls seen"}')
-        if one.tracks is not None:
-            print(f'  {int(one.tracks.seen.sum())} of {one.tray.count} beads seen')
-        if one.moving_area is not None:
-            print(f'  {_MM2 * one.moving_area:.1f} mm^2 move')
+    for number, tray in steps.trays.items():
+        flags = ', '.join(tray.image.quality.names()) or 'none'
+        print(f'tray {number}: cycle {tray.image.cycle}, flags: {flags}')
+        x, y = (_MM * value for value in tray.image.displacement)
+        offset = f'{x:+.3f}, {y:+.3f} mm from its place'
+        print(f'  the tray is {offset if math.isfinite(x) else "not tracked: no walls visible"}')
+        if tray.tracks is not None:
+            print(f'  {int(tray.tracks.seen.sum())} of {tray.tray.count} beads seen')
+        if tray.moving_area is not None:
+            print(f'  {_MM2 * tray.moving_area:.1f} mm^2 move')

@@ -6,6 +6,7 @@ import argparse
 import logging
 import os
 import sys
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import __version__
@@ -19,47 +20,39 @@ EXIT_CALL = 2
 EXIT_INTERRUPTED = 130
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """The parser of the whole command; heavy imports wait until a command runs."""
-    from nanorocks_ros.cli import (
-        analyse,
-        autocorrelation,
-        dashboard,
-        doctor,
-        look,
-        reproduce,
-        speeds,
-        track,
-    )
-    from nanorocks_ros.cli.calibration import calibrate, calibrate_area, cluster_curve, library
-    from nanorocks_ros.cli.figures import figure
-    from nanorocks_ros.cli.recordings import import_video, info, salvage
-    from nanorocks_ros.cli.simulation import simulate, sweep
+COMMANDS = {
+    'analyse': 'analyse',
+    'autocorrelation': 'autocorrelation',
+    'calibrate': 'calibration.calibrate',
+    'calibrate-area': 'calibration.calibrate_area',
+    'cluster-curve': 'calibration.cluster_curve',
+    'dashboard': 'dashboard',
+    'doctor': 'doctor',
+    'figure': 'figures.figure',
+    'import': 'recordings.import_video',
+    'info': 'recordings.info',
+    'library': 'calibration.library',
+    'look': 'look',
+    'reproduce': 'reproduce',
+    'salvage': 'recordings.salvage',
+    'simulate': 'simulation.simulate',
+    'speeds': 'speeds',
+    'sweep': 'simulation.sweep',
+    'track': 'track',
+}
+"""By command, the module of `nanorocks_ros.cli` that adds its parser; in the order of the help."""
 
+
+def build_parser() -> argparse.ArgumentParser:
+    """The parser of all commands; heavy imports wait until a command runs."""
     parser = argparse.ArgumentParser(
         prog='nanorocks',
         description='Coefficient of restitution, with its interval, from films of granular gases.',
     )
     parser.add_argument('--version', action='version', version=f'nanorocks {__version__}')
     commands = parser.add_subparsers(dest='command', metavar='COMMAND', required=True)
-    analyse.add_parser(commands)
-    autocorrelation.add_parser(commands)
-    calibrate.add_parser(commands)
-    calibrate_area.add_parser(commands)
-    cluster_curve.add_parser(commands)
-    dashboard.add_parser(commands)
-    doctor.add_parser(commands)
-    figure.add_parser(commands)
-    import_video.add_parser(commands)
-    info.add_parser(commands)
-    library.add_parser(commands)
-    look.add_parser(commands)
-    reproduce.add_parser(commands)
-    salvage.add_parser(commands)
-    simulate.add_parser(commands)
-    speeds.add_parser(commands)
-    sweep.add_parser(commands)
-    track.add_parser(commands)
+    for module in COMMANDS.values():
+        import_module(f'nanorocks_ros.cli.{module}').add_parser(commands)
     return parser
 
 
@@ -69,15 +62,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 when the work was done, 2 for a wrong call, 1 for input that cannot be used, 130
-        when interrupted.
+        0 after success, 1 for unusable input, 2 for a wrong call, 130 when interrupted.
     """
-    # Before numpy is loaded: no array here is worth a second thread.
+    # Set before numpy is loaded: arrays here are too small for a second thread.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-    # What the core has to say while it works; of others, warnings only.
+    # Progress messages of the package; of other packages only warnings.
     logging.basicConfig(format='nanorocks: %(message)s')
     logging.getLogger('nanorocks_ros').setLevel(logging.INFO)
-    # Which fonts of its own it did not find is no concern of who asked for a figure.
+    # Its messages about missing fonts are of no use to the user.
     logging.getLogger('matplotlib.font_manager').setLevel(logging.ERROR)
     try:
         options = build_parser().parse_args(arguments)
@@ -89,18 +81,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'nanorocks: {error}', file=sys.stderr)
         return EXIT_INPUT
     except KeyboardInterrupt as interruption:
-        what = str(interruption) or 'what was written until now can be read'
-        print(f'nanorocks: interrupted; {what}', file=sys.stderr)
+        message = str(interruption) or 'files written so far can be read'
+        print(f'nanorocks: interrupted; {message}', file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
-        # Whoever read our output has enough of it.
+        # The reader of the output closed the pipe.
         sys.stderr.close()
         return 0
     except OSError as error:
         from nanorocks_ros.outputs.safe_text import printable
 
         where = '' if error.filename is None else f'{printable(str(error.filename))}: '
-        what = f'{where}{error.strerror or error}'
-        print(f'nanorocks: {what}; make room, or write elsewhere', file=sys.stderr)
+        message = f'{where}{error.strerror or error}'
+        print(f'nanorocks: {message}; free some space, or write elsewhere', file=sys.stderr)
         return EXIT_INPUT
     return code

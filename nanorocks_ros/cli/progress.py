@@ -1,4 +1,7 @@
-"""How far a command has come, for people at a terminal."""
+"""Progress bars of the commands, shown on a terminal only.
+
+Tested by ``test/cli/simulation/test_sweep.py``.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +10,17 @@ from typing import Any
 
 
 class Progress:
-    """How much is done and the time left, on a terminal and when it takes more than a second."""
+    """A bar with the time left, on a terminal, for work of more than a second."""
 
-    def __init__(self, what: str) -> None:
-        self._what = what
+    def __init__(self, label: str) -> None:
+        self._label = label
 
     def __enter__(self) -> Progress:
         from tqdm import tqdm
 
         self._bar = tqdm(
             total=1.0,
-            desc=self._what,
+            desc=self._label,
             delay=1.0,
             leave=False,
             disable=None,
@@ -26,11 +29,11 @@ class Progress:
         return self
 
     def part(self, done: float) -> None:
-        """So much of 1 is done."""
+        """Show the part that is done, 0 to 1."""
         self._bar.update(done - self._bar.n)
 
     def count(self, done: int, total: int) -> None:
-        """So many of all are done."""
+        """Show the number of steps that are done."""
         self.part(done / total)
 
     def __exit__(self, *_: object) -> None:
@@ -38,23 +41,23 @@ class Progress:
 
 
 class RunProgress:
-    """Runs done, their rate and the time left on a terminal; silence elsewhere."""
+    """A bar with runs done, their rate and the time left, on a terminal."""
 
-    def __init__(self, what: str = '') -> None:
-        self._what = what
+    def __init__(self, label: str = '') -> None:
+        self._label = label
 
     def __enter__(self) -> RunProgress:
         self._bar: Any = None
         return self
 
     def update(self, done: int, total: int) -> None:
-        """So many runs of all are done."""
+        """Show the number of runs that are done."""
         from tqdm import tqdm
 
         if self._bar is None:
-            # Evenly weighed: tasks come in bursts.
+            # Mean rate since the start: tasks finish in bursts.
             self._bar = tqdm(
-                desc=self._what or None,
+                desc=self._label or None,
                 total=total,
                 initial=done,
                 unit='run',
@@ -65,7 +68,7 @@ class RunProgress:
         self._bar.update(done - self._bar.n)
 
     def notice(self, text: str) -> None:
-        """One line of what the user should know."""
+        """Print one message for the user."""
         print(f'nanorocks: {text}', file=sys.stderr)
 
     def __exit__(self, *_: object) -> None:

@@ -1,4 +1,7 @@
-"""``nanorocks reproduce``: the paper again, from simulated films, as one report."""
+"""``nanorocks reproduce``: the figures and tables of the paper from simulated films.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 
@@ -13,19 +16,19 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.studies.reproduction.simulated_campaign import CampaignPlan
+    from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan
 
 _TEXT = 'simulate the campaign, analyse its films, and report every figure and table of the paper'
 _EPILOG = """\
-The report says what the paper reports, what its own methods make of our films, what our defaults
-make of them, and what is true. Interrupted, the same command goes on where it was. Examples:
+The report compares the values of the paper, its methods on our films, our methods on our films,
+and the truth of the simulation. The same command resumes an interrupted run. Examples:
 
   nanorocks reproduce --quick -o reproduced
   nanorocks reproduce --cycles 18 --runs 178 -o campaign
 """
-# In full, and quick.
+# Full campaign, and with --quick.
 _RUNS, _CYCLES = (178, 10), (18, 1)
-_FASTEST = 0.03
+_MAX_STICKING_SPEED = 0.03
 _POLL = 1.0
 
 
@@ -41,12 +44,19 @@ def add_parser(commands: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument('-o', '--output', required=True, help='folder for films and report')
-    parser.add_argument('--quick', action='store_true', help='a cycle of each kind, few runs')
-    parser.add_argument('--cycles', type=int, help='of each kind; default 18, quick 1')
-    parser.add_argument('--runs', type=int, help='at each point searched; default 178, quick 10')
-    parser.add_argument('--seed', type=int, default=1, help='default 1')
+    parser.add_argument('--quick', action='store_true', help='one cycle of each kind, few runs')
     parser.add_argument(
-        '--sticking-speed', type=float, default=3e-3, help='[m/s] where beads stick; default 0.003'
+        '--cycles', type=int, help='cycles of each kind; default 18, with --quick 1'
+    )
+    parser.add_argument(
+        '--runs', type=int, help='runs at each point of a search; default 178, with --quick 10'
+    )
+    parser.add_argument('--seed', type=int, default=1, help='random seed; default 1')
+    parser.add_argument(
+        '--sticking-speed',
+        type=float,
+        default=3e-3,
+        help='[m/s] speed below which beads stick; default 0.003',
     )
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
     parser.add_argument('--json', action='store_true', help='print one JSON object')
@@ -54,7 +64,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Simulate, analyse, report; the exit code."""
+    """Simulate, analyse and report, and return the exit code."""
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.studies.reproduction.reproduce_paper import minutes, reproduce
     from nanorocks_ros.studies.reproduction.simulated_campaign import parts_done
@@ -62,8 +72,8 @@ def run(options: argparse.Namespace) -> int:
     plan, runs = _plan(options)
     workers = Workers(processes=options.workers)
     folder = Path(options.output)
-    about = minutes(plan, workers.count)
-    _notice(f'{2 * plan.cycles} films of the plate, about {about} minutes')
+    estimate = minutes(plan, workers.count)
+    _notice(f'{2 * plan.cycles} films of the plate, about {estimate} minutes')
     with _Bars(lambda: parts_done(folder, plan)) as bars:
         path = reproduce(folder, plan, workers, runs, bars.progress, _notice)
     if options.json:
@@ -74,29 +84,29 @@ def run(options: argparse.Namespace) -> int:
 
 def _plan(options: argparse.Namespace) -> tuple[CampaignPlan, int]:
     from nanorocks_ros.errors import ConfigurationError
-    from nanorocks_ros.studies.reproduction.simulated_campaign import CampaignPlan
+    from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan
 
     cycles, runs = (
-        usual[options.quick] if given is None else given
-        for given, usual in ((options.cycles, _CYCLES), (options.runs, _RUNS))
+        defaults[options.quick] if given is None else given
+        for given, defaults in ((options.cycles, _CYCLES), (options.runs, _RUNS))
     )
-    for flag, value, least in (('--cycles', cycles, 1), ('--runs', runs, 2)):
-        if value < least:
-            raise ConfigurationError(flag, f'{value}', f'give {least} or more')
+    for flag, value, minimum in (('--cycles', cycles, 1), ('--runs', runs, 2)):
+        if value < minimum:
+            raise ConfigurationError(flag, f'{value}', f'give {minimum} or more')
     if options.seed < 0:
         raise ConfigurationError('--seed', f'{options.seed}', 'give 0 or more')
-    if not 0.0 < options.sticking_speed <= _FASTEST:
+    if not 0.0 < options.sticking_speed <= _MAX_STICKING_SPEED:
         raise ConfigurationError(
             '--sticking-speed',
             f'{options.sticking_speed:g} m/s',
-            f'give one above 0, up to {_FASTEST:g}',
+            f'give a speed above 0, up to {_MAX_STICKING_SPEED:g}',
         )
     plan = CampaignPlan(cycles=cycles, seed=options.seed, sticking_speed=options.sticking_speed)
     return plan, runs
 
 
 class _Bars:
-    """One bar after another; that of the films follows what their processes say."""
+    """One bar after another; that of the films reads the progress files of their processes."""
 
     def __init__(self, films_done: Callable[[], float]) -> None:
         self._films_done = films_done
@@ -109,7 +119,7 @@ class _Bars:
         return self
 
     def progress(self, name: str, done: float) -> None:
-        """So much of it is done."""
+        """Show the part of a chapter that is done, 0 to 1."""
         from nanorocks_ros.cli.progress import Progress
 
         if self._bar is None or self._bar[0] != name:

@@ -1,4 +1,7 @@
-"""``nanorocks track BAG``: every bead of a recording, followed through it."""
+"""``nanorocks track BAG``: tracks of all beads of a recording.
+
+Tested by ``test/studies/analysis/test_bag_tracks.py``.
+"""
 
 from __future__ import annotations
 
@@ -25,14 +28,14 @@ def add_parser(commands: Any) -> None:
     """Add the command."""
     from nanorocks_ros.cli.flags import add_bag
 
-    parser = commands.add_parser('track', help='follow every bead through a bag')
+    parser = commands.add_parser('track', help='track all beads of a bag')
     add_bag(parser)
     parser.add_argument('-o', '--output', help='table of the tracks to write, .csv or .parquet')
     parser.add_argument('--picture', help='picture of the last frame with tracks to write, .png')
     parser.add_argument(
         '--compare',
         metavar='FILE',
-        help='tracks made by hand: CSV (frame, id, x, y), TrackMate CSV or XML, NASA Spotlight',
+        help='manual tracks: CSV (frame, id, x, y), TrackMate CSV or XML, NASA Spotlight',
     )
     parser.add_argument(
         '--first-frame', type=int, default=0, help='number of the first frame in FILE; default 0'
@@ -42,7 +45,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Track, print, write; the exit code."""
+    """Track, print and write, and return the exit code."""
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.analysis.bag_tracks import track_bag
@@ -57,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
         )
     for notice in bag.notices:
         print(f'nanorocks: {notice}', file=sys.stderr)
-    compared = {} if manual is None else _compared(bag, manual, options.first_frame)
+    compared = {} if manual is None else _comparisons(bag, manual, options.first_frame)
     if options.json:
         print(json.dumps(_as_json(bag, compared), allow_nan=False))
     else:
@@ -71,96 +74,98 @@ def _check_outputs(options: argparse.Namespace) -> None:
     from nanorocks_ros.outputs.parquet import check_parquet
     from nanorocks_ros.studies.analysis.tracks_files import TABLES
 
-    named = {'--output': options.output, '--picture': options.picture}
-    files = {flag: Path(name) for flag, name in named.items() if name}
+    names = {'--output': options.output, '--picture': options.picture}
+    files = {flag: Path(name) for flag, name in names.items() if name}
     check_outputs(files, {'--output': TABLES, '--picture': ('.png',)}, force=options.force)
     if options.output:
         check_parquet(Path(options.output))
 
 
-def _write(options: argparse.Namespace, found: TrackedBag) -> None:
+def _write(options: argparse.Namespace, bag: TrackedBag) -> None:
     from nanorocks_ros.studies.analysis.tracks_files import write_tracks
     from nanorocks_ros.studies.inspection.track_overlay import overlay, write_overlay
 
     if options.output:
-        write_tracks(Path(options.output), found)
+        write_tracks(Path(options.output), bag)
         print(f'nanorocks: tracks in {options.output}', file=sys.stderr)
     if options.picture:
         pictures = [
-            overlay(image, found.tracks[number], found.pixels_per_metre)
-            for number, image in sorted(found.pictures.items())
+            overlay(image, bag.tracks[number], bag.pixels_per_metre)
+            for number, image in sorted(bag.pictures.items())
         ]
         write_overlay(Path(options.picture), pictures)
         print(f'nanorocks: picture in {options.picture}', file=sys.stderr)
 
 
-def _compared(found: TrackedBag, manual: Any, first_frame: int) -> dict[int, TrackComparison]:
-    """The comparison for each tray in which the file has places."""
+def _comparisons(bag: TrackedBag, manual: Any, first_frame: int) -> dict[int, TrackComparison]:
+    """The comparison for each tray in which the file has positions."""
     from nanorocks_ros.errors import RecordingError
     from nanorocks_ros.studies.calibration.track_comparison import compare_tracks, manual_reference
 
-    results = {}
-    for number, tray in found.trays.items():
+    comparisons = {}
+    for number, tray in bag.trays.items():
         reference = manual_reference(
             manual,
-            found.tracks[number],
-            found.numbers[number],
-            region=found.regions[number],
-            pixels_per_metre=found.pixels_per_metre,
-            view=found.view,
+            bag.tracks[number],
+            bag.numbers[number],
+            region=bag.regions[number],
+            pixels_per_metre=bag.pixels_per_metre,
+            view=bag.view,
             first_frame=first_frame,
         )
         if reference:
-            reach = 0.5 * min(one.diameter_low for one in tray.species)
-            results[number] = compare_tracks(found.tracks[number], reference, reach=reach)
-    if not results:
+            reach = 0.5 * min(species.diameter_low for species in tray.species)
+            comparisons[number] = compare_tracks(bag.tracks[number], reference, reach=reach)
+    if not comparisons:
         raise RecordingError(
-            'the tracks made by hand',
+            'manual tracks',
             'lie in no tray and frame of the recording',
-            'give places in pixels of its frames, and --first-frame',
+            'give positions in pixels of its frames, and --first-frame',
         )
-    return results
+    return comparisons
 
 
-def _counts(found: TrackedBag, number: int) -> list[dict[str, Any]]:
-    """What was seen of each species of a tray, on average over the frames."""
+def _counts(bag: TrackedBag, number: int) -> list[dict[str, Any]]:
+    """Beads seen and tracked of each species of a tray, mean over the frames."""
     rows = []
-    for index, species in enumerate(found.trays[number].species):
-        tracks = found.tracks[number]
-        seen = sum(int((one.seen & (one.species == index)).sum()) for one in tracks)
-        followed = sum(int((one.species == index).sum()) for one in tracks)
-        numbers = {int(one) for record in tracks for one in record.ids[record.species == index]}
+    for index, species in enumerate(bag.trays[number].species):
+        tracks = bag.tracks[number]
+        seen = sum(int((track.seen & (track.species == index)).sum()) for track in tracks)
+        followed = sum(int((track.species == index).sum()) for track in tracks)
+        identities = {
+            int(track) for record in tracks for track in record.ids[record.species == index]
+        }
         rows.append(
             {
                 'material': species.material,
                 'expected': species.count,
                 'seen': seen / max(len(tracks), 1),
                 'followed': followed / max(len(tracks), 1),
-                'tracks': len(numbers),
+                'tracks': len(identities),
             }
         )
     return rows
 
 
-def _as_json(found: TrackedBag, compared: dict[int, TrackComparison]) -> dict[str, Any]:
+def _as_json(bag: TrackedBag, compared: dict[int, TrackComparison]) -> dict[str, Any]:
     return {
-        'frames': found.frames,
+        'frames': bag.frames,
         'trays': {
             str(number): {
-                'frames': len(found.tracks[number]),
-                'species': _counts(found, number),
+                'frames': len(bag.tracks[number]),
+                'species': _counts(bag, number),
                 'comparison': _comparison_as_json(compared.get(number)),
             }
-            for number in found.trays
+            for number in bag.trays
         },
     }
 
 
-def _comparison_as_json(found: TrackComparison | None) -> dict[str, Any] | None:
-    if found is None:
+def _comparison_as_json(comparison: TrackComparison | None) -> dict[str, Any] | None:
+    if comparison is None:
         return None
     values: dict[str, Any] = {
-        name: getattr(found, name)
+        name: getattr(comparison, name)
         for name in (
             'beads',
             'places',
@@ -173,18 +178,18 @@ def _comparison_as_json(found: TrackComparison | None) -> dict[str, Any] | None:
             'speed_ratio',
         )
     }
-    values['offset'] = list(found.offset)
-    known: dict[str, Any] = json_values(values)
-    if math.isnan(found.offset[0]):
-        known['offset'] = None
-    return known
+    values['offset'] = list(comparison.offset)
+    plain: dict[str, Any] = json_values(values)
+    if math.isnan(comparison.offset[0]):
+        plain['offset'] = None
+    return plain
 
 
-def _print(found: TrackedBag, compared: dict[int, TrackComparison]) -> None:
-    print(f'{found.frames} frames')
-    for number in found.trays:
-        print(f'tray {number}: {len(found.tracks[number])} frames tracked')
-        for row in _counts(found, number):
+def _print(bag: TrackedBag, compared: dict[int, TrackComparison]) -> None:
+    print(f'{bag.frames} frames')
+    for number in bag.trays:
+        print(f'tray {number}: {len(bag.tracks[number])} frames tracked')
+        for row in _counts(bag, number):
             share = _PERCENT * row['seen'] / row['expected']
             print(
                 f'  {row["material"]}: {row["seen"]:.1f} of {row["expected"]} seen '
@@ -194,12 +199,13 @@ def _print(found: TrackedBag, compared: dict[int, TrackComparison]) -> None:
             _print_comparison(compared[number])
 
 
-def _print_comparison(one: TrackComparison) -> None:
+def _print_comparison(comparison: TrackComparison) -> None:
     print(
-        f'  by hand: {one.beads} beads, {_PERCENT * one.found:.1f} % of {one.places} places '
-        f'found, rms distance {_MM * one.rms_distance:.3f} mm'
+        f'  manual: {comparison.beads} beads, {_PERCENT * comparison.found:.1f} % of '
+        f'{comparison.places} positions found, rms distance {_MM * comparison.rms_distance:.3f} mm'
     )
     print(
-        f'  {one.links_correct} of {one.links} links agree, {one.switches} identity switches, '
-        f'speed over theirs {one.speed_ratio:.3f}'
+        f'  {comparison.links_correct} of {comparison.links} links agree, '
+        f'{comparison.switches} identity switches, '
+        f'speed over manual speed {comparison.speed_ratio:.3f}'
     )

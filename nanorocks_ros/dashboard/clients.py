@@ -1,4 +1,7 @@
-"""The connection to one browser: viewed images, and flow control by acknowledgements."""
+"""The connection to one browser: viewed images, and flow control by acknowledgements.
+
+Tested by ``test/dashboard/test_server.py``.
+"""
 
 from __future__ import annotations
 

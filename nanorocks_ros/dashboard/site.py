@@ -1,4 +1,7 @@
-"""The routes of the site: page, files, login, live connection."""
+"""The routes of the site: page, files, login, live connection.
+
+Tested by ``test/dashboard/test_server.py``.
+"""
 
 from __future__ import annotations
 

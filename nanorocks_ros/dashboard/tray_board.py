@@ -1,6 +1,8 @@
 """One tray on the page: curves of the current cycle, latest results, past cycles.
 
 A `Cursor` per client records what was sent to it.
+
+Tested by ``test/dashboard/test_board.py``.
 """
 
 from __future__ import annotations

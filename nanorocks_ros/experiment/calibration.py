@@ -1,4 +1,7 @@
-"""Calibration of a film: lens, pose, scale, and regions of the trays."""
+"""Calibration of a film: lens, pose, scale, and regions of the trays.
+
+Tested by ``test/experiment/test_view.py``.
+"""
 
 from __future__ import annotations
 

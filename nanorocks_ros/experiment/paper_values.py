@@ -4,6 +4,8 @@ References
 ----------
 [B19] Brisset, Miletich, Metzger, Rascon, Dove, Colwell: Multi-Particle Collisions in
 Microgravity: Coefficient of Restitution and Sticking Threshold for Systems of Mm-Sized Particles.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
 """
 
 from __future__ import annotations

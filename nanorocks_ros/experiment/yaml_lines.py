@@ -1,4 +1,7 @@
-"""YAML reader whose errors name the line, for the files of trays and calibrations."""
+"""YAML reader whose errors name the line, for the files of trays and calibrations.
+
+Tested by ``test/experiment/test_trays.py``.
+"""
 
 from __future__ import annotations
 

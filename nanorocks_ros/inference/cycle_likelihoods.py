@@ -1,6 +1,6 @@
 """Likelihoods of both restitutions from finished cycles, which can be added and saved.
 
-Tested in test/studies/batch/test_batch_analysis.py.
+Tested by ``test/studies/batch/test_batch_analysis.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Tasks on the workers of a running Dask cluster.
 
-Tested in test_tasks.py.
+Tested by ``test/jobs/test_tasks.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A lock that lets one process at a time use a folder.
 
-Tested in test_journal.py.
+Tested by ``test/jobs/test_journal.py``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The type of callbacks that report progress; there is nothing to test."""
+"""The type of callbacks that report progress; there is nothing to test.
+
+Tested by ``test/jobs/test_resumed_tasks.py``.
+"""
 
 from __future__ import annotations
 

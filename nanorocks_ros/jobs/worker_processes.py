@@ -1,6 +1,6 @@
 """Tasks in worker processes of this machine, which exit when their parent does.
 
-Tested in test_tasks.py.
+Tested by ``test/jobs/test_tasks.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """``python -m nanorocks_ros.nodes NAME``: starts a node without an installed executable.
 
-Tested by test/nodes/test_graph.py.
+Tested by ``test/nodes/test_graph.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Node: gray tray images, bodies and speeds in, estimates of the clusters out.
 
-Tested by test/nodes/test_graph.py.
+Tested by ``test/nodes/test_graph.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """The demonstration: every node in a process of its own, tray 1, live COR, and a figure.
 
 Run by `make demo`, not by a test.
+
+Tested by ``test/nodes/test_reference.py``.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.pipeline.warm_up import warm_up_cooling
 from nanorocks_ros.records import Merge, PairCollision, Rebound, SpeedEstimate
 from nanorocks_ros.settings import PipelineSettings
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array
 
@@ -47,10 +47,13 @@ class HaffFitterNode(NanorocksNode):
                 # Without tracks there are speeds, but no contacts.
                 self.listen(topic, receive, tray, required=record_type is SpeedEstimate)
 
-    def _build(self, settings: PipelineSettings) -> dict[int, HaffFitter]:
-        return {number: HaffFitter(settings, tray) for number, tray in trays_of(settings).items()}
+    def _build(self, settings: PipelineSettings) -> dict[int, RestitutionEstimator]:
+        return {
+            number: RestitutionEstimator(settings, tray)
+            for number, tray in trays_of(settings).items()
+        }
 
-    def _adopt(self, settings: PipelineSettings, stages: dict[int, HaffFitter]) -> None:
+    def _adopt(self, settings: PipelineSettings, stages: dict[int, RestitutionEstimator]) -> None:
         self._settings, self._stages = settings, stages
 
     def _receive(

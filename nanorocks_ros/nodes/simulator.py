@@ -1,6 +1,6 @@
 """Node: one simulated tray, or the whole plate, filmed by a simulated camera, and the truth.
 
-Tested by test/nodes/test_graph.py.
+Tested by ``test/nodes/test_graph.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Node: tray images in, mean projected speeds, contacts, bodies and motion masks out.
 
-Tested by test/nodes/test_graph.py.
+Tested by ``test/nodes/test_graph.py``.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from nanorocks_ros.nodes.trays.tray_stage_node import TrayStageNode
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.wire import topics
 
 _OUTPUTS = (
@@ -26,7 +26,7 @@ class SpeedEstimatorNode(TrayStageNode):
     """Measures the mean projected speed of each tray, and finds rebounds and collisions."""
 
     def __init__(self) -> None:
-        super().__init__('speed_estimator', SpeedEstimator, _OUTPUTS, in_color=True)
+        super().__init__('speed_estimator', TrayMeasurement, _OUTPUTS, in_color=True)
 
     def select_images(self, stage: Any, tray: int) -> None:
         """Masks and images of tracks are made only while somebody subscribes."""

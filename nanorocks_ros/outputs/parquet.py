@@ -1,6 +1,6 @@
 """Tables as Parquet files, where pyarrow is installed.
 
-Tested in test_trajectory.py.
+Tested by ``test/studies/synthetic/test_trajectory.py``.
 """
 
 from __future__ import annotations

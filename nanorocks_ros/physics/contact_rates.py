@@ -14,7 +14,7 @@ order. Contacts with a wall increase because neighbours push beads against it: b
 order times the contact value, like the pressure of a fluid. In a wide box this is Enskog's
 theory.
 
-Tested in test/physics/test_confined_theory.py.
+Tested by ``test/physics/test_confined_theory.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Haff's law: decay of the mean speed of a freely cooling granular gas.
 
-Tested in test/physics/test_paper_formulas.py.
+Tested by ``test/physics/test_paper_formulas.py``.
 """
 
 from __future__ import annotations

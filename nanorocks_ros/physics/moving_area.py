@@ -1,6 +1,6 @@
 """Area that a moving disc uncovers and covers, for the speed from binarised images.
 
-Tested in test/physics/test_paper_formulas.py.
+Tested by ``test/physics/test_paper_formulas.py``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The only composition of the stages: a frame in at the top, restitutions out at the bottom."""
+"""The only composition of the stages: from a frame to the coefficients of restitution.
+
+Tested by ``test/pipeline/test_parallel_pipeline.py``.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement, TrayRecord
 from nanorocks_ros.records import (
     ArrayRecord,
     Autocorrelation,
     BodyEstimate,
-    ClusterEstimate,
     CorEstimate,
     Frame,
     Merge,
@@ -24,11 +27,10 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.stages.clusters.cluster_estimator import ClusterEstimator
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.experiment.view import View
@@ -38,7 +40,7 @@ Result = TrayImage | MotionMask | Tracks | Autocorrelation | ArrayRecord | Notic
 
 
 class Wanted(NamedTuple):
-    """Which pictures of a tray somebody looks at; they are not made otherwise."""
+    """The pictures of a tray that have a viewer; others are not made."""
 
     mask: bool = False
     tracks: bool = False
@@ -58,7 +60,10 @@ def trays_of(settings: PipelineSettings) -> dict[int, Tray]:
 
 
 class TrayStages:
-    """The stages behind one tray image.
+    """The stages behind the images of one tray.
+
+    An image goes to the measurement of tracks, contacts, bodies and speeds; from these the
+    restitution and, with the image itself, the clusters are estimated.
 
     Parameters
     ----------
@@ -67,29 +72,41 @@ class TrayStages:
     """
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
-        self.speed = SpeedEstimator(settings, tray)
+        self.measurement = TrayMeasurement(settings, tray)
+        self.restitution = RestitutionEstimator(settings, tray)
         self.clusters = ClusterEstimator(settings, tray)
-        self.cooling = HaffFitter(settings, tray)
 
     def emit(self, wanted: Wanted) -> None:
-        """Make these pictures from now on."""
-        self.speed.emit_mask, self.speed.emit_tracks, self.clusters.emit_image = wanted
+        """Choose the pictures to make from now on."""
+        self.measurement.emit_mask = wanted.mask
+        self.measurement.emit_tracks = wanted.tracks
+        self.clusters.emit_image = wanted.autocorrelation
 
     def push(self, image: TrayImage) -> tuple[Result, ...]:
         """Everything that follows from the next image of the tray."""
-        records: list[Result] = []
-        for record in self.speed.push(image):
+        return (*self._estimates(self.measurement.push(image)), *self.clusters.push(image))
+
+    def flush(self) -> tuple[Result, ...]:
+        """Everything that is held back when the images end.
+
+        Contacts first: they are part of the final restitution, as bodies are of the clusters.
+        """
+        return (
+            *self._estimates(self.measurement.flush()),
+            *self.restitution.flush(),
+            *self.clusters.flush(),
+        )
+
+    def _estimates(self, measured: Iterable[TrayRecord]) -> list[TrayRecord | CorEstimate]:
+        """The records measured, each with the estimates that follow from it."""
+        records: list[TrayRecord | CorEstimate] = []
+        for record in measured:
             records.append(record)
             if isinstance(record, SpeedEstimate | Rebound | PairCollision | Merge):
-                records += self.cooling.push(record)
+                records += self.restitution.push(record)
             if isinstance(record, SpeedEstimate | BodyEstimate | Merge):
                 self.clusters.push(record)
-        records += self.clusters.push(image)
-        return tuple(records)
-
-    def flush(self) -> tuple[CorEstimate | ClusterEstimate, ...]:
-        """What was held back when the images ended."""
-        return (*self.cooling.flush(), *self.clusters.flush())
+        return records
 
 
 class Pipeline:
@@ -99,9 +116,9 @@ class Pipeline:
     ----------
     settings : PipelineSettings
     camera : str
-        What to call the source of the frames in an error.
+        Name of the source of the frames in errors.
     view : View, optional
-        What camera_info says of the lens.
+        The lens, from camera_info.
 
     Raises
     ------
@@ -116,7 +133,7 @@ class Pipeline:
         self.trays = {number: TrayStages(settings, tray) for number, tray in trays.items()}
 
     def prepare(self) -> None:
-        """Do now what the first frame would have to wait for."""
+        """Prepare for the first frame, so that it need not wait."""
 
     def push(self, frame: Frame) -> tuple[Result, ...]:
         """Everything that follows from the next frame, tray images first.
@@ -131,7 +148,7 @@ class Pipeline:
     def follow(
         self, records: Sequence[TrayImage | Notice], wanted: Mapping[int, Wanted] | None = None
     ) -> tuple[Result, ...]:
-        """The same, of what the preprocessor made of a frame: the rest may be done elsewhere.
+        """Everything that follows from the records of the preprocessor, these included.
 
         Parameters
         ----------
@@ -139,15 +156,15 @@ class Pipeline:
         wanted : mapping of int to Wanted, optional
             By number of the tray; None: as before.
         """
-        for number, one in (wanted or {}).items():
-            self.trays[number].emit(one)
-        found: list[Result] = []
+        for number, pictures in (wanted or {}).items():
+            self.trays[number].emit(pictures)
+        results: list[Result] = []
         for record in records:
-            found.append(record)
+            results.append(record)
             if isinstance(record, TrayImage):
-                found += self.trays[record.tray].push(record)
-        return tuple(found)
+                results += self.trays[record.tray].push(record)
+        return tuple(results)
 
-    def flush(self) -> tuple[CorEstimate | ClusterEstimate, ...]:
-        """What was held back when the frames ended: final estimates, and the last of clusters."""
+    def flush(self) -> tuple[Result, ...]:
+        """Everything that is held back when the frames end."""
         return tuple(estimate for tray in self.trays.values() for estimate in tray.flush())

@@ -1,4 +1,4 @@
-"""The stages of a pipeline with the work behind the tray images shared out among processes."""
+"""The pipeline with the trays shared out among several processes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.pipeline.composition import Pipeline, trays_of
 from nanorocks_ros.pipeline.tray_processes import TrayProcess
-from nanorocks_ros.records import CorEstimate, TrayImage
+from nanorocks_ros.records import TrayImage
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -18,53 +18,53 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.experiment.view import View
     from nanorocks_ros.pipeline.composition import Result, Wanted
-    from nanorocks_ros.pipeline.tray_processes import Found
-    from nanorocks_ros.records import ClusterEstimate, Notice
+    from nanorocks_ros.pipeline.tray_processes import TrayRecords
+    from nanorocks_ros.records import Notice
     from nanorocks_ros.settings import PipelineSettings
 
-# More share the work of eight trays unevenly: the slowest tray takes a quarter of it.
-_MOST = 4
+# Largest number of processes by default: the slowest of eight trays takes a quarter of the work.
+_MAX_WORKERS = 4
 # Cost of a tray without beads, in beads.
-_EMPTY = 20
+_EMPTY_TRAY_COST = 20
 
 
 def worker_count(wanted: int, trays: int) -> int:
-    """How many processes follow the trays; 0: none but this one.
+    """Number of processes for the trays; 0: the work is done in this process.
 
     Parameters
     ----------
     wanted : int
-        As the setting says; negative: one core is left to this process, and a single tray is
-        followed in a thread of it.
+        The setting; negative: one core is left to this process, and a single tray is measured in
+        a thread of it.
     trays : int
-        There are.
+        Number of trays.
     """
     if wanted >= 0:
         return min(wanted, trays)
     cores = len(os.sched_getaffinity(0))
-    return 0 if trays == 1 else min(cores - 1, trays, _MOST)
+    return 0 if trays == 1 else min(cores - 1, trays, _MAX_WORKERS)
 
 
 def shares_of(trays: Sequence[Tray], workers: int) -> tuple[tuple[Tray, ...], ...]:
-    """The trays that each of some workers follows: about as many beads each."""
+    """Share out the trays among the workers, with about as many beads for each."""
     shares: list[list[Tray]] = [[] for _ in range(workers)]
     loads = np.zeros(workers)
     for tray in sorted(trays, key=lambda tray: -tray.count):
-        least = int(np.argmin(loads))
-        shares[least].append(tray)
-        loads[least] += tray.count + _EMPTY
+        lightest = int(np.argmin(loads))
+        shares[lightest].append(tray)
+        loads[lightest] += tray.count + _EMPTY_TRAY_COST
     return tuple(tuple(share) for share in shares)
 
 
 class SharedPipeline(Pipeline):
-    """The same stages for the same settings, and so the same records, from several cores.
+    """The same stages for the same settings, hence the same records, on several cores.
 
     Parameters
     ----------
     settings, camera, view
         As of `Pipeline`.
     workers : sequence of TrayProcess
-        At least one; their stages are made anew by `prepare`, or with the first frame.
+        At least one; `prepare` or the first frame makes their stages anew.
 
     Raises
     ------
@@ -83,68 +83,64 @@ class SharedPipeline(Pipeline):
         self._settings = calibrated(settings)
         self._workers = workers
         self._shares = shares_of(tuple(trays_of(self._settings).values()), len(workers))
-        self._begun = False
+        self._prepared = False
 
     def prepare(self) -> None:
-        """Have the stages made in the processes, which must not work for another pipeline."""
-        if not self._begun:
-            self._ask((), None)
+        """Make the stages in the processes, which must not serve another pipeline."""
+        if not self._prepared:
+            self._run((), None)
 
     def follow(
         self, records: Sequence[TrayImage | Notice], wanted: Mapping[int, Wanted] | None = None
     ) -> tuple[Result, ...]:
         """See `Pipeline.follow`; raises NanorocksError when a process has ended."""
         images = [record for record in records if isinstance(record, TrayImage)]
-        results_by_tray = self._ask(images, wanted) if images else {}
+        of_tray = self._run(images, wanted) if images else {}
         results: list[Result] = []
         for record in records:
             results.append(record)
             if isinstance(record, TrayImage):
-                results += results_by_tray[record.tray]
+                results += of_tray[record.tray]
         return tuple(results)
 
-    def flush(self) -> tuple[CorEstimate | ClusterEstimate, ...]:
+    def flush(self) -> tuple[Result, ...]:
         """See `Pipeline.flush`."""
-        if not self._begun:
+        if not self._prepared:
             return super().flush()
-        results_by_tray = self._ask((), None, flush=True)
-        return tuple(record for number in self.trays for record in results_by_tray[number])  # type: ignore[misc]
+        of_tray = self._run((), None, flush=True)
+        return tuple(record for number in self.trays for record in of_tray[number])
 
-    def _ask(
+    def _run(
         self,
         images: Sequence[TrayImage],
         wanted: Mapping[int, Wanted] | None,
         *,
         flush: bool = False,
-    ) -> Found:
-        begin, self._begun = not self._begun, True
-        busy = []
+    ) -> TrayRecords:
+        first, self._prepared = not self._prepared, True
+        asked = []
         for worker, share in zip(self._workers, self._shares, strict=True):
             numbers = {tray.number for tray in share}
             worker.send(
                 [image for image in images if image.tray in numbers],
-                {
-                    number: outputs
-                    for number, outputs in (wanted or {}).items()
-                    if number in numbers
-                },
-                begin=(self._settings, share) if begin else None,
+                {number: own for number, own in (wanted or {}).items() if number in numbers},
+                stages=(self._settings, share) if first else None,
                 flush=flush,
             )
-            busy.append(worker)
-        results_by_tray: Found = {}
-        # All are asked, also when one has met an error: none may be left with an answer.
+            asked.append(worker)
+        records: TrayRecords = {}
+        # All answers are received, also after an error: a worker must be free for the next job.
         errors = []
-        for worker in busy:
+        for worker in asked:
             try:
-                results_by_tray |= worker.answer()
+                records |= worker.answer()
             except Exception as error:
                 errors.append(error)
         if errors:
             raise errors[0]
-        return results_by_tray
+        return records
 
 
 def started(workers: int) -> tuple[TrayProcess, ...]:
-    """So many processes, all of them starting at once."""
+    """Start so many processes at once."""
     return tuple(TrayProcess() for _ in range(workers))

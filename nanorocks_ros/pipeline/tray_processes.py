@@ -1,4 +1,7 @@
-"""Processes beside this one that follow the trays: what each gets, does and hands back."""
+"""Processes beside this one that follow the trays: what each gets, does and hands back.
+
+Tested by ``test/pipeline/test_parallel_pipeline.py``.
+"""
 
 from __future__ import annotations
 
@@ -29,25 +32,25 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-Found = dict[int, tuple[Result, ...]]
-"""What followed from the images of each tray, by number."""
+TrayRecords = dict[int, tuple[Result, ...]]
+"""Records of each tray, by its number."""
 
-Begin = tuple[PipelineSettings, tuple[Tray, ...]]
-"""What stages are made of."""
+StageInputs = tuple[PipelineSettings, tuple[Tray, ...]]
+"""Settings and trays of which new stages are made."""
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _NO_PIXELS = np.empty((0, 0), dtype=np.uint8)
 
 
 class _Place(NamedTuple):
-    """Where a picture is in the shared memory."""
+    """Position of a picture in the shared memory."""
 
     offset: int
     shape: tuple[int, ...]
 
 
-class _Sent(NamedTuple):
-    """A tray image without its pixels, and where those are."""
+class _SentImage(NamedTuple):
+    """A tray image without its pixels, and the positions of these."""
 
     image: TrayImage
     gray: _Place
@@ -55,44 +58,44 @@ class _Sent(NamedTuple):
 
 
 class _Job(NamedTuple):
-    """What one process is to do; see `TrayProcess.send`."""
+    """A job for one process; see `TrayProcess.send`."""
 
-    begin: Begin | None
-    images: tuple[_Sent, ...]
+    stages: StageInputs | None
+    images: tuple[_SentImage, ...]
     wanted: Mapping[int, Wanted]
     flush: bool
 
 
 class TrayProcess:
-    """One process, which starts at once and ends with this one, whatever happens to it.
+    """One process, which starts at once and ends when this one ends, for whatever reason.
 
-    Images are handed over in shared memory: a tenth of the time that a pipe takes. It is
-    nameless as soon as both have it, so that nothing stays behind.
+    Images are handed over in shared memory: a tenth of the time that a pipe takes. The memory is
+    unlinked as soon as both have opened it, so that no file is left over.
     """
 
     def __init__(self) -> None:
         context = get_context('spawn')
-        self._connection, its = context.Pipe()
-        self._process = context.Process(target=_serve, args=(its,), daemon=True)
+        self._connection, remote = context.Pipe()
+        self._process = context.Process(target=_serve, args=(remote,), daemon=True)
         self._memory: SharedMemory | None = None
-        # It would unblock the signals when it is started.
+        # Started later, the resource tracker would unblock the signals.
         resource_tracker.ensure_running()
-        # Ctrl-C reaches all processes of a terminal: only this one is to heed it.
+        # Ctrl-C reaches all processes of a terminal: only this one handles it.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
         try:
             self._process.start()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        its.close()
+        remote.close()
         atexit.register(self.close)
 
     @property
     def pid(self) -> int | None:
-        """Its number."""
+        """Process id."""
         return self._process.pid
 
     def ready(self) -> None:
-        """Wait until all is compiled.
+        """Wait until all functions are compiled.
 
         Raises
         ------
@@ -106,42 +109,42 @@ class TrayProcess:
         images: Sequence[TrayImage] = (),
         wanted: Mapping[int, Wanted] | None = None,
         *,
-        begin: Begin | None = None,
+        stages: StageInputs | None = None,
         flush: bool = False,
     ) -> None:
-        """Leave a job to it; `answer` must be called before the next one.
+        """Send a job; `answer` must be called before the next one.
 
         Parameters
         ----------
         images : sequence of TrayImage
-            To be followed.
+            To be measured.
         wanted : mapping of int to Wanted
             By number of the tray.
-        begin : (PipelineSettings, tuple of Tray), optional
+        stages : (PipelineSettings, tuple of Tray), optional
             Make new stages first.
         flush : bool
-            Answer what is held back.
+            Answer with the records that are held back.
 
         Raises
         ------
         NanorocksError
             When the process ended.
         """
-        job = _Job(begin, tuple(self._packed(images)), wanted or {}, flush)
+        job = _Job(stages, tuple(self._packed(images)), wanted or {}, flush)
         try:
             self._connection.send(job)
         except OSError as error:
             raise self._ended() from error
 
-    def answer(self) -> Found:
-        """What followed from the job; an error that it met is raised here."""
-        results_by_tray, error = self._answer()
+    def answer(self) -> TrayRecords:
+        """The records of the job; an error in the process is raised here."""
+        records, error = self._answer()
         if error is not None:
             raise error
-        return results_by_tray
+        return records
 
     def close(self) -> None:
-        """End it; what it is doing is not done."""
+        """End the process, also in the middle of a job."""
         atexit.unregister(self.close)
         self._process.kill()
         self._process.join()
@@ -150,9 +153,9 @@ class TrayProcess:
             with suppress(BufferError):
                 self._memory.close()
 
-    def _answer(self) -> tuple[Found, Exception | None]:
+    def _answer(self) -> tuple[TrayRecords, Exception | None]:
         try:
-            answer: tuple[Found, Exception | None] = self._connection.recv()
+            answer: tuple[TrayRecords, Exception | None] = self._connection.recv()
         except (EOFError, OSError) as error:
             raise self._ended() from error
         return answer
@@ -161,25 +164,25 @@ class TrayProcess:
         self._process.join(1.0)
         return NanorocksError(
             'pipeline',
-            f'a process that follows trays ended (exit code {self._process.exitcode})',
-            'see what was said before; set workers: 0 to do without',
+            f'a process that measures trays ended (exit code {self._process.exitcode})',
+            'see the messages before; set workers: 0 to do without processes',
         )
 
-    def _packed(self, images: Sequence[TrayImage]) -> list[_Sent]:
-        pixel_arrays = [
+    def _packed(self, images: Sequence[TrayImage]) -> list[_SentImage]:
+        pictures = [
             pixels
             for image in images
             for pixels in (image.gray, image.color)
             if pixels is not None
         ]
-        self._make_room(sum(pixels.nbytes for pixels in pixel_arrays))
+        self._make_room(sum(picture.nbytes for picture in pictures))
         offset, packed = 0, []
         for image in images:
             gray, offset = self._written(image.gray, offset)
             color = None
             if image.color is not None:
                 color, offset = self._written(image.color, offset)
-            packed.append(_Sent(replace(image, gray=_NO_PIXELS, color=None), gray, color))
+            packed.append(_SentImage(replace(image, gray=_NO_PIXELS, color=None), gray, color))
         return packed
 
     def _written(self, pixels: NDArray[np.uint8], offset: int) -> tuple[_Place, int]:
@@ -203,9 +206,9 @@ class TrayProcess:
 
 
 def _serve(connection: Connection) -> None:
-    """What the process does: jobs, one after the other, until nobody is there."""
+    """Do jobs, one after the other, until the connection is closed."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    # There are more processes than this one for the cores.
+    # The other cores are used by other processes.
     cv2.setNumThreads(1)
     warm_up_speed()
     warm_up_clusters()
@@ -217,19 +220,19 @@ def _serve(connection: Connection) -> None:
             job = connection.recv()
         except EOFError:
             return
-        answer: tuple[Found, Exception | None]
+        answer: tuple[TrayRecords, Exception | None]
         try:
             answer = worker.take(job), None
         except NanorocksError as error:
             answer = {}, error
-        # Raised again where somebody sees it, who has no use for the traceback of another process.
+        # Raised again in the main process, where the traceback of this one would be lost.
         except Exception:
             answer = {}, RuntimeError(traceback.format_exc())
         connection.send(answer)
 
 
 def _end_with_parent() -> None:
-    """Also while a job takes its time, or a kernel is being compiled."""
+    """End this process with its parent, also in the middle of a job or a compilation."""
     parent = parent_process()
     assert parent is not None
     parent.join()
@@ -243,29 +246,29 @@ class _Worker:
         self._trays: dict[int, TrayStages] = {}
         self._memory: SharedMemory | None = None
 
-    def take(self, job: str | _Job) -> Found:
-        """Do a job, or use the shared memory of some name from now on."""
+    def take(self, job: str | _Job) -> TrayRecords:
+        """Do a job, or use the shared memory of this name from now on."""
         if isinstance(job, str):
             self._memory = SharedMemory(job)
             return {}
-        if job.begin is not None:
-            settings, trays = job.begin
+        if job.stages is not None:
+            settings, trays = job.stages
             self._trays = {tray.number: TrayStages(settings, tray) for tray in trays}
         for number, wanted in job.wanted.items():
             self._trays[number].emit(wanted)
-        results_by_tray: Found = {}
+        records: TrayRecords = {}
         for image, gray, color in job.images:
-            whole = replace(
+            complete = replace(
                 image,
                 gray=self._pixels(gray),
                 color=None if color is None else self._pixels(color),
             )
-            results_by_tray[image.tray] = self._trays[image.tray].push(whole)
+            records[image.tray] = self._trays[image.tray].push(complete)
         if job.flush:
-            results_by_tray = {number: tray.flush() for number, tray in self._trays.items()}
-        return results_by_tray
+            records = {number: tray.flush() for number, tray in self._trays.items()}
+        return records
 
     def _pixels(self, place: _Place) -> NDArray[np.uint8]:
-        """A copy: stages keep images, and the next ones will be written to the same place."""
+        """A copy: stages keep images, and the next ones are written to the same position."""
         assert self._memory is not None
         return np.ndarray(place.shape, np.uint8, self._memory.buf, place.offset).copy()

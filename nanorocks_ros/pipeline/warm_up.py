@@ -1,4 +1,4 @@
-"""Compiles what a first frame would have to wait for, while no frame is waiting."""
+"""Compile or load all compiled functions before the first frame."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from nanorocks_ros.experiment.view import IdentityLens, View
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
 from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
 from nanorocks_ros.physics.sticking_rates import slow_contacts
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import (
     Frame,
     Measured,
@@ -25,15 +26,14 @@ from nanorocks_ros.stages.clusters.correlation_width import ClusterAutocorrelato
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.shake_detection import CycleFollower
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
 _SIDE = 160
 _REGION = (40, 40, 80, 80)
 
 
 def warm_up_counting() -> None:
-    """Push two images through what counts shaking events in images that nobody has counted."""
+    """Push two images without a cycle through a `CycleFollower`."""
     follower = CycleFollower(2.0, 1.0)
     for stamp_ns in (0, 1):
         gray = np.full((16, 16), 100, dtype=np.uint8)
@@ -41,7 +41,7 @@ def warm_up_counting() -> None:
 
 
 def warm_up_clusters() -> None:
-    """Correlate a picture with a disc on it, and hold a merge against the theory."""
+    """Correlate a picture of a disc, and estimate a sticking speed from one merge."""
     stage = ClusterAutocorrelator(PipelineSettings(), load_trays()[1])
     gray = np.full((64, 64), 150, dtype=np.uint8)
     cv2.circle(gray, (32, 32), 12, 60, -1)
@@ -61,18 +61,18 @@ def warm_up_clusters() -> None:
 def warm_up() -> None:
     """Push a few pictures of a square through a preprocessor.
 
-    From the cache on the disk this takes a second, without it some tens of seconds.
+    With the cache on the disk this takes a second, without it some tens of seconds.
     """
     values = {'preprocess.regions_px': _REGION}
     settings = with_values(PipelineSettings(), values, 'warm-up')
     view = View(camera=IdentityLens(width=_SIDE, height=_SIDE))
     noise = np.random.default_rng(0).integers(90, 110, (3, _SIDE, _SIDE, 3), dtype=np.uint8)
     x, y, width, height = _REGION
-    # The last is lost, and looked for.
+    # In the last frame the square is missing, and searched for.
     noise[:2, y : y + height, x : x + width] += 80
     for encoding in ('bgr8', 'mono8'):
         stage = Preprocessor(settings, {1: load_trays()[1]}, 'warm-up', view)
-        # Enough frames for the look at the map of the trays.
+        # Enough frames for the check of the tray positions.
         for number in range(10):
             image = noise[2 if number == 9 else number % 2]
             pixels = image if encoding == 'bgr8' else np.ascontiguousarray(image[:, :, 0])
@@ -80,8 +80,8 @@ def warm_up() -> None:
 
 
 def warm_up_cooling() -> None:
-    """Hold a decay against the simulated ones, and a rebound beside it."""
-    fitter = HaffFitter(PipelineSettings(), load_trays()[1])
+    """Estimate the restitution of a decay and a rebound."""
+    fitter = RestitutionEstimator(PipelineSettings(), load_trays()[1])
     rebound = Rebound(
         stamp_ns=2_000_000_000,
         tray=1,
@@ -118,7 +118,7 @@ def warm_up_cooling() -> None:
 
 
 def warm_up_contacts() -> None:
-    """Follow three beads, of which one comes back from a wall and two from each other."""
+    """Find the contacts of three beads: one rebounds from a wall, two collide."""
     tray = load_trays()[1]
     finder, counter = ContactFinder(tray), BodyCounter(PipelineSettings(), tray)
     radius = 0.5 * tray.diameter
@@ -147,11 +147,11 @@ def warm_up_contacts() -> None:
 
 
 def warm_up_speed() -> None:
-    """Push a few pictures of moving discs through what measures speeds in colour images."""
+    """Push a few pictures of moving discs through the measurement of a tray."""
     settings = PipelineSettings()
-    # Under chalk beads are looked for in another way.
+    # Under chalk beads are detected in another way.
     for tray in (load_trays()[3], load_trays()[2]):
-        estimator = SpeedEstimator(settings, tray)
+        estimator = TrayMeasurement(settings, tray)
         for number in range(8):
             color = np.full((80, 160, 3), 150, dtype=np.uint8)
             for k in range(8):

@@ -1,4 +1,7 @@
-"""JPEG headers: size, Huffman tables, and whether the file is complete."""
+"""JPEG headers: size, Huffman tables, and whether the file is complete.
+
+Tested by ``test/studies/film_import/test_import_film.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Quality of service of recorded topics: conversion to and from the metadata of a recording."""
+"""Quality of service of recorded topics: conversion to and from the metadata of a recording.
+
+Tested by ``test/recordings/bag/test_writer.py``.
+"""
 
 from __future__ import annotations
 

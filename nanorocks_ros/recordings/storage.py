@@ -1,4 +1,7 @@
-"""The interface of storage files (MCAP, SQLite) and the values they return."""
+"""The interface of storage files (MCAP, SQLite) and the values they return.
+
+Tested by ``test/recordings/messages/test_message_builders.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The common fields of the records that are published as arrays."""
+"""The common fields of the records that are published as arrays.
+
+Tested by ``test/wire/test_array_layouts.py``.
+"""
 
 from __future__ import annotations
 

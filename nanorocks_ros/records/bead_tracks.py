@@ -1,4 +1,7 @@
-"""Tracked beads of one tray image."""
+"""Tracked beads of one tray image.
+
+Tested by ``test/wire/test_array_layouts.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Clusters of a tray: autocorrelation, bodies, merges."""
+"""Clusters of a tray: autocorrelation, bodies, merges.
+
+Tested by ``test/wire/test_array_layouts.py``.
+"""
 
 from __future__ import annotations
 

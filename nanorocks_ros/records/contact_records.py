@@ -1,4 +1,7 @@
-"""Single contacts: rebounds from walls and collisions of two beads."""
+"""Single contacts: rebounds from walls and collisions of two beads.
+
+Tested by ``test/wire/test_array_layouts.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Camera frames, tray images and motion masks."""
+"""Camera frames, tray images and motion masks.
+
+Tested by ``test/wire/test_array_layouts.py``.
+"""
 
 from __future__ import annotations
 

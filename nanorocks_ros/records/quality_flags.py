@@ -1,4 +1,7 @@
-"""Enumerations of methods, states and quality flags, and helpers for all records."""
+"""Enumerations of methods, states and quality flags, and helpers for all records.
+
+Tested by ``test/wire/test_array_layouts.py``.
+"""
 
 from __future__ import annotations
 

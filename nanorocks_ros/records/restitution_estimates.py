@@ -1,4 +1,7 @@
-"""Coefficient of restitution of a cooling cycle."""
+"""Coefficient of restitution of a cooling cycle.
+
+Tested by ``test/wire/test_array_layouts.py``.
+"""
 
 from __future__ import annotations
 

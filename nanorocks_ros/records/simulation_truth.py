@@ -1,4 +1,7 @@
-"""True values of simulated frames."""
+"""True values of simulated frames.
+
+Tested by ``test/wire/test_array_layouts.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Mean projected speed of a tray."""
+"""Mean projected speed of a tray.
+
+Tested by ``test/wire/test_array_layouts.py``.
+"""
 
 from __future__ import annotations
 

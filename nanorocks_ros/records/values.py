@@ -1,4 +1,7 @@
-"""Measured values: a number with its standard error, its interval, or both."""
+"""Measured values: a number with its standard error, its interval, or both.
+
+Tested by ``test/wire/test_array_layouts.py``.
+"""
 
 from __future__ import annotations
 

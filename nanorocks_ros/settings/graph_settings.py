@@ -1,6 +1,6 @@
 """Settings of the node graph: sources, playback, recording, live page.
 
-Tested in test/settings/test_setting_fields.py.
+Tested by ``test/settings/test_setting_fields.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Settings of the stages, from the camera frame to the restitution.
 
-Tested in test/settings/test_setting_fields.py.
+Tested by ``test/settings/test_setting_fields.py``.
 """
 
 from __future__ import annotations

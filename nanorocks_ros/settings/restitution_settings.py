@@ -1,6 +1,6 @@
 """Settings of the fits: sticking speed, cooling window, priors of the restitution.
 
-Tested in test/settings/test_setting_fields.py.
+Tested by ``test/settings/test_setting_fields.py``.
 """
 
 from __future__ import annotations

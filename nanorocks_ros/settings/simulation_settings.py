@@ -1,6 +1,6 @@
 """Settings of the simulated gas, of the scene and of its films.
 
-Tested in test/settings/test_setting_fields.py.
+Tested by ``test/settings/test_setting_fields.py``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Ensembles: many cooling runs of one tray."""
+"""Ensembles: many cooling runs of one tray.
+
+Tested by ``test/simulation/test_shaken_tray.py``.
+"""
 
 from __future__ import annotations
 

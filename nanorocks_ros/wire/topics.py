@@ -1,4 +1,7 @@
-"""Every topic by name and quality of service, declared here and nowhere else."""
+"""Every topic by name and quality of service, declared here and nowhere else.
+
+Tested by ``test/wire/test_products.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``nanorocks doctor`` where there is no ROS."""
+"""The command ``nanorocks doctor`` without ROS."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ WITHOUT_ROS = """
 import importlib.util
 import sys
 
-found = importlib.util.find_spec
-importlib.util.find_spec = lambda name, *rest: None if name == 'rclpy' else found(name, *rest)
+find_spec = importlib.util.find_spec
+importlib.util.find_spec = (
+    lambda name, *rest: None if name == 'rclpy' else find_spec(name, *rest)
+)
 from nanorocks_ros.cli.main import main
 
 sys.exit(main(sys.argv[1:]))
@@ -27,7 +29,7 @@ def doctor(*arguments):
     )
 
 
-def test_without_ros_it_examines_the_rest_and_says_so():
+def test_without_ros_the_other_checks_run():
     finished = doctor('--json')
     assert finished.returncode == 1, finished.stderr
     answer = json.loads(finished.stdout)
@@ -40,7 +42,7 @@ def test_without_ros_it_examines_the_rest_and_says_so():
     assert 'frames over loopback' not in checks
 
 
-def test_a_time_to_listen_that_cannot_be_is_a_wrong_call():
+def test_an_invalid_listening_time_is_a_wrong_call():
     finished = doctor('--graph', '--seconds', '-1')
     assert finished.returncode == 2
     assert '--seconds' in finished.stderr

@@ -1,4 +1,4 @@
-"""What the command says of faults that no part of it expected."""
+"""Errors of the system in the command ``nanorocks``."""
 
 from __future__ import annotations
 
@@ -12,15 +12,13 @@ from nanorocks_ros.cli import main as command
 
 
 @pytest.mark.parametrize(
-    ('arguments', 'said'),
+    ('arguments', 'message'),
     [
         ((errno.EACCES, 'Permission denied', 'a\udcff b'), 'a\\udcff b: Permission denied; '),
         ((errno.ENOSPC, 'No space left on device'), 'No space left on device; '),
     ],
 )
-def test_a_fault_of_the_system_is_one_line_that_names_the_file(
-    monkeypatch, capsys, arguments, said
-):
+def test_a_system_error_is_one_line_that_names_the_file(monkeypatch, capsys, arguments, message):
     def run(_):
         raise OSError(*arguments)
 
@@ -29,6 +27,6 @@ def test_a_fault_of_the_system_is_one_line_that_names_the_file(
     monkeypatch.setattr(command, 'build_parser', lambda: parser)
     assert command.main([]) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert line == f'nanorocks: {said}make room, or write elsewhere'
-    # So that any terminal takes it.
+    assert line == f'nanorocks: {message}free some space, or write elsewhere'
+    # Surrogates are escaped, so that any terminal can print the line.
     assert os.fsencode(line) == line.encode('utf-8')

@@ -64,7 +64,8 @@ def test_a_described_material_is_drawn_in_its_colour(tmp_path):
     tray = load(tmp_path, f'materials: {{{green}}}{TRAYS}')[1]
     settings = SimulationSettings(width_px=320, height_px=260, noise=0.0)
     camera = TrayCamera(settings, tray, np.array([0.001]), ('steel',))
-    column, row = camera.to_pixels(np.full((1, 2), 0.0075))[0].astype(int)
+    corner = np.array([camera.region.x, camera.region.y])
+    column, row = (0.0075 * settings.pixels_per_metre + corner).astype(int)
     blue, level, red = camera.picture(np.full((1, 3), 0.0075), 0)[row, column].astype(int)
     assert level > blue + 60
     assert level > red + 60

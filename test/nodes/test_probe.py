@@ -55,7 +55,7 @@ def test_incompatible_endpoints_are_listed(graph):
     assert 'qos_overrides./nanorocks/tray_1/cor.subscription' in deaf['remedy']
     assert fine['status'] == 'ok'
     assert alone['status'] == 'warning'
-    assert 'nobody -> /nanorocks/listener' in alone['found']
+    assert 'no node -> /nanorocks/listener' in alone['found']
     assert not any('doctor' in check['found'] for check in checks.values())
 
 

@@ -37,12 +37,12 @@ _NOBODY_S = 20.0
 @pytest.fixture(scope='module')
 def workers():
     """Two processes, which all tests share: each takes seconds to start."""
-    those = started(2)
-    for one in those:
-        one.ready()
-    yield those
-    for one in those:
-        one.close()
+    workers = started(2)
+    for worker in workers:
+        worker.ready()
+    yield workers
+    for worker in workers:
+        worker.close()
 
 
 def _image(tray, number):

@@ -15,8 +15,8 @@ from nanorocks_ros.physics.sticking_rates import _sum_slower
 from nanorocks_ros.pipeline.warm_up import warm_up_clusters, warm_up_cooling
 from nanorocks_ros.records import Rebound, SpeedEstimate
 from nanorocks_ros.settings import PipelineSettings
-from nanorocks_ros.stages.clusters.sticking_estimator import StickingMeter
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.clusters.sticking_estimator import StickingEstimator
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
 NS = 1_000_000_000
 
@@ -56,15 +56,17 @@ def test_the_estimates_of_a_first_cycle_compile_nothing_more():
     before = compiled_for()
     assert all(before)
     tray = load_trays()[1]
-    fitter, meter = (kind(PipelineSettings(), tray) for kind in (HaffFitter, StickingMeter))
+    fitter, meter = (
+        kind(PipelineSettings(), tray) for kind in (RestitutionEstimator, StickingEstimator)
+    )
     for time in (3.0, 4.0, 5.0):
         fitter.push(rebound(time))
-    found = []
+    results = []
     for record in cooling(until=24.0):
         meter.push(record)
         if isinstance(record, SpeedEstimate):
-            found += fitter.push(record)
-    assert found[-1].rebounds == 3
-    assert found[-1].restitution.value == pytest.approx(0.9, abs=0.2)
+            results += fitter.push(record)
+    assert results[-1].rebounds == 3
+    assert results[-1].restitution.value == pytest.approx(0.9, abs=0.2)
     assert meter.of_cycle(1, 20 * NS) is not None
     assert compiled_for() == before

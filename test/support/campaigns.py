@@ -1,4 +1,4 @@
-"""Results of many recordings as `nanorocks analyse` writes them, made up so that all is known."""
+"""Synthetic results of many recordings, in the tables of `nanorocks analyse`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ TIMES = np.concatenate((np.linspace(0.1, 3.0, 10), np.linspace(5.0, 59.0, 20)))
 
 
 def write_recording(folder, trays, cycles, sizes, *, peaks=None, bodies=False, seed=1):
-    """Cycles from 1 on; sizes and peaks by cycle, the restitution 0.89 in all."""
+    """Write the tables of cycles 1 to `cycles`; sizes and peaks by cycle, restitution 0.89."""
     folder.mkdir(parents=True)
     rng = np.random.default_rng(seed)
     for number in trays:
@@ -30,7 +30,7 @@ def write_recording(folder, trays, cycles, sizes, *, peaks=None, bodies=False, s
                 value = (sizes[k] if t > 49.0 else 0.1) * (1.0 + 1e-4 * rng.normal())
                 clusters.append((start + t, k + 1, math.pi * value**2, value))
                 counts.append((start + t, k + 1, 1e4 * value, 0.5))
-            # What came before the final estimate is not asked for.
+            # A provisional estimate, which is ignored, and the final one.
             cors += [(k + 1, 1, 0.5, 0.1, 0.9), (k + 1, 2, 0.89, 0.87, 0.91)]
         for name, fields, rows in (
             (

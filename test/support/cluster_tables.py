@@ -1,4 +1,4 @@
-"""Tables of autocorrelations as `nanorocks analyse` writes them."""
+"""Synthetic tables of clusters and speeds, as `nanorocks analyse` writes them."""
 
 from __future__ import annotations
 

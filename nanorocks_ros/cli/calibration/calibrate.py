@@ -1,4 +1,7 @@
-"""``nanorocks calibrate RECORDING``: lens and tray regions from the trays themselves."""
+"""``nanorocks calibrate RECORDING``: lens and tray regions from the edges of the trays.
+
+Tested by ``test/studies/calibration/test_camera_calibration.py``.
+"""
 
 from __future__ import annotations
 
@@ -24,10 +27,14 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument('recording', help='rosbag2 folder or .mcap file')
     parser.add_argument('-o', '--output', help='calibration file to write, YAML')
-    parser.add_argument('--picture', help='write a picture that shows the calibration, PNG')
-    parser.add_argument('--show', metavar='YAML', help='show this calibration, estimate none')
+    parser.add_argument('--picture', help='picture of the calibration to write, PNG')
+    parser.add_argument(
+        '--show', metavar='YAML', help='show this calibration instead of estimating one'
+    )
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
-    parser.add_argument('--image-topic', default='', help="the camera topic, if it isn't ours")
+    parser.add_argument(
+        '--image-topic', default='', help='camera topic; default: that of our nodes'
+    )
     parser.add_argument(
         '--trays', type=int, nargs='+', metavar='K', help='trays on the plate; default: all'
     )
@@ -37,13 +44,13 @@ def add_parser(commands: Any) -> None:
         type=float,
         nargs=2,
         metavar=('LOW', 'HIGH'),
-        help='px per metre between which the scale lies; default: plate in the whole picture',
+        help='bounds of the scale [px/m]; default: the plate fills the frame',
     )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Calibrate or show, print, write; the exit code."""
+    """Calibrate or show, print and write, and return the exit code."""
     from nanorocks_ros.experiment.calibration_file import load_calibration, write_calibration
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.studies.analysis.bag_frames import BagFrames
@@ -54,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
         write_picture,
     )
 
-    _check(options)
+    _check_options(options)
     flown = load_trays(options.trays_file)
     numbers = options.trays or sorted(flown)
     trays = [tray_by_number(flown, number) for number in dict.fromkeys(numbers)]
@@ -67,7 +74,9 @@ def run(options: argparse.Namespace) -> int:
         for tray in trays:
             if tray.place is None:
                 raise ConfigurationError(
-                    f'tray {tray.number}', 'has no place on the plate', 'leave it out of --trays'
+                    f'tray {tray.number}',
+                    'has no position on the plate',
+                    'leave it out of --trays',
                 )
         frames = BagFrames(options.recording, options.image_topic)
         scale = tuple(options.scale) if options.scale else None
@@ -85,12 +94,14 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _check(options: argparse.Namespace) -> None:
+def _check_options(options: argparse.Namespace) -> None:
     if options.show and options.output:
-        raise ConfigurationError('--show', 'together with --output', 'give one of them')
+        raise ConfigurationError('--show', 'cannot be used with --output', 'give one of them')
     low, high = options.scale or (1.0, 2.0)
     if not (math.isfinite(high) and 0.0 < low < high):
-        raise ConfigurationError('--scale', f'{low:g} to {high:g}', 'give a lower and a higher')
+        raise ConfigurationError(
+            '--scale', f'{low:g} to {high:g}', 'give a lower and a higher bound'
+        )
 
 
 def _check_size(path: str, calibration: Calibration, shape: tuple[int, ...]) -> None:
@@ -104,12 +115,12 @@ def _check_size(path: str, calibration: Calibration, shape: tuple[int, ...]) -> 
 
 
 def as_json(calibration: Calibration, fit: PlateFit | None) -> dict[str, Any]:
-    """The calibration as plain values; null where unknown."""
+    """The calibration as values for JSON; None where unknown."""
     from nanorocks_ros.studies.calibration.camera_calibration import max_distortion_px
 
     residual = calibration.residual_px
     info = calibration.info
-    found: dict[str, Any] = {
+    values: dict[str, Any] = {
         'width': info.width,
         'height': info.height,
         'distortion_model': info.distortion_model,
@@ -123,9 +134,9 @@ def as_json(calibration: Calibration, fit: PlateFit | None) -> dict[str, Any]:
         'trays': {str(number): list(region) for number, region in calibration.regions.items()},
     }
     if fit is not None:
-        found['edges'] = len(fit.residuals)
-        found['camera_pixels_per_metre'] = {str(k): scale for k, scale in fit.tray_scales.items()}
-    return found
+        values['edges'] = len(fit.residuals)
+        values['camera_pixels_per_metre'] = {str(k): scale for k, scale in fit.tray_scales.items()}
+    return values
 
 
 def _print(calibration: Calibration, fit: PlateFit | None, options: argparse.Namespace) -> None:
@@ -134,18 +145,20 @@ def _print(calibration: Calibration, fit: PlateFit | None, options: argparse.Nam
     info = calibration.info
     print(f'{info.width}x{info.height} px, {info.distortion_model}')
     print(f'focal length {info.k[0]:.1f} px, axis at {info.k[2]:.1f}, {info.k[5]:.1f} px')
-    print(f'distortion {", ".join(f"{one:.4f}" for one in info.d)}')
+    print(f'distortion {", ".join(f"{coefficient:.4f}" for coefficient in info.d)}')
     print(
         f'the lens moves the corners of the trays by up to {max_distortion_px(calibration):.1f} px'
     )
     print(f'scale {calibration.pixels_per_metre:.0f} px/m in the rectified picture')
     if not math.isnan(calibration.residual_px):
-        edges = '' if fit is None else f' ({len(fit.residuals)} places on edges)'
+        edges = '' if fit is None else f' ({len(fit.residuals)} points on edges)'
         print(f'residual {calibration.residual_px:.3f} px rms{edges}')
     for number, region in sorted(calibration.regions.items()):
-        seen = '' if fit is None else f', {fit.tray_scales[number] / 1e3:.2f} px/mm in the frame'
+        tray_scale = (
+            '' if fit is None else f', {fit.tray_scales[number] / 1e3:.2f} px/mm in the frame'
+        )
         x, y, width, height = region
-        print(f'tray {number}: x={x} y={y}, {width}x{height} px{seen}')
+        print(f'tray {number}: x={x} y={y}, {width}x{height} px{tray_scale}')
     for name in ('output', 'picture'):
         if getattr(options, name):
             print(f'written: {getattr(options, name)}')

@@ -1,4 +1,7 @@
-"""``nanorocks calibrate-area BAG TRACKS``: the binarised area fitted to tracks made by hand."""
+"""``nanorocks calibrate-area BAG TRACKS``: calibration of the binarised area by manual tracks.
+
+Tested by ``test/studies/calibration/test_area_calibration.py``.
+"""
 
 from __future__ import annotations
 
@@ -26,12 +29,12 @@ def add_parser(commands: Any) -> None:
     from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser(
-        'calibrate-area', help='calibrate the binarised area by tracks made by hand'
+        'calibrate-area', help='calibrate the binarised area by manual tracks'
     )
     add_bag(parser, skip={'speed.method', 'speed.area_factor', 'speed.area_offset'})
     parser.add_argument(
         'tracks',
-        help='tracks made by hand: CSV (frame, id, x, y), TrackMate CSV or XML, NASA Spotlight',
+        help='manual tracks: CSV (frame, id, x, y), TrackMate CSV or XML, NASA Spotlight',
     )
     parser.add_argument(
         '--first-frame', type=int, default=0, help='number of the first frame in TRACKS; default 0'
@@ -39,15 +42,15 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         '-o',
         '--output',
-        help='parameter file to write, .yaml; one for each tray where tracks lie in several',
+        help='parameter file to write, .yaml; one for each tray with tracks',
     )
-    parser.add_argument('--picture', help='picture of both speeds to write, .png')
+    parser.add_argument('--picture', help='picture of measured and manual speeds to write, .png')
     parser.add_argument('--force', action='store_true', help='replace files that exist')
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fit, print, write; the exit code."""
+    """Fit, print and write, and return the exit code."""
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.calibration.area_calibration import calibrate_area
@@ -89,9 +92,9 @@ def _files(options: argparse.Namespace, trays: tuple[int, ...]) -> dict[int, Pat
 def _check_outputs(options: argparse.Namespace, settings: PipelineSettings) -> None:
     from nanorocks_ros.outputs.atomic_files import check_outputs
 
-    named = {'--output': options.output, '--picture': options.picture}
+    names = {'--output': options.output, '--picture': options.picture}
     check_outputs(
-        {flag: Path(name) for flag, name in named.items() if name}, _KINDS, force=options.force
+        {flag: Path(name) for flag, name in names.items() if name}, _KINDS, force=options.force
     )
     if options.output:
         for path in _files(options, settings.trays).values():
@@ -99,27 +102,27 @@ def _check_outputs(options: argparse.Namespace, settings: PipelineSettings) -> N
 
 
 def _write(
-    options: argparse.Namespace, found: AreaCalibration, settings: PipelineSettings
+    options: argparse.Namespace, calibration: AreaCalibration, settings: PipelineSettings
 ) -> None:
     if options.output:
         from nanorocks_ros.studies.calibration.area_file import write_parameters
 
         files = _files(options, settings.trays)
-        for number, fit in found.fits.items():
+        for number, fit in calibration.fits.items():
             source = f'{Path(options.bag).name} and {Path(options.tracks).name}'
             write_parameters(files[number], fit, settings, f'tray {number}, {source}')
             print(f'nanorocks: parameters of tray {number} in {files[number]}', file=sys.stderr)
     if options.picture:
         from nanorocks_ros.studies.calibration.area_figure import area_figure
 
-        area_figure(Path(options.picture), found.fits)
+        area_figure(Path(options.picture), calibration.fits)
         print(f'nanorocks: picture in {options.picture}', file=sys.stderr)
 
 
-def _as_json(found: AreaCalibration) -> dict[str, Any]:
+def _as_json(calibration: AreaCalibration) -> dict[str, Any]:
     return {
-        'trays': {str(number): _fit_as_json(fit) for number, fit in found.fits.items()},
-        'refused': {str(number): str(error) for number, error in found.refused.items()},
+        'trays': {str(number): _fit_as_json(fit) for number, fit in calibration.fits.items()},
+        'refused': {str(number): str(error) for number, error in calibration.refused.items()},
     }
 
 
@@ -137,18 +140,18 @@ def _fit_as_json(fit: AreaFit) -> dict[str, Any]:
     }
 
 
-def _print(found: AreaCalibration) -> None:
-    for number, fit in found.fits.items():
+def _print(calibration: AreaCalibration) -> None:
+    for number, fit in calibration.fits.items():
         print(
-            f'tray {number}: {fit.windows} windows, by hand {_MM * fit.slowest:.2f} to '
+            f'tray {number}: {fit.windows} windows, manual speeds {_MM * fit.slowest:.2f} to '
             f'{_MM * fit.fastest:.2f} mm/s'
         )
         print(f'  --speed-area-factor {fit.factor:.4g}   (+- {fit.factor_error:.2g})')
         if math.isfinite(fit.offset_error):
             print(f'  --speed-area-offset {fit.offset:.4g}   (+- {fit.offset_error:.2g} m/s)')
         else:
-            print('  no offset: the speeds do not range far enough to tell one from a factor')
+            print('  no offset: the range of speeds is too small to separate it from the factor')
         print(
-            f'  calibrated speeds scatter by {_PERCENT * fit.scatter:.0f} % about those by hand; '
+            f'  calibrated speeds scatter by {_PERCENT * fit.scatter:.0f} % about manual speeds; '
             f'reduced chi square {fit.reduced_chi_square:.2f}'
         )

@@ -1,4 +1,7 @@
-"""``nanorocks cluster-curve``: simulated clusters, by which autocorrelations are calibrated."""
+"""``nanorocks cluster-curve``: calibration of cluster sizes by films of simulated clusters.
+
+Tested by ``test/studies/libraries/test_cluster_simulations.py``.
+"""
 
 from __future__ import annotations
 
@@ -14,22 +17,28 @@ if TYPE_CHECKING:
     import argparse
 
     from nanorocks_ros.inference.cluster_size.size_from_width import ClusterCurve
+    from nanorocks_ros.studies.libraries.cluster_films import ClusterPlan
 
-_STRONGEST = 2.0
+_MAX_STRENGTH = 2.0
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
     parser = commands.add_parser(
-        'cluster-curve', help='film simulated clusters that sizes are read from'
+        'cluster-curve', help='calibrate cluster sizes with films of simulated clusters'
     )
     parser.add_argument(
-        '--tray', type=int, action='append', help='number of a tray, as often as you like'
+        '--tray', type=int, action='append', help='number of a tray; may be repeated; default: all'
     )
     parser.add_argument('-o', '--output', required=True, help='file to write, .npz')
     parser.add_argument('--trays-file', default='', help='YAML file of trays; default: as flown')
-    parser.add_argument('--runs', type=int, default=128, help='films; default 128')
-    parser.add_argument('--level', type=float, default=0.5, help='as clusters.level; default 0.5')
+    parser.add_argument('--runs', type=int, default=128, help='number of films; default 128')
+    parser.add_argument(
+        '--level',
+        type=float,
+        default=0.5,
+        help='level of the contour, as clusters.level; default 0.5',
+    )
     parser.add_argument(
         '--strengths',
         type=float,
@@ -38,48 +47,27 @@ def add_parser(commands: Any) -> None:
         metavar=('LOW', 'HIGH'),
         help='range of the effects of camera, light and dust, relative to flight; default 0 1.5',
     )
-    parser.add_argument('--seed', type=int, default=1, help='of everything random; default 1')
+    parser.add_argument('--seed', type=int, default=1, help='random seed; default 1')
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
-    parser.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
+    parser.add_argument(
+        '--scheduler', metavar='tcp://HOST:PORT', help='scheduler of a Dask cluster'
+    )
     parser.add_argument('--force', action='store_true', help='replace a file that exists')
     parser.add_argument('--json', action='store_true', help='print one JSON object')
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Film, measure, write, print; the exit code."""
+    """Film, measure, write and print, and return the exit code."""
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.errors import ConfigurationError
-    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.inference.cluster_size.cluster_curve import curve_key
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.outputs.atomic_files import check_outputs
-    from nanorocks_ros.settings import PipelineSettings, with_values
-    from nanorocks_ros.studies.libraries.cluster_films import ClusterPlan
     from nanorocks_ros.studies.libraries.cluster_simulations import build_curves
 
     output = Path(options.output)
     check_outputs({'--output': output}, {'--output': ('.npz',)}, force=options.force)
-    with_values(PipelineSettings(), {'clusters.level': options.level}, '--level')
-    if options.seed < 0:
-        raise ConfigurationError('--seed', f'{options.seed}', 'give 0 or more')
-    weak, strong = options.strengths
-    if not 0.0 <= weak <= strong <= _STRONGEST:
-        raise ConfigurationError(
-            '--strengths', f'{weak:g} {strong:g}', f'give two, rising, from 0 to {_STRONGEST:g}'
-        )
-    cells = load_trays(options.trays_file or None)
-    numbers = tuple(sorted(set(options.tray or cells)))
-    for number in numbers:
-        tray_by_number(cells, number)
-    plan = ClusterPlan(
-        cells=cells,
-        trays=numbers,
-        runs=options.runs,
-        seed=options.seed,
-        level=options.level,
-        strengths=(weak, strong),
-    )
+    plan = _plan(options)
     workers = Workers(processes=options.workers, scheduler=options.scheduler)
     with Progress('films of clusters') as progress:
         curves = build_curves(
@@ -89,22 +77,54 @@ def run(options: argparse.Namespace) -> int:
             progress.count,
             lambda text: print(f'nanorocks: {text}', file=sys.stderr),
         )
-    found = {number: curves[curve_key(cells[number])] for number in numbers}
+    tray_curves = {number: curves[curve_key(plan.cells[number])] for number in plan.trays}
     if options.json:
-        shown = {str(number): _values(curve) for number, curve in found.items()}
+        values = {str(number): _values(curve) for number, curve in tray_curves.items()}
         print(
-            json.dumps({'output': str(output), 'trays': shown, **json.loads(plan.specification())})
+            json.dumps(
+                {'output': str(output), 'trays': values, **json.loads(plan.specification())}
+            )
         )
         return 0
-    for number, curve in found.items():
+    for number, curve in tray_curves.items():
         print(f'tray {number}: {_sentence(curve)}')
     return 0
+
+
+def _plan(options: argparse.Namespace) -> ClusterPlan:
+    from nanorocks_ros.errors import ConfigurationError
+    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+    from nanorocks_ros.settings import PipelineSettings, with_values
+    from nanorocks_ros.studies.libraries.cluster_films import ClusterPlan
+
+    with_values(PipelineSettings(), {'clusters.level': options.level}, '--level')
+    if options.seed < 0:
+        raise ConfigurationError('--seed', f'{options.seed}', 'give 0 or more')
+    weak, strong = options.strengths
+    if not 0.0 <= weak <= strong <= _MAX_STRENGTH:
+        raise ConfigurationError(
+            '--strengths',
+            f'{weak:g} {strong:g}',
+            f'give two rising numbers from 0 to {_MAX_STRENGTH:g}',
+        )
+    trays = load_trays(options.trays_file or None)
+    numbers = tuple(sorted(set(options.tray or trays)))
+    for number in numbers:
+        tray_by_number(trays, number)
+    return ClusterPlan(
+        cells=trays,
+        trays=numbers,
+        runs=options.runs,
+        seed=options.seed,
+        level=options.level,
+        strengths=(weak, strong),
+    )
 
 
 def _values(curve: ClusterCurve) -> dict[str, Any]:
     return {
         'largest': finite_or_none(curve.largest),
-        'sizes': [math.exp(one) for one in curve.log_size],
+        'sizes': [math.exp(log_size) for log_size in curve.log_size],
         'readings': curve.reading.tolist(),
         'weight': curve.weight,
         'scatter': curve.scatter.tolist(),
@@ -114,5 +134,5 @@ def _values(curve: ClusterCurve) -> dict[str, Any]:
 
 def _sentence(curve: ClusterCurve) -> str:
     if math.isnan(curve.largest):
-        return 'the autocorrelation says nothing of the size of its clusters'
+        return 'the autocorrelation does not depend on the size of its clusters'
     return f'sizes up to {curve.largest:.1f} beads'

@@ -1,4 +1,4 @@
-"""``nanorocks library``: simulated decays of a tray, which measured ones are held against."""
+"""``nanorocks library``: simulated decays of a tray, to compare measured decays with."""
 
 from __future__ import annotations
 
@@ -14,23 +14,25 @@ if TYPE_CHECKING:
 def add_parser(commands: Any) -> None:
     """Add the command."""
     parser = commands.add_parser(
-        'library', help='simulate the decays of a tray that restitutions are read from'
+        'library', help='simulate the decays of a tray from which restitutions are inferred'
     )
     parser.add_argument('--tray', type=int, required=True, help='number of the tray')
     parser.add_argument('-o', '--output', required=True, help='file to write, .npz')
     parser.add_argument('--trays-file', default='', help='YAML file of trays; default: as flown')
-    parser.add_argument('--nodes', type=int, default=800, help='places simulated; default 800')
-    parser.add_argument('--runs', type=int, default=12, help='runs at each; default 12')
-    parser.add_argument('--seed', type=int, default=1, help='of everything random; default 1')
+    parser.add_argument('--nodes', type=int, default=800, help='simulated points; default 800')
+    parser.add_argument('--runs', type=int, default=12, help='runs at each point; default 12')
+    parser.add_argument('--seed', type=int, default=1, help='random seed; default 1')
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
-    parser.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
+    parser.add_argument(
+        '--scheduler', metavar='tcp://HOST:PORT', help='scheduler of a Dask cluster'
+    )
     parser.add_argument('--force', action='store_true', help='replace a file that exists')
     parser.add_argument('--json', action='store_true', help='print one JSON object')
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Simulate, write, print; the exit code."""
+    """Simulate, write and print, and return the exit code."""
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.jobs.tasks import Workers
@@ -55,8 +57,8 @@ def run(options: argparse.Namespace) -> int:
             lambda text: print(f'nanorocks: {text}', file=sys.stderr),
         )
     if options.json:
-        made = {'output': str(output), 'misfit': library.misfit, **json.loads(library.made_by)}
-        print(json.dumps(made))
+        summary = {'output': str(output), 'misfit': library.misfit, **json.loads(library.made_by)}
+        print(json.dumps(summary))
     else:
-        print(f'{output}: off by {100.0 * library.misfit:.1f} % beyond the noise of its runs')
+        print(f'{output}: misfit {100.0 * library.misfit:.1f} % beyond the noise of its runs')
     return 0

@@ -1,4 +1,4 @@
-"""``nanorocks figure cor RESULTS``: the paper's figures behind a restitution, in one folder."""
+"""``nanorocks figure cor RESULTS``: figures 7, 12 and 13 of the paper for one tray."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 _TEXT = 'the decay, the search over simulated runs, and restitution against speed (7, 12, 13)'
 _EPILOG = """\
-Writes decay.png (figure 7, with the simulated decay that agrees best), walls.png and width.png
-(figure 12: which restitutions of beads and walls, or beads and width of a distribution, agree),
-and cor_against_speed.png (figure 13). Interrupted, the same command goes on where it was. As
-many runs at a point as the paper has: --runs 178. Example:
+Writes decay.png (figure 7, with the simulated decay of best fit), walls.png and width.png
+(figure 12: chi square over the restitutions of beads and walls, and over the restitution and the
+width of its distribution), and cor_against_speed.png (figure 13). The same command resumes an
+interrupted search. The paper has 178 runs at each point: --runs 178. Example:
 
   nanorocks analyse BAG && nanorocks figure cor BAG_results -o figures
 """
-# What `analyse` uses by itself where its results do not say.
+# Cooling window of `nanorocks analyse`, where the results have none.
 _FIRST, _LAST = 1.75, 20.0
 
 
@@ -38,37 +38,49 @@ def add_parser(kinds: Any) -> None:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument('source', help='results of `nanorocks analyse`, or a bag')
+    parser.add_argument('source', help='folder of results of `nanorocks analyse`, or a bag')
     parser.add_argument('-o', '--output', required=True, help='folder for the figures')
-    parser.add_argument('--tray', type=int, help='where there are several, or with a bag')
-    parser.add_argument('--runs', type=int, default=20, help='at every point; default 20')
     parser.add_argument(
-        '--beads', default='0.5:1:26', help='restitutions searched; default 0.5:1:26'
+        '--tray', type=int, help='number of the tray; required with a bag or several trays'
     )
-    parser.add_argument('--walls', default='0.8:1:11', help='the same of walls; default 0.8:1:11')
     parser.add_argument(
-        '--widths', default='0:0.16:5', help='widths of a distribution; default 0:0.16:5'
+        '--runs', type=int, default=20, help='runs at each point of the search; default 20'
+    )
+    parser.add_argument(
+        '--beads', default='0.5:1:26', help='restitutions of the beads; default 0.5:1:26'
+    )
+    parser.add_argument(
+        '--walls', default='0.8:1:11', help='restitutions of the walls; default 0.8:1:11'
+    )
+    parser.add_argument(
+        '--widths',
+        default='0:0.16:5',
+        help='widths of the distribution of restitutions; default 0:0.16:5',
     )
     parser.add_argument(
         '--wall-restitution',
         type=float,
         default=0.99,
-        help='taken for known beside widths and against speed; default 0.99',
+        help='restitution of the walls in width.png and cor_against_speed.png; default 0.99',
     )
     parser.add_argument(
-        '--first', type=float, help='[s] since the shaking event; default: as analysed'
+        '--first',
+        type=float,
+        help='[s] start of the fit, since the shaking event; default: as analysed',
     )
-    parser.add_argument('--last', type=float, help='[s]; default: as analysed')
-    parser.add_argument('--parameters', help='of the analysis of a bag: a ROS parameter file')
-    parser.add_argument('--seed', type=int, default=1, help='of the runs; default 1')
+    parser.add_argument('--last', type=float, help='[s] end of the fit; default: as analysed')
+    parser.add_argument('--parameters', help='ROS parameter file for the analysis of a bag')
+    parser.add_argument('--seed', type=int, default=1, help='random seed of the runs; default 1')
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
-    parser.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
+    parser.add_argument(
+        '--scheduler', metavar='tcp://HOST:PORT', help='scheduler of a Dask cluster'
+    )
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read or analyse, search, draw, print; the exit code."""
+    """Read or analyse, search, draw and print, and return the exit code."""
     from nanorocks_ros.cli.progress import RunProgress
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.studies.figures.cor_figures import Reports, cor_figures, prepare_folder
@@ -80,9 +92,9 @@ def run(options: argparse.Namespace) -> int:
     source = Path(options.source)
     if _is_bag(source):
         if options.tray is None:
-            raise ConfigurationError('--tray', 'is needed with a bag', 'name the tray')
+            raise ConfigurationError('--tray', 'is required with a bag', 'name the tray')
         prepare_folder(folder)
-        source = _analysed(options, source, folder / 'results')
+        source = _analyse_bag(options, source, folder / 'results')
     data = _data(options, source)
     prepare_folder(folder)
     bars: dict[str, RunProgress] = {}
@@ -96,15 +108,15 @@ def run(options: argparse.Namespace) -> int:
         print(f'nanorocks: {text}', file=sys.stderr)
 
     try:
-        found = cor_figures(
+        values = cor_figures(
             folder, data, search, workers, Reports(progress=progress, notice=notice)
         )
     finally:
         for bar in bars.values():
             bar.__exit__()
     if options.json:
-        print(json.dumps(_as_json(data, found), allow_nan=False))
-    _print(data, found, folder)
+        print(json.dumps(_as_json(data, values), allow_nan=False))
+    _print(data, values, folder)
     return 0
 
 
@@ -130,8 +142,8 @@ def _is_bag(path: Path) -> bool:
     )
 
 
-def _analysed(options: argparse.Namespace, bag: Path, folder: Path) -> Path:
-    """The results of a bag, beside the figures."""
+def _analyse_bag(options: argparse.Namespace, bag: Path, folder: Path) -> Path:
+    """Analyse a bag into a folder beside the figures."""
     from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.settings import PipelineSettings, with_values
@@ -161,11 +173,11 @@ def _data(options: argparse.Namespace, source: Path) -> CorData:
 
     table, number = speed_table(source, options.tray)
     if number is None:
-        raise ConfigurationError('--tray', 'is not known from the name', 'name the tray')
+        raise ConfigurationError('--tray', 'cannot be read from the file name', 'name the tray')
     tray = tray_by_number(load_trays(), number)
     cycles = read_cycles(table)
     window = cooling_window(table)
-    usual = (window.first, window.last) if window else (_FIRST, _LAST)
+    default_span = (window.first, window.last) if window else (_FIRST, _LAST)
     if not 0.0 <= options.wall_restitution <= 1.0:
         raise ConfigurationError(
             '--wall-restitution', f'{options.wall_restitution:g}', 'give a number from 0 to 1'
@@ -174,28 +186,28 @@ def _data(options: argparse.Namespace, source: Path) -> CorData:
         tray=tray,
         cycles=cycles,
         species=species_cycles(table, tray),
-        span=span_of(options.first, options.last, usual),
+        span=span_of(options.first, options.last, default_span),
         start=window.start if window else 0.0,
         wall_restitution=options.wall_restitution,
     )
 
 
-def _as_json(data: CorData, found: dict[str, Any]) -> dict[str, Any]:
+def _as_json(data: CorData, values: dict[str, Any]) -> dict[str, Any]:
     from nanorocks_ros.studies.figures.instantaneous_figure import instantaneous_values
 
-    local = found['instantaneous']
+    instantaneous = values['instantaneous']
     return {
         'tray': data.tray.number,
         'cycles': len(data.cycles),
         'first': data.span[0],
         'last': data.span[1],
-        **found,
-        'instantaneous': None if local is None else instantaneous_values(local),
+        **values,
+        'instantaneous': None if instantaneous is None else instantaneous_values(instantaneous),
     }
 
 
-def _print(data: CorData, found: dict[str, Any], folder: Path) -> None:
-    library = found['decay']['library']
+def _print(data: CorData, values: dict[str, Any], folder: Path) -> None:
+    library = values['decay']['library']
     if library is not None:
         print(
             f'nanorocks: simulated decays: beads {library["restitution"]:.3f} '
@@ -205,9 +217,11 @@ def _print(data: CorData, found: dict[str, Any], folder: Path) -> None:
             file=sys.stderr,
         )
     for name in ('walls', 'width'):
-        best = ', '.join(f'{key} {value:g}' for key, value in found[name]['best'].items())
+        best = ', '.join(f'{key} {value:g}' for key, value in values[name]['best'].items())
         print(
-            f'nanorocks: search, {name}: best at {best}; not alone, see the map', file=sys.stderr
+            f'nanorocks: search, {name}: best at {best}; other points may agree as well, '
+            'see the map',
+            file=sys.stderr,
         )
-    many = f'{len(data.cycles)} cycles' if len(data.cycles) > 1 else 'a cycle'
-    print(f'nanorocks: {many} of tray {data.tray.number} in {folder}', file=sys.stderr)
+    cycles = f'{len(data.cycles)} cycles' if len(data.cycles) > 1 else 'a cycle'
+    print(f'nanorocks: {cycles} of tray {data.tray.number} in {folder}', file=sys.stderr)

@@ -1,4 +1,4 @@
-"""``nanorocks figure dust``: sticking thresholds beside dust collision models (figure 14)."""
+"""``nanorocks figure dust``: sticking thresholds and dust collision models (figure 14)."""
 
 from __future__ import annotations
 
@@ -23,30 +23,30 @@ _FORM = 'give TRAY:SPEED or TRAY:SPEED:LOWER:UPPER in m/s, such as 1:0.0104:0.00
 
 def add_parser(kinds: Any) -> None:
     """Add the kind to those of ``nanorocks figure``."""
-    one = kinds.add_parser('dust', help=_TEXT, description=_TEXT)
-    one.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
-    one.add_argument(
+    parser = kinds.add_parser('dust', help=_TEXT, description=_TEXT)
+    parser.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
+    parser.add_argument(
         '--measured',
         action='append',
         default=[],
         metavar='TRAY:SPEED[:LOWER:UPPER]',
-        help='a threshold that was measured [m/s]; may be repeated',
+        help='measured threshold [m/s]; may be repeated',
     )
-    one.add_argument('--no-paper', action='store_true', help="leave out the paper's points")
-    one.add_argument(
+    parser.add_argument('--no-paper', action='store_true', help="leave out the paper's points")
+    parser.add_argument(
         '--restitution',
         type=float,
         default=0.89,
-        help='for the factor by which a cloud collapses more slowly; default 0.89',
+        help='restitution for the collapse time of a cloud; default 0.89',
     )
-    one.add_argument('--trays', default='', help='YAML file of trays; default: those flown')
-    one.add_argument('--json', action='store_true', help='print one JSON object, SI units')
-    one.add_argument('--force', action='store_true', help='replace a picture that exists')
-    one.set_defaults(run=run)
+    parser.add_argument('--trays', default='', help='YAML file of trays; default: as flown')
+    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    parser.add_argument('--force', action='store_true', help='replace a picture that exists')
+    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Draw, print; the exit code."""
+    """Draw and print, and return the exit code."""
     from nanorocks_ros.experiment.trays import load_trays
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.physics.dust_models import collapse_time_factor
@@ -60,14 +60,14 @@ def run(options: argparse.Namespace) -> int:
     from nanorocks_ros.studies.figures.dust_figure import dust_figure, paper_thresholds
 
     paper = () if options.no_paper else paper_thresholds(trays)
-    found = dust_figure(path, [*paper, *measured])
-    found['collapse_time_factor'] = factor if factor < float('inf') else None
-    found['restitution'] = options.restitution
+    values = dust_figure(path, [*paper, *measured])
+    values['collapse_time_factor'] = factor if factor < float('inf') else None
+    values['restitution'] = options.restitution
     if options.json:
-        print(json.dumps(found, allow_nan=False))
+        print(json.dumps(values, allow_nan=False))
     else:
-        _print(found)
-    print(f'nanorocks: {len(found["points"])} thresholds in {path}', file=sys.stderr)
+        _print(values)
+    print(f'nanorocks: {len(values["points"])} thresholds in {path}', file=sys.stderr)
     return 0
 
 
@@ -81,22 +81,22 @@ def _threshold(text: str, trays: Mapping[int, Tray]) -> MeasuredThreshold:
     except ValueError as error:
         raise ConfigurationError('--measured', f'{text!r} cannot be read', _FORM) from error
     if len(interval) not in (0, 2):
-        raise ConfigurationError('--measured', f'{text!r} has half an interval', _FORM)
+        raise ConfigurationError('--measured', f'{text!r} has one end of an interval only', _FORM)
     ends = (interval[0], interval[1]) if interval else None
     return threshold_of_tray(tray_by_number(trays, number), speed, ends)
 
 
-def _print(found: dict[str, Any]) -> None:
-    for point in found['points']:
+def _print(values: dict[str, Any]) -> None:
+    for point in values['points']:
         mark = '' if point['all_bounce_above_verified'] else ' (unverified)'
         print(
             f'tray {point["tray"]}: {1e3 * point["sticking_speed"]:.1f} mm/s at '
             f'{1e6 * point["mass"]:.2f} mg ({point["source"]}); published: all bounce above '
             f'{1e3 * point["all_bounce_above"]:.1f} mm/s{mark}'
         )
-    factor = found['collapse_time_factor']
-    cloud = f'a cloud of particles of restitution {found["restitution"]:g}'
+    factor = values['collapse_time_factor']
+    cloud = f'a cloud of particles of restitution {values["restitution"]:g}'
     if factor is None:
         print(f'{cloud} never collapses')
     else:
-        print(f'{cloud} takes {factor:.2f} times as long to collapse as one of 0')
+        print(f'{cloud} takes {factor:.2f} times as long to collapse as with restitution 0')

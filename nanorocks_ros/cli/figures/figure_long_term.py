@@ -1,4 +1,4 @@
-"""``nanorocks figure long-term RESULTS...``: a campaign cycle by cycle (figure 9)."""
+"""``nanorocks figure long-term RESULTS...``: evolution over all cycles (figure 9)."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ _TEXT = 'peak speed, restitution and cluster size by cycle, trends, quiet period
 
 def add_parser(kinds: Any) -> None:
     """Add the kind to those of ``nanorocks figure``."""
-    one = kinds.add_parser('long-term', help=_TEXT, description=_TEXT)
-    one.add_argument(
+    parser = kinds.add_parser('long-term', help=_TEXT, description=_TEXT)
+    parser.add_argument(
         'results', nargs='+', help='folders of results of `nanorocks analyse`, in order of time'
     )
-    one.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
-    one.add_argument('--table', help='also write all cycles as CSV')
-    one.add_argument(
+    parser.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
+    parser.add_argument('--table', help='also write all cycles as CSV')
+    parser.add_argument(
         '--false-alarms',
         type=float,
         default=0.01,
-        help='part of campaigns without quiet periods in which one is found; default 0.01',
+        help='probability of a quiet period by chance in a campaign; default 0.01',
     )
-    one.add_argument('--json', action='store_true', help='print one JSON object, SI units')
-    one.add_argument('--force', action='store_true', help='replace files that exist')
-    one.set_defaults(run=run)
+    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    parser.add_argument('--force', action='store_true', help='replace files that exist')
+    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read, find trends and periods, draw, print; the exit code."""
+    """Read, find trends and quiet periods, draw and print, and return the exit code."""
     from nanorocks_ros.outputs.atomic_files import check_outputs
 
     files = {'--output': Path(options.output)}
@@ -68,15 +68,15 @@ def _print(campaign: Campaign) -> None:
             'restitution': ('', 1.0),
             'cluster_size': size,
         }[name]
-        what = f'tray {tray}, {name.replace("_", " ")}'
+        label = f'tray {tray}, {name.replace("_", " ")}'
         if trend.samples == 0:
-            print(f'{what}: not known')
+            print(f'{label}: not known')
         elif trend.slope != trend.slope:
-            print(f'{what}: no trend from {trend.samples} cycles')
+            print(f'{label}: no trend from {trend.samples} cycles')
         else:
             slope, error = scale * trend.slope, scale * trend.slope_error
             change = f'{slope:+.3g} ± {error:.2g} {unit}'.rstrip()
-            print(f'{what}: {change} a cycle, {trend.samples} cycles')
+            print(f'{label}: {change} a cycle, {trend.samples} cycles')
     print(f'cluster size: {campaign.measure.text} ({campaign.measure.column})')
     for period in campaign.periods:
         print(

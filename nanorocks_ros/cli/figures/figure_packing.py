@@ -17,34 +17,50 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.analysis.cluster_packing import PackingCurve
 
 PICTURES = ('.png', '.pdf', '.svg')
-_TEXT = 'how densely clusters are packed, measured or simulated with the truth (figure 10)'
+_TEXT = 'packing of clusters, measured or simulated with the truth (figure 10)'
 
 
 def add_parser(kinds: Any) -> None:
     """Add the kind to those of ``nanorocks figure``."""
-    one = kinds.add_parser('packing', help=_TEXT, description=_TEXT)
-    one.add_argument('results', nargs='?', help='of `nanorocks analyse`; left out with --simulate')
-    one.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
-    one.add_argument('--trays', metavar='K,K,...', help='default: all there are; simulated 1,3,5')
-    one.add_argument(
-        '--simulate', action='store_true', help='shake and film trays whose beads stick'
+    parser = kinds.add_parser('packing', help=_TEXT, description=_TEXT)
+    parser.add_argument(
+        'results', nargs='?', help='folder of results of `nanorocks analyse`; not with --simulate'
     )
-    one.add_argument('--cycles', type=int, default=6, help='simulated; default 6')
-    one.add_argument(
-        '--sticking-speed', type=float, default=0.003, help='simulated [m/s]; default 0.003'
+    parser.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
+    parser.add_argument(
+        '--trays',
+        metavar='K,K,...',
+        help='trays; default: all in the results, or 1,3,5 with --simulate',
     )
-    one.add_argument(
-        '--mean-speed', type=float, default=0.010, help='after a shaking event [m/s]; 0.01'
+    parser.add_argument(
+        '--simulate', action='store_true', help='simulate and film trays with sticking beads'
     )
-    one.add_argument('--restitution', type=float, default=0.89, help='simulated; default 0.89')
-    one.add_argument('--seed', type=int, default=1, help='simulated; default 1')
-    one.add_argument('--json', action='store_true', help='print one JSON object, SI units')
-    one.add_argument('--force', action='store_true', help='replace a picture that exists')
-    one.set_defaults(run=run)
+    parser.add_argument('--cycles', type=int, default=6, help='simulated cycles; default 6')
+    parser.add_argument(
+        '--sticking-speed',
+        type=float,
+        default=0.003,
+        help='[m/s] simulated sticking speed; default 0.003',
+    )
+    parser.add_argument(
+        '--mean-speed',
+        type=float,
+        default=0.010,
+        help='[m/s] simulated mean speed after a shaking event; default 0.01',
+    )
+    parser.add_argument(
+        '--restitution', type=float, default=0.89, help='simulated restitution; default 0.89'
+    )
+    parser.add_argument(
+        '--seed', type=int, default=1, help='random seed of the simulation; default 1'
+    )
+    parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    parser.add_argument('--force', action='store_true', help='replace a picture that exists')
+    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read or simulate, draw, print; the exit code."""
+    """Read or simulate, draw and print, and return the exit code."""
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.outputs.atomic_files import check_outputs
 
@@ -63,17 +79,17 @@ def run(options: argparse.Namespace) -> int:
         from nanorocks_ros.studies.analysis.result_tables import trays_of
 
         numbers = numbers or trays_of(Path(options.results), 'cluster')
-    every = load_trays()
-    trays = {number: tray_by_number(every, number) for number in numbers}
-    curves = (_simulated if options.simulate else _measured)(options, trays)
+    all_trays = load_trays()
+    trays = {number: tray_by_number(all_trays, number) for number in numbers}
+    curves = (_simulate_curves if options.simulate else _read_curves)(options, trays)
 
     from nanorocks_ros.studies.figures.packing_figure import packing_figure
 
-    found = packing_figure(path, trays, curves)
+    tray_values = packing_figure(path, trays, curves)
     if options.json:
-        print(json.dumps({'simulated': options.simulate, 'trays': found}, allow_nan=False))
+        print(json.dumps({'simulated': options.simulate, 'trays': tray_values}, allow_nan=False))
     else:
-        _print(found)
+        _print(tray_values)
     print(f'nanorocks: {len(trays)} tray{"s" * (len(trays) > 1)} in {path}', file=sys.stderr)
     return 0
 
@@ -85,7 +101,7 @@ def _numbers(text: str | None) -> tuple[int, ...]:
     return tuple(dict.fromkeys(int(word) for word in words))
 
 
-def _measured(
+def _read_curves(
     options: argparse.Namespace, trays: dict[int, Tray]
 ) -> dict[int, Sequence[PackingCurve]]:
     from nanorocks_ros.studies.analysis.cluster_packing import measured_packing
@@ -93,7 +109,7 @@ def _measured(
     return {number: measured_packing(Path(options.results), number) for number in trays}
 
 
-def _simulated(
+def _simulate_curves(
     options: argparse.Namespace, trays: dict[int, Tray]
 ) -> dict[int, Sequence[PackingCurve]]:
     from nanorocks_ros.cli.progress import Progress
@@ -106,15 +122,15 @@ def _simulated(
         restitution=options.restitution,
         seed=options.seed,
     )
-    found: dict[int, Sequence[PackingCurve]] = {}
+    curves: dict[int, Sequence[PackingCurve]] = {}
     for number, tray in trays.items():
         with Progress(f'filming tray {number}') as bar:
-            found[number] = simulated_packing(tray, settings, options.cycles, progress=bar.count)
-    return found
+            curves[number] = simulated_packing(tray, settings, options.cycles, progress=bar.count)
+    return curves
 
 
-def _print(found: dict[str, Any]) -> None:
-    for number, values in found.items():
+def _print(tray_values: dict[str, Any]) -> None:
+    for number, values in tray_values.items():
         text = f'tray {number}, {values["cycles"]} cycles: '
         text += f"compaction by the paper's rule {_percent(values, 'apparent_compaction')}"
         if values['true_compaction'] is not None:

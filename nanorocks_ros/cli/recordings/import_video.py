@@ -1,4 +1,7 @@
-"""``nanorocks import VIDEO... -o BAG``: import videos and folders of images into bags."""
+"""``nanorocks import VIDEO... -o BAG``: import videos and folders of images into bags.
+
+Tested by ``test/cli/recordings/test_recordings.py``.
+"""
 
 from __future__ import annotations
 

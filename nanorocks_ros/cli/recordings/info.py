@@ -1,4 +1,7 @@
-"""``nanorocks info BAG``: topics, calibration, provenance and problems of a bag."""
+"""``nanorocks info BAG``: topics, calibration, provenance and problems of a bag.
+
+Tested by ``test/cli/recordings/test_recordings.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""``nanorocks salvage BAG -o BAG2``: copy the readable messages of a damaged bag."""
+"""``nanorocks salvage BAG -o BAG2``: copy the readable messages of a damaged bag.
+
+Tested by ``test/cli/recordings/test_recordings.py``.
+"""
 
 from __future__ import annotations
 

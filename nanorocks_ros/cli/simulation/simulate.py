@@ -1,4 +1,4 @@
-"""``nanorocks simulate``: a tray that cools after a shaking event, for people and for programs."""
+"""``nanorocks simulate``: simulated runs of a tray that cools after a shaking event."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _DURATION, _SAMPLES = 60.0, 301
 _CAMERA = 'width_px', 'height_px', 'pixels_per_metre'
 _EPILOG = """\
-The first run is the one that is filmed. Results are the same whatever the workers. Examples:
+The first run is filmed. Results do not depend on the number of workers. Examples:
 
   nanorocks simulate --tray 3 --runs 20 --picture tray_3.png
   nanorocks simulate --tray 1 --sticking-speed 0.002 --trajectory run.npz --video run.mp4
@@ -37,87 +37,90 @@ def add_parser(commands: Any) -> None:
 
     parser = commands.add_parser(
         'simulate',
-        help='let a simulated tray cool after a shaking event; write files of it, film it',
+        help='simulate a tray that cools after a shaking event; write tables and films',
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    _add_work(parser)
-    _add_outputs(parser.add_argument_group('files to write, all optional'))
+    _add_run_options(parser)
+    _add_output_options(parser.add_argument_group('files to write, all optional'))
     add_flags(parser, SimulationSettings(), skip=set())
     add_flags(parser, SceneFilmSettings(), skip=set(), title='settings of --scene')
     parser.set_defaults(run=run)
 
 
-def _add_work(parser: argparse.ArgumentParser) -> None:
+def _add_run_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--trays-file',
         help='YAML file of your own trays, numbered 1 to 8; see docs/use/simulate.md',
     )
-    parser.add_argument('--runs', type=int, default=1, help='default 1')
+    parser.add_argument('--runs', type=int, default=1, help='number of runs; default 1')
     parser.add_argument(
         '--duration',
         type=float,
         default=_DURATION,
-        help='[s] from the shaking event on; films are as long, and begin --first-shake before '
-        f'it; default {_DURATION:g}',
+        help='[s] simulated time after the shaking event; films have this length and begin '
+        f'--first-shake before it; default {_DURATION:g}',
     )
     parser.add_argument(
         '--times',
         type=int,
-        help='evenly spaced times from 0 to --duration, in what is printed and in trajectories; '
-        f'default: as many as at --frame-rate, but at most {_SAMPLES}',
+        help='number of evenly spaced times from 0 to --duration, in the printed curves and in '
+        f'trajectories; default: one for each frame, at most {_SAMPLES}',
     )
     parser.add_argument(
         '--scene',
         action='store_true',
-        help='film the whole plate with all its trays, through the lens of the flight camera, '
+        help='film the plate with all its trays through the lens of the flight camera, '
         'into --bag, --video or --picture (one .png, at the end); see docs/use/scene.md',
     )
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
 
 
-def _add_outputs(group: Any) -> None:
+def _add_output_options(group: Any) -> None:
     group.add_argument(
         '--trajectory',
         metavar='OUT.npz|.parquet',
-        help='beads of all runs at all times; at most 1e8 numbers',
+        help='positions and velocities of all runs at all times; at most 1e8 numbers',
     )
     group.add_argument(
         '--events', metavar='OUT.npz|.parquet', help='every collision of all runs; at most 1.6e7'
     )
     group.add_argument(
-        '--picture', metavar='OUT.png', help='beads at four times, and the decay; or .pdf, .svg'
+        '--picture',
+        metavar='OUT.png',
+        help='picture of the beads at four times, and the decay; or .pdf, .svg',
     )
     group.add_argument(
         '--video',
         metavar='OUT.mp4|.avi',
-        help='the first run from close by, unless the camera is set below; .mp4 (H.264) needs '
-        'PyAV, .avi (Motion JPEG) nothing',
+        help='film of the first run, close to the tray unless the camera is set below; .mp4 '
+        '(H.264) needs PyAV, .avi (Motion JPEG) needs nothing',
     )
-    group.add_argument(
-        '--bag', help='rosbag2 folder: the first run as the camera films it, and the truth'
-    )
+    group.add_argument('--bag', help='rosbag2 folder with the film of the first run and the truth')
     group.add_argument(
         '--effects',
         choices=('all', 'none'),
         default='all',
-        help='of the camera, in bag and video; none: no sensor noise, and with --scene nothing '
-        'but shaded beads on a clean plate at rest; default all',
+        help='effects of the camera in bag and video; none: no sensor noise, and with --scene '
+        'only shaded beads on a clean plate at rest; default all',
     )
     group.add_argument(
-        '--quality', type=int, default=90, help='of the JPEGs in the bag, 1 to 100; default 90'
+        '--quality',
+        type=int,
+        default=90,
+        help='quality of the JPEGs in the bag, 1 to 100; default 90',
     )
     group.add_argument('--force', action='store_true', help='replace files (not bags) that exist')
 
 
 def run(options: argparse.Namespace) -> int:
-    """Simulate, write, film, print; the exit code."""
-    from nanorocks_ros.cli.simulation.simulate_scene import check_alone, film_the_scene
+    """Simulate, write, film and print, and return the exit code."""
+    from nanorocks_ros.cli.simulation.simulate_scene import check_no_scene_flags, film_scene
 
     if options.scene:
-        return film_the_scene(options)
-    check_alone(options)
+        return film_scene(options)
+    check_no_scene_flags(options)
     return _run_tray(options)
 
 
@@ -146,7 +149,7 @@ def _run_tray(options: argparse.Namespace) -> int:
                 filmed.update(files.film_bag(plan, bar.count))
             written.append(str(files.bag))
     except KeyboardInterrupt as interruption:
-        raise KeyboardInterrupt(_left(files, written)) from interruption
+        raise KeyboardInterrupt(_remaining_files(files, written)) from interruption
     _print(options, files, runs, filmed)
     return 0
 
@@ -176,7 +179,7 @@ def _plan(options: argparse.Namespace, files: SimulatedFiles) -> SimulationPlan:
     settings = settings_from(options, SimulationSettings())
     if options.effects == 'none' and options.noise is not None and settings.noise > 0.0:
         raise ConfigurationError(
-            '--effects', 'none means no noise, and --noise asks for it', 'give one of them'
+            '--effects', 'none means no noise, but --noise is above 0', 'give one of them'
         )
     samples = options.times
     if samples is None:
@@ -193,20 +196,20 @@ def _plan(options: argparse.Namespace, files: SimulatedFiles) -> SimulationPlan:
     )
 
 
-def _left(files: SimulatedFiles, written: list[str]) -> str:
-    """What an interruption leaves."""
-    left = []
+def _remaining_files(files: SimulatedFiles, written: list[str]) -> str:
+    """Message about the files that an interruption leaves."""
+    messages = []
     if written:
-        left.append(f'complete: {", ".join(written)}')
+        messages.append(f'complete: {", ".join(written)}')
     if files.bag is not None and files.bag.exists():
-        left.append(f'what {files.bag} holds until now can be read')
-    return '; '.join(left) or 'nothing was written'
+        messages.append(f'{files.bag} can be read up to the last frame written')
+    return '; '.join(messages) or 'nothing was written'
 
 
 def _print(
     options: argparse.Namespace,
     files: SimulatedFiles,
-    found: SimulatedRuns,
+    runs: SimulatedRuns,
     filmed: dict[str, Any],
 ) -> None:
     from nanorocks_ros.cli.simulation.simulate_report import as_json, as_table
@@ -214,7 +217,7 @@ def _print(
     if options.json:
         names = {flag.removeprefix('--'): str(path) for flag, path in files.named.items()}
         bag = {'bag': options.bag} if options.bag else {}
-        whole = {**as_json(found), **filmed, **bag, 'files': names}
-        print(json.dumps(whole, allow_nan=False))
+        printed = {**as_json(runs), **filmed, **bag, 'files': names}
+        print(json.dumps(printed, allow_nan=False))
     else:
-        print(as_table(found, [str(path) for path in files.named.values()]))
+        print(as_table(runs, [str(path) for path in files.named.values()]))

@@ -1,4 +1,7 @@
-"""What ``nanorocks simulate`` says about its runs: one JSON object, or a table for people."""
+"""Report of ``nanorocks simulate``: one JSON object, or a table.
+
+Tested by ``test/cli/simulation/test_simulate.py``.
+"""
 
 from __future__ import annotations
 
@@ -21,15 +24,15 @@ _NAMES = {
 }
 
 
-def as_json(found: SimulatedRuns) -> dict[str, Any]:
-    """The runs as plain values, in SI units, None for what is not known.
+def as_json(runs: SimulatedRuns) -> dict[str, Any]:
+    """The runs as values for JSON, in SI units; None where unknown.
 
-    Curves are means over the runs, with their standard errors; events are those of all runs.
+    Curves are means over the runs with their standard errors; counts are sums over the runs.
     """
-    plan = found.plan
-    curves: dict[str, Any] = {name: found.mean(name).tolist() for name in (*_SPEEDS, 'bodies')}
+    plan = runs.plan
+    curves: dict[str, Any] = {name: runs.mean(name).tolist() for name in (*_SPEEDS, 'bodies')}
     for name in _SPEEDS:
-        error = found.error(name)
+        error = runs.error(name)
         curves[f'{name}_error'] = None if error is None else error.tolist()
     return {
         'tray': plan.settings.tray,
@@ -39,44 +42,46 @@ def as_json(found: SimulatedRuns) -> dict[str, Any]:
         'settings': asdict(plan.settings),
         'duration': plan.duration,
         'beads': plan.tray.count,
-        'filling_factor': found.filling_factor,
-        'events': found.events,
-        **{name: found.count(kind) for name, kind in _NAMES.items()},
-        'cpu_seconds': found.cpu_seconds,
-        'half_time': found.half_time,
+        'filling_factor': runs.filling_factor,
+        'events': runs.events,
+        **{name: runs.count(kind) for name, kind in _NAMES.items()},
+        'cpu_seconds': runs.cpu_seconds,
+        'half_time': runs.half_time,
         'time': plan.times.tolist(),
         **curves,
     }
 
 
-def as_table(found: SimulatedRuns, written: list[str]) -> str:
-    """The runs in a few lines, in mm/s."""
-    plan = found.plan
-    speed = found.mean('mean_speed') * _MM
-    half = found.half_time
+def as_table(runs: SimulatedRuns, written: list[str]) -> str:
+    """The runs as a table of a few lines, with speeds in mm/s."""
+    plan = runs.plan
+    speed = runs.mean('mean_speed') * _MM
+    half_time = runs.half_time
     rows = {
         'tray': f'{plan.settings.tray}',
         'beads': f'{plan.tray.count}',
-        'filling factor': f'{found.filling_factor:.3f}',
+        'filling factor': f'{runs.filling_factor:.3f}',
         'runs': f'{plan.runs}, seed {plan.settings.seed}',
-        'events': _events(found),
+        'events': _events(runs),
         'mean speed': f'{speed[0]:.3g} mm/s at the start, {speed[-1]:.3g} mm/s after '
         f'{plan.duration:g} s',
-        'half that speed': f'not within {plan.duration:g} s' if half is None else f'{half:.3g} s',
-        'bodies at end': f'{round(found.mean("bodies")[-1], 1):g}',
-        'processor time': f'{found.cpu_seconds:.3g} s',
+        'half that speed': f'not within {plan.duration:g} s'
+        if half_time is None
+        else f'{half_time:.3g} s',
+        'bodies at end': f'{round(runs.mean("bodies")[-1], 1):g}',
+        'processor time': f'{runs.cpu_seconds:.3g} s',
     }
     if written:
         rows['written'] = ', '.join(written)
     return '\n'.join(f'{name:17}{text}' for name, text in rows.items())
 
 
-def _events(found: SimulatedRuns) -> str:
+def _events(runs: SimulatedRuns) -> str:
     kinds = {
-        'collisions of beads': found.count('pair'),
-        'with walls': found.count('wall'),
-        'merges': found.count('merge'),
-        'stuck to a wall': found.count('fix'),
+        'collisions of beads': runs.count('pair'),
+        'with walls': runs.count('wall'),
+        'merges': runs.count('merge'),
+        'stuck to a wall': runs.count('fix'),
     }
     parts = ', '.join(f'{count} {name}' for name, count in kinds.items() if count)
-    return f'{found.events}' + (f' ({parts})' if parts else '')
+    return f'{runs.events}' + (f' ({parts})' if parts else '')

@@ -1,4 +1,4 @@
-"""``nanorocks simulate --scene``: the whole plate, filmed."""
+"""``nanorocks simulate --scene``: a film of the plate with all its trays."""
 
 from __future__ import annotations
 
@@ -17,50 +17,52 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
 
-# What is of one tray alone, and what the scene has settings of its own for.
-_OF_A_TRAY = 'tray', 'trajectory', 'events', 'times', 'workers', 'noise', 'pixels_per_metre'
-_MOVED = {
+# Flags of the simulation of one tray, and the flags of the scene that replace some of them.
+_TRAY_FLAGS = 'tray', 'trajectory', 'events', 'times', 'workers', 'noise', 'pixels_per_metre'
+_SCENE_FLAGS = {
     'tray': '--scene-trays',
     'noise': '--scene-noise',
     'pixels_per_metre': '--scene-pixels-per-metre',
 }
 
 
-def check_alone(options: argparse.Namespace) -> None:
-    """Refuse flags of the scene where one tray alone is simulated.
+def check_no_scene_flags(options: argparse.Namespace) -> None:
+    """Reject flags of the scene in the simulation of one tray.
 
     Raises
     ------
     ConfigurationError
-        Naming the first of them.
+        For the first such flag.
     """
     for row in rows(SceneFilmSettings()):
         if getattr(options, row.name) is not None:
             raise ConfigurationError(
-                flag_of(row.name), 'is of the whole plate', 'add --scene, or leave it out'
+                flag_of(row.name),
+                'is a setting of the whole plate',
+                'add --scene, or leave it out',
             )
 
 
-def film_the_scene(options: argparse.Namespace) -> int:
-    """Film, write, print; the exit code."""
+def film_scene(options: argparse.Namespace) -> int:
+    """Film, write and print, and return the exit code."""
     files = _files(options)
     recorder, filmed, settings = _recorder(options)
-    made: list[str] = []
+    written: list[str] = []
     try:
         if 'picture' in files:
             recorder.into_picture(files['picture'])
-            made.append(str(files['picture']))
+            written.append(str(files['picture']))
         if 'video' in files:
             with Progress('filming the video') as bar:
                 recorder.into_video(files['video'], bar.count)
-            made.append(str(files['video']))
+            written.append(str(files['video']))
         if 'bag' in files:
             with Progress('filming the bag') as bar:
                 recorder.into_bag(files['bag'], filmed.compression, options.quality, bar.count)
-            made.append(str(files['bag']))
+            written.append(str(files['bag']))
     except KeyboardInterrupt as interruption:
-        left = f'complete: {", ".join(made)}' if made else 'nothing is complete'
-        raise KeyboardInterrupt(left) from interruption
+        state = f'complete: {", ".join(written)}' if written else 'nothing is complete'
+        raise KeyboardInterrupt(state) from interruption
     _print(options, recorder, files, {**asdict(filmed), 'simulation': asdict(settings)})
     return 0
 
@@ -69,18 +71,18 @@ def _files(options: argparse.Namespace) -> dict[str, Path]:
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.synthetic.film_video import VIDEOS, check_video
 
-    for name in _OF_A_TRAY:
+    for name in _TRAY_FLAGS:
         if getattr(options, name) is not None:
-            remedy = f'use {_MOVED[name]}' if name in _MOVED else 'leave it, or --scene, out'
-            raise ConfigurationError(flag_of(name), 'is of one tray alone', remedy)
+            remedy = (
+                f'use {_SCENE_FLAGS[name]}' if name in _SCENE_FLAGS else 'leave out one of them'
+            )
+            raise ConfigurationError(flag_of(name), 'is a setting of one tray', remedy)
     if options.runs != 1:
-        raise ConfigurationError('--runs', 'is of one tray alone', 'change --seed instead')
+        raise ConfigurationError('--runs', 'is a setting of one tray', 'change --seed instead')
     names = 'picture', 'video', 'bag'
     files = {name: Path(getattr(options, name)) for name in names if getattr(options, name)}
     if not files:
-        raise ConfigurationError(
-            '--scene', 'makes nothing but films', 'name a --bag, --video or --picture'
-        )
+        raise ConfigurationError('--scene', 'has no output', 'name a --bag, --video or --picture')
     check_outputs(
         {f'--{name}': path for name, path in files.items()},
         {'--picture': ('.png',), '--video': VIDEOS},
@@ -104,10 +106,10 @@ def _recorder(
     from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
 
     check_quality(options.quality)
-    base = SceneFilmSettings()
+    defaults = SceneFilmSettings()
     if options.effects == 'none':
-        base = replace(base, scene=without_effects(base.scene))
-    filmed = settings_from(options, base)
+        defaults = replace(defaults, scene=without_effects(defaults.scene))
+    filmed = settings_from(options, defaults)
     settings = settings_from(options, SimulationSettings())
     check_settings(settings)
     check_scene(filmed.scene)
@@ -125,8 +127,8 @@ def _print(
     summary = recorder.summary
     if options.json:
         bag = {'bag': options.bag} if options.bag else {}
-        named = {name: str(path) for name, path in files.items()}
-        print(json.dumps({**summary, **bag, 'settings': settings, 'files': named}))
+        paths = {name: str(path) for name, path in files.items()}
+        print(json.dumps({**summary, **bag, 'settings': settings, 'files': paths}))
         return
     print(f'{"trays":17}{", ".join(str(number) for number in summary["trays"])}')
     print(f'{"film":17}{summary["frames"]} frames, {summary["duration"]:g} s')

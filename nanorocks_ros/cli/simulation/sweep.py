@@ -1,4 +1,4 @@
-"""``nanorocks sweep``: many simulated runs at a point or over a grid of settings."""
+"""``nanorocks sweep``: many simulated runs at one point or over a grid of settings."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.sweeps.sweep_plan import SweepPlan
     from nanorocks_ros.studies.sweeps.sweep_result import Sweep
 
-_MOST_VALUES = 10_000
+_MAX_VALUES = 10_000
 _DIGITS = 12
-# What the camera sees, and when the tray is shaken, is no part of a single decay.
+# Settings of camera and shaking, which do not change a single decay.
 _CAMERA = {
     'first_shake',
     'shake_period',
@@ -32,9 +32,9 @@ _CAMERA = {
     'noise',
 }
 _EPILOG = """\
-A setting given as low:high:count or a,b,c is an axis of the grid; without any, the sweep is a
-single point. Interrupted, the same command goes on where it was. Results are the same whatever
-the workers. Example:
+A setting given as low:high:count or a,b,c is an axis of the grid; without an axis the sweep is a
+single point. The same command resumes an interrupted sweep. Results do not depend on the number of
+workers. Example:
 
   nanorocks sweep --restitution 0.5:0.95:10 --wall-restitution 0.8,0.9,0.99 --runs 178 -o out.npz
 """
@@ -48,32 +48,40 @@ def add_parser(commands: Any) -> None:
 
     parser = commands.add_parser(
         'sweep',
-        help='simulate many runs at a point or over a grid of settings',
+        help='simulate many runs at one point or over a grid of settings',
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument('-o', '--output', required=True, help='.npz file to write')
-    parser.add_argument('--runs', type=int, default=178, help='at every point; default 178')
-    parser.add_argument('--times', default='0:30:31', help='[s]; default 0:30:31')
+    parser.add_argument('--runs', type=int, default=178, help='runs at each point; default 178')
+    parser.add_argument(
+        '--times', default='0:30:31', help='[s] times of the curves; default 0:30:31'
+    )
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
-    parser.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='of a Dask cluster')
     parser.add_argument(
-        '--task-seconds', type=float, default=1.0, help='work in one task, about; default 1'
+        '--scheduler', metavar='tcp://HOST:PORT', help='scheduler of a Dask cluster'
     )
     parser.add_argument(
-        '--common-random-numbers', action='store_true', help='run k starts alike at every point'
+        '--task-seconds', type=float, default=1.0, help='[s] approximate work of a task; default 1'
     )
-    parser.add_argument('--keep-runs', action='store_true', help='keep every run, not only means')
-    parser.add_argument('--csv', help='write the curves as a table, too')
-    parser.add_argument('--figure', help='draw the deviation from --reference over the grid')
+    parser.add_argument(
+        '--common-random-numbers',
+        action='store_true',
+        help='run k has the same random numbers at every point',
+    )
+    parser.add_argument(
+        '--keep-runs', action='store_true', help='keep the curves of all runs, not only means'
+    )
+    parser.add_argument('--csv', help='table of the curves to write, .csv')
+    parser.add_argument('--figure', help='picture of the deviation from --reference over the grid')
     parser.add_argument(
         '--reference',
-        help='point of the grid (A,B), .csv or .npz file of a decay, or results of an analysis',
+        help='point of the grid (A,B), .csv or .npz file of a decay, or folder of results',
     )
     parser.add_argument(
         '--free-speed',
         action='store_true',
-        help='the reference may start faster or slower than the sweep, by up to 1.5 times',
+        help='fit the initial speed of the reference, within a factor of 1.5 of the sweep',
     )
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     add_flags(parser, SimulationSettings(), skip=_CAMERA)
@@ -81,7 +89,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Sweep, write, print; the exit code."""
+    """Sweep, write and print, and return the exit code."""
     from nanorocks_ros.cli.progress import RunProgress
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.studies.sweeps.sweep_runs import sweep
@@ -92,17 +100,17 @@ def run(options: argparse.Namespace) -> int:
         scheduler=options.scheduler,
         task_seconds=options.task_seconds,
     )
-    # Before hours of work, not after.
+    # Checked before hours of work.
     reference = _reference(options, plan)
     output = Path(options.output)
     with RunProgress() as progress:
-        found = sweep(plan, output, workers, progress.update, progress.notice)
+        result = sweep(plan, output, workers, progress.update, progress.notice)
     if options.csv:
         units = {row.name: row.unit for row in rows(SimulationSettings())}
-        found.write_table(Path(options.csv), units)
+        result.write_table(Path(options.csv), units)
     if options.figure:
-        _draw(Path(options.figure), found, reference, options.free_speed)
-    _print(options, found)
+        _draw(Path(options.figure), result, reference, options.free_speed)
+    _print(options, result)
     return 0
 
 
@@ -127,16 +135,16 @@ def _plan(options: argparse.Namespace) -> SweepPlan:
 
 
 def values_of(text: str, flag: str, row: SettingRow | None = None) -> list[Scalar]:
-    """The values that a text names.
+    """The values of an axis from its text.
 
     Parameters
     ----------
     text : str
         ``low:high:count``, both ends included, or ``a,b,c``.
     flag : str
-        To name in the error.
+        Flag, for the error.
     row : SettingRow, optional
-        The setting, where the values are one's; without it they are numbers.
+        The setting of the axis; without it the values are numbers.
 
     Raises
     ------
@@ -153,13 +161,13 @@ def values_of(text: str, flag: str, row: SettingRow | None = None) -> list[Scala
         number, start, end = int(count), float(low), float(high)
     except ValueError as error:
         raise ConfigurationError(flag, f'{text!r} cannot be read', form) from error
-    if not (2 <= number <= _MOST_VALUES and start < end):
+    if not (2 <= number <= _MAX_VALUES and start < end):
         raise ConfigurationError(
-            flag, f'{text!r} has no values', f'{form} with low < high, 2 to {_MOST_VALUES} values'
+            flag, f'{text!r} has no values', f'{form} with low < high, 2 to {_MAX_VALUES} values'
         )
     step = (end - start) / (number - 1)
     values = [*(start + k * step for k in range(number - 1)), end]
-    # 0.6, not 0.6000000000000001: people will ask for the point by its value.
+    # 0.6, not 0.6000000000000001: --reference names the point by its value.
     return [_number(f'{value:.{_DIGITS}g}') for value in values]
 
 
@@ -171,12 +179,12 @@ def _number(text: str) -> int | float:
 
 
 def _reference(options: argparse.Namespace, plan: SweepPlan) -> SpeedCurve | list[Scalar] | None:
-    """The decay to compare with, or the point of the grid where it will be."""
+    """The decay to compare with, or the point of the grid that is the reference."""
     from nanorocks_ros.studies.decays.cooling_curves import read_decay
     from nanorocks_ros.studies.decays.decay_curve import place_of
 
     if (options.figure is None) != (options.reference is None):
-        raise ConfigurationError('--figure', 'goes with --reference', 'give both or neither')
+        raise ConfigurationError('--figure', 'needs --reference', 'give both or neither')
     if options.figure is None:
         return None
     from nanorocks_ros.studies.figures.sweep_figure import check_drawable
@@ -200,41 +208,41 @@ def _point(text: str) -> list[Scalar]:
 
 
 def _draw(
-    path: Path, found: Sweep, reference: SpeedCurve | list[Scalar] | None, scaled: bool
+    path: Path, result: Sweep, reference: SpeedCurve | list[Scalar] | None, scaled: bool
 ) -> None:
     from nanorocks_ros.studies.decays.decay_curve import curve_at
     from nanorocks_ros.studies.figures.sweep_figure import chi_square_figure
 
     if reference is not None:
-        curve = curve_at(found, reference) if isinstance(reference, list) else reference
-        chi_square_figure(path, found, curve, scaled=scaled)
+        curve = curve_at(result, reference) if isinstance(reference, list) else reference
+        chi_square_figure(path, result, curve, scaled=scaled)
 
 
-def _print(options: argparse.Namespace, found: Sweep) -> None:
-    points = found.mean_speed.size // found.times.size
-    events = int(found.pair_collisions.sum() + found.wall_collisions.sum())
+def _print(options: argparse.Namespace, result: Sweep) -> None:
+    points = result.mean_speed.size // result.times.size
+    events = int(result.pair_collisions.sum() + result.wall_collisions.sum())
     if options.json:
-        print(json.dumps({'output': options.output, 'events': events, **_as_json(found)}))
+        print(json.dumps({'output': options.output, 'events': events, **_as_json(result)}))
         return
     print(
-        f'nanorocks: {found.runs} runs at each of {points} points, {events} events, in '
+        f'nanorocks: {result.runs} runs at each of {points} points, {events} events, in '
         f'{options.output}',
         file=sys.stderr,
     )
 
 
-def _as_json(found: Sweep) -> dict[str, Any]:
+def _as_json(result: Sweep) -> dict[str, Any]:
     from nanorocks_ros.studies.sweeps.sweep_parts import COUNTS
     from nanorocks_ros.studies.sweeps.sweep_result import CURVES
 
-    specification = json.loads(found.specification)
-    curves = {name: getattr(found, name) for name in CURVES}
+    specification = json.loads(result.specification)
+    curves = {name: getattr(result, name) for name in CURVES}
     return {
-        'axes': {axis.name: list(axis.values) for axis in found.axes},
-        'runs': found.runs,
+        'axes': {axis.name: list(axis.values) for axis in result.axes},
+        'runs': result.runs,
         'seed': specification['settings']['seed'],
         'version': specification['version'],
-        'time': found.times.tolist(),
+        'time': result.times.tolist(),
         **{name: json_values(curve) for name, curve in curves.items()},
-        **{name: getattr(found, name).tolist() for name in COUNTS},
+        **{name: getattr(result, name).tolist() for name in COUNTS},
     }

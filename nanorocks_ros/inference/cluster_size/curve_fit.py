@@ -1,6 +1,6 @@
 """Fit of the cluster curve, from autocorrelation width to cluster size, to simulated images.
 
-Tested in test/inference/cluster_size/test_cluster_curve.py.
+Tested by ``test/inference/cluster_size/test_cluster_curve.py``.
 """
 
 from __future__ import annotations

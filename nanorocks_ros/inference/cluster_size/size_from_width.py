@@ -12,7 +12,7 @@ slowly with ln(size). Its mean over many simulated images is a rising curve, and
 single images about it is the error of a size. The curve ends where that error exceeds a factor
 of three.
 
-Tested in test/inference/cluster_size/test_cluster_curve.py.
+Tested by ``test/inference/cluster_size/test_cluster_curve.py``.
 """
 
 from __future__ import annotations

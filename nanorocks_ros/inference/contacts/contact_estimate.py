@@ -1,6 +1,6 @@
 """Restitution with its error from a log likelihood on a grid, for reports.
 
-Tested in test/inference/contacts/test_contact_likelihood.py.
+Tested by ``test/inference/contacts/test_contact_likelihood.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A tilted line of centres appears shortened, and so does the speed along it.
 
-Tested in test/inference/contacts/test_contact_likelihood.py.
+Tested by ``test/inference/contacts/test_contact_likelihood.py``.
 """
 
 from __future__ import annotations

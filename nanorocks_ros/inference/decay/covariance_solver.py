@@ -1,6 +1,6 @@
 """Cholesky solver of the small covariances of `haff_likelihood`, compiled.
 
-Tested in test/inference/decay/test_haff_likelihood.py.
+Tested by ``test/inference/decay/test_haff_likelihood.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Files of decay libraries: reading them, and the arrays they consist of.
 
-Tested in test/inference/decay/test_decay_library.py.
+Tested by ``test/inference/decay/test_decay_library.py``.
 """
 
 from __future__ import annotations

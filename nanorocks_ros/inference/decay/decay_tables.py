@@ -1,6 +1,6 @@
 """Decay library tabulated on a grid of restitutions, with its slopes by the nuisances.
 
-Tested in test/inference/test_posterior.py.
+Tested by ``test/inference/test_posterior.py``.
 """
 
 from __future__ import annotations

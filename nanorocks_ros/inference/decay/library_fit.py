@@ -1,6 +1,6 @@
 """Fit of a decay library: smooth functions through simulated decays.
 
-Tested in test/inference/decay/test_decay_library.py.
+Tested by ``test/inference/decay/test_decay_library.py``.
 """
 
 from __future__ import annotations

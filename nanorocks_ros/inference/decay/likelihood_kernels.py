@@ -1,6 +1,6 @@
 """Compiled loops of `decay_likelihood` over the points of the grid of restitutions.
 
-Tested in test/inference/decay/test_decay_likelihood.py.
+Tested by ``test/inference/decay/test_decay_likelihood.py``.
 """
 
 from __future__ import annotations

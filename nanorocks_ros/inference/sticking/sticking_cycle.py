@@ -1,6 +1,6 @@
 """Input of the sticking-speed inference: merges and speeds of one cycle.
 
-Tested in test/inference/sticking/test_sticking_speed.py.
+Tested by ``test/inference/sticking/test_sticking_speed.py``.
 """
 
 from __future__ import annotations

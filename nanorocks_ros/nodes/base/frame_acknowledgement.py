@@ -1,6 +1,6 @@
 """Tells on ``camera/taken`` which frame a node has processed.
 
-Tested by test/nodes/workers/test_graph_recorder.py.
+Tested by ``test/nodes/workers/test_graph_recorder.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What all nodes of the graph share: parameters, publishers, diagnostics, topic checks.
 
-Tested by test/nodes/base/test_diagnostics.py.
+Tested by ``test/nodes/base/test_diagnostics.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Records that are published as images, and all topics of results.
 
-Tested by test/nodes/base/test_publishing.py.
+Tested by ``test/nodes/base/test_publishing.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The publishers for the topics of a bag: which are played, their names, their QoS.
 
-Tested by test/nodes/test_bag_player.py.
+Tested by ``test/nodes/test_bag_player.py``.
 """
 
 from __future__ import annotations

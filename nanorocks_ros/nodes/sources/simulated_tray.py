@@ -1,6 +1,6 @@
 """One simulated tray as a source of frames, with the true state of its beads.
 
-Tested by test/nodes/test_graph.py.
+Tested by ``test/nodes/test_graph.py``.
 """
 
 from __future__ import annotations

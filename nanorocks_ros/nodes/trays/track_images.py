@@ -1,6 +1,6 @@
 """Publishes images of the tracks of a tray, while somebody subscribes.
 
-Tested by test/nodes/test_pipeline.py.
+Tested by ``test/nodes/test_pipeline.py``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Open the storage files of a rosbag2 folder, or a single storage file, and read its metadata."""
+"""Open the storage files of a rosbag2 folder, or a single storage file, and read its metadata.
+
+Tested by ``test/recordings/bag/test_find_bags.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Connections of a rosbag2 writer: topic, type, message definition and quality of service."""
+"""Connections of a rosbag2 writer: topic, type, message definition and quality of service.
+
+Tested by ``test/recordings/bag/test_writer.py``.
+"""
 
 from __future__ import annotations
 

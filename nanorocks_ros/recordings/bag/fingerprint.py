@@ -3,6 +3,8 @@
 Hashing takes about one second per gigabyte and leaves the bytes in the page cache, so it is done
 just before a recording is analysed. As long as size, inode and times of the files are unchanged,
 the recording need not be hashed again.
+
+Tested by ``test/recordings/bag/test_find_bags.py``.
 """
 
 from __future__ import annotations

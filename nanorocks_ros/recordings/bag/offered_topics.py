@@ -1,4 +1,7 @@
-"""Topics of a recording: type, message definition and quality of service."""
+"""Topics of a recording: type, message definition and quality of service.
+
+Tested by ``test/recordings/bag/test_writer.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Provenance of a recording: checksum of its source, and whether an import or salvage finished."""
+"""Provenance of a recording: checksum of its source, and whether an import or salvage finished.
+
+Tested by ``test/recordings/bag/test_salvage.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Rotation of video frames by the display matrix of the file."""
+"""Rotation of video frames by the display matrix of the file.
+
+Tested by ``test/studies/film_import/test_import_times.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The interface of films (videos and folders of images): frames, their times, and metadata."""
+"""The interface of films (videos and folders of images): frames, their times, and metadata.
+
+Tested by ``test/recordings/film/test_duplicate_frames.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Decoding of image files to 8 bits, including 16-bit files of cameras with 8 to 14 bits."""
+"""Decoding of image files to 8 bits, including 16-bit files of cameras with 8 to 14 bits.
+
+Tested by ``test/studies/film_import/test_import_times.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Folders of images as films: order, time stamps from names or EXIF, and bit depth."""
+"""Folders of images as films: order, time stamps from names or EXIF, and bit depth.
+
+Tested by ``test/studies/film_import/test_import_times.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Natural sorting of file names, and the running number in them."""
+"""Natural sorting of file names, and the running number in them.
+
+Tested by ``test/recordings/bag/test_find_bags.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Import of PyAV, an optional library that decodes and encodes videos."""
+"""Import of PyAV, an optional library that decodes and encodes videos.
+
+Tested by ``test/studies/synthetic/test_film_video.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Video files: their frames, upright and with square pixels, and their time stamps."""
+"""Video files: their frames, upright and with square pixels, and their time stamps.
+
+Tested by ``test/studies/film_import/test_import_times.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""A decoded frame of a video, with square pixels and upright."""
+"""A decoded frame of a video, with square pixels and upright.
+
+Tested by ``test/studies/film_import/test_import_times.py``.
+"""
 
 from __future__ import annotations
 

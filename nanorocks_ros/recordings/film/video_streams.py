@@ -1,4 +1,7 @@
-"""Metadata of video files: format, stream, frame rate, aspect ratio, and time of recording."""
+"""Metadata of video files: format, stream, frame rate, aspect ratio, and time of recording.
+
+Tested by ``test/studies/film_import/test_import_each.py``.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 Records are split here by their lengths, which are checked against the size of the data, because a
 recording that lost its power ends inside a record. The `mcap` library parses the records.
+
+Tested by ``test/recordings/bag/test_find_bags.py``.
 """
 
 from __future__ import annotations

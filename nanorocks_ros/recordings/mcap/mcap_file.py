@@ -1,4 +1,7 @@
-"""Read an MCAP file, also a truncated or damaged one: all readable messages in order of time."""
+"""Read an MCAP file, also a truncated or damaged one: all readable messages in order of time.
+
+Tested by ``test/recordings/bag/test_reader.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Index of the messages in an MCAP file, read from the summary at its end."""
+"""Index of the messages in an MCAP file, read from the summary at its end.
+
+Tested by ``test/recordings/bag/test_reader.py``.
+"""
 
 from __future__ import annotations
 

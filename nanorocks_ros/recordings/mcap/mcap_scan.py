@@ -1,4 +1,7 @@
-"""Build the index of an MCAP file that has none, by scanning the file."""
+"""Build the index of an MCAP file that has none, by scanning the file.
+
+Tested by ``test/recordings/bag/test_reader.py``.
+"""
 
 from __future__ import annotations
 

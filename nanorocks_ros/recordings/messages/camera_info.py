@@ -1,4 +1,7 @@
-"""Conversion of camera_info messages, of rosbags and of rclpy, to calibrations and views."""
+"""Conversion of camera_info messages, of rosbags and of rclpy, to calibrations and views.
+
+Tested by ``test/nodes/base/test_ros_messages.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Conversion between time stamps and ISO 8601 text."""
+"""Conversion between time stamps and ISO 8601 text.
+
+Tested by ``test/studies/film_import/test_import_film.py``.
+"""
 
 from __future__ import annotations
 

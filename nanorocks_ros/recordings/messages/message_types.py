@@ -1,4 +1,7 @@
-"""Message types: those of ROS 2 Jazzy, and others that are defined in a recording."""
+"""Message types: those of ROS 2 Jazzy, and others that are defined in a recording.
+
+Tested by ``test/recordings/bag/test_writer.py``.
+"""
 
 from __future__ import annotations
 

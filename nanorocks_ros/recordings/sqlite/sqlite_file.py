@@ -1,4 +1,7 @@
-"""One SQLite file of a rosbag2 recording."""
+"""One SQLite file of a rosbag2 recording.
+
+Tested by ``test/recordings/bag/test_reader.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Read-only access to SQLite files without writing to their folder."""
+"""Read-only access to SQLite files without writing to their folder.
+
+Tested by ``test/recordings/bag/test_reader.py``.
+"""
 
 from __future__ import annotations
 

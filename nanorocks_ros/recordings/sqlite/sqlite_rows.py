@@ -1,4 +1,7 @@
-"""Find the readable rows of a damaged SQLite file."""
+"""Find the readable rows of a damaged SQLite file.
+
+Tested by ``test/recordings/bag/test_reader.py``.
+"""
 
 from __future__ import annotations
 

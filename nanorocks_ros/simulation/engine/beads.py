@@ -1,4 +1,7 @@
-"""Beads at one instant: sizes, positions, velocities, spins and species."""
+"""Beads at one instant: sizes, positions, velocities, spins and species.
+
+Tested by ``test/simulation/engine/test_input_checks.py``.
+"""
 
 from __future__ import annotations
 

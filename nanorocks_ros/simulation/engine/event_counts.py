@@ -1,4 +1,7 @@
-"""How many events of each kind there were."""
+"""How many events of each kind there were.
+
+Tested by ``test/simulation/test_shaken_tray.py``.
+"""
 
 from __future__ import annotations
 

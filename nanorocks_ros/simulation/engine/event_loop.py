@@ -1,4 +1,7 @@
-"""The event loop: execute the earliest event, predict the next ones, write frames."""
+"""The event loop: execute the earliest event, predict the next ones, write frames.
+
+Tested by ``test/simulation/engine/test_reference_agreement.py``.
+"""
 
 from __future__ import annotations
 

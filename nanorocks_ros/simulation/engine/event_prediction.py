@@ -1,4 +1,7 @@
-"""Prediction of the next event of a bead: its time and its partner."""
+"""Prediction of the next event of a bead: its time and its partner.
+
+Tested by ``test/simulation/engine/test_reference_agreement.py``.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 Every bead has one pending event. The lowest level holds their times; each level above holds
 the smallest time of each group of eight below, so one cache line answers for a group.
+
+Tested by ``test/simulation/engine/test_epochs.py``.
 """
 
 from __future__ import annotations

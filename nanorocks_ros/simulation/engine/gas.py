@@ -1,4 +1,7 @@
-"""Event-driven molecular dynamics of a granular gas of hard spheres in a box."""
+"""Event-driven molecular dynamics of a granular gas of hard spheres in a box.
+
+Tested by ``test/simulation/engine/test_reference_agreement.py``.
+"""
 
 from __future__ import annotations
 

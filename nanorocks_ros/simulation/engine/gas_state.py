@@ -1,4 +1,7 @@
-"""State of a gas in memory: one row and one pending event per bead."""
+"""State of a gas in memory: one row and one pending event per bead.
+
+Tested by ``test/simulation/engine/test_epochs.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Read access to a gas: beads, bodies, event counts and ledger."""
+"""Read access to a gas: beads, bodies, event counts and ledger.
+
+Tested by ``test/simulation/engine/test_reference_agreement.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Integer conversions for compiled code, so that it is compiled for one width only."""
+"""Integer conversions for compiled code, so that it is compiled for one width only.
+
+Tested by ``test/simulation/engine/test_observables.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Choice between scan and neighbour lists, and the state arranged for it."""
+"""Choice between scan and neighbour lists, and the state arranged for it.
+
+Tested by ``test/simulation/engine/neighbours/test_neighbour_lists.py``.
+"""
 
 from __future__ import annotations
 

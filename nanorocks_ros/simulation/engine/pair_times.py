@@ -1,4 +1,7 @@
-"""Contact times of two beads."""
+"""Contact times of two beads.
+
+Tested by ``test/simulation/engine/test_input_checks.py``.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 A table with room for as many contacts as can matter: one older than the contact duration has
 no effect, and its place is free.
+
+Tested by ``test/simulation/engine/test_epochs.py``.
 """
 
 from __future__ import annotations

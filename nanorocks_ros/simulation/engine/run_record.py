@@ -1,4 +1,7 @@
-"""Record of a run: frames, observations and events."""
+"""Record of a run: frames, observations and events.
+
+Tested by ``test/simulation/engine/test_reference_agreement.py``.
+"""
 
 from __future__ import annotations
 

@@ -5,6 +5,8 @@ wide as its largest bead. So a small bead checks few cells for large neighbours,
 few cells per grid.
 
 Results do not depend on the cells; they only avoid tests of distant beads.
+
+Tested by ``test/simulation/packing/test_random_placement.py``.
 """
 
 from __future__ import annotations

@@ -7,6 +7,8 @@ Metropolis moves at full size lead to the equilibrium of a hard-sphere fluid.
 
 When beads lock each other in a tight box, a new attempt begins: all enter small, and grow more
 slowly than before.
+
+Tested by ``test/simulation/packing/test_random_placement.py``.
 """
 
 from __future__ import annotations

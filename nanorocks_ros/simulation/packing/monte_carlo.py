@@ -4,6 +4,8 @@ References
 ----------
 Widom 1966, J. Chem. Phys. 44, 3888: random sequential insertion, and where it jams.
 Metropolis et al. 1953, J. Chem. Phys. 21, 1087: the moves.
+
+Tested by ``test/simulation/packing/test_random_placement.py``.
 """
 
 from __future__ import annotations

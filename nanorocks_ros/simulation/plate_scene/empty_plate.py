@@ -1,6 +1,8 @@
 """The empty scene: the aluminium plate with its cells and housing, through the lens.
 
 Painted once in the rectified picture at twice the scale, then remapped through the lens.
+
+Tested by ``test/simulation/plate_scene/test_plate_camera.py``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Effects on the pixels of a frame: shift, glare, light, noise, gray levels."""
+"""Effects on the pixels of a frame: shift, glare, light, noise, gray levels.
+
+Tested by ``test/simulation/plate_scene/test_plate_camera.py``.
+"""
 
 from __future__ import annotations
 

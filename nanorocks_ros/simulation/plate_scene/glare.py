@@ -2,6 +2,8 @@
 
 A flat window that moves within its own plane shows its mirror images where they were: the glare
 stays while the plate swings.
+
+Tested by ``test/simulation/plate_scene/test_plate_camera.py``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Illumination of the picture: vignetting, gradient and rolling bands."""
+"""Illumination of the picture: vignetting, gradient and rolling bands.
+
+Tested by ``test/simulation/plate_scene/test_plate_camera.py``.
+"""
 
 from __future__ import annotations
 

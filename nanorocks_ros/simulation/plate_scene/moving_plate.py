@@ -1,4 +1,7 @@
-"""The empty plate, displaced on its springs."""
+"""The empty plate, displaced on its springs.
+
+Tested by ``test/simulation/plate_scene/test_plate_camera.py``.
+"""
 
 from __future__ import annotations
 

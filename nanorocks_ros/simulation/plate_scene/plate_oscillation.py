@@ -1,4 +1,7 @@
-"""Damped oscillation of the plate on its springs after a shaking event."""
+"""Damped oscillation of the plate on its springs after a shaking event.
+
+Tested by ``test/simulation/plate_scene/test_plate_camera.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Geometry of the scene: plate, trays and beads in the picture."""
+"""Geometry of the scene: plate, trays and beads in the picture.
+
+Tested by ``test/nodes/sources/test_simulated_scene.py``.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 The pixels of a body go through one long loop, since loops over its short rows would not be
 vectorised. The rows of the rectangle are padded to a multiple of 8, so that drawing them is.
+
+Tested by ``test/simulation/plate_scene/test_plate_camera.py``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Drawing of shaded spheres with smooth outlines, and sensor noise."""
+"""Drawing of shaded spheres with smooth outlines, and sensor noise.
+
+Tested by ``test/simulation/tray_camera/test_tray_renderer.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Looks of beads as rows of numbers, for the drawing kernels."""
+"""Looks of beads as rows of numbers, for the drawing kernels.
+
+Tested by ``test/simulation/tray_camera/test_tray_renderer.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The empty tray: a lit floor of brushed aluminium, its rim, and the plate around it."""
+"""The empty tray: a lit floor of brushed aluminium, its rim, and the plate around it.
+
+Tested by ``test/simulation/tray_camera/test_tray_renderer.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Film of a simulated tray, with the ground truth of every frame."""
+"""Film of a simulated tray, with the ground truth of every frame.
+
+Tested by ``test/simulation/tray_camera/test_tray_renderer.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Granular temperature of a tray: energy of each species, and local temperature at each bead."""
+"""Granular temperature of a tray: energy of each species, and local temperature at each bead.
+
+Tested by ``test/stages/bodies/test_body_counter.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Occluded beads of a body: they stay in it, and keep their number when they reappear."""
+"""Occluded beads of a body: they stay in it, and keep their number when they reappear.
+
+Tested by ``test/stages/bodies/test_body_counter.py``.
+"""
 
 from __future__ import annotations
 

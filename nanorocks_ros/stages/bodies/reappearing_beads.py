@@ -1,4 +1,7 @@
-"""Tracks that begin at a body and stay there: most likely beads of it that reappear."""
+"""Tracks that begin at a body and stay there: most likely beads of it that reappear.
+
+Tested by ``test/stages/bodies/test_comoving_bodies.py``.
+"""
 
 from __future__ import annotations
 

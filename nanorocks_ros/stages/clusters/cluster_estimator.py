@@ -1,4 +1,4 @@
-"""All that is known of the clusters of one tray at an instant, by pictures and by tracks."""
+"""Clusters of one tray: sizes from the autocorrelation, with bodies and sticking from tracks."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ from nanorocks_ros.records import (
     TrayImage,
 )
 from nanorocks_ros.stages.clusters.correlation_width import ClusterAutocorrelator
-from nanorocks_ros.stages.clusters.sticking_estimator import StickingMeter
+from nanorocks_ros.stages.clusters.sticking_estimator import StickingEstimator
+from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 from nanorocks_ros.stages.preprocess.shake_detection import NS
+from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,23 +36,24 @@ if TYPE_CHECKING:
     from nanorocks_ros.inference.sticking.sticking_speed import StickingEstimate
     from nanorocks_ros.settings import PipelineSettings
 
-# What tracks say of an instant is known a second later; another one is for messages on their way.
-_HELD_NS = 2 * NS
-# The sticking speed of a cycle is worked out anew so often.
+# Interval at which the sticking speed of a cycle is worked out anew.
 _UPDATE_NS = NS
-# Counts of bodies further back than this say nothing of the instant.
+# Largest age of a count of bodies that is used for an instant.
 _RECENT_NS = NS
-# A size is not known better, [beads].
-_LEAST_ERROR = 0.01
+# Smallest error of a size, [beads].
+_SMALLEST_ERROR = 0.01
 
+Input = TrayImage | SpeedEstimate | BodyEstimate | Merge
 Clusters = ClusterEstimate | Autocorrelation | Notice
 
 
-class ClusterEstimator:
-    """Puts together the autocorrelation of a tray image and what tracks say of that instant.
+class ClusterEstimator(RestartingStage[Input, Clusters]):
+    """Joins the autocorrelation of a tray image with the bodies and merges of that instant.
 
     Estimates come two seconds after their instant, so that they do not depend on the order in
-    which records of different kinds come in.
+    which records of different kinds come in. An image whose stamp goes back gives out the
+    estimates held so far and starts afresh; merges and speeds start afresh with the first speed
+    whose stamp goes back.
 
     Parameters
     ----------
@@ -68,13 +71,19 @@ class ClusterEstimator:
         For a calibration file that cannot be read, or has no curve of this tray.
     """
 
+    clock = TrayImage
+
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._images = ClusterAutocorrelator(settings, tray)
-        self._sticking = StickingMeter(settings, tray)
+        self._sticking = StickingEstimator(settings, tray)
+        self.reset()
+
+    def _restart(self, stamp_ns: int | None = None) -> None:
+        self._images.reset(stamp_ns)
         # With whether the scale of the picture is wrong.
         self._held: deque[tuple[ClusterEstimate, bool]] = deque()
-        self._last_ns: int | None = None
-        self._of_cycle: tuple[tuple[int, int], StickingEstimate | None] | None = None
+        # The last one, with its cycle and second.
+        self._sticking_speed: tuple[tuple[int, int], StickingEstimate | None] | None = None
 
     @property
     def emit_image(self) -> bool:
@@ -88,42 +97,41 @@ class ClusterEstimator:
     @property
     def cycles(self) -> tuple[StickingCycle, ...]:
         """Merges and speeds of the cycles since time last went back."""
-        return self._sticking.seen()
+        return self._sticking.cycles()
 
     def together(self, cycles: Sequence[StickingCycle]) -> StickingEstimate | None:
-        """What cycles of this tray say of the sticking speed, also such of other recordings."""
+        """Sticking speed of several cycles of this tray, also of other recordings."""
         return self._sticking.together(cycles)
 
-    def push(
-        self, record: TrayImage | SpeedEstimate | BodyEstimate | Merge
-    ) -> tuple[Clusters, ...]:
-        """Take the next record; estimates of the instant two seconds before an image."""
+    def _process(self, record: Input) -> tuple[Clusters, ...]:
         if not isinstance(record, TrayImage):
             self._sticking.push(record)
             return ()
-        found: list[Clusters] = []
-        if self._last_ns is not None and record.stamp_ns <= self._last_ns:
-            found += self.flush()
-        self._last_ns = record.stamp_ns
+        records: list[Clusters] = []
         wrong_scale = bool(record.quality & Quality.WRONG_SCALE)
-        for one in self._images.push(record):
-            if isinstance(one, ClusterEstimate):
-                self._held.append((_without_size(one) if wrong_scale else one, wrong_scale))
-            else:
-                found.append(one)
-        while self._held and record.stamp_ns - self._held[0][0].stamp_ns >= _HELD_NS:
-            found.append(self._completed(*self._held.popleft()))
-        return tuple(found)
+        for result in self._images.push(record):
+            if not isinstance(result, ClusterEstimate):
+                records.append(result)
+                continue
+            estimate = _without_size(result) if wrong_scale else result
+            self._held.append((estimate, wrong_scale))
+        known_ns = record.stamp_ns - KNOWN_AFTER_NS[ClusterEstimate]
+        while self._held and self._held[0][0].stamp_ns <= known_ns:
+            records.append(self._completed(*self._held.popleft()))
+        return tuple(records)
 
     def flush(self) -> tuple[ClusterEstimate, ...]:
         """The estimates of the last two seconds."""
-        left, self._held = list(self._held), deque()
-        return tuple(self._completed(*one) for one in left)
+        held, self._held = self._held, deque()
+        return tuple(self._completed(estimate, wrong_scale) for estimate, wrong_scale in held)
+
+    def _interrupted(self) -> tuple[Clusters, ...]:
+        return self.flush()
 
     def _completed(self, estimate: ClusterEstimate, wrong_scale: bool) -> ClusterEstimate:
         cycle, stamp_ns = estimate.cycle, estimate.stamp_ns
         if wrong_scale:
-            # Nor are beads and merges what they seem to be.
+            # Bodies and merges are wrong as well.
             return estimate
         fields: dict[str, Any] = {}
         bodies = self._sticking.bodies(cycle, stamp_ns)
@@ -137,7 +145,7 @@ class ClusterEstimator:
         onset = self._sticking.onset(cycle, stamp_ns)
         if onset is not None:
             fields['onset'] = onset
-        of_cycle = self._of(cycle, stamp_ns)
+        of_cycle = self._sticking_speed_of(cycle, stamp_ns)
         if of_cycle is not None:
             fields |= {
                 'sticking_status': StickingStatus(of_cycle.status),
@@ -156,17 +164,17 @@ class ClusterEstimator:
         )
         return replace(estimate, combined_size=size, **fields)
 
-    def _of(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
-        """What the cycle says of the sticking speed, as of the last full second."""
+    def _sticking_speed_of(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
+        """Sticking speed of the cycle, as of the last full second."""
         whole_ns = stamp_ns - stamp_ns % _UPDATE_NS
         key = cycle, whole_ns
-        if self._of_cycle is None or self._of_cycle[0] != key:
-            self._of_cycle = key, self._sticking.of_cycle(cycle, whole_ns)
-        return self._of_cycle[1]
+        if self._sticking_speed is None or self._sticking_speed[0] != key:
+            self._sticking_speed = key, self._sticking.of_cycle(cycle, whole_ns)
+        return self._sticking_speed[1]
 
 
 def _without_size(estimate: ClusterEstimate) -> ClusterEstimate:
-    """The same of a picture whose scale is wrong, of which nobody can tell the size of a bead."""
+    """The estimate without sizes: in a picture of a wrong scale the size of a bead is unknown."""
     return replace(
         estimate,
         size_status=SizeStatus.NOTHING,
@@ -179,7 +187,7 @@ def _combined(*sizes: Measured) -> Measured:
     known = [size for size in sizes if size.known]
     if not known:
         return UNKNOWN_MEASURED
-    # An error of 0 would be a size that is known exactly; none is.
-    weights = [1.0 / max(size.error, _LEAST_ERROR) ** 2 for size in known]
+    # An error of 0 would give an infinite weight.
+    weights = [1.0 / max(size.error, _SMALLEST_ERROR) ** 2 for size in known]
     mean = sum(w * size.value for w, size in zip(weights, known, strict=True)) / sum(weights)
     return Measured(mean, sum(weights) ** -0.5)

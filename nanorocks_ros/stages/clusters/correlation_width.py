@@ -1,4 +1,4 @@
-"""Width of the autocorrelation of a tray image, and the size of the clusters it goes with."""
+"""Width of the autocorrelation of a tray image, and the size of clusters from it."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from nanorocks_ros.records import (
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.stages.clusters.background_removal import tray_contrast, tray_levels
 from nanorocks_ros.stages.preprocess.shake_detection import NS, CycleFollower
+from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,15 +39,16 @@ if TYPE_CHECKING:
 # From this scale on, two by two pixels show as much of the clusters as one does, in a quarter of
 # the time: then such a pixel is as large as one at half this scale. [px/m]
 _FINE = 9000.0
+Correlations = ClusterEstimate | Autocorrelation | Notice
 _NO_SIZE = SizeEstimate(UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, SizeStatus.UNCALIBRATED)
 
 
 class Correlated(NamedTuple):
-    """The autocorrelation of what stands out in a tray image.
+    """The autocorrelation of the contrast of a tray image.
 
     `values`: ndarray of float32, 1 at zero lag, in the centre; `side` of its pixels, [m];
-    `contrast`: standard deviation of what stands out, [gray levels]; `cover`: share of the picture
-    that does clearly.
+    `contrast`: standard deviation of the picture, [gray levels]; `cover`: share of its pixels
+    that are clearly darker than the floor.
     """
 
     values: NDArray[np.float32]
@@ -55,17 +57,17 @@ class Correlated(NamedTuple):
     cover: float
 
     def region(self, level: float) -> LevelRegion:
-        """Where it exceeds a level."""
+        """The region around zero lag in which it exceeds a level."""
         return level_region(self.values, level)
 
     def width(self, level_area: float) -> Width:
-        """With a level area that is known, [px^2]."""
+        """The width, from a level area, [px^2]."""
         inner = level_region(self.values, INNER_LEVEL).area
         return Width(level_area * self.side**2, inner * self.side**2, self.contrast, self.cover)
 
 
 def correlated(gray: NDArray[np.uint8], pixels_per_metre: float) -> Correlated:
-    """The autocorrelation of what stands out in a tray image.
+    """Correlate the contrast of a tray image.
 
     Parameters
     ----------
@@ -78,7 +80,7 @@ def correlated(gray: NDArray[np.uint8], pixels_per_metre: float) -> Correlated:
 
 
 def correlated_with_shadows(gray: NDArray[np.uint8], pixels_per_metre: float) -> Correlated:
-    """The same of the image as it is, for methods that do not even the floor.
+    """Correlate the levels of a tray image, with its shadows, for methods that keep the floor.
 
     Parameters
     ----------
@@ -101,8 +103,8 @@ def _correlated(
     return Correlated(autocorrelation(contrast), side, float(contrast.std()), cover)
 
 
-class ClusterAutocorrelator:
-    """Follows the width of the autocorrelation of one tray.
+class ClusterAutocorrelator(RestartingStage[TrayImage, Correlations]):
+    """Measures the width of the autocorrelation of the images of one tray.
 
     Parameters
     ----------
@@ -112,7 +114,7 @@ class ClusterAutocorrelator:
     Attributes
     ----------
     emit_image : bool
-        Also emit each :class:`Autocorrelation`; off by default since few look at it.
+        Also emit each :class:`Autocorrelation`; off by default.
 
     Raises
     ------
@@ -120,48 +122,49 @@ class ClusterAutocorrelator:
         For a calibration file that cannot be read, or has no curve of this tray.
     """
 
+    clock = TrayImage
+
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings
         self._tray = tray
         self._curve, self._notice = _curve(settings, tray)
         self.emit_image = False
-        self._restart()
+        self.reset()
 
-    def _restart(self) -> None:
+    def _restart(self, stamp_ns: int | None = None) -> None:
+        del stamp_ns
         speed = self._settings.speed
-        self._shakes = CycleFollower(speed.shake_ratio, speed.min_cycle_duration)
-        self._last_stamp_ns: int | None = None
+        self._cycles = CycleFollower(speed.shake_ratio, speed.min_cycle_duration)
         self._next_ns: int | None = None
 
-    def push(self, image: TrayImage) -> tuple[ClusterEstimate | Autocorrelation | Notice, ...]:
-        """Take the next image of the tray; empty between two intervals."""
-        if self._last_stamp_ns is not None and image.stamp_ns <= self._last_stamp_ns:
-            self._restart()
-        self._last_stamp_ns = image.stamp_ns
-        self._shakes.push(image)
+    def _process(self, record: TrayImage) -> tuple[Correlations, ...]:
+        image = record
+        self._cycles.push(image)
         if self._next_ns is not None and image.stamp_ns < self._next_ns:
             return ()
         self._next_ns = image.stamp_ns + round(self._settings.clusters.interval * NS)
-        found: list[ClusterEstimate | Autocorrelation | Notice] = []
-        seen = correlated(image.gray, self._settings.preprocess.pixels_per_metre)
-        found.append(self._estimate(image.stamp_ns, seen))
+        records: list[Correlations] = []
+        correlation = correlated(image.gray, self._settings.preprocess.pixels_per_metre)
+        records.append(self._estimate(image.stamp_ns, correlation))
         if self.emit_image:
-            picture = Autocorrelation(stamp_ns=image.stamp_ns, tray=image.tray, values=seen.values)
-            found.append(picture)
+            picture = Autocorrelation(
+                stamp_ns=image.stamp_ns, tray=image.tray, values=correlation.values
+            )
+            records.append(picture)
         if self._notice:
-            found.append(Notice(stamp_ns=image.stamp_ns, text=self._notice))
+            records.append(Notice(stamp_ns=image.stamp_ns, text=self._notice))
             self._notice = ''
-        return tuple(found)
+        return tuple(records)
 
-    def _estimate(self, stamp_ns: int, seen: Correlated) -> ClusterEstimate:
-        region = seen.region(self._settings.clusters.level)
-        width = seen.width(region.area)
+    def _estimate(self, stamp_ns: int, correlation: Correlated) -> ClusterEstimate:
+        region = correlation.region(self._settings.clusters.level)
+        width = correlation.width(region.area)
         size = _NO_SIZE if self._curve is None else self._curve.size_of(width)
         area, inner = width.level_area, width.inner_area
         return ClusterEstimate(
             stamp_ns=stamp_ns,
             tray=self._tray.number,
-            cycle=self._shakes.cycle,
+            cycle=self._cycles.cycle,
             level_area=area,
             correlation_length=math.sqrt(area / math.pi),
             axes_ratio=region.axes_ratio,
@@ -173,11 +176,11 @@ class ClusterAutocorrelator:
 
 
 def _curve(settings: PipelineSettings, tray: Tray) -> tuple[ClusterCurve | None, str]:
-    """The calibration, or None and why there is none."""
+    """The calibration curve, or None and the reason."""
     try:
         curve = curve_of(tray, settings.clusters.curve)
     except ConfigurationError as error:
-        # Speeds and restitutions do not need it; a file that was named is another matter.
+        # Speeds and restitutions do not need the curve; a file named in the settings is required.
         if settings.clusters.curve:
             raise
         return None, f'{error}; until then cluster sizes are unknown'

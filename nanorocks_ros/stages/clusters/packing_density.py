@@ -1,4 +1,4 @@
-"""How densely the clusters of a tray are packed at one instant, from places of beads."""
+"""Packing density of the clusters of a tray at one instant, from the positions of the beads."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Packing:
-    """All clusters of a tray together: sums over them are divided, not means taken of ratios.
+    """Packing of all clusters of a tray: ratios of sums over the clusters.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Packing:
         Mean area of the hull of a cluster in the picture.
     filling, filling_error : float
         Of a layer one bead high; its error is the scatter of clusters (jackknife), NaN for one.
-        It does not hold that beads may lie over each other: see `least`.
+        Beads that lie over each other are not taken into account: see `least`.
     least : float
         The same if clusters were as high as the tray.
     paper : float
@@ -56,7 +56,7 @@ def packing_of_clusters(
     bodies: NDArray[np.int32],
     height: float,
 ) -> Packing | None:
-    """How densely clusters are packed; None where no beads stick together.
+    """Packing density of the clusters; None where no beads stick together.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def packing_of_clusters(
             'give a place, a radius and a body for each bead',
         )
     labels, counts = np.unique(bodies, return_counts=True)
-    members = [np.flatnonzero(bodies == one) for one in labels[counts > 1]]
+    members = [np.flatnonzero(bodies == label) for label in labels[counts > 1]]
     if not members:
         return None
     areas = np.array([hull_area(places[member], radii[member]) for member in members])
@@ -105,7 +105,7 @@ def packing_of_clusters(
 def bodies_of_pairs(
     ids: NDArray[np.int32], pairs: NDArray[np.int32] | list[tuple[int, int]]
 ) -> NDArray[np.int32]:
-    """For each bead the smallest number of a bead of its body.
+    """Label each bead by the smallest number of a bead in its body.
 
     Parameters
     ----------
@@ -114,18 +114,18 @@ def bodies_of_pairs(
     pairs : (m, 2)
         Numbers of beads that stick together; those not among `ids` may join others.
     """
-    root: dict[int, int] = {int(one): int(one) for one in ids}
+    root: dict[int, int] = {int(bead): int(bead) for bead in ids}
 
-    def find(one: int) -> int:
-        while root.setdefault(one, one) != one:
-            root[one] = root[root[one]]
-            one = root[one]
-        return one
+    def find(bead: int) -> int:
+        while root.setdefault(bead, bead) != bead:
+            root[bead] = root[root[bead]]
+            bead = root[bead]
+        return bead
 
     for first, second in pairs:
         low, high = sorted((find(int(first)), find(int(second))))
         root[high] = low
-    return np.array([find(int(one)) for one in ids], dtype=np.int32)
+    return np.array([find(int(bead)) for bead in ids], dtype=np.int32)
 
 
 def _jackknife(above: NDArray[np.float64], below: NDArray[np.float64]) -> float:

@@ -1,4 +1,4 @@
-"""From merges and speeds to when beads began to stick, and below which speed they do."""
+"""From merges and speeds to the onset of clustering and the sticking speed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial, reduce
 from operator import add, attrgetter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
@@ -17,7 +17,9 @@ from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, stick
 from nanorocks_ros.inference.sticking.sticking_speed import StickingEstimate, sticking_estimate_of
 from nanorocks_ros.physics.sticking_rates import slow_contacts
 from nanorocks_ros.records import BodyEstimate, Merge, Quality, SpeedEstimate
+from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 from nanorocks_ros.stages.preprocess.shake_detection import NS
+from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -25,25 +27,24 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import PipelineSettings
 
-# Fewer speeds are no cycle.
+# Speeds that a cycle needs.
 _FEWEST_SPEEDS = 4
-# A merge is used in what is said of an instant when it was known that much later at the latest.
-_KNOWN_NS = 1_000_000_000
-# Counts of bodies are kept that long; nobody asks of an instant more than seconds ago.
+# Counts of bodies are kept that long; the instants asked for are some seconds ago.
 _KEPT_NS = 20 * NS
 # Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
 _ROUNDING_NS = 1_000_000
 
+Input = SpeedEstimate | BodyEstimate | Merge
 _stamp = attrgetter('stamp_ns')
 
 
 @dataclass(slots=True)
 class _Cycle:
-    """What was seen since a shaking event; counts of bodies by their stamps."""
+    """Records since a shaking event; counts of bodies are sorted by their stamps."""
 
     number: int
     start_ns: int | None = None
-    # Speeds and places are wrong by nobody knows how much.
+    # Errors of speeds and positions are unknown.
     wrong_scale: bool = False
     stamps_ns: list[int] = field(default_factory=list)
     speeds: list[float] = field(default_factory=list)
@@ -51,11 +52,12 @@ class _Cycle:
     bodies: list[BodyEstimate] = field(default_factory=list)
 
 
-class StickingMeter:
-    """Follows the merges of one tray, cycle by cycle.
+class StickingEstimator(RestartingStage[Input, NoReturn]):
+    """Gathers the merges of one tray, cycle by cycle, for the sticking speed as of an instant.
 
-    What it says of an instant depends only on records of times up to then, and merges known a
-    second later at the latest, in whatever order they came in.
+    An estimate of an instant depends only on records of times up to then, and merges known a
+    second later at the latest, in whatever order they came in. A speed whose stamp goes back
+    starts all afresh.
 
     Parameters
     ----------
@@ -63,33 +65,30 @@ class StickingMeter:
     tray : Tray
     """
 
+    clock = SpeedEstimate
+
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.sticking
         self._tray = tray
         self._make_rates: Callable[[], MergeRates] | None = None
         with suppress(NanorocksError):
-            # Without a theory of the tray merges are counted, but no speed follows from them.
+            # Without a theory of the tray merges are counted, but there is no sticking speed.
             contacts = slow_contacts(tray)
-            # Its curve is worked out now, while no image waits; a single bead has none.
+            # The curve is worked out now, while no image waits; a single bead has none.
             if contacts.rates.any():
                 contacts.interpolated_rate_below(1.0, settings.sticking.measure)
             self._make_rates = partial(MergeRates, contacts, tray.count, settings.sticking.measure)
-        self._restart()
+        self.reset()
 
-    def _restart(self) -> None:
+    def _restart(self, stamp_ns: int | None = None) -> None:
+        del stamp_ns
         self._cycles = {0: _Cycle(0)}
-        self._last_ns: int | None = None
         self._finished: dict[int, StickingCycle] = {}
         self._terms: list[MergeLikelihood | None] = []
         self._all: StickingEstimate | None = None
         self._rates = self._make_rates() if self._make_rates else None
 
-    def push(self, record: SpeedEstimate | BodyEstimate | Merge) -> None:
-        """Take the next record; a speed whose stamp goes back starts all afresh."""
-        if isinstance(record, SpeedEstimate):
-            if self._last_ns is not None and record.stamp_ns <= self._last_ns:
-                self._restart()
-            self._last_ns = record.stamp_ns
+    def _process(self, record: Input) -> tuple[NoReturn, ...]:
         cycle = self._cycles.setdefault(record.cycle, _Cycle(record.cycle))
         if isinstance(record, Merge):
             cycle.merges.append(record)
@@ -106,9 +105,10 @@ class StickingMeter:
             if cycle.start_ns is not None and np.isfinite(record.mean_projected_speed.value):
                 cycle.stamps_ns.append(record.stamp_ns)
                 cycle.speeds.append(record.mean_projected_speed.value)
-        # Of earlier cycles nothing more is asked, once the next is on its way.
-        for number in [one for one in self._cycles if one < record.cycle - 1]:
+        # Two cycles back nothing is asked any more.
+        for number in [number for number in self._cycles if number < record.cycle - 1]:
             del self._cycles[number]
+        return ()
 
     def bodies(self, cycle: int, stamp_ns: int) -> BodyEstimate | None:
         """The last count of bodies up to an instant of a cycle."""
@@ -117,64 +117,64 @@ class StickingMeter:
         count = bisect_right(own.bodies, last_ns, key=_stamp) if own else 0
         if own is None or count == 0:
             return None
-        # Of some with the same stamp the one that came in first.
+        # Of several with the same stamp the one that came in first.
         return own.bodies[bisect_left(own.bodies, _stamp(own.bodies[count - 1]), key=_stamp)]
 
     def onset(self, cycle: int, stamp_ns: int) -> float | None:
         """Time of the first merge since the shaking event, [s], as of an instant; None before."""
         own = self._cycles.get(cycle)
-        known = [merge.stamp_ns for merge in self._known(own, stamp_ns)] if own else []
+        known = [merge.stamp_ns for merge in self._known_merges(own, stamp_ns)] if own else []
         if not known or own is None or own.start_ns is None:
             return None
         return (min(known) - own.start_ns) / NS
 
     def of_cycle(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
-        """What the cycle says of the sticking speed up to an instant; None when nothing."""
-        seen = self._seen(cycle, stamp_ns)
-        return self._estimate([self._terms_of(seen)]) if seen else None
+        """Sticking speed of the cycle up to an instant; None when it tells nothing."""
+        cycle_so_far = self._cycle_until(cycle, stamp_ns)
+        return self._estimate_by([self._terms_of(cycle_so_far)]) if cycle_so_far else None
 
-    def seen(self) -> tuple[StickingCycle, ...]:
-        """All cycles since time last went back, the one under way among them, as known by now."""
+    def cycles(self) -> tuple[StickingCycle, ...]:
+        """All cycles since time last went back, with the one under way."""
         last = max(self._cycles)
         own = self._cycles[last]
         if own.stamps_ns:
             self.of_all(last, own.stamps_ns[-1])
         cycles = dict(self._finished)
-        under_way = self._seen(last, own.stamps_ns[-1]) if own.stamps_ns else None
+        under_way = self._cycle_until(last, own.stamps_ns[-1]) if own.stamps_ns else None
         if under_way is not None:
             cycles[last] = under_way
         return tuple(cycles[number] for number in sorted(cycles))
 
     def together(self, cycles: Sequence[StickingCycle]) -> StickingEstimate | None:
-        """What some cycles of this tray say together, also such of other recordings."""
+        """Sticking speed of several cycles of this tray, also of other recordings."""
         if self._make_rates is None or not cycles:
             return None
-        # Rates of their own, lest the cycle under way has to be worked out afresh.
+        # Other rates, so that those of the cycle under way need not be worked out again.
         rates = self._make_rates()
-        return self._estimate([self._terms_of(cycle, rates) for cycle in cycles])
+        return self._estimate_by([self._terms_of(cycle, rates) for cycle in cycles])
 
     def of_all(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
-        """The same of all cycles that were over by then."""
+        """Sticking speed of all cycles that were over by then."""
         before = cycle - 1
         if before > 0 and before not in self._finished:
-            seen = self._seen(before, stamp_ns)
-            if seen is not None:
-                self._finished[before] = seen
-                self._terms.append(self._terms_of(seen))
-                self._all = self._estimate(self._terms)
+            cycle_so_far = self._cycle_until(before, stamp_ns)
+            if cycle_so_far is not None:
+                self._finished[before] = cycle_so_far
+                self._terms.append(self._terms_of(cycle_so_far))
+                self._all = self._estimate_by(self._terms)
         return self._all
 
-    def _known(self, cycle: _Cycle, stamp_ns: int) -> list[Merge]:
+    def _known_merges(self, cycle: _Cycle, stamp_ns: int) -> list[Merge]:
         last_ns = stamp_ns + _ROUNDING_NS
         return [
             merge
             for merge in cycle.merges
-            if merge.stamp_ns <= last_ns and merge.known_ns <= last_ns + _KNOWN_NS
+            if merge.stamp_ns <= last_ns and merge.known_ns <= last_ns + KNOWN_AFTER_NS[Merge]
         ]
 
-    def _seen(self, cycle: int, stamp_ns: int) -> StickingCycle | None:
+    def _cycle_until(self, cycle: int, stamp_ns: int) -> StickingCycle | None:
         own = self._cycles.get(cycle)
-        # Without counts of bodies nobody looked for merges.
+        # Without counts of bodies there was no search for merges.
         if own is None or own.start_ns is None or own.wrong_scale or not own.bodies:
             return None
         used = int(np.searchsorted(own.stamps_ns, stamp_ns + _ROUNDING_NS))
@@ -182,7 +182,7 @@ class StickingMeter:
             return None
         return sticking_cycle(
             self._tray.count,
-            self._known(own, stamp_ns),
+            self._known_merges(own, stamp_ns),
             np.array(own.stamps_ns[:used], dtype=np.int64),
             np.array(own.speeds[:used]),
             own.start_ns,
@@ -191,14 +191,14 @@ class StickingMeter:
     def _terms_of(
         self, cycle: StickingCycle, rates: MergeRates | None = None
     ) -> MergeLikelihood | None:
-        """What a cycle says of each sticking speed; None where that cannot be told."""
+        """Likelihood terms of a cycle for each sticking speed; None where there is no theory."""
         rates = rates or self._rates
         with suppress(NanorocksError):
             return rates.terms(cycle) if rates else None
         return None
 
-    def _estimate(self, terms: Sequence[MergeLikelihood | None]) -> StickingEstimate | None:
-        """By all of some cycles; None where one of them cannot be used."""
+    def _estimate_by(self, terms: Sequence[MergeLikelihood | None]) -> StickingEstimate | None:
+        """Estimate from the terms of several cycles; None where one of them is missing."""
         known = [term for term in terms if term is not None]
         if len(known) < len(terms):
             return None

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import Tracks
 
 _NS = 1e9
-LATEST_NS = 2_000_000_000
-"""Largest delay between a contact and its record at 30 frames/s, [ns]."""
 
 # In intervals between frames: longest gap within a flight (a bead may collide unseen in a longer
 # one), and longest gap at a contact.

@@ -1,4 +1,7 @@
-"""Rebounds and collisions of the current cooling cycle, summed for the restitution fit."""
+"""Rebounds and collisions of the current cooling cycle, summed for the restitution fit.
+
+Tested by ``test/stages/restitution/test_restitution_estimator.py``.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.records import PairCollision, Rebound
-from nanorocks_ros.stages.contacts.contact_finder import LATEST_NS
+from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,7 +46,7 @@ class CycleContacts:
 
     def count(self, first_ns: int, last_ns: int) -> None:
         """Sum the contacts between the end of the shaking and 2 s before the last speed."""
-        latest = last_ns - LATEST_NS
+        latest = last_ns - KNOWN_AFTER_NS[Rebound]
         ripe = [contact for contact in self._waiting if contact.stamp_ns <= latest]
         self._keep(lambda stamp_ns: stamp_ns > latest)
         within = [contact for contact in ripe if contact.stamp_ns >= first_ns]

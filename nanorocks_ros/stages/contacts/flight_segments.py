@@ -1,4 +1,7 @@
-"""Segmentation of tracks into straight flights, with the velocity jumps between them."""
+"""Segmentation of tracks into straight flights, with the velocity jumps between them.
+
+Tested by ``test/stages/contacts/test_contact_finder.py``.
+"""
 
 from __future__ import annotations
 

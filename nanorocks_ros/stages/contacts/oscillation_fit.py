@@ -1,4 +1,7 @@
-"""Fits of polynomials and damped oscillations to tray positions, for the velocity at one time."""
+"""Fits of polynomials and damped oscillations to tray positions, for the velocity at one time.
+
+Tested by ``test/stages/contacts/test_tray_history.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Tests that two velocity jumps are one collision of two beads without a third body."""
+"""Tests that two velocity jumps are one collision of two beads without a third body.
+
+Tested by ``test/stages/contacts/test_contact_finder.py``.
+"""
 
 from __future__ import annotations
 

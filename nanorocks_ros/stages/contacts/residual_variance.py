@@ -1,4 +1,7 @@
-"""Residual variance of positions about straight flights, estimated from the flights."""
+"""Residual variance of positions about straight flights, estimated from the flights.
+
+Tested by ``test/stages/contacts/test_contact_finder.py``.
+"""
 
 from __future__ import annotations
 

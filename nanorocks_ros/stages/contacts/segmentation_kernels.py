@@ -1,4 +1,7 @@
-"""Compiled piecewise linear segmentation of tracks: straight flights and velocity jumps."""
+"""Compiled piecewise linear segmentation of tracks: straight flights and velocity jumps.
+
+Tested by ``test/stages/contacts/test_contact_finder.py``.
+"""
 
 from __future__ import annotations
 

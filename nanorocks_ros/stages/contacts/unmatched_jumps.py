@@ -1,4 +1,7 @@
-"""Velocity jumps that wait for the jump of the collision partner."""
+"""Velocity jumps that wait for the jump of the collision partner.
+
+Tested by ``test/stages/contacts/test_contact_finder.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Compiled part of cutting out trays: bilinear interpolation of whole crops in integers."""
+"""Bilinear interpolation of whole crops in integers, in compiled functions.
+
+Tested by ``test/stages/preprocess/test_rectify.py``.
+"""
 
 from __future__ import annotations
 
@@ -197,10 +200,10 @@ def fill_by_runs(
 
 
 @compiled
-def _runs(places: NDArray[np.int32], row: int, found: NDArray[np.int32]) -> None:
+def _runs(places: NDArray[np.int32], row: int, runs: NDArray[np.int32]) -> None:
     """Beginnings and steps along one axis of all runs of a row, (runs, 2)."""
-    for j in range(found.shape[0]):
-        found[j, 0], found[j, 1] = _run(places, row // STEP, j, np.int32(row % STEP))
+    for j in range(runs.shape[0]):
+        runs[j, 0], runs[j, 1] = _run(places, row // STEP, j, np.int32(row % STEP))
 
 
 @compiled

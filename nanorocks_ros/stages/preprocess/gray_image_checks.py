@@ -1,4 +1,7 @@
-"""What can be said against the gray image of a tray: too bright, too flat, hidden by glare."""
+"""Checks of the gray image of a tray: saturation, low contrast and glare.
+
+Tested by ``test/stages/preprocess/test_preprocessor.py``.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from nanorocks_ros.records import Quality
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Levels from here on are full scale; a sensor's noise takes some pixels a little below it.
+# Levels from here on count as full scale, with the noise of the sensor.
 _FULL = 250
 # Glare covers whole blocks of so many pixels, the highlight on a bead does not.
 _BLOCK = 8
@@ -50,7 +53,7 @@ def _hidden(gray: NDArray[np.uint8]) -> float:
     blocks = 0
     for i in range(0, rows - _BLOCK + 1, _BLOCK):
         for j in range(0, columns - _BLOCK + 1, _BLOCK):
-            # Most blocks are dark in the middle, and need no closer look.
+            # Most blocks are dark in the middle.
             if gray[i + _BLOCK // 2, j + _BLOCK // 2] >= _FULL:
                 blocks += gray[i : i + _BLOCK, j : j + _BLOCK].min() >= _FULL
     return blocks * _BLOCK * _BLOCK / gray.size

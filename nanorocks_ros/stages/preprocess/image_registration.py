@@ -1,8 +1,10 @@
-"""Compiled part of the stabilisation: how far a set of points has moved between two pictures.
+"""Registration of a set of points in a picture, in compiled functions.
 
 Gauss-Newton on the squared differences (Lucas and Kanade 1981; Baker and Matthews 2004,
 IJCV 56, 221, "inverse compositional"), with the light's gain and offset as two more unknowns and
-differences far out of the rest bounded (Huber).
+outliers bounded (Huber).
+
+Tested by ``test/stages/preprocess/test_stabilise.py``.
 """
 
 from __future__ import annotations
@@ -24,8 +26,8 @@ _BOUND = 2.0
 # Median of the absolute value of a normal variate.
 _MEDIAN = 0.6745
 _ROUNDING = 0.3
-# A point whose level changes so much more than usual in power is half trusted: something passes
-# in front of it, or light that does not move with the tray.
+# A point whose squared change of level is so many times the usual has half the weight: something
+# passes in front of it, or the light changes there.
 _SUSPECT = 3.0
 UNKNOWNS = 4
 
@@ -69,7 +71,7 @@ def sample(
 
 @compiled
 def substitute(factor: NDArray[np.float64], right: NDArray[np.float64]) -> None:
-    """Solve with a factor of Cholesky already at hand, in place."""
+    """Solve with a known Cholesky factor, in place."""
     n = factor.shape[0]
     for m in range(right.shape[1]):
         for i in range(n):
@@ -91,7 +93,7 @@ def solve(matrix: NDArray[np.float64], right: NDArray[np.float64]) -> bool:
     Parameters
     ----------
     matrix : ndarray, (n, n)
-        Spoilt.
+        Overwritten.
     right : ndarray, (n, m)
         Right sides; holds the solutions afterwards.
     """
@@ -128,7 +130,7 @@ def register(
     slopes: NDArray[np.float64],
     trust: NDArray[np.float64],
     start: tuple[float, float],
-    found: NDArray[np.float64],
+    result: NDArray[np.float64],
     values: NDArray[np.float64],
 ) -> bool:
     """Displacement at which the picture shows the reference best.
@@ -143,16 +145,16 @@ def register(
     trust : ndarray, (n,), 0 to 1
         Weight of each point.
     start : tuple of 2 floats, [px]
-    found : ndarray, (5,)
-        Written: displacement (2) [px], its standard error, and the spread of what differences
-        remain and of the reference [gray levels].
+    result : ndarray, (5,)
+        Written: displacement (2) [px], its standard error, and the standard deviations of the
+        remaining differences and of the reference [gray levels].
     values : ndarray, (n,)
         Written: the samples at that displacement, corrected for the light.
 
     Returns
     -------
     bool
-        False when there was no direction to go.
+        False when the equations have no solution.
     """
     n = reference.size
     dx, dy, gain, offset = start[0], start[1], 1.0, 0.0
@@ -191,33 +193,33 @@ def register(
     for k in range(n):
         values[k] = (raw[k] - offset - middle) / max(gain, 0.1) + middle
         total += (reference[k] - middle) * (reference[k] - middle)
-    found[0], found[1] = dx, dy
+    result[0], result[1] = dx, dy
     # The factor of Cholesky is left in `normal`: errors of the first two unknowns.
     sides = np.zeros((UNKNOWNS, 2))
     sides[0, 0] = sides[1, 1] = 1.0
     substitute(normal, sides)
-    found[2] = spread * math.sqrt(0.5 * (sides[0, 0] + sides[1, 1])) + 0.5 * change
-    found[3] = spread
-    found[4] = math.sqrt(total / n)
+    result[2] = spread * math.sqrt(0.5 * (sides[0, 0] + sides[1, 1])) + 0.5 * change
+    result[3] = spread
+    result[4] = math.sqrt(total / n)
     return True
 
 
 @compiled
-def learn(
+def update_reference(
     values: NDArray[np.float64],
     seen: int,
     reference: NDArray[np.float64],
     powers: NDArray[np.float64],
     trust: NDArray[np.float64],
 ) -> None:
-    """Take the samples of another picture into the reference.
+    """Update the reference with the samples of another picture.
 
     Parameters
     ----------
     values : ndarray, (n,), [gray levels]
-        At the displacement found.
+        At the displacement of this picture.
     seen : int
-        Pictures that are averaged, with this one.
+        Number of pictures averaged, with this one.
     reference, powers : ndarray, (n,), [gray levels], [gray levels^2]
         Means of the values, and of the squares of their differences from it; changed.
     trust : ndarray, (n,), 0 to 1
@@ -234,7 +236,7 @@ def learn(
 
 
 @compiled
-def search(
+def search_shift(
     image: NDArray[np.uint8],
     mix: NDArray[np.float64],
     places: NDArray[np.float64],

@@ -1,4 +1,7 @@
-"""Where the plate is in a picture: roughly, from the slopes along the sides of its trays."""
+"""Rough position of the plate in a picture, from the slopes along the sides of its trays.
+
+Tested by ``test/studies/calibration/test_plate_fit.py``.
+"""
 
 from __future__ import annotations
 
@@ -19,10 +22,10 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
 
-# The search for the plate looks at a picture so much smaller.
+# Reduction of the picture for the search.
 _REDUCED = 4
 _SCALE_STEP = 1.01
-# Slopes beyond this share of all pixels count as this steep: a glare must not outshine a tray.
+# Quantile at which slopes are cut off: glare must not outweigh a tray.
 _STEEPEST = 0.98
 
 
@@ -50,7 +53,7 @@ def _best_plate(
     down: NDArray[np.float64],
     boxes: NDArray[np.float64],
     scales: NDArray[np.float64],
-    found: NDArray[np.float64],
+    result: NDArray[np.float64],
 ) -> None:
     """Scale and place at which the sides of the boxes collect the steepest slopes.
 
@@ -63,7 +66,7 @@ def _best_plate(
     boxes : ndarray, (n, 4)
         x, y, width, height of the floors at scale 1.
     scales : ndarray, (m,)
-    found : ndarray, (m, 4)
+    result : ndarray, (m, 4)
         Written: mean slope, x, y and length of the sides, for each scale.
     """
     rows, columns = down.shape[0], across.shape[1]
@@ -89,9 +92,9 @@ def _best_plate(
                     total += down[b, c] - down[b, a] + down[d, c] - down[d, a]
                 if total > best:
                     best = total
-                    found[m, 1], found[m, 2] = x, y
-        found[m, 0] = best / max(length, 1)
-        found[m, 3] = length
+                    result[m, 1], result[m, 2] = x, y
+        result[m, 0] = best / max(length, 1)
+        result[m, 3] = length
 
 
 def guess_plate(
@@ -131,15 +134,15 @@ def guess_plate(
         slopes[k] = np.pad(np.cumsum(slope, axis=k, dtype=np.float64), _FRONT[k])
     count = max(1, math.ceil(math.log(high / low) / math.log(_SCALE_STEP)) + 1)
     scales = np.geomspace(low, high, count)
-    found = np.full((count, 4), -1.0)
-    _best_plate(slopes[0], slopes[1], boxes, scales / _REDUCED, found)
-    # The longer the sides, the less likely by chance.
-    excess = (found[:, 0] - np.mean(usual)) * np.sqrt(np.maximum(found[:, 3], 0.0))
+    candidates = np.full((count, 4), -1.0)
+    _best_plate(slopes[0], slopes[1], boxes, scales / _REDUCED, candidates)
+    # The mean over longer sides has less scatter.
+    excess = (candidates[:, 0] - np.mean(usual)) * np.sqrt(np.maximum(candidates[:, 3], 0.0))
     best = int(np.argmax(excess))
     return PlateGuess(
         pixels_per_metre=float(scales[best]),
-        corner=(float(found[best, 1] * _REDUCED), float(found[best, 2] * _REDUCED)),
-        contrast=float(found[best, 0] / max(np.mean(usual), 1e-9)),
+        corner=(float(candidates[best, 1] * _REDUCED), float(candidates[best, 2] * _REDUCED)),
+        contrast=float(candidates[best, 0] / max(np.mean(usual), 1e-9)),
     )
 
 

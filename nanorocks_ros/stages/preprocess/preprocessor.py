@@ -1,4 +1,4 @@
-"""From the camera's frame to the straight, steady, gray crop of each tray, once per frame."""
+"""From a camera frame to the rectified, stabilised crop of each tray."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from nanorocks_ros.stages.preprocess.gray_image_checks import picture_quality
 from nanorocks_ros.stages.preprocess.shake_detection import PlateMeter, ShakeCounter
 from nanorocks_ros.stages.preprocess.stabilise import shift_of_plate
 from nanorocks_ros.stages.preprocess.tray_crop import TrayCrop
-from nanorocks_ros.stages.preprocess.tray_position_check import map_problem
+from nanorocks_ros.stages.preprocess.tray_position_check import position_problem
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 
 CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
 NS = 1_000_000_000
-# Frames at which the trays are looked for.
-_MAP_CHECKS = (8, 16)
+# Frames at which the positions of the trays are checked.
+_POSITION_CHECKS = (8, 16)
 
 
 class Preprocessor:
-    """Cuts the trays out of each frame: straight, at rest, with their gray mix.
+    """Cuts the trays out of each frame: rectified, stabilised, with their gray mix.
 
     Parameters
     ----------
@@ -44,10 +44,10 @@ class Preprocessor:
     trays : mapping of int to Tray
         The trays of `settings.trays`.
     camera : str
-        What to call the source of the frames in an error.
+        Name of the source of the frames in errors.
     view : View, optional
-        What camera_info says of the lens. A calibration file in the settings goes before it;
-        without either, frames are taken as straight.
+        The lens, from camera_info. A calibration file in the settings has priority; without
+        either, frames are taken as rectified.
 
     Raises
     ------
@@ -77,19 +77,19 @@ class Preprocessor:
 
     @property
     def view(self) -> View | None:
-        """What is known of the lens."""
+        """The lens; None when it is unknown."""
         return self._view
 
     @property
     def regions(self) -> dict[int, Region]:
-        """Where the trays are in the rectified frame, by number; empty before the first frame."""
+        """Regions of the trays in the rectified frame, by number; empty before the first frame."""
         return {
             tray.number: region for tray, region in zip(self._trays, self._regions, strict=False)
         }
 
     @property
     def duplicates(self) -> int:
-        """Frames left out so far since they were the same as the one before."""
+        """Number of frames left out so far because they equalled the one before."""
         return 0 if self._shape is None else self._checks.duplicates
 
     def push(self, frame: Frame) -> tuple[TrayImage | Notice, ...]:
@@ -116,10 +116,10 @@ class Preprocessor:
         if not verdict.usable:
             return (*notices, *verdict.notices)
         images = self._tray_images(frame, verdict.rows, verdict.quality)
-        return (*notices, *images, *verdict.notices, *self._check_map(frame))
+        return (*notices, *images, *verdict.notices, *self._check_positions(frame))
 
     def _start(self) -> None:
-        """Forget everything but where the trays are."""
+        """Forget everything but the regions of the trays."""
         speed = self._pipeline.speed
         height, width = (self._shape or (1, 1))[:2]
         self._straight = View(camera=IdentityLens(width=width, height=height))
@@ -142,19 +142,19 @@ class Preprocessor:
             for tray, region in zip(self._trays, self._regions, strict=True)
         )
 
-    def _check_map(self, frame: Frame) -> tuple[Notice, ...]:
-        """Whether the trays are where they should be: early on, and once more to be sure."""
+    def _check_positions(self, frame: Frame) -> tuple[Notice, ...]:
+        """Check the positions of the trays, early in the recording and once more."""
         self._frames += 1
-        if self._frames not in _MAP_CHECKS or not self._settings.check_tray_positions:
+        if self._frames not in _POSITION_CHECKS or not self._settings.check_tray_positions:
             return ()
         view = self._view or self._straight
         image = np.ascontiguousarray(frame.image).reshape(*frame.image.shape[:2], -1)
         numbers = [tray.number for tray in self._trays]
-        text, wrong = map_problem(image, view, self._regions, numbers, self._settings)
+        text, wrong = position_problem(image, view, self._regions, numbers, self._settings)
         before, self._suspects = self._suspects, wrong
-        if self._frames != _MAP_CHECKS[-1]:
+        if self._frames != _POSITION_CHECKS[-1]:
             return ()
-        # One picture may have been taken in the middle of a jolt.
+        # A single picture may have been taken during a jolt.
         self._misplaced = before & wrong
         if not self._misplaced:
             return ()
@@ -166,16 +166,16 @@ class Preprocessor:
         whole = []
         for crop in self._crops:
             if rows < image.shape[0] and crop.lowest_row > rows:
-                # The images before and after it are compared as if it had not been.
+                # The tray has no image of this frame; the next one carries the flag.
                 crop.pending |= Quality.HALF_FRAME
                 continue
-            hint = crop.follow(image, hint) or hint
+            hint = crop.register(image, hint) or hint
             whole.append(crop)
         plate = shift_of_plate([crop.shift for crop in whole if crop.shift is not None])
         pictures: list[tuple[TrayCrop, NDArray[np.uint8], NDArray[np.uint8] | None]] = []
         jumps = []
         for crop in whole:
-            crop.settle(frame.stamp_ns, plate)
+            crop.update_motion(frame.stamp_ns, plate)
             gray, color = crop.crop(image)
             jumps.append(crop.meter.push(frame.stamp_ns, gray))
             pictures.append((crop, gray, color))
@@ -188,7 +188,7 @@ class Preprocessor:
         )
 
     def _plate_speed(self) -> tuple[float, float]:
-        """Speed of the plate and its error, [m/s]; NaN when no tray knows."""
+        """Speed of the plate and its error, [m/s]; NaN when no tray was registered."""
         known = [crop for crop in self._crops if math.isfinite(crop.velocity_error)]
         if not known:
             return math.nan, math.nan
@@ -289,8 +289,8 @@ class Preprocessor:
         height, width = shape[:2]
         if self._settings.layout == 'plate' and not self._settings.regions_px:
             scale = self._settings.pixels_per_metre
-            found = regions_on_plate(self._trays, (height, width), scale)
-            return tuple(found[tray.number] for tray in self._trays)
+            on_plate = regions_on_plate(self._trays, (height, width), scale)
+            return tuple(on_plate[tray.number] for tray in self._trays)
         flat = self._settings.regions_px or self._centred(width, height)
         regions = tuple(Region(*flat[i : i + 4]) for i in range(0, len(flat), 4))
         for tray, (x, y, w, h) in zip(self._trays, regions, strict=True):

@@ -1,8 +1,8 @@
-"""From the picture of the lens to the straight crop of one tray, its colours and its gray mix.
+"""Rectified crop of one tray from a frame, in colour and as gray mix.
 
-The lens bends lines so gently that where a pixel comes from is worked out at every eighth pixel
-only, and each pixel is interpolated once, straight from the frame: lens, pose of the plate and
-motion of the tray in one go.
+The source position of a pixel is computed at every eighth pixel only, as the lens distorts little;
+each pixel is interpolated once, directly from the frame: lens, pose of the plate and motion of the
+tray in one step.
 """
 
 from __future__ import annotations
@@ -78,14 +78,14 @@ def resample_gray(
     shift: tuple[float, float],
     gray: NDArray[np.uint8],
 ) -> None:
-    """The same for a picture without colours, (height, width)."""
+    """Fill a rectified gray crop from a gray picture, (height, width)."""
     places_x = moved(nodes, shift, 0, image.shape[1])
     places_y = moved(nodes, shift, 1, image.shape[0])
     fill_gray(image, places_x, places_y, gray)
 
 
 def nodes_of(region: Region, view: View) -> NDArray[np.float64]:
-    """Where every eighth pixel of a region comes from, and how that follows a shift.
+    """Source position of every eighth pixel of a region, and its derivative by a shift.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def nodes_of(region: Region, view: View) -> NDArray[np.float64]:
 
 
 def places_of(points: NDArray[np.float64], view: View) -> NDArray[np.float64]:
-    """Where points of the rectified picture are in that of the lens, with derivatives.
+    """Positions of points of the rectified picture in the frame, with derivatives.
 
     Parameters
     ----------

@@ -1,14 +1,14 @@
 """Sensor noise and shaking events, from the gray images and from the motion of the trays.
 
-Shaking events are counted in one place, by the :class:`ShakeCounter` of the preprocessor; its
-count travels with each tray image. Whoever is given images that nobody counted uses a counter
-of its own, which finds the same events in the same images.
+The :class:`ShakeCounter` of the preprocessor counts the shaking events; each tray image carries
+the count. For images without a count a :class:`CycleFollower` finds the same events.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import cv2
@@ -29,7 +29,7 @@ NS = 1_000_000_000
 # Half a second of pictures at 30 Hz: longer than a jump takes, shorter than a decay.
 _MEMORY_FRAMES = 15
 _NOISE_FRAMES = 300
-# Fewer say nothing of the least noise.
+# Frames needed for the smallest noise.
 _FEW_FRAMES = 5
 _NOISE_QUANTILE = 0.2
 # A step in time so many times longer than usual means that frames are missing.
@@ -39,9 +39,9 @@ _CLIP = 3.0
 _CLIPPED_VARIANCE = 0.9733
 # A uint8 difference of variance 2 sigma^2 is never known better than its rounding.
 _ROUNDING_POWER = 1.0 / 6.0
-# A plate that swings stands still twice in every period, and that is no rest.
+# An oscillating plate stands still twice in every period, which is no rest.
 _SWING_NS = 5 * NS
-# A speed of the tray counts when it is known to be one.
+# Smallest significant speed of the tray, in standard errors.
 _SIGNIFICANT = 5.0
 
 
@@ -55,10 +55,10 @@ def _difference_counts(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> 
     """How many pixels differ by 0, 1, ... 255 gray levels."""
     # Two tables: the same entry twice in a row would wait for itself.
     counts = np.zeros((2, 256), dtype=np.int64)
-    one, other = later.reshape(-1), earlier.reshape(-1)
-    for k in range(one.size):
+    first, second = later.reshape(-1), earlier.reshape(-1)
+    for k in range(first.size):
         place = np.uint64(k)
-        difference = np.int32(one[place]) - np.int32(other[place])
+        difference = np.int32(first[place]) - np.int32(second[place])
         counts[np.uint64(k & 1), np.uint64(abs(difference))] += 1
     total: NDArray[np.int64] = counts[0] + counts[1]
     return total
@@ -108,21 +108,21 @@ def noise_power(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> float:
 
 
 class NoiseMeter:
-    """Noise of a series of images: the least that was seen.
+    """Noise of a series of images: the smallest measured.
 
-    Where grains cover much of a picture nothing in it tells fast motion from noise: of the grains
-    of tray 7 at 15 mm/s all motion was taken for noise. At rest, or slow, they show it.
+    Where grains cover much of a picture, fast motion cannot be told from noise: of the grains of
+    tray 7 at 15 mm/s all motion was taken for noise. Grains that are slow or at rest show it.
     """
 
     def __init__(self) -> None:
-        # A frame stored twice has no noise: the least of all will not do.
+        # A frame stored twice has no noise: the minimum would be wrong.
         self._recent = Quantile(_NOISE_QUANTILE, _MEMORY_FRAMES)
         self._pushed = 0
-        self._least = math.inf
+        self._smallest = math.inf
         self._last: NDArray[np.uint8] | None = None
 
-    def begin(self, image: NDArray[np.uint8]) -> None:
-        """Take an image that is not the next after the last one."""
+    def start_from(self, image: NDArray[np.uint8]) -> None:
+        """Compare the next image with this one."""
         self._last = image
 
     def push(self, image: NDArray[np.uint8]) -> float:
@@ -133,8 +133,8 @@ class NoiseMeter:
         recent = self._recent.push(noise_power(image, last))
         self._pushed += 1
         if self._pushed >= _FEW_FRAMES:
-            self._least = min(self._least, recent)
-        return min(self._least, recent)
+            self._smallest = min(self._smallest, recent)
+        return min(self._smallest, recent)
 
 
 class MotionMeter:
@@ -172,17 +172,17 @@ class MotionMeter:
             return False
         usual = median(self._steps) if self._steps else step
         self._steps.append(step)
-        # Beads come further while frames are missing, and that is no jump. One that happened
-        # just then is seen with the next image.
+        # Beads move further while frames are missing, which is no jump. A jump during the gap is
+        # seen with the next image.
         if step > _GAP * usual:
             return False
         counts = _difference_counts(gray, last)
-        # Slow motion hides in the noise, and a frame stored twice has none: neither the mean
-        # nor the least will do.
+        # Motion adds to the noise, and a frame stored twice has none: neither the mean nor the
+        # minimum is right.
         self.noise_power = self._noise.push(_power_of(counts))
         quiet = self.noise_power * gray.size
         motion = _total_power(counts) - quiet
-        # 15 frames rather than all: the gas may have been shaken harder long ago.
+        # Of 15 frames, not of all: an earlier shaking event may have been stronger.
         before = max(self._recent, default=None)
         self._recent.append(motion)
         return before is not None and motion > self._ratio * max(before, 0.0) + quiet
@@ -209,16 +209,16 @@ class PlateMeter:
             return False
         while self._recent and stamp_ns - self._recent[0][0] > _SWING_NS:
             self._recent.popleft()
-        before = max((one for _, one in self._recent), default=None)
+        before = max((speed for _, speed in self._recent), default=None)
         self._recent.append((stamp_ns, speed))
         least = max(self._least, _SIGNIFICANT * error)
         return before is not None and speed > max(least, self._ratio * before)
 
 
 class ShakeCounter:
-    """Numbers the shaking events, from what the trays and the plate say of each frame.
+    """Counts the shaking events, by the jumps of the trays and of the plate in each frame.
 
-    All trays are on one plate and are shaken together: an event is what the plate shows, or at
+    All trays are on one plate and are shaken together: an event is a jump of the plate, or of at
     least half of the trays.
 
     Parameters
@@ -240,7 +240,7 @@ class ShakeCounter:
         self.cycle_start_ns: int | None = None
 
     def push(self, stamp_ns: int, jumps: Iterable[bool], plate: bool = False) -> bool:
-        """Take what is said of the next frame; True when the trays were shaken before it."""
+        """Take the jumps of the next frame; True when the trays were shaken before it."""
         last, self._last_ns = self._last_ns, stamp_ns
         if last is None:
             return False
@@ -255,7 +255,7 @@ class ShakeCounter:
 
 
 class CycleFollower:
-    """Cycle and noise of the images of one tray: as they say, or found from them.
+    """Cycle and noise of the images of one tray: carried by the images, or found from them.
 
     Parameters
     ----------
@@ -290,5 +290,16 @@ class CycleFollower:
             self.cycle, self.cycle_start_ns = image.cycle, image.cycle_start_ns
             if not math.isnan(image.noise_power):
                 self.noise_power = image.noise_power
-        # A recording that is joined in the middle of a cycle was not shaken just then.
+        # A recording that starts in the middle of a cycle was not shaken at its first image.
         return self.cycle != before and not first
+
+    def counted(self, image: TrayImage) -> TrayImage:
+        """The last image with its cycle and noise filled in."""
+        if image.cycle is not None and not math.isnan(image.noise_power):
+            return image
+        return replace(
+            image,
+            cycle=self.cycle,
+            cycle_start_ns=self.cycle_start_ns,
+            noise_power=self.noise_power,
+        )

@@ -1,7 +1,7 @@
-"""Where a tray is in each picture: it swings on its springs after it was shaken.
+"""Displacement of a tray in each picture: it oscillates on its springs after it was shaken.
 
-The walls around the floor are compared with how they looked before. No bead ever lies there, so
-nothing has to be known about beads.
+The walls around the floor are registered with a reference of earlier pictures; no bead ever lies
+there.
 """
 
 from __future__ import annotations
@@ -15,7 +15,12 @@ import numpy as np
 
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.numerics.quantiles import median
-from nanorocks_ros.stages.preprocess.image_registration import learn, register, sample, search
+from nanorocks_ros.stages.preprocess.image_registration import (
+    register,
+    sample,
+    search_shift,
+    update_reference,
+)
 from nanorocks_ros.stages.preprocess.rectify import places_of
 
 if TYPE_CHECKING:
@@ -25,21 +30,21 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.view import View
 
-# Points across edges that run along rows, and as many across those along columns.
+# Number of points on edges along rows, and as many on edges along columns.
 _POINTS = 250
 _FEWEST_POINTS = 60
-# Least slope that is no noise, [gray levels/px], and share of the steepest that is as good.
-_LEAST_SLOPE = 3.0
+# Smallest slope above the noise, [gray levels/px], and share of the steepest that is as good.
+_SMALLEST_SLOPE = 3.0
 _STEEP = 0.3
-# Next to the floor, [px], what lies there is blurred into the wall.
+# Distance from the floor within which it is blurred into the wall, [px].
 _BLUR = 2
-# How far off a tray that was lost is looked for, and one whose neighbour is known, [px].
+# Range of the search for a lost tray, and for one with a registered neighbour, [px].
 _REACH = 16
 _NARROW_REACH = 4
-# What differences may remain, as a share of the contrast, and the largest standard error, [px].
-_MOST_SPREAD = 0.5
+# Largest remaining difference, as a share of the contrast, and largest standard error, [px].
+_LARGEST_RESIDUAL = 0.5
 _LARGEST_ERROR = 0.2
-# What interpolation between pixels does to an edge, [px]: measured on simulated swings.
+# Error by the interpolation between pixels, [px]: measured on simulated oscillations.
 _INTERPOLATION = 0.02
 _FEWEST_TRAYS = 3
 # Pictures averaged in the reference.
@@ -62,7 +67,7 @@ class Shift:
 
 
 def shift_of_plate(shifts: Sequence[Shift]) -> Shift | None:
-    """Where the plate is that the trays are on: the median of three or more."""
+    """Displacement of the plate: the median of three or more trays."""
     if len(shifts) < _FEWEST_TRAYS:
         return None
     return Shift(
@@ -72,8 +77,8 @@ def shift_of_plate(shifts: Sequence[Shift]) -> Shift | None:
     )
 
 
-class TrayFollower:
-    """Follows the walls of one tray from picture to picture.
+class TrayRegistration:
+    """Registers the walls of one tray from picture to picture.
 
     Parameters
     ----------
@@ -100,7 +105,7 @@ class TrayFollower:
         self._last = Shift(0.0, 0.0, 0.0)
 
     def push(self, image: NDArray[np.uint8], hint: Shift | None) -> Shift | None:
-        """Where the tray is in the next picture.
+        """Displacement of the tray in the next picture.
 
         Parameters
         ----------
@@ -111,10 +116,10 @@ class TrayFollower:
         Returns
         -------
         Shift or None
-            From where it was in the first picture; None when the walls are not seen.
+            From its position in the first picture; None when the walls are not seen.
         """
         if self._places is None:
-            return self._begin(image)
+            return self._choose_points(image)
         if self._reference.size == 0:
             return None
         first = self._last if hint is None else hint
@@ -122,7 +127,7 @@ class TrayFollower:
         if shift is None:
             reach = _REACH if hint is None else _NARROW_REACH
             few = slice(None, None, 4)
-            start = search(
+            start = search_shift(
                 image,
                 self._mix,
                 np.ascontiguousarray(self._places[few]),
@@ -134,23 +139,23 @@ class TrayFollower:
         if shift is None:
             return None
         self._last = shift
-        # The average is sharper than any one picture is free of noise.
+        # The average has less noise than a single picture.
         self._seen = min(self._seen + 1, _MEMORY)
-        learn(self._values, self._seen, self._reference, self._powers, self._trust)
+        update_reference(self._values, self._seen, self._reference, self._powers, self._trust)
         return shift
 
     @property
-    def sighted(self) -> bool:
-        """Whether there are walls to follow the tray by."""
+    def has_walls(self) -> bool:
+        """Whether there are walls by which the tray can be registered."""
         return self._reference.size > 0
 
-    def corrected(self, shift: Shift) -> None:
-        """Be told where the tray really was in the last picture."""
+    def set_shift(self, shift: Shift) -> None:
+        """Set the true displacement in the last picture."""
         self._last = shift
 
     def _registered(self, image: NDArray[np.uint8], start: tuple[float, float]) -> Shift | None:
         assert self._places is not None
-        found = np.empty(5)
+        result = np.empty(5)
         done = register(
             image,
             self._mix,
@@ -159,18 +164,18 @@ class TrayFollower:
             self._slopes,
             self._trust,
             start,
-            found,
+            result,
             self._values,
         )
-        if not done or not np.isfinite(found).all():
+        if not done or not np.isfinite(result).all():
             return None
-        x, y, error, spread, contrast = (float(one) for one in found)
-        if spread > _MOST_SPREAD * contrast or error > _LARGEST_ERROR:
+        x, y, error, spread, contrast = (float(number) for number in result)
+        if spread > _LARGEST_RESIDUAL * contrast or error > _LARGEST_ERROR:
             return None
         return Shift(x, y, math.hypot(error, _INTERPOLATION))
 
-    def _begin(self, image: NDArray[np.uint8]) -> Shift | None:
-        """Choose the points to follow; None when the walls have too few edges."""
+    def _choose_points(self, image: NDArray[np.uint8]) -> Shift | None:
+        """Choose the points to register; None when the walls have too few edges."""
         points, slopes = self._edges(image)
         self._places = places_of(points, self._view)
         self._slopes = slopes
@@ -194,7 +199,7 @@ class TrayFollower:
         places[..., :2] = self._view.source(grid)
         gray = np.empty(rows * columns)
         sample(image, self._mix, places.reshape(-1, 6), (0.0, 0.0), gray)
-        # Chosen where they are no noise, but followed by how steep they are.
+        # Points are chosen in the smoothed picture, but registered by the slopes of the original.
         smooth = cv2.GaussianBlur(gray.reshape(rows, columns), (3, 3), 0.0)
         steepness = np.stack(np.gradient(smooth)[::-1], axis=-1)
         slopes = np.stack(np.gradient(gray.reshape(rows, columns))[::-1], axis=-1)
@@ -206,18 +211,18 @@ class TrayFollower:
         usable &= (places[..., 0] >= 1.0) & (places[..., 0] <= width - 1.0)
         usable &= (places[..., 1] >= 1.0) & (places[..., 1] <= height - 1.0)
         chosen = [_steepest(np.abs(steepness[..., axis]), usable) for axis in (0, 1)]
-        if min(len(one) for one in chosen) < _FEWEST_POINTS:
+        if min(len(points) for points in chosen) < _FEWEST_POINTS:
             return np.empty((0, 2)), np.empty((0, 2))
-        both = np.unique(np.concatenate(chosen))
-        return grid.reshape(-1, 2)[both], np.ascontiguousarray(slopes.reshape(-1, 2)[both])
+        pixels = np.unique(np.concatenate(chosen))
+        return grid.reshape(-1, 2)[pixels], np.ascontiguousarray(slopes.reshape(-1, 2)[pixels])
 
 
 def _steepest(slope: NDArray[np.float64], usable: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Flat places of steep pixels, spread evenly over all that are steep enough."""
+    """Flat indices of steep pixels, spread evenly over all that are steep enough."""
     if not usable.any():
         return np.empty(0, dtype=np.intp)
-    least = max(_LEAST_SLOPE, _STEEP * float(np.quantile(slope[usable], 0.98)))
-    steep = np.flatnonzero(usable & (slope >= least))
+    smallest = max(_SMALLEST_SLOPE, _STEEP * float(np.quantile(slope[usable], 0.98)))
+    steep = np.flatnonzero(usable & (slope >= smallest))
     if steep.size <= _POINTS:
         return steep
     return steep[np.linspace(0, steep.size - 1, _POINTS).astype(np.intp)]

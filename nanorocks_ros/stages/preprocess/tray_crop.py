@@ -1,4 +1,7 @@
-"""One tray in the frames: where its floor is, how it moves, and the crop that is made of it."""
+"""The crop of one tray: its region, its motion and its pixels at rest.
+
+Tested by ``test/stages/preprocess/test_preprocessor.py``.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ from nanorocks_ros.stages.preprocess.rectify import (
     resample_gray,
 )
 from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter
-from nanorocks_ros.stages.preprocess.stabilise import Shift, TrayFollower
+from nanorocks_ros.stages.preprocess.stabilise import Shift, TrayRegistration
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,11 +29,11 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
 
 NS = 1_000_000_000
-# A smaller shift is not worth the sharpness that an interpolation costs.
+# A smaller shift is ignored, since an interpolation blurs the picture.
 _NEGLIGIBLE_PX = 0.04
 _SIGNIFICANT = 2.0
 _WHOLE = (0.0, 0.0)
-# A tray does not leave its plate: one that seems to was mistaken for what moves beside it.
+# Largest distance from the plate: beyond it something that moves beside the tray was registered.
 _STRAYED_PX = 1.0
 
 
@@ -45,7 +48,7 @@ class TrayCrop:
         Its floor in the rectified picture.
     view : View
     bent : bool
-        Whether the view is any other than the frame itself.
+        Whether the frame must be rectified.
     encoding : str
         Of the frames: ``bgr8``, ``rgb8`` or ``mono8``.
 
@@ -55,7 +58,7 @@ class TrayCrop:
         Of the tray in the last frame; None when it is not known.
     velocity, velocity_error : tuple of 2 floats and float, [m/s]
     pending : Quality
-        Flags that the next image of the tray has to carry.
+        Flags for the next image of the tray.
     """
 
     def __init__(
@@ -80,8 +83,10 @@ class TrayCrop:
         mono = encoding == 'mono8'
         channel_mix = np.ones(1) if mono else np.array(self._mix, dtype=np.float64)
         wall = settings.preprocess.wall_width * self._scale
-        follows = settings.preprocess.stabilise
-        self._follower = TrayFollower(region, view, wall, channel_mix) if follows else None
+        stabilise = settings.preprocess.stabilise
+        self._registration = (
+            TrayRegistration(region, view, wall, channel_mix) if stabilise else None
+        )
         self.meter = MotionMeter(settings.speed.shake_ratio)
         self.shift: Shift | None = None
         self.velocity = (UNKNOWN, UNKNOWN)
@@ -107,8 +112,8 @@ class TrayCrop:
         """One standard error of each component, [m]."""
         return UNKNOWN if self.shift is None else self.shift.error / self._scale
 
-    def follow(self, image: NDArray[np.uint8], hint: Shift | None) -> Shift | None:
-        """Find the tray in the next frame.
+    def register(self, image: NDArray[np.uint8], hint: Shift | None) -> Shift | None:
+        """Register the tray in the next frame.
 
         Parameters
         ----------
@@ -116,31 +121,31 @@ class TrayCrop:
         hint : Shift or None
             Of another tray in the same frame.
         """
-        if self._follower is None:
+        if self._registration is None:
             return None
-        self.shift = self._follower.push(image, hint)
-        if self.shift is None and self._follower.sighted:
+        self.shift = self._registration.push(image, hint)
+        if self.shift is None and self._registration.has_walls:
             self.pending |= Quality.STABILISATION_LOST
         return self.shift
 
-    def settle(self, stamp_ns: int, plate: Shift | None) -> None:
-        """Take where the plate is, if the tray was lost or strayed from it, and the speed.
+    def update_motion(self, stamp_ns: int, plate: Shift | None) -> None:
+        """Correct the displacement by that of the plate, and update the velocity.
 
         Parameters
         ----------
         stamp_ns : int
         plate : Shift or None
-            What most of the trays on the plate say; None when there are too few.
+            Median of the trays on the plate; None when there are too few.
         """
         own = self.shift
-        if plate is not None and self._follower is not None:
+        if plate is not None and self._registration is not None:
             strayed = (
                 own is not None and math.hypot(own.x - plate.x, own.y - plate.y) > _STRAYED_PX
             )
             if own is None or strayed:
                 self.pending |= Quality.STABILISATION_LOST
                 self.shift = plate
-                self._follower.corrected(plate)
+                self._registration.set_shift(plate)
         last, last_ns = self._last, self._last_ns
         self._last, self._last_ns = self.shift, stamp_ns
         self.velocity, self.velocity_error = (UNKNOWN, UNKNOWN), UNKNOWN
@@ -157,7 +162,7 @@ class TrayCrop:
         image : ndarray of uint8, (height, width, channels)
             In one piece.
         """
-        shift = self._worth_while()
+        shift = self._significant_shift()
         if not self._bent and shift == _WHOLE:
             return self._cut(image)
         size = (self.region.height, self.region.width)
@@ -169,8 +174,8 @@ class TrayCrop:
         resample_color(image, self._nodes, shift, self._weights, color, gray)
         return gray, self._as_bgr(color)
 
-    def _worth_while(self) -> tuple[float, float]:
-        """The shift to take out, which is none where the tray may as well be at rest."""
+    def _significant_shift(self) -> tuple[float, float]:
+        """The shift to remove: zero where it is not significant."""
         if self.shift is None:
             return _WHOLE
         least = max(_NEGLIGIBLE_PX, _SIGNIFICANT * self.shift.error)

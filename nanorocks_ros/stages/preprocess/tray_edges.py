@@ -1,4 +1,7 @@
-"""Where the edges of the trays are in a picture, to a fraction of a pixel."""
+"""Edges of the trays in a picture, to a fraction of a pixel.
+
+Tested by ``test/studies/calibration/test_plate_fit.py``.
+"""
 
 from __future__ import annotations
 
@@ -131,7 +134,7 @@ def find_edges(
         parts.append(
             (numbers, look.sides[good], look.places[good], found[good], look.normals[good])
         )
-    columns = [np.concatenate(one) for one in zip(*parts, strict=True)]
+    columns = [np.concatenate(part) for part in zip(*parts, strict=True)]
     expected = sum(len(look.sides) for look in looks)
     return Edges(columns[0], columns[1], columns[2], columns[3], columns[4], wall, expected)
 
@@ -172,8 +175,8 @@ def _walls(looks: Sequence[_Look]) -> tuple[float, dict[tuple[int, int], float]]
         for look in looks
         for side in range(4)
     }
-    pairs = {key: _pairs(found) for key, found in peaks.items()}
-    widths = np.array([b[0] - a[0] for found in pairs.values() for a, b in found])
+    pairs = {key: _pairs(edges) for key, edges in peaks.items()}
+    widths = np.array([b[0] - a[0] for edge_pairs in pairs.values() for a, b in edge_pairs])
     width = 0.0
     if widths.size:
         support = (np.abs(widths[:, np.newaxis] - widths) < _WALL_SPREAD).sum(axis=1)
@@ -181,14 +184,14 @@ def _walls(looks: Sequence[_Look]) -> tuple[float, dict[tuple[int, int], float]]
             like = np.abs(widths - widths[support.argmax()]) < _WALL_SPREAD
             width = float(np.median(widths[like]))
     anchors = {}
-    for key, found in peaks.items():
+    for key, edges in peaks.items():
         if width > 0.0:
-            fitting = [one for one in pairs[key] if abs(one[1][0] - one[0][0] - width) < 1.5]
+            fitting = [pair for pair in pairs[key] if abs(pair[1][0] - pair[0][0] - width) < 1.5]
             best = max(fitting, key=_likelihood, default=None)
             if best is not None:
                 anchors[key] = best[1][0]
-        elif found:
-            anchors[key] = max(found, key=lambda one: one[1] / (1.0 + abs(one[0])))[0]
+        elif edges:
+            anchors[key] = max(edges, key=lambda peak: peak[1] / (1.0 + abs(peak[0])))[0]
     return width, anchors
 
 
@@ -244,7 +247,7 @@ def _offsets(
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """How far along each normal of a side its edge is, and whether it is an edge."""
     if anchor is None:
-        # What is nearer to where it should be is more likely it.
+        # An edge nearer to its expected position is more likely.
         signed = np.abs(slope) * np.exp(-0.5 * (across / (0.7 * reach)) ** 2)
         signed = signed * (np.abs(across) <= reach)
     else:

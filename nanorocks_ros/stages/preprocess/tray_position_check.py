@@ -1,4 +1,7 @@
-"""Whether the trays are where the settings say, and if not, which number looks wrong."""
+"""Check of the tray positions in a frame against the settings.
+
+Tested by ``test/stages/preprocess/test_preprocessor.py``.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ if TYPE_CHECKING:
 
 # One pixel of the reduced picture is so many of the frame.
 _REDUCED = 4
-# What is tried beside what is set: scales, and shifts in reduced pixels.
+# Scales and shifts that are tried beside those of the settings; shifts in reduced pixels.
 _SCALES = np.geomspace(0.2, 5.0, 323)
 _SHIFT = 16
 # Scales this close to one another are of the same trays.
@@ -29,17 +32,17 @@ _NEARLY = 0.1
 # A slope is an edge when it is so many times the usual one, and so many gray levels.
 _TIMES_USUAL = 3.0
 _LEAST_SLOPE = 6.0
-# Share of the sides that lie on edges: where the trays are for certain, how much less where they
-# are not, and of a single tray that is not where the others say.
+# Share of the sides that lie on edges: where the trays are certainly found, by how much the share
+# of the settings must be smaller, and the largest of a single tray that is misplaced.
 _FOUND = 0.65
 _CLEARLY = 0.12
-# At a scale that is off by more than this, what has four sides need not be a tray: more is asked.
+# Further off in scale, other rectangles are found by chance: a larger share is required.
 _FAR, _FOUND_FAR = 1.35, 0.85
 _ABSENT = 0.4
 _AS_GOOD = 0.01
 _SCALE_MATTERS = 0.02
 _SHIFT_MATTERS_PX = 8.0
-# Reduced pixels around the trays that have to be there, and by which a size must differ.
+# Reduced pixels required around the trays, and the smallest significant difference of a size.
 _ROOM, _RESOLVED = 2.0, 5.0
 
 
@@ -78,7 +81,7 @@ def _best(
     boxes: NDArray[np.float64],
     scales: NDArray[np.float64],
     reach: int,
-    found: NDArray[np.float64],
+    result: NDArray[np.float64],
 ) -> None:
     """Scale and shift at which the sides lie on edges least by chance: share, scale, shifts.
 
@@ -92,7 +95,7 @@ def _best(
     usual = 0.5 * (across[-1].sum() + down[:, -1].sum()) / area
     chosen, highest = 0, -np.inf
     for k in range(scales.size):
-        # What small boxes do by chance, large ones do not.
+        # Small boxes lie on edges by chance more often than large ones.
         weight = math.sqrt(scales[k] * perimeter)
         for i in range(side):
             for j in range(side):
@@ -103,19 +106,19 @@ def _best(
                     chosen, highest = k, score
     near = np.abs(scales / scales[chosen] - 1.0) < _NEARLY
     best, count = tried[near].max(), 0
-    found[:] = 0.0
+    result[:] = 0.0
     for k in range(scales.size):
         if not near[k]:
             continue
         for i in range(side):
             for j in range(side):
                 if tried[k, i, j] >= best - _AS_GOOD:
-                    found[1] += scales[k]
-                    found[2] += j - reach
-                    found[3] += i - reach
+                    result[1] += scales[k]
+                    result[2] += j - reach
+                    result[3] += i - reach
                     count += 1
-    found /= count
-    found[0] = best
+    result /= count
+    result[0] = best
 
 
 def _edge_sums(
@@ -141,17 +144,17 @@ def _edge_sums(
     return sums[0], sums[1]
 
 
-def map_problem(
+def position_problem(
     image: NDArray[np.uint8],
     view: View,
     regions: Sequence[Region],
     trays: Sequence[int],
     settings: PreprocessSettings,
 ) -> tuple[str, frozenset[int]]:
-    """What looks wrong with scale or regions, in one line, and in which trays; '' when nothing.
+    """What looks wrong with scale or regions, in one line, and the trays; '' when nothing does.
 
-    Said only when the trays are plainly seen somewhere else: a picture without clear edges
-    proves nothing.
+    Only when the trays are clearly seen somewhere else: a picture without clear edges tells
+    nothing.
 
     Parameters
     ----------
@@ -170,26 +173,26 @@ def map_problem(
     across, down = _edge_sums(image, view)
     shares = np.empty(len(boxes))
     own = _coverage(across, down, boxes, 1.0, (0.0, 0.0), shares)
-    found = np.empty(4)
-    _best(across, down, boxes, _SCALES, _SHIFT, found)
-    share, scale, x, y = (float(one) for one in found)
+    best = np.empty(4)
+    _best(across, down, boxes, _SCALES, _SHIFT, best)
+    share, scale, x, y = (float(number) for number in best)
     near = 1.0 / _FAR < scale < _FAR
     if share < (_FOUND if near else _FOUND_FAR):
         return '', frozenset()
     if own >= share - _CLEARLY:
         return _one_tray(shares, trays, settings)
-    what = _source(settings)
+    subject = _source(settings)
     extent = float((ends.max(axis=0) - boxes[:, :2].min(axis=0)).max())
     if abs(scale - 1.0) > max(_SCALE_MATTERS, _RESOLVED / extent):
         set_to = settings.pixels_per_metre
         text = (
-            f'{what} looks wrong: the trays look as at {set_to * scale:.0f} px/m, '
+            f'{subject} looks wrong: the trays look as at {set_to * scale:.0f} px/m, '
             f'not at {set_to:.0f}; {_remedy(settings, set_to * scale)}'
         )
         return text, frozenset(trays)
     if max(abs(x), abs(y)) * _REDUCED > _SHIFT_MATTERS_PX:
         text = (
-            f'{what} looks wrong: the trays look shifted by {x * _REDUCED:.0f}, '
+            f'{subject} looks wrong: the trays look shifted by {x * _REDUCED:.0f}, '
             f'{y * _REDUCED:.0f} px; {_remedy(settings)}'
         )
         return text, frozenset(trays)
@@ -211,7 +214,7 @@ def _one_tray(
 
 
 def _source(settings: PreprocessSettings) -> str:
-    """The setting that says where the trays are."""
+    """The setting that gives the positions of the trays."""
     if settings.calibration:
         return settings.calibration
     if settings.regions_px:
@@ -220,7 +223,7 @@ def _source(settings: PreprocessSettings) -> str:
 
 
 def _remedy(settings: PreprocessSettings, scale: float = 0.0) -> str:
-    """What to do about it."""
+    """What the user should do."""
     if settings.calibration:
         remedy = 'calibrate again'
     elif scale and not settings.regions_px:

@@ -1,4 +1,4 @@
-"""From speeds and contacts to the coefficient of restitution of the cycle, updated as it cools."""
+"""From speeds and contacts to the coefficients of restitution of each cycle."""
 
 from __future__ import annotations
 
@@ -21,15 +21,17 @@ from nanorocks_ros.records import (
     SpeedMethod,
 )
 from nanorocks_ros.stages.contacts.cycle_contacts import CycleContacts
+from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 from nanorocks_ros.stages.preprocess.shake_detection import NS
 from nanorocks_ros.stages.restitution.restitution_methods import (
     UNDETERMINED,
     Decay,
-    LibraryReading,
-    PaperReading,
-    Reading,
+    DecayLibraryMethod,
+    PaperMethod,
+    RestitutionMethod,
 )
 from nanorocks_ros.stages.restitution.species_decays import species_decays
+from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
@@ -39,17 +41,21 @@ if TYPE_CHECKING:
 
 # Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
 _STAMP_ROUNDING_NS = 1_000_000
-# The first speed may come that much later for other reasons than a tray that swings.
+# The first speed may come that much later for other reasons than a tray that oscillates.
 _LATE_NS = 500_000_000
 # Standard deviations by which decay, rebounds and collisions may disagree without a flag.
 _TENSE = 3.0
 
 
-class HaffFitter:
-    """Reads restitutions from the speeds and contacts of each cycle, and of all of them.
+Input = SpeedEstimate | Rebound | PairCollision | Merge
 
-    While a cycle cools it publishes an estimate every `update_interval`; the last one of the
-    cycle, at the end of the cooling window or at the next shaking event, is final.
+
+class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
+    """Estimates restitutions from the speeds and contacts of each cycle, and of all of them.
+
+    While a cycle cools there is an estimate every `update_interval`. The last one of the cycle,
+    at the end of the cooling window or at the next shaking event, is final. A speed whose stamp
+    goes back ends the cycle and starts all afresh, running mean included.
 
     Parameters
     ----------
@@ -59,49 +65,46 @@ class HaffFitter:
     Raises
     ------
     ConfigurationError
-        For a window that cannot be, or a tray without a library of simulated decays.
+        For a window that is not valid, or a tray without a library of simulated decays.
     """
+
+    clock = SpeedEstimate
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.cooling
         self._tray = tray
-        reading = LibraryReading if self._settings.relation == 'library' else PaperReading
-        self._make_reading = partial(reading, settings, tray)
+        method = DecayLibraryMethod if self._settings.relation == 'library' else PaperMethod
+        self._make_method = partial(method, settings, tray)
         self._grains = any(species.properties.hue == 0 for species in tray.species)
         self._contacts = CycleContacts(self._settings)
-        self._restart()
+        self.reset()
 
-    def _restart(self) -> None:
-        self._last_stamp_ns: int | None = None
+    def _restart(self, stamp_ns: int | None = None) -> None:
+        if stamp_ns is not None:
+            self._contacts.restart(stamp_ns)
         self._samples: list[SpeedEstimate] = []
         self._cycle = 0
         self._finished = True
         self._merged = False
         self._last_update_ns: int | None = None
-        self._reading: Reading = self._make_reading()
+        self._method: RestitutionMethod = self._make_method()
 
     @property
     def evidence(self) -> CycleLikelihoods | None:
-        """What the cycles finished since time last went back say; None without any."""
-        return self._reading.evidence
+        """Evidence of the cycles finished since time last went back; None without any."""
+        return self._method.evidence
 
     def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
-        """What cycles say together, also such of other recordings of the tray.
+        """Mean restitution of several cycles, also of other recordings of the tray.
 
         Raises
         ------
         FitError
-            When they were read in another way.
+            When they were estimated by another method.
         """
-        return self._reading.mean_of(evidence)
+        return self._method.mean_of(evidence)
 
-    def push(
-        self, record: SpeedEstimate | Rebound | PairCollision | Merge
-    ) -> tuple[CorEstimate, ...]:
-        """Take the next speed, contact or merge; empty between two updates and before any shake.
-
-        A speed whose stamp goes back ends the cycle and starts all afresh, running mean included.
-        """
+    def _process(self, record: Input) -> tuple[CorEstimate, ...]:
         if isinstance(record, SpeedEstimate):
             return self._push_speed(record)
         if isinstance(record, Merge):
@@ -118,17 +121,12 @@ class HaffFitter:
                 sample for sample in self._samples if sample.stamp_ns < merge.stamp_ns
             ]
             self._merged = True
-        return self.flush()
+        return self._end_cycle()
 
     def _push_speed(self, speed: SpeedEstimate) -> tuple[CorEstimate, ...]:
         estimates: tuple[CorEstimate, ...] = ()
-        if self._last_stamp_ns is not None and speed.stamp_ns <= self._last_stamp_ns:
-            estimates = self.flush()
-            self._restart()
-            self._contacts.restart(speed.stamp_ns)
-        self._last_stamp_ns = speed.stamp_ns
         if speed.cycle != self._cycle:
-            estimates = (*estimates, *self.flush())
+            estimates = self._end_cycle()
             self._cycle, self._samples, self._finished = speed.cycle, [], False
             self._last_update_ns = None
             self._merged = False
@@ -137,12 +135,12 @@ class HaffFitter:
             return estimates
         age = (speed.stamp_ns - speed.cycle_start_ns) / NS
         if not self._samples and self._driven(speed):
-            # A tray that swings drives the gas, but does nothing to a single contact.
+            # A tray that oscillates drives the gas, but a single contact is used as well.
             self._count_contacts(speed)
             return estimates
         first = self._samples[0] if self._samples else speed
         if speed.stamp_ns - self._start_ns(first) > self._settings.duration * NS:
-            return (*estimates, *self.flush())
+            return (*estimates, *self._end_cycle())
         if age > 0.0 and age >= self._settings.delay and _usable(speed):
             self._samples.append(speed)
             self._count_contacts(speed)
@@ -150,25 +148,42 @@ class HaffFitter:
                 estimates = (*estimates, *self._estimate(CorStatus.COOLING))
         return estimates
 
-    def _count_contacts(self, speed: SpeedEstimate) -> None:
-        """Count those since the shaking was over, up to shortly before a speed."""
+    def _count_contacts(self, speed: SpeedEstimate, later_ns: int = 0) -> None:
+        """Count the contacts since the shaking was over that are all known after a speed.
+
+        Parameters
+        ----------
+        speed : SpeedEstimate
+        later_ns : int, [ns]
+            Time from the speed up to which contacts have come in.
+        """
         shake_ns = speed.cycle_start_ns or 0
-        self._contacts.count(shake_ns + round(self._settings.delay * NS), speed.stamp_ns)
+        first_ns = shake_ns + round(self._settings.delay * NS)
+        self._contacts.count(first_ns, speed.stamp_ns + later_ns)
 
     def _driven(self, speed: SpeedEstimate) -> bool:
-        """Whether the tray still swings too fast for the gas in it to cool freely."""
+        """Whether the tray still oscillates too fast for the gas in it to cool freely."""
         calm = self._settings.max_tray_to_bead_speed * speed.mean_projected_speed.value
         return speed.tray_speed > calm
 
     def _start_ns(self, first: SpeedEstimate) -> int:
         """When the gas began to cool, by the first speed used."""
         shake_ns = first.cycle_start_ns or 0
-        # A tray that swung on drove the gas until shortly before the window.
+        # A tray that went on oscillating drove the gas until shortly before the window.
         late_ns = first.stamp_ns - shake_ns - round(self._settings.delay * NS)
         return shake_ns + (late_ns if late_ns > _LATE_NS else 0)
 
     def flush(self) -> tuple[CorEstimate, ...]:
-        """End the cycle: its final estimate, if it has samples and had none yet."""
+        """End the recording: the final estimate, with all contacts up to the last speed."""
+        if self._samples and not self._finished:
+            self._count_contacts(self._samples[-1], later_ns=KNOWN_AFTER_NS[Rebound])
+        return self._end_cycle()
+
+    def _interrupted(self) -> tuple[CorEstimate, ...]:
+        return self._end_cycle()
+
+    def _end_cycle(self) -> tuple[CorEstimate, ...]:
+        """The final estimate of the cycle, if it has samples and had none yet."""
         if self._finished:
             return ()
         self._finished = True
@@ -185,8 +200,8 @@ class HaffFitter:
         return True
 
     def _undetermined(self) -> tuple[CorEstimate, ...]:
-        """What is said of a cycle with too few speeds: that they tell nothing."""
-        stamp_ns = self._samples[-1].stamp_ns if self._samples else self._last_stamp_ns
+        """The estimate of a cycle with too few speeds: undetermined."""
+        stamp_ns = self._samples[-1].stamp_ns if self._samples else self._last_ns
         if stamp_ns is None or not (self._samples or self._merged):
             return ()
         return (
@@ -195,7 +210,7 @@ class HaffFitter:
                 tray=self._tray.number,
                 cycle=self._cycle,
                 status=CorStatus.UNDETERMINED,
-                relation=self._reading.relation,
+                relation=self._method.relation,
                 restitution=UNDETERMINED,
                 samples=len(self._samples),
             ),
@@ -218,13 +233,13 @@ class HaffFitter:
         quality = reduce(or_, {sample.quality for sample in self._samples})
         try:
             if quality & Quality.WRONG_SCALE:
-                # Speeds and places are wrong by nobody knows how much.
-                fields = _nothing(CorStatus.UNDETERMINED)
+                # Errors of speeds and positions are unknown.
+                fields = _unknown(CorStatus.UNDETERMINED)
             else:
-                fields.update(self._reading.read(decay, self._contacts.terms, final=final))
+                fields.update(self._method.estimate(decay, self._contacts.terms, final=final))
         except FitError:
-            # Nothing is known of the restitution then, and that is what is published.
-            fields = _nothing(CorStatus.NO_DECAY)
+            # The restitution is published as unknown.
+            fields = _unknown(CorStatus.NO_DECAY)
         if status is CorStatus.FINAL:
             few = self._settings.min_samples
             decays = species_decays(self._tray, decay.time, self._samples, few)
@@ -236,7 +251,7 @@ class HaffFitter:
                 stamp_ns=last.stamp_ns,
                 tray=last.tray,
                 cycle=last.cycle,
-                relation=self._reading.relation,
+                relation=self._method.relation,
                 samples=len(self._samples),
                 quality=Quality(quality),
                 window_start=(self._samples[0].stamp_ns - shake_ns) / NS,
@@ -247,7 +262,7 @@ class HaffFitter:
         )
 
 
-def _nothing(status: CorStatus) -> dict[str, Any]:
+def _unknown(status: CorStatus) -> dict[str, Any]:
     return {'status': status, 'restitution': UNDETERMINED}
 
 

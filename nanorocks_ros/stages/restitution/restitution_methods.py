@@ -1,4 +1,7 @@
-"""What turns the decay of one cycle into a restitution: simulated decays, or the paper's form."""
+"""The two methods that turn a decay into a restitution: simulated decays, or the paper's form.
+
+Tested by ``test/stages/restitution/test_restitution_estimator.py``.
+"""
 
 from __future__ import annotations
 
@@ -34,11 +37,11 @@ if TYPE_CHECKING:
     from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood
     from nanorocks_ros.settings import PipelineSettings
 
-# With less known than that, nothing is: anything from 0 to 1 has a deviation of 0.29.
-_LEAST_KNOWN = 0.2
+# Largest standard deviation of a restitution that is given: a uniform one from 0 to 1 has 0.29.
+_LARGEST_DEVIATION = 0.2
 UNDETERMINED = Interval(lower=0.0, upper=1.0)
 """The restitution of a cycle that does not determine it: any."""
-_UNKNOWN = {'status': CorStatus.UNDETERMINED, 'restitution': UNDETERMINED}
+_UNKNOWN_FIELDS = {'status': CorStatus.UNDETERMINED, 'restitution': UNDETERMINED}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,20 +63,20 @@ class Decay:
     of_grains: bool = False
 
 
-class Reading(Protocol):
-    """What a way to read decays does; it remembers the cycles that are finished."""
+class RestitutionMethod(Protocol):
+    """A method that turns decays into restitutions; it keeps the evidence of finished cycles."""
 
     relation: CorRelation
     evidence: CycleLikelihoods | None
 
-    def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
+    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate; raises FitError where there is no decay."""
 
     def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
-        """What all cycles of some evidence say together, those of other recordings, too."""
+        """Mean restitution of the cycles of some evidence, also of other recordings."""
 
 
-class PaperReading:
+class PaperMethod:
     """The closed form of [B19] on a fit of Haff's law.
 
     Parameters
@@ -89,8 +92,8 @@ class PaperReading:
         self._tray = tray
         self.evidence: CycleLikelihoods | None = None
 
-    def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
-        """Fields of a CorEstimate; contacts are nothing that the paper uses.
+    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
+        """Fields of a CorEstimate; the method of the paper does not use contacts.
 
         Raises
         ------
@@ -102,7 +105,7 @@ class PaperReading:
         quantile = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + 0.5 * self._probability))
         spread = math.exp(quantile * fit.log_decay_rate_error)
         value, lower, upper = (
-            _by_paper(rate, self._tray)
+            _paper_restitution(rate, self._tray)
             for rate in (fit.decay_rate, fit.decay_rate * spread, fit.decay_rate / spread)
         )
         if final:
@@ -138,8 +141,8 @@ class PaperReading:
         )
 
 
-class LibraryReading:
-    """Simulated decays of the tray, held against the measured one.
+class DecayLibraryMethod:
+    """Compares the measured decay with simulated decays of the tray.
 
     Parameters
     ----------
@@ -149,31 +152,31 @@ class LibraryReading:
     Raises
     ------
     ConfigurationError
-        When there is no library of such a tray, or no walls are as the prior says.
+        When there is no library of such a tray, or the prior of the walls is not valid.
     """
 
     relation = CorRelation.LIBRARY
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._tray = tray
-        known = settings.prior
+        prior = settings.prior
         library = library_of(tray, settings.cooling.decay_library)
-        self._tables = tables_of(library, tray, known)
-        # What the library itself is off by acts as a wrong scale would.
-        scale = math.hypot(known.scale_error, library.misfit)
+        self._tables = tables_of(library, tray, prior)
+        # An error of the library itself acts as an error of the scale.
+        scale = math.hypot(prior.scale_error, library.misfit)
         self._camera = {
-            False: (scale, known.speed_bias),
-            True: (math.hypot(scale, known.grain_scale_error), known.grain_speed_bias),
+            False: (scale, prior.speed_bias),
+            True: (math.hypot(scale, prior.grain_scale_error), prior.grain_speed_bias),
         }
-        self._biases = (known.collision_bias, known.rebound_bias)
-        self._walls = (known.min_wall_restitution, known.max_wall_restitution)
+        self._biases = (prior.collision_bias, prior.rebound_bias)
+        self._walls = (prior.min_wall_restitution, prior.max_wall_restitution)
         check_walls(self._walls)
         half = 0.5 * settings.cooling.probability
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
         self.evidence: CycleLikelihoods | None = None
         self._mean_so_far: dict[str, Measured] = {}
 
-    def read(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
+    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
         """Fields of a CorEstimate.
 
         Raises
@@ -184,9 +187,9 @@ class LibraryReading:
         if (decay.time - decay.time.mean()) @ np.log(decay.speed) >= 0.0:
             raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
         if decay.of_grains and not contacts.rebounds and not contacts.collisions:
-            # How such speeds are off changes while grains slow down: intervals of filmed trays 6
-            # and 8 lay beside the truth, and over many cycles that does not average out.
-            return {**self._speeds(decay, final=final), **_UNKNOWN}
+            # The bias of such speeds changes while grains slow down: intervals of filmed trays 6
+            # and 8 missed the truth, and over many cycles that does not average out.
+            return {**self._speeds(decay, final=final), **_UNKNOWN_FIELDS}
         likelihood = decay_likelihood(
             self._tables, decay.time, decay.speed, decay.error, self._camera[decay.of_grains]
         )
@@ -200,11 +203,11 @@ class LibraryReading:
             **self._speeds(decay, final=final),
             'reduced_chi_square': likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
         }
-        if math.sqrt(posterior.covariance[0, 0]) > _LEAST_KNOWN:
-            return {**fields, **_UNKNOWN, **self._mean(likelihood, contacts, final=final)}
+        if math.sqrt(posterior.covariance[0, 0]) > _LARGEST_DEVIATION:
+            return {**fields, **_UNKNOWN_FIELDS, **self._mean(likelihood, contacts, final=final)}
         return {
             **fields,
-            **_known(posterior, self._ends),
+            **_restitution_fields(posterior, self._ends),
             **self._mean(likelihood, contacts, final=final),
         }
 
@@ -220,7 +223,7 @@ class LibraryReading:
     def _mean(
         self, likelihood: DecayLikelihood, contacts: ContactTerms, *, final: bool
     ) -> dict[str, Measured]:
-        """The mean of what all finished cycles together say; a final one is among them."""
+        """Mean restitution of all finished cycles; a final one is among them."""
         if not final:
             return self._mean_so_far
         own = CycleLikelihoods(cycles=1, decay=likelihood, contacts=contacts)
@@ -233,12 +236,12 @@ class LibraryReading:
         return self._mean_so_far
 
     def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
-        """What the cycles say together: what is not known is the same in all of them.
+        """Mean restitution of several cycles, whose systematic errors are the same.
 
         Raises
         ------
         FitError
-            When they were not read by a library, or by one of another grid.
+            When the cycles were not compared with a library, or with one of another grid.
         """
         decay, contacts = evidence.decay, evidence.contacts
         if (
@@ -270,22 +273,22 @@ class LibraryReading:
         )
 
     def _speeds(self, decay: Decay, *, final: bool) -> dict[str, Any]:
-        """Speed at the shaking event, and Haff time; with errors once the cycle is over."""
+        """Initial speed and Haff time, with errors once the cycle is over."""
         if final:
             with suppress(FitError):
-                # Next to elastic beads may have no Haff time, but have a restitution.
+                # Nearly elastic beads may have no Haff time, but have a restitution.
                 fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
                 return {
                     **_haff_fields(fit),
-                    'paper_restitution': _by_paper(fit.decay_rate, self._tray),
+                    'paper_restitution': _paper_restitution(fit.decay_rate, self._tray),
                 }
         # A straight line through 1/v, as Haff's law is one; a proper fit takes too long.
-        slope, offset = (float(one) for one in np.polyfit(decay.time, 1.0 / decay.speed, 1))
+        slope, offset = (float(number) for number in np.polyfit(decay.time, 1.0 / decay.speed, 1))
         falling = slope > 0.0 and offset > 0.0
         return {
             'initial_speed': Measured(1.0 / offset if falling else math.nan),
             'haff_time': Measured(offset / slope if falling else math.nan),
-            'paper_restitution': _by_paper(max(slope, 0.0), self._tray),
+            'paper_restitution': _paper_restitution(max(slope, 0.0), self._tray),
         }
 
 
@@ -296,7 +299,7 @@ def _intervals(posterior: Posterior, ends: NDArray[np.float64]) -> tuple[Interva
     return Interval(value, lower, upper), Interval(wall, wall_lower, wall_upper)
 
 
-def _known(posterior: Posterior, ends: NDArray[np.float64]) -> dict[str, Any]:
+def _restitution_fields(posterior: Posterior, ends: NDArray[np.float64]) -> dict[str, Any]:
     restitution, wall_restitution = _intervals(posterior, ends)
     spread = posterior.covariance
     product = math.sqrt(spread[0, 0] * spread[1, 1])
@@ -314,5 +317,5 @@ def _haff_fields(fit: HaffFit) -> dict[str, Measured]:
     }
 
 
-def _by_paper(rate: float, tray: Tray) -> float:
+def _paper_restitution(rate: float, tray: Tray) -> float:
     return paper_restitution_of_decay(rate, tray.diameter, tray.number_density)

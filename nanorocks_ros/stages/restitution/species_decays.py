@@ -44,7 +44,7 @@ def species_decays(
     Returns
     -------
     initial_speeds, haff_times : tuple of Measured, [m/s], [s]
-        Unknown for a species whose speeds are not known or do not fall; empty for a tray with a
+        Unknown for a species whose speeds are unknown or do not fall; empty for a tray with a
         single species.
     """
     if len(tray.species) < 2:

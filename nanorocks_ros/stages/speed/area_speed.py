@@ -1,4 +1,7 @@
-"""Mean projected speed from the area that changed: the paper's recipe ([B19] section 3.2)."""
+"""Mean projected speed from the area that changed: the paper's recipe ([B19] section 3.2).
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ from nanorocks_ros.records import (
     SpeedMethod,
     TrayImage,
 )
-from nanorocks_ros.stages.preprocess.shake_detection import NS, CycleFollower
+from nanorocks_ros.stages.preprocess.shake_detection import NS
 from nanorocks_ros.stages.speed.motion_mask import MotionMasker
 
 if TYPE_CHECKING:
@@ -25,13 +28,13 @@ if TYPE_CHECKING:
 
 # Standard deviation of a Rayleigh distribution over its mean.
 _RAYLEIGH_SPREAD = math.sqrt(4.0 / math.pi - 1.0)
-# Displacements between the pictures compared that an area can tell: in pixels at least, and in
-# bead diameters at most.
-_LEAST_PX, _MOST_DIAMETERS = 1.0, 1.0
+# Range of displacements between the pictures compared that an area can tell: from so many pixels
+# to so many bead diameters.
+_SHORTEST_PX, _LONGEST_DIAMETERS = 1.0, 1.0
 
 
 class AreaSpeed:
-    """Measures the speed by the binarised area, and makes the mask that it is read from.
+    """Measures the speed by the binarised area, and makes the motion mask.
 
     Parameters
     ----------
@@ -41,36 +44,46 @@ class AreaSpeed:
     Attributes
     ----------
     emit_mask : bool
-        Also emit a :class:`MotionMask` per image; off by default since few look at it.
+        Also emit a :class:`MotionMask` per image; off by default.
     emit_speed : bool
-        Emit speeds.
+        Emit speeds; by default when the setting `speed.method` asks for them.
     """
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.speed
         self._scale = settings.preprocess.pixels_per_metre
         self._tray = tray
-        self._masker = MotionMasker(settings.speed)
-        self._last_ns: int | None = None
         self.emit_mask = False
-        self.emit_speed = False
+        self.emit_speed = settings.speed.method == 'binarised_area'
+        self.reset()
 
-    def push(
-        self, image: TrayImage, shakes: CycleFollower, shaken: bool
-    ) -> tuple[SpeedEstimate | MotionMask, ...]:
-        """Take the next image; empty while there are too few for a mask."""
+    def reset(self, stamp_ns: int | None = None) -> None:
+        """Start afresh."""
+        del stamp_ns
+        self._masker = MotionMasker(self._settings)
+        self._last_ns: int | None = None
+        self._cycle: int | None = None
+
+    def push(self, image: TrayImage) -> tuple[SpeedEstimate | MotionMask, ...]:
+        """Take the next image, whose cycle is known; empty while there are too few for a mask."""
+        shaken = self._cycle not in (None, image.cycle)
+        self._cycle = image.cycle
         if shaken:
             self._masker.clear()
         self._masker.push(image.stamp_ns, image.gray)
         if not self._masker.full or not (self.emit_mask or self.emit_speed):
             return ()
-        mask = self._masker.mask(shakes.noise_power)
-        found: list[SpeedEstimate | MotionMask] = []
+        mask = self._masker.mask(image.noise_power)
+        records: list[SpeedEstimate | MotionMask] = []
         if self.emit_mask:
-            found.append(MotionMask(stamp_ns=image.stamp_ns, tray=image.tray, mask=mask))
+            records.append(MotionMask(stamp_ns=image.stamp_ns, tray=image.tray, mask=mask))
         if self.emit_speed and self._due(image.stamp_ns, shaken):
-            found.append(self._speed(int(np.count_nonzero(mask)), image, shakes))
-        return tuple(found)
+            records.append(self._speed(int(np.count_nonzero(mask)), image))
+        return tuple(records)
+
+    def flush(self) -> tuple[SpeedEstimate | MotionMask, ...]:
+        """Nothing: a speed is known with the last image of its window."""
+        return ()
 
     def _due(self, stamp_ns: int, shaken: bool) -> bool:
         last = self._last_ns
@@ -79,7 +92,7 @@ class AreaSpeed:
         self._last_ns = stamp_ns
         return True
 
-    def _speed(self, moving_pixels: int, image: TrayImage, shakes: CycleFollower) -> SpeedEstimate:
+    def _speed(self, moving_pixels: int, image: TrayImage) -> SpeedEstimate:
         area = moving_pixels / self._scale**2 / self._tray.count
         radius = 0.5 * self._tray.diameter
         raw = mean_displacement(area, radius, self._settings.geometry)
@@ -89,8 +102,8 @@ class AreaSpeed:
         return SpeedEstimate(
             stamp_ns=(first + last) // 2,
             tray=self._tray.number,
-            cycle=shakes.cycle,
-            cycle_start_ns=shakes.cycle_start_ns,
+            cycle=image.cycle or 0,
+            cycle_start_ns=image.cycle_start_ns,
             # The error is the spread over the beads; the bias is larger (docs/method/speed.md).
             mean_projected_speed=Measured(
                 speed, abs(speed) * _RAYLEIGH_SPREAD / math.sqrt(self._tray.count)
@@ -101,12 +114,12 @@ class AreaSpeed:
         )
 
     def _range(self, displacement: float) -> Quality:
-        """What is to be said of a speed from a displacement, [m]."""
+        """Flags of a speed from a displacement, [m]."""
         quality = Quality(0)
         if self._settings.area_factor == 1.0 and self._settings.area_offset == 0.0:
-            # No reading of the recipe is right without manual tracks (docs/method/speed.md).
+            # No form of the recipe is right without manual tracks (docs/method/speed.md).
             quality |= Quality.UNCALIBRATED
-        most = _MOST_DIAMETERS * self._tray.diameter
-        if not _LEAST_PX / self._scale <= displacement <= most:
+        longest = _LONGEST_DIAMETERS * self._tray.diameter
+        if not _SHORTEST_PX / self._scale <= displacement <= longest:
             quality |= Quality.UNCERTAIN
         return quality

@@ -1,7 +1,9 @@
 """The paper's motion mask: average, subtract, despeckle, binarise ([B19] fig. 4).
 
-The paper's words allow several readings of "averaged over 10 frames, then each subtracted
+The paper's words allow several interpretations of "averaged over 10 frames, then each subtracted
 from the next"; `averaging` and `time_step` of the settings select one.
+
+Tested by ``test/studies/inspection/test_preprocessing_steps.py``.
 """
 
 from __future__ import annotations
@@ -39,7 +41,7 @@ class MotionMasker:
         self._images: deque[tuple[int, NDArray[np.uint8]]] = deque(maxlen=kept)
 
     def clear(self) -> None:
-        """Forget all images but the last, from which the next may differ."""
+        """Forget all images but the last, with which the next is compared."""
         while len(self._images) > 1:
             self._images.popleft()
 
@@ -49,7 +51,7 @@ class MotionMasker:
 
     @property
     def full(self) -> bool:
-        """Whether there are images enough for a mask."""
+        """Whether there are enough images for a mask."""
         return len(self._images) == self._images.maxlen
 
     @property
@@ -59,7 +61,7 @@ class MotionMasker:
 
     @property
     def time_step(self) -> float:
-        """Time between the pictures compared, [s], as the settings read the paper."""
+        """Time between the pictures compared, [s], by the interpretation in the settings."""
         first, last = self.span_ns
         steps = len(self._images) - 1
         if self._one_frame:
@@ -69,7 +71,7 @@ class MotionMasker:
         return (last - first) / NS
 
     def difference(self) -> NDArray[np.uint8] | NDArray[np.float32]:
-        """How much the two averages differ, pixel by pixel, [gray levels].
+        """Absolute difference of the two averages, pixel by pixel, [gray levels].
 
         Of running means, times the number of frames averaged: consecutive ones differ by
         (last - first) / count, which gives the same mask and needs no mean.

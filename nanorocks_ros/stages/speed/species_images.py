@@ -1,10 +1,11 @@
-"""One gray image per species out of a colour image: each shows the beads of one and hides others'.
+"""One gray image per species from a colour image, in which only the beads of that species show.
 
-Shading darkens a bead and keeps the proportions of its colour, and a highlight adds white; so a
-species is told by its hue, the direction in which blue and red differ from green. Grains without
-a hue are told by being darker than the floor. Hues are learnt from one image of the tray, starting
-from what the material is; a table over all colours then says how much of each species a pixel
-shows.
+Shading darkens a bead and keeps the proportions of its colour, and a highlight adds white; so the
+species are separated by hue, the direction in which blue and red differ from green. Grains without
+a hue are darker than the floor. Hues are learnt from one image of the tray, starting from the
+colour of the material; a table over all colours then holds how much of each species a pixel shows.
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
 """
 
 from __future__ import annotations
@@ -24,24 +25,24 @@ if TYPE_CHECKING:
 _STEPS = 64
 _PER_STEP = 256 // _STEPS
 _ROUNDS = 10
-# A pixel of so much colour shows a bead that has one, [gray levels].
+# From this saturation on a pixel shows a coloured bead, [gray levels].
 _COLOURED = 40.0
-# Over this range of colour a pixel goes from showing a gray grain to showing none, [gray levels].
+# Over this range of saturation a pixel goes from gray grain to none, [gray levels].
 _GRAY_UP_TO, _NO_LONGER_GRAY = 15.0, 45.0
-# Below this a pixel is no more of one hue than of another.
+# Over this range of saturation a hue goes from unknown to known, [gray levels].
 _FAINT, _CLEAR = 12.0, 24.0
-# Of the images: what the floor becomes, so that noise is as even there as on a bead.
+# Level of the floor in the images, so that the noise there is not cut off.
 _ZERO = 64
 # Difference of the cosines of two hues over which a colour goes from one to the other.
 _WIDTH = 0.3
 # Cosine between two hues that a camera cannot tell apart.
 _ALIKE = 0.9
-# A species must show at least this share of the area that its beads cover.
-_FEWEST = 0.2
+# Smallest share of the area of its beads that a species must show.
+_SMALLEST_AREA_SHARE = 0.2
 
 
 class SpeciesImages:
-    """Tells the species of a tray apart by their colours.
+    """Separates the species of a tray by their colours.
 
     Parameters
     ----------
@@ -53,8 +54,8 @@ class SpeciesImages:
         self._materials = tuple(species.properties for species in tray.species)
         self._areas = np.array(
             [
-                0.25 * np.pi * one.count * one.diameter**2 * pixels_per_metre**2
-                for one in tray.species
+                0.25 * np.pi * species.count * species.diameter**2 * pixels_per_metre**2
+                for species in tray.species
             ]
         )
         self._tables: NDArray[np.uint8] | None = None
@@ -66,7 +67,7 @@ class SpeciesImages:
         return len(self._materials) > 1 and grays < 2
 
     @property
-    def known(self) -> bool:
+    def learnt(self) -> bool:
         """Whether the colours have been learnt."""
         return self._tables is not None
 
@@ -88,7 +89,7 @@ class SpeciesImages:
         for _ in range(_ROUNDS):
             nearest = (tints @ hues.T).argmax(axis=1)
             shown = np.bincount(nearest, minlength=len(hues))
-            if (shown < _FEWEST * self._areas[coloured]).any():
+            if (shown < _SMALLEST_AREA_SHARE * self._areas[coloured]).any():
                 return False
             hues = _unit(np.array([tints[nearest == k].sum(axis=0) for k in range(len(hues))]))
         if (hues @ hues.T - np.eye(len(hues))).max() > _ALIKE:
@@ -97,12 +98,12 @@ class SpeciesImages:
         return True
 
     def _floor(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Colour of the floor: of the middle one of the pixels that no bead covers."""
+        """Colour of the floor: the median of the pixels that no bead covers."""
         bare = np.exp(-self._areas.sum() / len(pixels))
         return np.asarray(np.percentile(pixels, 100.0 * (1.0 - 0.5 * bare), axis=0))
 
-    def of(self, color: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], ...]:
-        """The images of the species.
+    def images(self, color: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], ...]:
+        """One gray image for each species.
 
         Parameters
         ----------
@@ -111,7 +112,7 @@ class SpeciesImages:
         Returns
         -------
         tuple of ndarray of uint8, (rows, columns)
-            In the order of `Tray.species`; near 64 where nothing of it shows.
+            In the order of `Tray.species`; near 64 where the species does not show.
         """
         assert self._tables is not None
         images = np.empty((len(self._tables), *color.shape[:2]), dtype=np.uint8)
@@ -120,7 +121,7 @@ class SpeciesImages:
 
 
 def _tint(away: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Blue and red less green: what white light and shadow leave alone."""
+    """Blue and red less green, which white light and shadow do not change."""
     return np.stack((away[..., 0] - away[..., 1], away[..., 2] - away[..., 1]), axis=-1)
 
 
@@ -131,24 +132,24 @@ def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 def _tables(
     floor: NDArray[np.float64], hues: NDArray[np.float64], coloured: list[int], n_species: int
 ) -> NDArray[np.uint8]:
-    """How much of each species every colour shows, (n_species, steps^3)."""
+    """Share of each species in every colour, (n_species, steps^3)."""
     levels = (np.arange(_STEPS) + 0.5) * _PER_STEP
     grid = np.stack(np.meshgrid(levels, levels, levels, indexing='ij'), axis=-1).reshape(-1, 3)
     away = grid - floor
     tint = _tint(away)
     strength = np.maximum(np.linalg.norm(tint, axis=1), 1e-9)
     cosines = tint @ hues.T / strength[:, np.newaxis]
-    # Noise of the floor has a hue too; left alone, it is what it is on a bead.
+    # The noise of the floor has a random hue; it is kept, as it is on a bead.
     hued = np.clip((strength - _FAINT) / (_CLEAR - _FAINT), 0.0, 1.0)
-    found = np.zeros((n_species, len(grid)))
-    for place, k in enumerate(coloured):
-        others = np.delete(cosines, place, axis=1).max(axis=1, initial=-1.0)
-        share = np.clip(0.5 + (cosines[:, place] - others) / _WIDTH, 0.0, 1.0)
-        found[k] = (share * hued + (1.0 - hued)) * (tint @ hues[place])
+    amounts = np.zeros((n_species, len(grid)))
+    for column, k in enumerate(coloured):
+        others = np.delete(cosines, column, axis=1).max(axis=1, initial=-1.0)
+        share = np.clip(0.5 + (cosines[:, column] - others) / _WIDTH, 0.0, 1.0)
+        amounts[k] = (share * hued + (1.0 - hued)) * (tint @ hues[column])
     gray = np.clip((_NO_LONGER_GRAY - strength) / (_NO_LONGER_GRAY - _GRAY_UP_TO), 0.0, 1.0)
     for k in set(range(n_species)) - set(coloured):
-        found[k] = -gray * away.mean(axis=1)
-    return np.asarray(np.clip(np.round(_ZERO + found), 0, 255).astype(np.uint8))
+        amounts[k] = -gray * away.mean(axis=1)
+    return np.asarray(np.clip(np.round(_ZERO + amounts), 0, 255).astype(np.uint8))
 
 
 @compiled
@@ -157,7 +158,7 @@ def _look_up(
 ) -> None:
     rows, columns, _ = color.shape
     places = np.empty(columns, dtype=np.uint32)
-    # Row by row, one species after the other: such short loops are done for many pixels at once.
+    # Row by row, one species after the other: short loops are vectorised.
     for i in range(rows):
         for j in range(columns):
             blue = np.uint32(color[i, j, 0]) // np.uint32(_PER_STEP)

@@ -1,9 +1,12 @@
-"""Mean speeds of the species of a tray, and of all its beads, from images of each species."""
+"""Mean speeds of the species of a tray, and of all its beads, from images of each species.
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.stages.preprocess.shake_detection import NS
@@ -17,12 +20,12 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.settings import SpeedSettings
 
-# Estimates kept back for a species whose beads do not move enough to be known.
-_MOST_HELD = 3000
+# Samples held back at most while the beads do not move enough to be known.
+_MAX_HELD = 3000
 
 
 @dataclass(frozen=True, slots=True)
-class MeanMotion:
+class PictureSpeed:
     """Mean speed of the beads in the picture at one instant.
 
     Parameters
@@ -36,7 +39,7 @@ class MeanMotion:
     species : tuple of (float, float), [px/s]
         Speed and its error for each species.
     in_range : bool
-        Whether no species went too far between two pictures.
+        Whether the displacement of every species can be read reliably.
     """
 
     stamp_ns: int
@@ -49,8 +52,8 @@ class MeanMotion:
     in_range: bool
 
 
-class MeanMotions:
-    """Follows all species about the same instants; silent until it knows the beads of each.
+class SpeciesSpeeds:
+    """Measures all species about the same instants, once the appearance of their beads is known.
 
     Parameters
     ----------
@@ -60,7 +63,7 @@ class MeanMotions:
     counts : sequence of int
         Beads of each species.
     factors : sequence of (float, float)
-        What the speed of each species is to be multiplied by, and the error of that.
+        Factor for the speed of each species, and its error.
     """
 
     def __init__(
@@ -91,7 +94,7 @@ class MeanMotions:
         cycle: tuple[int, int | None],
         noise_powers: Sequence[float],
         shift_px: tuple[float, float] = (0.0, 0.0),
-    ) -> tuple[MeanMotion, ...]:
+    ) -> tuple[PictureSpeed, ...]:
         """Take the next image of each species.
 
         Parameters
@@ -107,7 +110,7 @@ class MeanMotions:
 
         Returns
         -------
-        tuple of MeanMotion
+        tuple of PictureSpeed
             In order of time; empty between two samples.
         """
         samples = tuple(
@@ -118,18 +121,30 @@ class MeanMotions:
         if len(samples) != len(self._parts):
             return ()
         self._held.append(samples)
-        del self._held[:-_MOST_HELD]
+        del self._held[:-_MAX_HELD]
         if not all(part.ready for part in self._parts):
             return ()
-        held, self._held = self._held, []
-        motions = []
-        for motion in map(self._motion, held):
-            if self._last_emitted_ns is None or motion.stamp_ns > self._last_emitted_ns:
-                self._last_emitted_ns = motion.stamp_ns
-                motions.append(motion)
-        return tuple(motions)
+        return self._released()
 
-    def _motion(self, samples: tuple[Sample, ...]) -> MeanMotion:
+    def flush(self) -> tuple[PictureSpeed, ...]:
+        """The speeds held back at the end of the recording, which are not reliable.
+
+        Empty when too few image pairs have been seen to measure any speed.
+        """
+        if not all(part.measurable for part in self._parts):
+            return ()
+        return tuple(replace(speed, in_range=False) for speed in self._released())
+
+    def _released(self) -> tuple[PictureSpeed, ...]:
+        held, self._held = self._held, []
+        speeds = []
+        for speed in map(self._speed, held):
+            if self._last_emitted_ns is None or speed.stamp_ns > self._last_emitted_ns:
+                self._last_emitted_ns = speed.stamp_ns
+                speeds.append(speed)
+        return tuple(speeds)
+
+    def _speed(self, samples: tuple[Sample, ...]) -> PictureSpeed:
         lags = [
             part.longest_lag(sample) for part, sample in zip(self._parts, samples, strict=True)
         ]
@@ -144,14 +159,14 @@ class MeanMotions:
             species.append((factor[0] * speed, error))
         shares = [count / sum(self._counts) for count in self._counts]
         fastest = windows.index(min(windows))
-        return MeanMotion(
+        return PictureSpeed(
             stamp_ns=int(samples[fastest].middles_ns[lags[fastest]]),
             window_ns=windows[fastest],
             cycle=samples[0].cycle,
             cycle_start_ns=samples[0].cycle_start_ns,
-            speed=sum(share * one for share, (one, _) in zip(shares, species, strict=True)),
+            speed=sum(share * speed for share, (speed, _) in zip(shares, species, strict=True)),
             error=math.hypot(
-                *(share * one for share, (_, one) in zip(shares, species, strict=True))
+                *(share * error for share, (_, error) in zip(shares, species, strict=True))
             ),
             species=tuple(species),
             in_range=all(

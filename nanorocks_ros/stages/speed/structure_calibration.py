@@ -1,10 +1,12 @@
-"""How much an image changes when its beads move: learnt from the images themselves.
+"""Calibration of the structure function: image difference against displacement of the beads.
 
 The squared difference of two images in which every bead has moved by d is, for independent
 beads, the autocovariance of their appearance: D(d) = 2 [C(0) - C(d)]. The difference of two
 images far enough apart in time holds every bead twice, in unrelated places, and nothing that
 stands still, so its autocovariance is 2 C(d): neither a background, nor the number of beads,
 nor their shading has to be known.
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
 """
 
 from __future__ import annotations
@@ -83,7 +85,7 @@ def displacement_response(
     return displacements, changed @ radial
 
 
-class BeadResponse:
+class StructureCalibration:
     """Mean squared difference of two tray images against the mean displacement between them.
 
     Parameters

@@ -1,9 +1,11 @@
 """Mean projected speed from the structure function of the tray image.
 
-S(L), the sum of the squared differences of two images L apart in time less what noise alone
-gives, grows with the mean displacement of the beads in that time. The largest lag still well
-below the plateau is used, and the curve that turns S into a displacement is learnt from the
-same recording (:mod:`nanorocks_ros.stages.speed.structure_calibration`).
+S(L), the sum of the squared differences of two images L apart in time less that of the noise,
+grows with the mean displacement of the beads in that time. The largest lag still well below the
+plateau is used, and the curve that turns S into a displacement is learnt from the same recording
+(:mod:`nanorocks_ros.stages.speed.structure_calibration`).
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
 """
 
 from __future__ import annotations
@@ -16,27 +18,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.stages.preprocess.shake_detection import NS, difference_power
-from nanorocks_ros.stages.speed.structure_calibration import BeadResponse
+from nanorocks_ros.stages.speed.structure_calibration import StructureCalibration
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.settings import SpeedSettings
 
-# Path, in bead diameters, after which two images are taken to be unrelated but for a share
-# that is made up for; and how many such pairs are needed before speeds are released.
+# Path, in bead diameters, after which two images are taken to be unrelated, but for a share that
+# is corrected for; and the number of such pairs needed before speeds are released.
 _UNRELATED_PATH = 4.0
 _PAIRS_NEEDED = 6
+# Fewer leave the spread of the response unknown; used for speeds that are flagged.
+_PAIRS_MEASURABLE = 2
 # A bead deflected between two images has come further than it is away. Share of the path lost
 # per path of one diameter, and variance of that loss for one bead per unit of it: measured on
 # simulated gases in tray 1; the rates of deflection per diameter in trays 3 and 5 are alike.
 _DEFLECTION_LOSS = 0.25
 _DEFLECTION_SCATTER = 0.75
-# Of that loss, what differs from one gas to another; and of what a tray that swings adds to a
-# displacement, what may be left when it is taken off.
-_DEFLECTION_UNSURE = 0.3
-_SHIFT_UNSURE = 0.5
-# Of the plateau: beyond it a displacement can hardly be read, and a sixth of the simulated
+# Share of that loss that differs from one gas to another; and share of the motion of the tray that
+# may be left when it is subtracted.
+_DEFLECTION_ERROR = 0.3
+_SHIFT_ERROR = 0.5
+# Share of the plateau beyond which a displacement is not reliable: a sixth of the simulated
 # estimates were off by more than 20 %.
 _OUT_OF_RANGE = 0.65
 _PAIRS_KEPT = 400
@@ -71,7 +75,7 @@ class Sample:
 
 
 class StructureFunction:
-    """Turns images of one species into mean displacements, once it knows its beads.
+    """Turns images of one species into mean displacements, once it is calibrated.
 
     Parameters
     ----------
@@ -80,9 +84,9 @@ class StructureFunction:
         Mean bead diameter.
     beads : int
     centred : bool
-        Whether all pairs of images have one middle, so that species that differ in speed can
-        have lags of their own; otherwise all end with the last image, which is half the longest
-        lag earlier.
+        Whether all pairs of images have the same middle, so that species of different speeds can
+        have different lags; otherwise all pairs end with the last image, half the longest lag
+        earlier.
     """
 
     def __init__(
@@ -98,8 +102,8 @@ class StructureFunction:
         self._shifts: deque[tuple[float, float]] = deque(maxlen=settings.max_lag_frames + 1)
         self._keys: list[tuple[int, NDArray[np.uint8]]] = []
         self._key_interval_ns = _KEY_INTERVAL_NS
-        self._response = BeadResponse(diameter_px, beads)
-        self._first_guess = BeadResponse(diameter_px, beads)
+        self._response = StructureCalibration(diameter_px, beads)
+        self._first_guess = StructureCalibration(diameter_px, beads)
         self._beads = beads
         self._path_stamps: list[int] = []
         self._path: list[float] = []
@@ -151,11 +155,11 @@ class StructureFunction:
             self._next_sample_ns = max(self._next_sample_ns, stamp_ns + 1)
             sample = self._sample(cycle, noise_power, self._centred)
         if self._response.pairs >= _PAIRS_KEPT:
-            # All is learnt.
+            # The calibration is complete.
             self._keys.clear()
         elif not self._keys or stamp_ns - self._keys[-1][0] >= self._key_interval_ns:
             self._learn(stamp_ns, gray, noise_power)
-            self._keep(stamp_ns, gray)
+            self._keep_key(stamp_ns, gray)
         return sample
 
     @property
@@ -163,12 +167,17 @@ class StructureFunction:
         """Whether enough unrelated image pairs have been seen."""
         return self._response.pairs >= _PAIRS_NEEDED
 
+    @property
+    def measurable(self) -> bool:
+        """Whether displacements can be measured at all, if not reliably."""
+        return self._response.pairs >= _PAIRS_MEASURABLE
+
     def _sample(
         self, cycle: tuple[int, int | None], noise_power: float, centred: bool = False
     ) -> Sample:
         lags = [lag for lag in self._lags if lag < len(self._images)]
         last = len(self._images) - 1
-        # The later of the two images: the last one, or so that all pairs have one middle.
+        # The later of the two images: the last one, or the one that gives all pairs one middle.
         ends = [last - (last - lag) // 2 if centred else last for lag in lags]
         pairs = [
             (self._images[end], self._images[end - lag])
@@ -194,7 +203,7 @@ class StructureFunction:
         )
 
     def longest_lag(self, sample: Sample) -> int:
-        """Place of the longest lag over which the beads have not gone too far."""
+        """Index of the longest lag over which the displacement can be read."""
         return self._lag_below_plateau(sample, self._response)
 
     def displacement(self, sample: Sample, lag: int) -> tuple[float, float]:
@@ -204,37 +213,37 @@ class StructureFunction:
         ----------
         sample : Sample
         lag : int
-            Place in `sample.windows_ns`.
+            Index in `sample.windows_ns`.
         """
         power = sample.powers[lag : lag + 1]
         pixels = self._images[-1][1].size
-        away = float(self._response.displacement(power)[0])
+        apparent = float(self._response.displacement(power)[0])
         error = float(self._response.displacement_error(power, sample.noise_power, pixels)[0])
-        # Beads fly past the camera, and the images follow the tray: the mean of distances that
-        # are Rayleigh distributed grows like this when all are shifted.
-        square = away**2 - 0.25 * np.pi * float(sample.shifts_px[lag]) ** 2
+        # Beads move past the camera, and the images follow the tray: so grows the mean of Rayleigh
+        # distributed distances when all beads are shifted.
+        square = apparent**2 - 0.25 * np.pi * float(sample.shifts_px[lag]) ** 2
         if square > 0.0:
-            error *= away / np.sqrt(square)
+            error *= apparent / np.sqrt(square)
         left = float(np.sqrt(max(square, 0.0)))
         loss = min(0.5, _DEFLECTION_LOSS * left / self._diameter_px)
         scatter = np.sqrt(_DEFLECTION_SCATTER * loss / self._beads) * left
-        unsure = (_DEFLECTION_UNSURE * loss * left, _SHIFT_UNSURE * (away - left))
-        return left / (1.0 - loss), math.hypot(error, scatter, *unsure)
+        systematic = (_DEFLECTION_ERROR * loss * left, _SHIFT_ERROR * (apparent - left))
+        return left / (1.0 - loss), math.hypot(error, scatter, *systematic)
 
     def in_range(self, sample: Sample, lag: int) -> bool:
-        """Whether the beads have not gone so far over a lag that it can hardly be read."""
+        """Whether the displacement over a lag can be read reliably."""
         return bool(sample.powers[lag] <= _OUT_OF_RANGE * self._response.plateau)
 
-    def _lag_below_plateau(self, sample: Sample, response: BeadResponse) -> int:
+    def _lag_below_plateau(self, sample: Sample, response: StructureCalibration) -> int:
         low_enough = sample.powers <= self._settings.saturation * response.plateau
-        # The lags before the first that is too long, so that a chance return is no choice.
+        # Up to the first lag that is too long: a later one may return below it by chance.
         return max(0, int(np.argmin(np.append(low_enough, False))) - 1)
 
     def _learn(self, stamp_ns: int, gray: NDArray[np.uint8], noise_power: float) -> None:
         if not self._keys:
             return
         if not self.ready:
-            self._guess(gray, noise_power)
+            self._guess_response(gray, noise_power)
         self._extend_path(stamp_ns, noise_power)
         path_now = self._path[-1]
         for key_stamp, key in self._keys:
@@ -243,26 +252,26 @@ class StructureFunction:
                 self._response.add(gray, key, noise_power, path)
                 return
 
-    def _keep(self, stamp_ns: int, gray: NDArray[np.uint8]) -> None:
+    def _keep_key(self, stamp_ns: int, gray: NDArray[np.uint8]) -> None:
         self._keys.append((stamp_ns, gray))
         if len(self._keys) > _KEYS_KEPT:
-            # Slow beads need images ever further apart: keep every other, all the way back.
+            # Slow beads need images further apart: keep every other one.
             del self._keys[1::2]
             self._key_interval_ns *= 2
 
-    def _guess(self, gray: NDArray[np.uint8], noise_power: float) -> None:
+    def _guess_response(self, gray: NDArray[np.uint8], noise_power: float) -> None:
         """A response from the two images furthest apart, until there is a better one."""
-        self._first_guess = BeadResponse(self._diameter_px, self._beads)
+        self._first_guess = StructureCalibration(self._diameter_px, self._beads)
         self._first_guess.add(gray, self._keys[0][1], noise_power)
 
     def _extend_path(self, stamp_ns: int, noise_power: float) -> None:
-        """How far a bead has come since the shaking event, on average, in pixels."""
+        """Extend the mean path of a bead since the shaking event, [px]."""
         if not self._path:
             self._path_stamps.append(self._keys[-1][0])
             self._path.append(0.0)
         step = 0.0
         response = self._response if self.ready else self._first_guess
-        # Without motion the guess is made of noise and would lead anywhere.
+        # Without motion the guess is made of noise alone.
         if response.plateau > noise_power * self._images[-1][1].size:
             sample = self._sample((0, None), noise_power)
             lag = self._lag_below_plateau(sample, response)

@@ -1,20 +1,17 @@
-"""Mean projected speed from the structure function, for each species that a colour tells apart."""
+"""Mean projected speed from the structure function, for each species that a colour tells apart.
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
+"""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.records import (
-    Measured,
-    Quality,
-    SpeedEstimate,
-    SpeedMethod,
-    TrayImage,
-)
-from nanorocks_ros.stages.preprocess.shake_detection import NS, CycleFollower, NoiseMeter
+from nanorocks_ros.records import Measured, Quality, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.stages.preprocess.shake_detection import NS, NoiseMeter
 from nanorocks_ros.stages.speed.species_images import SpeciesImages
-from nanorocks_ros.stages.speed.species_speeds import MeanMotion, MeanMotions
+from nanorocks_ros.stages.speed.species_speeds import PictureSpeed, SpeciesSpeeds
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,20 +20,21 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Species, Tray
     from nanorocks_ros.settings import PipelineSettings
 
-# Relative error of the mean speed of a mixture seen as one: fast light beads count too little.
+# Relative error of the mean speed of a mixture measured as one species: fast light beads count too
+# little.
 _UNKNOWN_MIXTURE = 0.25
-# Pictures that do not show every species, after which all beads are seen as one; and pictures
-# without colour in a row, after which one need not wait for it.
+# Pictures that do not show every species, after which all beads are measured together; and
+# pictures without colour in a row, after which colour is given up.
 _PATIENCE = 30
-# While others measure, two of so many pictures are looked at for the noise.
+# While another method measures, the noise is measured between two of so many pictures.
 _WATCHED = 10
 
 
 class StructureSpeed:
-    """Measures the speed by the structure function; silent until it knows the beads.
+    """Measures the speed by the structure function, once the appearance of the beads is known.
 
-    A mixture is told apart by colour where there is one: the light beads of a mixture are the
-    fast ones, and a bead counts by its area and contrast when all are seen as one.
+    The species of a mixture are separated by colour where possible: the light beads are the fast
+    ones, and together each bead counts by its area and contrast.
 
     Parameters
     ----------
@@ -48,119 +46,139 @@ class StructureSpeed:
         self._settings = settings.speed
         self._scale = settings.preprocess.pixels_per_metre
         self._tray = tray
-        self._watched = 0
-        self._flags = Quality(0)
-        self._restart()
+        self.reset()
 
-    def _restart(self) -> None:
+    def reset(self, stamp_ns: int | None = None) -> None:
+        """Start afresh."""
+        del stamp_ns
+        self._watched = 0
+        self._idle = False
+        self._cycle: int | None = None
+        self._flags = Quality(0)
+        self._forget_beads()
+
+    def _forget_beads(self) -> None:
         self._images = SpeciesImages(self._tray, self._scale)
-        self._told_apart = False
+        self._separated = False
         self._waited = 0
         self._noise: list[NoiseMeter] = []
-        self._motions: MeanMotions | None = None
+        self._speeds: SpeciesSpeeds | None = None
 
-    def push(
-        self, image: TrayImage, shakes: CycleFollower, shaken: bool
-    ) -> tuple[SpeedEstimate, ...]:
-        """Take the next image; one without colour, where there was colour before, is left out."""
+    def push(self, image: TrayImage) -> tuple[SpeedEstimate, ...]:
+        """Take the next image, whose cycle is known.
+
+        An image without colour is left out where there was colour before.
+        """
         self._flags |= image.quality
-        if self._motions is not None and shaken:
-            self._motions.shaken()
+        shaken = self._cycle not in (None, image.cycle)
+        self._cycle = image.cycle
+        # The images before a time without images are of no use.
+        if self._speeds is not None and (shaken or self._idle):
+            self._speeds.shaken()
+        self._idle = False
         shown = self._shown(image)
-        if not shown or self._motions is None:
+        if not shown or self._speeds is None:
             return ()
-        cycle = (shakes.cycle, shakes.cycle_start_ns)
         across, down = (
-            0.0 if math.isnan(one) else self._scale * one for one in image.displacement
+            0.0 if math.isnan(component) else self._scale * component
+            for component in image.displacement
         )
-        shift = (across, down)
-        noise = [meter.push(one) for meter, one in zip(self._noise, shown, strict=True)]
-        motions = self._motions.push(image.stamp_ns, shown, cycle, noise, shift)
-        if not motions:
-            return ()
-        estimates = tuple(self._estimate(motion) for motion in motions)
-        self._flags = Quality(0)
-        return estimates
+        cycle = (image.cycle or 0, image.cycle_start_ns)
+        noise = [meter.push(gray) for meter, gray in zip(self._noise, shown, strict=True)]
+        return self._estimates(
+            self._speeds.push(image.stamp_ns, shown, cycle, noise, (across, down))
+        )
 
-    def rest(self) -> None:
-        """Hold no images while there is no use for them."""
-        if self._motions is not None:
-            self._motions.shaken()
+    def pause(self) -> None:
+        """Release the images while another method measures."""
+        if not self._idle and self._speeds is not None:
+            self._speeds.shaken()
+        self._idle = True
 
-    def watch(self, image: TrayImage) -> None:
-        """See no more of an image than what the noise is, for when it will be needed."""
+    def watch_noise(self, image: TrayImage) -> None:
+        """Measure only the noise of an image, for when another method fails."""
         self._watched = (self._watched + 1) % _WATCHED
         if self._watched > 1:
             return
-        for meter, one in zip(self._noise, self._shown(image), strict=False):
+        for meter, gray in zip(self._noise, self._shown(image), strict=False):
             if self._watched == 0:
-                meter.begin(one)
+                meter.start_from(gray)
             else:
-                meter.push(one)
+                meter.push(gray)
+
+    def flush(self) -> tuple[SpeedEstimate, ...]:
+        """Speeds held back in a recording too short to know the beads, flagged as uncertain."""
+        return self._estimates(self._speeds.flush()) if self._speeds is not None else ()
 
     def _shown(self, image: TrayImage) -> tuple[NDArray[np.uint8], ...]:
-        """An image of each species, or one of all; none while that is not decided."""
-        if self._motions is None and not self._begin(image):
+        """An image of each species, or one of all beads; none while that is not decided."""
+        if self._speeds is None and not self._learn_beads(image):
             return ()
-        if not self._told_apart:
+        if not self._separated:
             return (image.gray,)
         if image.color is not None:
             self._waited = 0
-            return self._images.of(image.color)
+            return self._images.images(image.color)
         self._flags |= Quality.GRAY_CAMERA
         self._waited += 1
         if self._waited > _PATIENCE:
-            self._restart()
+            self._forget_beads()
         return ()
 
-    def _begin(self, image: TrayImage) -> bool:
-        """Decide whether species are told apart; False until the picture shows it."""
+    def _learn_beads(self, image: TrayImage) -> bool:
+        """Decide whether the species are separated; False until the picture shows it."""
         tray = self._tray
-        told_apart = image.color is not None and self._images.possible
-        if told_apart and image.color is not None and not self._images.learn(image.color):
+        separated = image.color is not None and self._images.possible
+        if separated and image.color is not None and not self._images.learn(image.color):
             self._waited += 1
             if self._waited <= _PATIENCE:
                 return False
-            told_apart = False
-        if told_apart or len(tray.species) == 1:
-            diameters = [one.diameter * self._scale for one in tray.species]
-            counts = [one.count for one in tray.species]
-            factors = [size_factor(one) for one in tray.species]
+            separated = False
+        if separated or len(tray.species) == 1:
+            diameters = [species.diameter * self._scale for species in tray.species]
+            counts = [species.count for species in tray.species]
+            factors = [size_factor(species) for species in tray.species]
         else:
             diameters, counts = [tray.diameter * self._scale], [tray.count]
             factors = [(1.0, _UNKNOWN_MIXTURE)]
-        self._told_apart = told_apart
+        self._separated = separated
         self._waited = 0
         self._noise = [NoiseMeter() for _ in diameters]
-        self._motions = MeanMotions(self._settings, diameters, counts, factors)
+        self._speeds = SpeciesSpeeds(self._settings, diameters, counts, factors)
         return True
 
-    def _estimate(self, motion: MeanMotion) -> SpeedEstimate:
+    def _estimates(self, speeds: tuple[PictureSpeed, ...]) -> tuple[SpeedEstimate, ...]:
+        estimates = tuple(self._estimate(speed) for speed in speeds)
+        if estimates:
+            self._flags = Quality(0)
+        return estimates
+
+    def _estimate(self, speed: PictureSpeed) -> SpeedEstimate:
         scale = self._scale
-        known = motion.species if self._told_apart else ()
-        out_of_range = Quality(0) if motion.in_range else Quality.UNCERTAIN
+        species = speed.species if self._separated else ()
+        out_of_range = Quality(0) if speed.in_range else Quality.UNCERTAIN
         return SpeedEstimate(
-            stamp_ns=motion.stamp_ns,
+            stamp_ns=speed.stamp_ns,
             tray=self._tray.number,
-            cycle=motion.cycle,
-            cycle_start_ns=motion.cycle_start_ns,
-            mean_projected_speed=Measured(motion.speed / scale, motion.error / scale),
-            window=motion.window_ns / NS,
+            cycle=speed.cycle,
+            cycle_start_ns=speed.cycle_start_ns,
+            mean_projected_speed=Measured(speed.speed / scale, speed.error / scale),
+            window=speed.window_ns / NS,
             method=SpeedMethod.STRUCTURE_FUNCTION,
             quality=self._flags | out_of_range,
             species_speeds=tuple(
-                Measured(speed / scale, error / scale) for speed, error in known[:2]
+                Measured(value / scale, error / scale) for value, error in species[:2]
             ),
         )
 
 
 def size_factor(species: Species) -> tuple[float, float]:
-    """What a spread of sizes asks of the speed of a species: a factor, and its error.
+    """Factor for the speed of a species with a range of sizes, and its error.
 
     The squared difference of two images grows with the outline of a bead times its path, so it
-    tells <R v> / <R>. That is the mean speed when all are as fast; when all have the same energy,
-    v goes as R^-3/2 and the mean speed is more. Half way between, with half the difference as
-    the error.
+    gives <R v> / <R>. That is the mean speed when all beads are equally fast; when all have the
+    same energy, v goes as R^-3/2 and the mean speed is larger. The factor is half way between, its
+    error half the difference.
 
     Parameters
     ----------

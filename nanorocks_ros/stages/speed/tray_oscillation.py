@@ -1,4 +1,4 @@
-"""How fast the tray itself moves on its springs, which drives the gas in it."""
+"""Speed of the tray itself, which oscillates on its springs and drives the gas in it."""
 
 from __future__ import annotations
 
@@ -6,33 +6,32 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.records import UNKNOWN
+from nanorocks_ros.records import UNKNOWN, SpeedEstimate
+from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 from nanorocks_ros.stages.preprocess.shake_detection import NS
 
 if TYPE_CHECKING:
-    from nanorocks_ros.records import SpeedEstimate, TrayImage
+    from nanorocks_ros.records import TrayImage
 
-# Speeds are given out as late as that after their middle.
-_MEMORY_NS = 10 * NS
-# About half a period of the swing on each side.
+# About half a period of the oscillation on each side.
 _REACH_NS = 350_000_000
 _DEVIATIONS = 2.0
 
 
-class SwingMeter:
-    """Remembers the velocity of the tray, and tells its speed around an estimate."""
+class TrayOscillation:
+    """Keeps the last velocities of the tray, for its speed around an estimate."""
 
     def __init__(self) -> None:
         self._squares: deque[tuple[int, float, float]] = deque()
 
     def push(self, image: TrayImage) -> None:
-        """Take the next image; one whose tray was not followed tells nothing."""
+        """Take the next image; one whose tray could not be registered is left out."""
         across, down = image.velocity
         square, noise = across**2 + down**2, 2.0 * image.velocity_error**2
         if not math.isfinite(square + noise):
             return
         self._squares.append((image.stamp_ns, square, noise))
-        while image.stamp_ns - self._squares[0][0] > _MEMORY_NS:
+        while image.stamp_ns - self._squares[0][0] > KNOWN_AFTER_NS[SpeedEstimate]:
             self._squares.popleft()
 
     def speed(self, estimate: SpeedEstimate) -> float:
@@ -46,11 +45,11 @@ class SwingMeter:
         Returns
         -------
         float
-            Without what errors may add; NaN when the tray was not followed.
+            Without what errors may add; NaN when the tray could not be registered.
         """
         reach = max(_REACH_NS, round(0.5 * estimate.window * NS))
         near = []
-        # An estimate is of a second ago, and ten are kept.
+        # From the end: an estimate is of a second ago, and ten seconds are kept.
         for stamp_ns, square, noise in reversed(self._squares):
             if stamp_ns < estimate.stamp_ns - reach:
                 break
@@ -61,5 +60,5 @@ class SwingMeter:
         near.reverse()
         square, noise = (sum(column) / len(near) for column in zip(*near, strict=True))
         # The mean of so many squares of noise scatters by itself.
-        may_be = noise * (1.0 + _DEVIATIONS / math.sqrt(len(near)))
-        return math.sqrt(max(square - may_be, 0.0))
+        largest_noise = noise * (1.0 + _DEVIATIONS / math.sqrt(len(near)))
+        return math.sqrt(max(square - largest_noise, 0.0))

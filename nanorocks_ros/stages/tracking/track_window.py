@@ -1,4 +1,7 @@
-"""Sliding window of the tracks of a tray, in contiguous arrays."""
+"""Sliding window of the tracks of a tray, in contiguous arrays.
+
+Tested by ``test/pipeline/test_tray_measurement.py``.
+"""
 
 from __future__ import annotations
 

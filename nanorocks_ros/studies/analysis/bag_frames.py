@@ -1,4 +1,7 @@
-"""The camera in a bag: its frames in order, its epoch, and the truth where there is one."""
+"""The camera in a bag: its frames in order, its epoch, and the truth where there is one.
+
+Tested by ``test/studies/analysis/test_sample_bag.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The tray images of a bag: its frames, preprocessed."""
+"""The tray images of a bag: its frames, preprocessed.
+
+Tested by ``test/studies/inspection/test_preprocessing_steps.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Summary of each shaking cycle from the tables: peak speed, restitution, cluster size."""
+"""Summary of each shaking cycle from the tables: peak speed, restitution, cluster size.
+
+Tested by ``test/studies/analysis/test_long_term.py``.
+"""
 
 from __future__ import annotations
 

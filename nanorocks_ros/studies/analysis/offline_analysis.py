@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
     from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
     from nanorocks_ros.jobs.progress import Progress
+    from nanorocks_ros.pipeline.composition import Result
     from nanorocks_ros.records import ArrayRecord, RecordType
     from nanorocks_ros.settings import PipelineSettings
 
@@ -246,10 +247,9 @@ def analyse(
     if result.refused:
         result.notices.append(f'{bag.where}: {result.refused} frames could not be used')
         result.complete = False
-    for record in pipeline.flush():
-        result.trays[record.tray].add(record)
+    _keep(result, pipeline.flush())
     for number, stages in pipeline.trays.items():
-        result.trays[number].evidence = stages.cooling.evidence
+        result.trays[number].evidence = stages.restitution.evidence
         result.trays[number].sticking = stages.clusters.cycles
     # Known only after reading: where a damaged bag ends.
     result.notices[:0] = [*bag.reader.notices, *bag.notices]
@@ -282,6 +282,10 @@ def _push(result: Analysis, pipeline: Pipeline, frame: Frame) -> None:
     records = pipeline.push(frame)
     if any(isinstance(record, TrayImage) for record in records):
         result.stamps_ns.append(frame.stamp_ns)
+    _keep(result, records)
+
+
+def _keep(result: Analysis, records: Iterable[Result]) -> None:
     for record in records:
         if isinstance(record, Notice):
             result.notices.append(record.text)

@@ -1,4 +1,7 @@
-"""Tables that `nanorocks analyse` wrote, read back by the names of their columns."""
+"""Tables that `nanorocks analyse` wrote, read back by the names of their columns.
+
+Tested by ``test/studies/analysis/test_long_term.py``.
+"""
 
 from __future__ import annotations
 

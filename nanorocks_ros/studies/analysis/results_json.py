@@ -1,4 +1,7 @@
-"""Results of an analysis as a JSON object."""
+"""Results of an analysis as a JSON object.
+
+Tested by ``test/studies/analysis/test_results_folder.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Tracks as tables: CSV, or Parquet where pyarrow is installed."""
+"""Tracks as tables: CSV, or Parquet where pyarrow is installed.
+
+Tested by ``test/studies/analysis/test_bag_tracks.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""How the gas of every tray cools, in all cycles of a batch."""
+"""How the gas of every tray cools, in all cycles of a batch.
+
+Tested by ``test/studies/batch/test_batch_analysis.py``.
+"""
 
 from __future__ import annotations
 

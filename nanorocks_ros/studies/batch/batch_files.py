@@ -1,4 +1,7 @@
-"""Tables and report of a batch, beside the results of each recording."""
+"""Tables and report of a batch, beside the results of each recording.
+
+Tested by ``test/studies/batch/test_batch_analysis.py``.
+"""
 
 from __future__ import annotations
 

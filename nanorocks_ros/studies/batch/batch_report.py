@@ -1,4 +1,7 @@
-"""The report of a batch: one HTML page with embedded figures."""
+"""The report of a batch: one HTML page with embedded figures.
+
+Tested by ``test/studies/batch/test_batch_analysis.py``.
+"""
 
 from __future__ import annotations
 

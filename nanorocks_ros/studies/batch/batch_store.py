@@ -1,4 +1,7 @@
-"""The folder of the results of a batch, and its manifest."""
+"""The folder of the results of a batch, and its manifest.
+
+Tested by ``test/studies/batch/test_batch_analysis.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""A batch as tables: a row for every cycle, and one for every tray."""
+"""A batch as tables: a row for every cycle, and one for every tray.
+
+Tested by ``test/studies/batch/test_batch_analysis.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""One recording of a batch: its analysis, results and summary."""
+"""One recording of a batch: its analysis, results and summary.
+
+Tested by ``test/studies/batch/test_batch_analysis.py``.
+"""
 
 from __future__ import annotations
 

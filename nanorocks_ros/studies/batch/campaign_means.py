@@ -1,4 +1,7 @@
-"""Means and posteriors over all cycles of all recordings of a batch, per tray."""
+"""Means and posteriors over all cycles of all recordings of a batch, per tray.
+
+Tested by ``test/studies/batch/test_batch_analysis.py``.
+"""
 
 from __future__ import annotations
 
@@ -139,7 +142,7 @@ def combined(
         mean = None
         if number in evidence:
             try:
-                mean = stages.cooling.mean_of(evidence[number])
+                mean = stages.restitution.mean_of(evidence[number])
             except FitError as error:
                 notices.append(str(error))
         trays[number] = TrayMeans(

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import FitError, RecordingError
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import SpeedEstimate, Tracks
 from nanorocks_ros.settings import with_values
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 from nanorocks_ros.stages.tracking.mean_speed import MeanSpeed, mean_speed
 from nanorocks_ros.studies.analysis.bag_images import BagImages
 from nanorocks_ros.studies.calibration.area_fit import AreaFit, SpeedPair, fit_area
@@ -108,7 +108,7 @@ def calibrate_area(
     }
     images = BagImages(path, with_values(settings, values, 'calibration'), image_topic)
     estimators = {
-        number: SpeedEstimator(images.settings, tray) for number, tray in images.trays.items()
+        number: TrayMeasurement(images.settings, tray) for number, tray in images.trays.items()
     }
     speeds: dict[int, list[SpeedEstimate]] = {number: [] for number in images.trays}
     pictures: dict[int, list[_TrayView]] = {number: [] for number in images.trays}

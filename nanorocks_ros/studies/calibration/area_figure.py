@@ -1,6 +1,6 @@
 """Figure of a calibration of the binarised area: manual speeds over its speeds.
 
-Tested in test_area_calibration.py.
+Tested by ``test/studies/calibration/test_area_calibration.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Parameter file of a calibration of the binarised area.
 
-Tested in test_area_calibration.py.
+Tested by ``test/studies/calibration/test_area_calibration.py``.
 """
 
 from __future__ import annotations

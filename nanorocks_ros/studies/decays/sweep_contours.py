@@ -1,6 +1,6 @@
 """Lines of equal decay rate across the map of a sweep, by closed forms.
 
-Tested in test_chi_square_map.py.
+Tested by ``test/studies/decays/test_chi_square_map.py``.
 """
 
 from __future__ import annotations

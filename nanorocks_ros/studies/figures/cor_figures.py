@@ -1,7 +1,9 @@
-"""The figures by which the paper gets at restitutions, of one tray, in one folder.
+"""The figures of the paper that determine the restitutions of one tray, in one folder.
 
 The decay with its fits (figure 7), the maps of the search over simulated runs (figure 12), and the
 restitution against speed (figure 13).
+
+Tested by ``test/cli/figures/test_figure_cor.py``.
 """
 
 from __future__ import annotations
@@ -37,31 +39,31 @@ if TYPE_CHECKING:
 
 _MARK = '.nanorocks_cor_figures'
 DECAY, WALLS, WIDTH, SPEED = 'decay.png', 'walls.png', 'width.png', 'cor_against_speed.png'
-# The search leaves its last third to decays that started faster.
-_LONGER = 1.5
+# Length of the sweep over that of the decay, for decays with a higher initial speed.
+_DURATION_FACTOR = 1.5
 _TIMES = 31
 _ROUNDING = 1e-12
-# Of the mean in three dimensions, that in the picture.
+# Mean projected speed over mean speed of an isotropic gas.
 _PROJECTED = 0.25 * math.pi
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CorData:
-    """What was measured in one tray.
+    """Measured cycles of one tray.
 
     Parameters
     ----------
     tray : Tray
-        One that was flown: others cannot be searched.
+        A tray as flown; sweeps simulate no other.
     cycles : tuple of CycleSpeeds
     species : tuple of tuples of CycleSpeeds
-        Of each species; empty where they were not told apart.
+        The cycles of each species; empty where species were not separated.
     span : tuple of 2 floats, [s]
-        First and last time since the shaking event that is used.
+        First and last time of the fit, since the shaking event.
     start : float, [s]
-        From when on the gas cools, since the shaking event.
+        Start of the cooling, since the shaking event.
     wall_restitution : float, 0 to 1
-        Where a figure needs it to be known.
+        Restitution of the walls in figures that do not vary it.
     """
 
     tray: Tray
@@ -74,15 +76,15 @@ class CorData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Search:
-    """What to search.
+    """The grids of the search.
 
     Parameters
     ----------
     beads, walls, widths : tuple of float, 0 to 1
-        Restitutions between beads, at walls, and full widths of an even distribution of the
-        former; two or more each.
+        Restitutions between beads, restitutions at walls, and full widths of a uniform
+        distribution of the former; two or more each.
     runs : int, > 0
-        At every point.
+        Simulated runs at each point.
     seed : int
     """
 
@@ -95,14 +97,14 @@ class Search:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reports:
-    """Where to say how it goes.
+    """Callbacks for progress and messages.
 
     Parameters
     ----------
     progress : callable
-        Called with the name of the map, and the runs done and the runs there are.
+        Called with the name of the map, the runs done and all runs.
     notice : callable
-        Called with what the user should know, one line each.
+        Called with messages for the user, one line each.
     """
 
     progress: Callable[[str, int, int], None]
@@ -110,16 +112,16 @@ class Reports:
 
 
 def prepare_folder(folder: Path) -> None:
-    """Make the folder, or take up the one an earlier call left.
+    """Make the folder, or reuse that of an earlier call.
 
     Raises
     ------
     RecordingError
-        When it holds something else, or cannot be made or written.
+        When it holds other files, or cannot be made or written.
     """
     if folder.exists() and not (folder / _MARK).is_file():
         raise RecordingError(
-            str(folder), 'exists and holds no figures of ours', 'pass another --output'
+            str(folder), 'exists and holds no figures of this command', 'pass another --output'
         )
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -135,7 +137,7 @@ def prepare_folder(folder: Path) -> None:
 def cor_figures(
     folder: Path, data: CorData, search: Search, workers: Workers, reports: Reports
 ) -> dict[str, Any]:
-    """Draw all figures; the runs of the search are kept in the folder and taken up again.
+    """Draw all figures; runs of the search are kept in the folder and reused.
 
     Parameters
     ----------
@@ -149,50 +151,57 @@ def cor_figures(
     Returns
     -------
     dict
-        What was found: ``decay``, ``walls`` and ``width`` (values along both axes, chi square,
-        the best point), and ``instantaneous`` (InstantaneousCor, or None where it cannot be told).
+        ``decay``; ``walls`` and ``width`` (values along both axes, chi square, best point);
+        ``instantaneous`` (InstantaneousCor, or None where it cannot be determined).
 
     Raises
     ------
     ConfigurationError
-        For a tray that was not flown, or a search that cannot be carried out.
+        For a tray that was not flown, or an invalid search.
     FitError, RecordingError
-        When there is no decay.
+        When the speeds are no decay.
     KeyboardInterrupt
-        Ctrl-C; its text says what is kept.
+        On Ctrl-C; the text names the runs that are kept.
     """
     if load_trays().get(data.tray.number) != data.tray:
         raise ConfigurationError(
-            f'tray {data.tray.number}', 'is not as flown', 'use `nanorocks figure decay`'
+            f'tray {data.tray.number}',
+            'differs from the tray as flown',
+            'use `nanorocks figure decay`',
         )
     curve = mean_cycle(data.cycles, *data.span)
     check_errors(curve)
     plans = search_plans(search, data, curve)
     for axes in (plan.axes for plan in plans.values()):
         check_drawable(folder / WALLS, axes)
-    given: dict[str, Any] = {'wall_restitution': data.wall_restitution, 'span': data.span}
-    found: dict[str, Any] = {
+    common: dict[str, Any] = {'wall_restitution': data.wall_restitution, 'span': data.span}
+    values: dict[str, Any] = {
         'decay': decay_figure(
-            folder / DECAY, data.tray, data.cycles, **given, species=data.species, start=data.start
+            folder / DECAY,
+            data.tray,
+            data.cycles,
+            **common,
+            species=data.species,
+            start=data.start,
         ),
         'instantaneous': _instantaneous(folder / SPEED, data, reports),
     }
     cycles, span = cooling_part(data.cycles, data.span, data.start)
     cooling = mean_cycle(cycles, *span)
     for name, plan in plans.items():
-        found[name] = _map(folder, name, plan, cooling, workers, reports)
-    return found
+        values[name] = _map(folder, name, plan, cooling, workers, reports)
+    return values
 
 
 def search_plans(search: Search, data: CorData, curve: SpeedCurve) -> dict[str, SweepPlan]:
     """The two sweeps behind the maps of the paper's figure 12.
 
-    Their beads start as fast as those of the decay did, as far as two digits tell.
+    Their beads start with the initial speed of the decay, rounded to two digits.
 
     Raises
     ------
     ConfigurationError
-        For values that cannot be used.
+        For invalid values.
     """
     mean_speed = float(f'{_initial_speed(data, curve) / _PROJECTED:.2g}')
     settings = with_values(
@@ -200,27 +209,31 @@ def search_plans(search: Search, data: CorData, curve: SpeedCurve) -> dict[str, 
         {'tray': data.tray.number, 'seed': search.seed, 'mean_speed': mean_speed},
         'search',
     )
-    last = float(f'{_LONGER * (data.span[1] - data.start):.6g}')
+    last = float(f'{_DURATION_FACTOR * (data.span[1] - data.start):.6g}')
     times = [last * k / (_TIMES - 1) for k in range(_TIMES)]
     walls = {'restitution': search.beads, 'wall_restitution': search.walls}
-    # First, as it checks the restitutions.
+    # Made first, since it checks the restitutions.
     plans = {'walls': sweep_plan(settings, walls, times, search.runs, keep_runs=True)}
     half = 0.5 * max(search.widths, default=0.0)
-    # No single collision may gain energy.
-    narrow = [one for one in search.beads if half <= one <= 1.0 - half + _ROUNDING]
-    if len(narrow) < 2:
+    # No collision may gain energy.
+    possible = [
+        restitution
+        for restitution in search.beads
+        if half <= restitution <= 1.0 - half + _ROUNDING
+    ]
+    if len(possible) < 2:
         raise ConfigurationError(
             '--widths',
-            f'up to {2.0 * half:g} leave {len(narrow)} of --beads between 0 and 1',
+            f'up to {2.0 * half:g} leave {len(possible)} of --beads between 0 and 1',
             'give narrower widths',
         )
-    known = with_values(settings, {'wall_restitution': data.wall_restitution}, 'search')
-    widths = {'restitution': narrow, 'restitution_width': search.widths}
-    return {**plans, 'width': sweep_plan(known, widths, times, search.runs, keep_runs=True)}
+    fixed = with_values(settings, {'wall_restitution': data.wall_restitution}, 'search')
+    widths = {'restitution': possible, 'restitution_width': search.widths}
+    return {**plans, 'width': sweep_plan(fixed, widths, times, search.runs, keep_runs=True)}
 
 
 def _initial_speed(data: CorData, curve: SpeedCurve) -> float:
-    """Mean projected speed when the gas began to cool, about."""
+    """Approximate mean projected speed at the start of the cooling, [m/s]."""
     try:
         return library_decay(data.tray, data.cycles, curve, data.start).initial_speed
     except FitError:
@@ -234,7 +247,7 @@ def _instantaneous(path: Path, data: CorData, reports: Reports) -> Instantaneous
             path, data.tray, cycles, wall_restitution=data.wall_restitution, span=span
         )
     except (ConfigurationError, FitError) as error:
-        # The other figures do not need it.
+        # The other figures can be drawn without it.
         reports.notice(f'no {path.name}: {error}')
         path.unlink(missing_ok=True)
         return None
@@ -248,16 +261,16 @@ def _map(
     workers: Workers,
     reports: Reports,
 ) -> dict[str, Any]:
-    """Search, draw and read one map."""
-    found = sweep(
+    """Run the sweep of one map, draw it, and return its values."""
+    result = sweep(
         plan,
         folder / f'{name}_{plan.runs}_runs.npz',
         workers,
         lambda done, total: reports.progress(name, done, total),
         reports.notice,
     )
-    chi_square_figure(folder / f'{name}.png', found, curve, scaled=True)
-    values = chi_square(found, curve, scaled=True)
+    chi_square_figure(folder / f'{name}.png', result, curve, scaled=True)
+    values = chi_square(result, curve, scaled=True)
     best = np.unravel_index(int(values.argmin()), values.shape)
     return {
         **{axis.name: list(axis.values) for axis in plan.axes},

@@ -1,4 +1,7 @@
-"""The figure of a measured decay after the paper's figure 7."""
+"""The figure of a measured decay, after figure 7 of the paper.
+
+Tested by ``test/cli/figures/test_figure_decay.py``.
+"""
 
 from __future__ import annotations
 
@@ -53,9 +56,9 @@ def decay_figure(
     species: Sequence[Sequence[CycleSpeeds]] = (),
     start: float = 0.0,
 ) -> dict[str, Any]:
-    """The energy of each cycle and of their mean, with our fit, the library's and the paper's.
+    """Draw the energy of the cycles and their mean, with our fit, the library and the paper's fit.
 
-    Of a mixture the energy of each species is drawn below, with a fit of its own.
+    A second panel shows the energy of each species of a mixture, each with its own fit.
 
     Parameters
     ----------
@@ -63,26 +66,26 @@ def decay_figure(
     tray : Tray
     cycles : sequence of CycleSpeeds
     wall_restitution : float, [0, 1]
-        For the confined theory.
+        Restitution of the walls in the confined theory.
     span : tuple of 2 floats, [s]
-        First and last time since the shaking event that is fitted.
+        First and last time of the fit, since the shaking event.
     species : sequence of sequences of CycleSpeeds, optional
         The cycles of each species of a mixture, in the order of `Tray.species`.
     start : float, [s], optional
-        From when on the gas cools, since the shaking event: initial speeds are those of then,
-        unless `span` begins before it.
+        Start of the cooling, since the shaking event. Initial speeds refer to this time, or to
+        the start of `span` where that is earlier.
 
     Returns
     -------
     dict
-        What was fitted, in SI; None where a relation has no value, or the tray no library.
+        Fitted values, in SI; None where a relation has no value, or the tray no library.
 
     Raises
     ------
     FitError
         When the mean speed does not fall.
     RecordingError
-        When the cycles have too few times in common, or errors are not known.
+        When the cycles have too few times in common, or errors are unknown.
 
     References
     ----------
@@ -94,17 +97,17 @@ def decay_figure(
     age = curve.times - origin
     fit = fit_haff(age, curve.speed, curve.error, tray.count * len(cycles))
     energy, time = _paper_fit(age, curve.speed, tray.mean_mass)
-    found: dict[str, Any] = _values(tray, fit, (energy, time), wall_restitution)
+    values: dict[str, Any] = _values(tray, fit, (energy, time), wall_restitution)
     library = _library(tray, cycles, curve, start)
-    each = species_energies(tray, species, span, origin)
-    figure = Figure(figsize=(8.0, 9.0 if each else 5.5), layout='constrained')
-    panels = figure.subplots(2 if each else 1, 1, sharex=True, squeeze=False)[:, 0]
+    energies = species_energies(tray, species, span, origin)
+    figure = Figure(figsize=(8.0, 9.0 if energies else 5.5), layout='constrained')
+    panels = figure.subplots(2 if energies else 1, 1, sharex=True, squeeze=False)[:, 0]
     _draw_energy(panels[0], tray, cycles, curve)
-    _draw_laws(panels[0], tray, (curve.times, age), (fit, energy, time), found)
+    _draw_laws(panels[0], tray, (curve.times, age), (fit, energy, time), values)
     _draw_library(panels[0], tray, library)
     panels[0].legend(frameon=False, fontsize=9)
     for panel in panels[1:]:
-        draw_species(panel, each, origin)
+        draw_species(panel, energies, origin)
     panels[-1].set_xlabel('time since the shaking event [s]')
     panels[0].set_title(
         f'Tray {tray.number}, {len(cycles)} cycle{"s" if len(cycles) > 1 else ""}: '
@@ -114,10 +117,10 @@ def decay_figure(
     with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
     return {
-        **found,
+        **values,
         'cooling_start': origin,
         'library': None if library is None else _library_values(library),
-        **species_values(each),
+        **species_values(energies),
     }
 
 
@@ -127,16 +130,16 @@ def _library(
     try:
         return library_decay(tray, cycles, curve, start)
     except (ConfigurationError, FitError):
-        # Another tray than those flown; too short a decay.
+        # The tray has no library, or the decay is too short.
         return None
 
 
 def _library_values(library: LibraryDecay) -> dict[str, float]:
-    found = {'initial_speed': library.initial_speed}
+    values = {'initial_speed': library.initial_speed}
     for name in ('restitution', 'wall_restitution'):
         value, lower, upper = getattr(library, name)
-        found |= {name: value, f'{name}_lower': lower, f'{name}_upper': upper}
-    return found
+        values |= {name: value, f'{name}_lower': lower, f'{name}_upper': upper}
+    return values
 
 
 def _draw_laws(
@@ -144,26 +147,26 @@ def _draw_laws(
     tray: Tray,
     times: tuple[NDArray[np.float64], NDArray[np.float64]],
     fits: tuple[HaffFit, float, float],
-    found: dict[str, Any],
+    values: dict[str, Any],
 ) -> None:
-    """Our fit of Haff's law and the paper's (its energy [J] and time [s]).
+    """Draw our fit of Haff's law and the paper's fit, of energy [J] and time [s].
 
-    Times are those since the shaking event and since the gas began to cool.
+    `times` are those since the shaking event and since the start of the cooling.
     """
     fit, energy, time = fits
-    shown, age = times
+    since_shaking, age = times
     scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
     law = haff_speed(age, fit.initial_speed, fit.haff_time)
-    label = f"Haff's law, speeds weighted: {_cor_text('confined theory', found, 'confined')}"
-    axes.plot(shown, scale * law**2, color=_FIT, lw=2, zorder=3, label=label)
+    label = f"Haff's law, speeds weighted: {_cor_text('confined theory', values, 'confined')}"
+    axes.plot(since_shaking, scale * law**2, color=_FIT, lw=2, zorder=3, label=label)
     axes.plot(
-        shown,
+        since_shaking,
         _NANOJOULE * energy / (1.0 + age / time) ** 2,
         color=_PAPER,
         lw=2,
         ls='--',
         zorder=4,
-        label=f'as the paper fits, energies alike: {_cor_text("its COR", found, "paper")}',
+        label=f'fit of the paper, energies unweighted: {_cor_text("its COR", values, "paper")}',
     )
 
 
@@ -191,7 +194,7 @@ def _interval(values: tuple[float, float, float]) -> str:
 def _paper_fit(
     times: NDArray[np.float64], speed: NDArray[np.float64], mass: float
 ) -> tuple[float, float]:
-    """T0 [J] and tau0 [s] of the paper's fit: least squares of the energies, all alike."""
+    """T0 [J] and tau0 [s] of the paper's fit: unweighted least squares of the energies."""
     scale = relative_energy(1.0, mass)
     energies = scale * speed**2
 
@@ -210,7 +213,7 @@ def _values(
 ) -> dict[str, float | None]:
     rate = fit.decay_rate
     error = rate * fit.log_decay_rate_error
-    found: dict[str, float | None] = {
+    values: dict[str, float | None] = {
         'initial_speed': fit.initial_speed,
         'haff_time': fit.haff_time,
         'decay_rate': rate,
@@ -223,23 +226,23 @@ def _values(
         'wall_restitution': walls,
     }
     try:
-        found['paper'] = paper_restitution(
+        values['paper'] = paper_restitution(
             *paper, tray.mean_mass, tray.diameter, tray.number_density
         )
     except FitError:
-        found['paper'] = None
+        values['paper'] = None
     try:
         cor = confined_restitution(tray, Estimate(value=rate, error=error), walls)
     except FitError:
-        return found
-    return {**found, 'confined': cor.value, 'confined_error': cor.error}
+        return values
+    return {**values, 'confined': cor.value, 'confined_error': cor.error}
 
 
-def _cor_text(name: str, found: dict[str, float | None], key: str) -> str:
-    value, error = found[key], found.get(f'{key}_error')
+def _cor_text(name: str, values: dict[str, float | None], key: str) -> str:
+    value, error = values[key], values.get(f'{key}_error')
     if value is None:
         return f'{name} has no value'
-    walls = f', walls {found["wall_restitution"]:g}' if key == 'confined' else ''
+    walls = f', walls {values["wall_restitution"]:g}' if key == 'confined' else ''
     return f'{name} {value:.3f}' + (f' ± {error:.3f}' if error else '') + walls
 
 
@@ -265,10 +268,10 @@ def _draw_energy(axes: Axes, tray: Tray, cycles: Sequence[CycleSpeeds], curve: S
         lw=0.8,
         color=_MEASURED,
         zorder=2,
-        label='at their mean speed' if len(cycles) > 1 else 'measured',
+        label='mean of the cycles' if len(cycles) > 1 else 'measured',
     )
     axes.set_yscale('log')
-    # Noise about zero reaches down without end.
+    # On a log scale noise about zero has no lower end.
     axes.set_ylim(bottom=0.3 * scale * float(curve.speed.min()) ** 2)
     axes.set_ylabel(r'energy at the relative speed $\frac{1}{2} m (2\bar{v})^2$ [nJ]')
     axes.grid(alpha=0.25)

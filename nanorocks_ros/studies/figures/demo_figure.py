@@ -1,4 +1,4 @@
-"""Pictures of results, for people."""
+"""The figure of the demo: one cooling cycle and its restitution."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def cooling_figure(
     cors: Sequence[CorEstimate],
     truth: Sequence[GroundTruth] = (),
 ) -> None:
-    """The decay of one cycle, its fit, and the restitution as it converged, as a PNG.
+    """Draw the decay of one cycle, its fit, and the convergence of the restitution, as a PNG.
 
     Parameters
     ----------
@@ -71,8 +71,8 @@ def _draw_energy(
 
     if truth:
         axes.plot(
-            [(one.stamp_ns - start_ns) / NS for one in truth],
-            energy([one.mean_projected_speed for one in truth]),
+            [(state.stamp_ns - start_ns) / NS for state in truth],
+            energy([state.mean_projected_speed for state in truth]),
             color=_TRUTH,
             lw=3,
             alpha=0.6,
@@ -89,9 +89,9 @@ def _draw_energy(
     )
     last = cors[-1]
     if math.isfinite(last.haff_time.value):
-        begin = last.cooling_start if math.isfinite(last.cooling_start) else 0.0
-        line = np.linspace(begin, max(time), 300)
-        fitted = haff_speed(line - begin, last.initial_speed.value, last.haff_time.value)
+        start = last.cooling_start if math.isfinite(last.cooling_start) else 0.0
+        line = np.linspace(start, max(time), 300)
+        fitted = haff_speed(line - start, last.initial_speed.value, last.haff_time.value)
         axes.plot(
             line,
             energy(list(fitted)),
@@ -155,5 +155,5 @@ def _draw_convergence(
 
 
 def _name(last: CorEstimate, by_paper: bool) -> str:
-    what = 'closed form of the paper' if by_paper else 'from simulated decays'
-    return f'{what}: {last.restitution.value:.3f}'
+    source = 'closed form of the paper' if by_paper else 'from simulated decays'
+    return f'{source}: {last.restitution.value:.3f}'

@@ -1,4 +1,7 @@
-"""Sticking thresholds against mass beside published collision models, as the paper's figure 14."""
+"""The figure of sticking thresholds and published collision models, after figure 14.
+
+Tested by ``test/cli/figures/test_figure_dust.py``.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +39,7 @@ _MM, _MG = 1e3, 1e6
 _PAPER, _MEASURED, _CURVE, _SLOPE, _SEEN = '#e8b93c', '#c23b22', '#7a7a7a', '#30506f', '#4c8c5b'
 PAPER_SOURCE = 'the paper, twice the mean speed at its onset'
 _MASSES = 1e-10, 1e-3
-# The part of the masses over which a slope without a height is shown.
+# Factor of mass, up and down, over which the slope is drawn.
 _SLOPE_SPAN = 12.0
 
 
@@ -46,14 +49,14 @@ def threshold_of_tray(
     interval: tuple[float, float] | None = None,
     source: str = 'measured',
 ) -> MeasuredThreshold:
-    """A threshold [m/s] and its interval, at the masses of the beads of a tray.
+    """A threshold and its interval [m/s], at the masses of the beads of a tray.
 
     Raises
     ------
     ConfigurationError
-        For numbers that are not positive, or an interval that does not hold the threshold.
+        For numbers that are not positive, or an interval that does not contain the threshold.
     """
-    masses = [one.bead_mass for one in tray.species]
+    masses = [species.bead_mass for species in tray.species]
     lower, upper = (speed, speed) if interval is None else interval
     return MeasuredThreshold(
         tray=tray.number,
@@ -68,7 +71,7 @@ def threshold_of_tray(
 
 
 def paper_thresholds(trays: Mapping[int, Tray]) -> tuple[MeasuredThreshold, ...]:
-    """Those that the paper gives, of the trays that are there."""
+    """The thresholds of the paper for the given trays."""
     return tuple(
         threshold_of_tray(trays[number], speed, source=PAPER_SOURCE)
         for number, speed in PAPER_STICKING_SPEEDS.items()
@@ -77,7 +80,7 @@ def paper_thresholds(trays: Mapping[int, Tray]) -> tuple[MeasuredThreshold, ...]
 
 
 def dust_figure(path: Path, points: Sequence[MeasuredThreshold]) -> dict[str, Any]:
-    """Draw thresholds against mass, with every published curve, unverified ones marked.
+    """Draw thresholds against mass, with all published curves; unverified ones are marked.
 
     Parameters
     ----------
@@ -88,12 +91,12 @@ def dust_figure(path: Path, points: Sequence[MeasuredThreshold]) -> dict[str, An
     Returns
     -------
     dict
-        The points, and what the published curves say at their masses; SI units.
+        The points, and the published curves at their masses, in SI.
 
     Raises
     ------
     ConfigurationError
-        For no point.
+        For an empty sequence of points.
     RecordingError
         When the picture cannot be written.
 
@@ -102,7 +105,7 @@ def dust_figure(path: Path, points: Sequence[MeasuredThreshold]) -> dict[str, An
     [B19] fig. 14.
     """
     if not points:
-        raise ConfigurationError('thresholds', 'there is none', 'give one with --measured')
+        raise ConfigurationError('thresholds', 'there are none', 'give one with --measured')
     figure = Figure(figsize=(8.5, 6.0), layout='constrained')
     axes = figure.subplots()
     _draw_published(axes, points)
@@ -164,7 +167,7 @@ def _draw_published(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
             label=curve.label,
         )
         if not curve.verified:
-            # On the curve as well: a legend can be cut off.
+            # Written on the curve as well, since a legend can be cut off.
             place = 1.5e-10
             axes.annotate(
                 f'{curve.name} ({UNVERIFIED})',
@@ -187,7 +190,7 @@ def _draw_published(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
         _MM * MILLIMETRE_STICKS_BELOW,
         color=_SEEN,
         lw=1.2,
-        label=f'aggregates of a millimetre always stick below: {STICKING_SEEN.source}',
+        label=f'millimetre aggregates always stick below: {STICKING_SEEN.source}',
     )
     middle = np.exp(np.mean(np.log([(point.mass, point.speed) for point in points]), axis=0))
     ends = middle[0] * np.array([1.0 / _SLOPE_SPAN, _SLOPE_SPAN])
@@ -197,7 +200,7 @@ def _draw_published(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
         '-.',
         color=_SLOPE,
         lw=1.3,
-        label=f'slope only, {BOUNCING_SLOPE:g}, at a height of ours: {BOUNCING_SLOPE_SOURCE}',
+        label=f'slope {BOUNCING_SLOPE:g}, at an arbitrary height: {BOUNCING_SLOPE_SOURCE}',
     )
 
 

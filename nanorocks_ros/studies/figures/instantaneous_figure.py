@@ -1,4 +1,7 @@
-"""The figure of restitution against speed after the paper's figure 13."""
+"""The figure of restitution against speed, after figure 13 of the paper.
+
+Tested by ``test/cli/figures/test_figure_decay.py``.
+"""
 
 from __future__ import annotations
 
@@ -28,8 +31,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.decays.cooling_curves import CycleSpeeds
 
 _MM = 1e3
-# Of a few cycles longer stretches are needed to see a slope.
-_WINDOWS, _MANY = 8, 6
+# Windows of local slopes; half as many with fewer cycles, since their noise is larger.
+_WINDOWS, _MANY_CYCLES = 8, 6
 _MEASURED, _FIT, _BAND = '#30506f', '#c23b22', '#e0a458'
 
 
@@ -41,7 +44,7 @@ def instantaneous_figure(
     wall_restitution: float,
     span: tuple[float, float],
 ) -> InstantaneousCor:
-    """Restitution against speed: the paper's estimate, what noise alone makes of it, and ours.
+    """Draw restitution against speed: the paper's estimate, the effect of noise, and ours.
 
     Parameters
     ----------
@@ -49,9 +52,9 @@ def instantaneous_figure(
     tray : Tray
     cycles : sequence of CycleSpeeds
     wall_restitution : float, [0, 1]
-        For the local slopes; taken for known.
+        Restitution of the walls, for the local slopes.
     span : tuple of 2 floats, [s]
-        First and last time since the shaking event that is used.
+        First and last time since the shaking event.
 
     Raises
     ------
@@ -60,7 +63,7 @@ def instantaneous_figure(
     FitError
         When the mean speed does not fall.
     RecordingError
-        When the cycles have too few times in common, or errors are not known.
+        When the cycles have too few times in common, or errors are unknown.
 
     References
     ----------
@@ -74,7 +77,7 @@ def instantaneous_figure(
         confined_gas(tray),
         wall_restitution=wall_restitution,
         cycles=len(cycles),
-        windows=_WINDOWS if len(cycles) >= _MANY else _WINDOWS // 2,
+        windows=_WINDOWS if len(cycles) >= _MANY_CYCLES else _WINDOWS // 2,
     )
     figure = Figure(figsize=(9.0, 8.0), layout='constrained')
     above, below = figure.subplots(2, 1, sharex=True)
@@ -90,9 +93,9 @@ def instantaneous_figure(
     return cor
 
 
-def _draw_paper(axes: Axes, found: InstantaneousCor) -> None:
-    speed = found.fitted_collision_speed * _MM
-    fluctuating, noise = found.noise_and_gas, found.noise
+def _draw_paper(axes: Axes, cor: InstantaneousCor) -> None:
+    speed = cor.fitted_collision_speed * _MM
+    fluctuating, noise = cor.noise_and_gas, cor.noise
     axes.fill_between(
         speed,
         fluctuating[0],
@@ -100,7 +103,7 @@ def _draw_paper(axes: Axes, found: InstantaneousCor) -> None:
         color=_BAND,
         alpha=0.3,
         lw=0,
-        label='95 % of what noise and the fluctuations of so few beads make of one restitution',
+        label='95 % band of noise and of the fluctuations of few beads, one restitution',
     )
     axes.fill_between(
         speed,
@@ -109,11 +112,11 @@ def _draw_paper(axes: Axes, found: InstantaneousCor) -> None:
         color=_BAND,
         alpha=0.6,
         lw=0,
-        label='95 % with the errors of the speeds alone',
+        label='95 % band of the errors of the speeds alone',
     )
     axes.plot(
         speed,
-        found.paper,
+        cor.paper,
         'o',
         ms=3.5,
         color=_MEASURED,
@@ -128,8 +131,8 @@ def _draw_paper(axes: Axes, found: InstantaneousCor) -> None:
     axes.grid(alpha=0.25)
 
 
-def _draw_local(axes: Axes, found: InstantaneousCor, walls: float) -> None:
-    local = found.local
+def _draw_local(axes: Axes, cor: InstantaneousCor, walls: float) -> None:
+    local = cor.local
     known = np.isfinite(local.restitution)
     value = np.where(known, local.restitution, 0.5 * (local.lower + local.upper))
     spread = np.stack((value - local.lower, local.upper - value))
@@ -150,11 +153,11 @@ def _draw_local(axes: Axes, found: InstantaneousCor, walls: float) -> None:
             local.upper[~known],
             color=_FIT,
             alpha=0.4,
-            label='no value; this range is allowed',
+            label='no value, only this range',
         )
-    if np.isfinite(found.whole):
-        label = f'the same from the whole decay, {found.whole:.3f}'
-        axes.axhline(found.whole, color=_FIT, lw=1.2, ls='--', label=label)
+    if np.isfinite(cor.whole):
+        label = f'the same from the whole decay, {cor.whole:.3f}'
+        axes.axhline(cor.whole, color=_FIT, lw=1.2, ls='--', label=label)
     axes.axhline(1.0, color='black', lw=0.7)
     axes.set_ylim(max(0.0, float(local.lower.min()) - 0.05), 1.05)
     axes.set_ylabel('COR by the local slope')
@@ -162,20 +165,20 @@ def _draw_local(axes: Axes, found: InstantaneousCor, walls: float) -> None:
     axes.set_xscale('log')
     axes.xaxis.set_major_formatter('{x:g}')
     axes.xaxis.set_minor_formatter('{x:g}')
-    # All numbers on one line.
+    # Puts major and minor labels on one line.
     axes.tick_params(axis='x', which='both', length=4, pad=4)
     axes.legend(frameon=False, fontsize=9)
     axes.grid(alpha=0.25)
 
 
-def instantaneous_values(found: InstantaneousCor) -> dict[str, Any]:
-    """What was found, in SI, as JSON has it: None for NaN."""
-    local = found.local
+def instantaneous_values(cor: InstantaneousCor) -> dict[str, Any]:
+    """The restitutions for JSON, in SI; None for NaN."""
+    local = cor.local
     arrays = {
-        'collision_speed': found.collision_speed,
-        'paper_restitution': found.paper,
-        'noise_95': found.noise[[0, 3]],
-        'noise_and_gas_95': found.noise_and_gas[[0, 3]],
+        'collision_speed': cor.collision_speed,
+        'paper_restitution': cor.paper,
+        'noise_95': cor.noise[[0, 3]],
+        'noise_and_gas_95': cor.noise_and_gas[[0, 3]],
         'local_speed': local.speed,
         'local_decay_rate': local.decay_rate,
         'local_decay_rate_error': local.decay_rate_error,

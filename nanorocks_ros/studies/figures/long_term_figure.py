@@ -1,4 +1,7 @@
-"""The figure of a campaign cycle by cycle, after the paper's figure 9."""
+"""The figure of the cycles of a campaign, after figure 9 of the paper.
+
+Tested by ``test/cli/figures/test_figure_long_term.py``.
+"""
 
 from __future__ import annotations
 
@@ -27,11 +30,11 @@ _MM = 1e3
 _COLOURS = ('#30506f', '#c23b22', '#e8b93c', '#4c8c5b', '#8a5fa8', '#5f5f5f', '#d07fae', '#2b8f9c')
 _MARKS = 'o', 's', '^', 'D', 'v', 'x', 'P', '*'
 _QUIET = '#9fc5e8'
-_MANY = 40
+_MANY_CYCLES = 40
 
 
 def long_term_figure(path: Path, campaign: Campaign) -> None:
-    """Cluster sizes, peak speeds and restitutions by cycle, with trends and quiet periods.
+    """Draw cluster sizes, peak speeds and restitutions by cycle, with trends and quiet periods.
 
     Parameters
     ----------
@@ -68,10 +71,14 @@ def long_term_figure(path: Path, campaign: Campaign) -> None:
         axes.grid(alpha=0.25)
         if not axes.has_data():
             axes.text(0.5, 0.5, 'not known', transform=axes.transAxes, ha='center', va='center')
-    found = len(campaign.periods)
+    quiet_periods = len(campaign.periods)
     sizes.set_title(
         f'{campaign.places} cycle{"s" * (campaign.places != 1)}; '
-        + (f'{found} quiet period{"s" * (found > 1)}, shaded' if found else 'no quiet period'),
+        + (
+            f'{quiet_periods} quiet period{"s" * (quiet_periods > 1)}, shaded'
+            if quiet_periods
+            else 'no quiet period'
+        ),
         fontsize=10,
     )
     sizes.legend(frameon=False, fontsize=8.5, ncols=len(campaign.trays), loc='upper left')
@@ -84,22 +91,23 @@ def long_term_figure(path: Path, campaign: Campaign) -> None:
         figure.savefig(part, dpi=110)
 
 
-def _draw(axes: Axes, campaign: Campaign, tray: int, what: tuple[str, float, int]) -> None:
-    quantity, scale, k = what
+def _draw(axes: Axes, campaign: Campaign, tray: int, column: tuple[str, float, int]) -> None:
+    """Draw a quantity of one tray; `column` is its name, its scale and the index of the tray."""
+    quantity, scale, k = column
     values = scale * campaign.values(tray, quantity)
     known = np.isfinite(values)
     if not known.any():
         return
     x = np.arange(campaign.places, dtype=np.float64)
-    # Trays side by side, not over each other.
-    off = 0.12 * (k - 0.5 * (len(campaign.trays) - 1))
+    # Trays side by side.
+    offset = 0.12 * (k - 0.5 * (len(campaign.trays) - 1))
     colour = _COLOURS[k % len(_COLOURS)]
     axes.errorbar(
-        x[known] + 1.0 + off,
+        x[known] + 1.0 + offset,
         values[known],
         yerr=scale * _errors(campaign, tray, quantity)[:, known],
         fmt=_MARKS[k % len(_MARKS)],
-        ms=4 if campaign.places <= _MANY else 2.5,
+        ms=4 if campaign.places <= _MANY_CYCLES else 2.5,
         lw=0.7,
         color=colour,
         label=f'tray {tray}',
@@ -110,7 +118,7 @@ def _draw(axes: Axes, campaign: Campaign, tray: int, what: tuple[str, float, int
 
 
 def _errors(campaign: Campaign, tray: int, quantity: str) -> NDArray[np.float64]:
-    """Bars below and above, (2, places); 0 where not known."""
+    """Error bars below and above, (2, places); 0 where unknown."""
     if quantity == 'restitution':
         middle = campaign.values(tray, quantity)
         ends = [campaign.values(tray, f'restitution_{end}') for end in ('lower', 'upper')]
@@ -121,7 +129,7 @@ def _errors(campaign: Campaign, tray: int, quantity: str) -> NDArray[np.float64]
 
 
 def campaign_values(campaign: Campaign) -> dict[str, Any]:
-    """Everything about a campaign for JSON, SI units, None where not known."""
+    """The values of a campaign for JSON, in SI; None where unknown."""
     fields = (
         'peak_speed',
         'peak_speed_error',

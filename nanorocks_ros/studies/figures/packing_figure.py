@@ -1,4 +1,7 @@
-"""The figure of how clusters are packed, after the paper's figure 10."""
+"""The figure of the packing of clusters, after figure 10 of the paper.
+
+Tested by ``test/cli/figures/test_figure_packing.py``.
+"""
 
 from __future__ import annotations
 
@@ -31,14 +34,14 @@ if TYPE_CHECKING:
 
 _COLOURS = ('#30506f', '#c23b22', '#e8b93c', '#4c8c5b', '#8a5fa8', '#5f5f5f', '#d07fae', '#2b8f9c')
 _BINS = 30
-# Of the first part of a cycle: beads are single then.
-_SINGLE = 1.5
+# Time since the shaking event in which beads are single, [s].
+_SINGLE_TIME = 1.5
 
 
 def packing_figure(
     path: Path, trays: Mapping[int, Tray], curves: Mapping[int, Sequence[PackingCurve]]
 ) -> dict[str, Any]:
-    """Draw filling factors over a cycle, where places are known, and the apparent compaction.
+    """Draw filling factors over a cycle, where positions are known, and the compaction.
 
     Parameters
     ----------
@@ -50,39 +53,49 @@ def packing_figure(
     Returns
     -------
     dict
-        By tray: cycles, compaction as the paper has it and in truth with their standard errors
-        over the cycles, and filling factors at the end; None where not known.
+        By tray: number of cycles, compaction by the paper's rule and true compaction with their
+        standard errors over the cycles, and filling factors at the end; None where unknown.
 
     Raises
     ------
     RecordingError
         When a cycle is too short, or the picture cannot be written.
     """
-    found = {number: [compaction(curve) for curve in own] for number, own in curves.items()}
+    compactions = {
+        number: [compaction(curve) for curve in tray_curves]
+        for number, tray_curves in curves.items()
+    }
     figure = Figure(figsize=(11.0, 4.8), layout='constrained')
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
-    known = any(np.isfinite(curve.filling).any() for own in curves.values() for curve in own)
+    known = any(
+        np.isfinite(curve.filling).any()
+        for tray_curves in curves.values()
+        for curve in tray_curves
+    )
     (_draw_fillings if known else _draw_areas)(left, curves)
-    _draw_compaction(right, found)
+    _draw_compaction(right, compactions)
     left.set_xlabel('time since the shaking event [s]')
     for axes in (left, right):
         axes.grid(alpha=0.25)
     with atomic_file(path) as part:
         figure.savefig(part, dpi=110)
     return {
-        str(number): _values(trays[number], own, found[number]) for number, own in curves.items()
+        str(number): _values(trays[number], tray_curves, compactions[number])
+        for number, tray_curves in curves.items()
     }
 
 
 def _values(
-    tray: Tray, curves: Sequence[PackingCurve], found: Sequence[Compaction]
+    tray: Tray, curves: Sequence[PackingCurve], compactions: Sequence[Compaction]
 ) -> dict[str, Any]:
-    apparent = _mean([one.apparent for one in found])
-    true = _mean([one.true for one in found])
+    apparent = _mean([cycle.apparent for cycle in compactions])
+    true = _mean([cycle.true for cycle in compactions])
     single = float(
-        np.median(np.concatenate([curve.level_area[curve.times < _SINGLE] for curve in curves]))
+        np.median(
+            np.concatenate([curve.level_area[curve.times < _SINGLE_TIME] for curve in curves])
+        )
     )
-    end = float(np.mean([one.end for one in found]))
+    end = float(np.mean([cycle.end for cycle in compactions]))
     return {
         'cycles': len(curves),
         'apparent_compaction': apparent[0],
@@ -101,7 +114,7 @@ def _values(
 
 
 def _mean(values: Sequence[float]) -> tuple[float | None, float | None]:
-    """Mean and its standard error over what is known."""
+    """Mean of the finite values and its standard error."""
     known = np.array(values, dtype=np.float64)
     known = known[np.isfinite(known)]
     if known.size == 0:
@@ -113,27 +126,27 @@ def _mean(values: Sequence[float]) -> tuple[float | None, float | None]:
 def _binned(
     curves: Sequence[PackingCurve], values: Sequence[NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean over all cycles by time; times without a value are left out."""
+    """Mean of all cycles in bins of time; bins without a value are left out."""
     times = np.concatenate([curve.times for curve in curves])
-    every = np.concatenate(values)
+    all_values = np.concatenate(values)
     edges = np.linspace(0.0, float(times.max()) * (1.0 + 1e-9), _BINS + 1)
-    place = np.digitize(times, edges) - 1
+    bins = np.digitize(times, edges) - 1
     rows = [
-        (times[own].mean(), every[own].mean())
+        (times[in_bin].mean(), all_values[in_bin].mean())
         for k in range(_BINS)
-        if (own := (place == k) & np.isfinite(every)).any()
+        if (in_bin := (bins == k) & np.isfinite(all_values)).any()
     ]
     middle, mean = np.array(rows).reshape(-1, 2).T
     return middle, mean
 
 
 def _draw_fillings(axes: Axes, curves: Mapping[int, Sequence[PackingCurve]]) -> None:
-    for colour, (number, own) in zip(_COLOURS, curves.items(), strict=False):
+    for colour, (number, tray_curves) in zip(_COLOURS, curves.items(), strict=False):
         for style, kind, text in (
             ('-', 'filling', 'layer one bead high'),
             (':', 'in_space', 'true height'),
         ):
-            times, mean = _binned(own, [getattr(curve, kind) for curve in own])
+            times, mean = _binned(tray_curves, [getattr(curve, kind) for curve in tray_curves])
             axes.plot(times, mean, style, color=colour, lw=1.8, label=f'tray {number}, {text}')
     axes.axhline(HEXAGONAL_LAYER, color='black', lw=1.0, ls='--')
     axes.text(
@@ -158,15 +171,15 @@ def _draw_fillings(axes: Axes, curves: Mapping[int, Sequence[PackingCurve]]) -> 
     )
     axes.set_ylim(0.0, 0.95)
     axes.set_ylabel('filling factor of the hulls of clusters')
-    axes.set_title('True places: mean over cycles', fontsize=10)
+    axes.set_title('True positions: mean over cycles', fontsize=10)
     axes.legend(frameon=False, fontsize=8.5, ncols=2, loc='upper right')
 
 
 def _draw_areas(axes: Axes, curves: Mapping[int, Sequence[PackingCurve]]) -> None:
-    for colour, (number, own) in zip(_COLOURS, curves.items(), strict=False):
-        ends = [compaction(curve).end for curve in own]
-        relative = [end / curve.level_area for curve, end in zip(own, ends, strict=True)]
-        times, mean = _binned(own, relative)
+    for colour, (number, tray_curves) in zip(_COLOURS, curves.items(), strict=False):
+        ends = [compaction(curve).end for curve in tray_curves]
+        relative = [end / curve.level_area for curve, end in zip(tray_curves, ends, strict=True)]
+        times, mean = _binned(tray_curves, relative)
         axes.plot(times, mean, '-', color=colour, lw=1.8, label=f'tray {number}')
     axes.axhline(1.0, color='black', lw=0.7)
     axes.set_ylabel('end of the cycle over level area')
@@ -174,25 +187,25 @@ def _draw_areas(axes: Axes, curves: Mapping[int, Sequence[PackingCurve]]) -> Non
     axes.legend(frameon=False)
 
 
-def _draw_compaction(axes: Axes, found: Mapping[int, Sequence[Compaction]]) -> None:
+def _draw_compaction(axes: Axes, compactions: Mapping[int, Sequence[Compaction]]) -> None:
     labelled: set[str] = set()
-    for place, (number, own) in enumerate(found.items()):
-        shown = [
+    for place, (number, cycles) in enumerate(compactions.items()):
+        series = [
             (
                 -0.2,
-                "the paper's rule, these pictures",
+                "the paper's rule, these images",
                 'o',
                 '#30506f',
-                [c.apparent for c in own],
+                [cycle.apparent for cycle in cycles],
             ),
-            (0.2, 'true', 's', '#c23b22', [c.true for c in own]),
+            (0.2, 'true', 's', '#c23b22', [cycle.true for cycle in cycles]),
         ]
-        for off, text, mark, colour, values in shown:
+        for offset, text, mark, colour, values in series:
             mean, error = _mean(values)
             if mean is None:
                 continue
             axes.errorbar(
-                place + off,
+                place + offset,
                 100.0 * mean,
                 yerr=100.0 * (error or 0.0),
                 fmt=mark,
@@ -217,8 +230,8 @@ def _draw_compaction(axes: Axes, found: Mapping[int, Sequence[Compaction]]) -> N
             )
             labelled.add(text)
     axes.axhline(0.0, color='black', lw=0.7)
-    axes.set_xticks(range(len(found)), [f'tray {one}' for one in found])
-    axes.set_xlim(-0.6, len(found) - 0.4)
+    axes.set_xticks(range(len(compactions)), [f'tray {number}' for number in compactions])
+    axes.set_xlim(-0.6, len(compactions) - 0.4)
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.4 * (high - low))
     axes.set_ylabel('compaction [%]')

@@ -1,4 +1,7 @@
-"""The picture of a sweep over two settings: which points agree with a decay, and which do not."""
+"""The figure of a sweep over two settings: a map of the deviation from a decay.
+
+Tested by ``test/cli/simulation/test_sweep.py``.
+"""
 
 from __future__ import annotations
 
@@ -34,12 +37,12 @@ _PICTURES = ('.png', '.pdf', '.svg')
 _MARK = '#ffffff'
 _OUTLINE = [withStroke(linewidth=4.5, foreground='black')]
 _LABEL_WIDTH = 55
-# Below this, two curves are alike; colours are not spent on noise.
-_ALIKE = 0.5
+# Chi square below which curves agree; the colour scale begins there.
+_AGREEMENT = 0.5
 
 
 def check_drawable(path: Path, axes: tuple[Axis, ...]) -> None:
-    """Refuse what is no picture, or a grid that is no map.
+    """Reject an unknown picture format, or a grid without two axes of numbers.
 
     Raises
     ------
@@ -49,7 +52,7 @@ def check_drawable(path: Path, axes: tuple[Axis, ...]) -> None:
     """
     if path.suffix not in _PICTURES:
         raise ConfigurationError(
-            '--figure', f'{str(path)!r} is no picture', f'end it in {", ".join(_PICTURES)}'
+            '--figure', f'{str(path)!r} is no picture file', f'end it in {", ".join(_PICTURES)}'
         )
     numbers = [
         axis
@@ -66,10 +69,10 @@ def check_drawable(path: Path, axes: tuple[Axis, ...]) -> None:
 def chi_square_figure(
     path: Path, sweep: Sweep, curve: SpeedCurve, *, scaled: bool = False
 ) -> None:
-    """Map of the deviation of a sweep over two settings from a decay, as a picture.
+    """Draw a map of the deviation of a sweep over two settings from a decay.
 
-    Over restitutions of beads and walls, or the width of their distribution, the lines are drawn
-    along which closed forms give the same decay.
+    For restitutions of beads and walls, or the width of their distribution, lines mark equal decay
+    rates by closed forms.
 
     Parameters
     ----------
@@ -83,8 +86,8 @@ def chi_square_figure(
     Raises
     ------
     ConfigurationError
-        When the sweep is not over two settings, or cannot be compared with the curve, or the
-        name is no picture's.
+        When the sweep is not over two settings, cannot be compared with the curve, or the
+        picture format is unknown.
 
     References
     ----------
@@ -96,14 +99,14 @@ def chi_square_figure(
     order = np.ix_(np.argsort(across), np.argsort(up))
     figure = Figure(figsize=(7.5, 6.0), layout='constrained')
     axes = figure.subplots()
-    shown = np.maximum(values[order].T, _ALIKE)
+    shown = np.maximum(values[order].T, _AGREEMENT)
     mesh = axes.pcolormesh(
         np.sort(across),
         np.sort(up),
         shown,
         shading='nearest',
         cmap='turbo',
-        norm=LogNorm(vmin=_ALIKE, vmax=max(float(shown.max()), 2.0)),
+        norm=LogNorm(vmin=_AGREEMENT, vmax=max(float(shown.max()), 2.0)),
     )
     figure.colorbar(mesh, ax=axes, label=r'mean $\chi^2$ over the times', extend='min')
     _draw_contours(axes, sweep, curve)
@@ -121,7 +124,7 @@ def _mark(axes: Axes, sweep: Sweep, values: NDArray[np.float64], curve: SpeedCur
         point = first.values[int(best[0])], second.values[int(best[1])]
         marker, label = 'o', f'best: {point[0]:g}, {point[1]:g}'
     axes.plot(
-        *([float(one)] for one in point),
+        *([float(value)] for value in point),
         marker,
         ms=14,
         color=_MARK,
@@ -132,14 +135,14 @@ def _mark(axes: Axes, sweep: Sweep, values: NDArray[np.float64], curve: SpeedCur
     )
     axes.set_xlabel(_label(first))
     axes.set_ylabel(_label(second))
-    axes.set_title(f'{_held(sweep)}{sweep.runs} runs at each of {values.size} points')
-    # Beside the map, whose corners may hold what matters.
+    axes.set_title(f'{_fixed_settings(sweep)}{sweep.runs} runs at each of {values.size} points')
+    # Beside the map, since the minimum may lie in a corner.
     figure: Any = axes.figure
     figure.legend(loc='outside lower center', ncols=3, fontsize=9, facecolor='#c8ccd4')
 
 
-def _held(sweep: Sweep) -> str:
-    """Tray and walls, where they do not vary."""
+def _fixed_settings(sweep: Sweep) -> str:
+    """Text with tray and walls, where they do not vary."""
     settings = json.loads(sweep.specification)['settings']
     names = {'tray': 'tray', 'wall_restitution': 'walls'}
     varied = {axis.name for axis in sweep.axes}
@@ -148,20 +151,20 @@ def _held(sweep: Sweep) -> str:
 
 
 def _draw_contours(axes: Axes, sweep: Sweep, curve: SpeedCurve) -> None:
-    """Lines of one decay rate, within the map."""
+    """Draw the lines of equal decay rate within the map."""
     ends = axes.get_xlim(), axes.get_ylim()
     for contour, style in zip(contours(sweep, curve), ('-', '--'), strict=False):
         first = sweep.axes[0].name == 'restitution'
         x, y = (
             (contour.restitution, contour.other) if first else (contour.other, contour.restitution)
         )
-        seen = (x >= ends[0][0]) & (x <= ends[0][1]) & (y >= ends[1][0]) & (y <= ends[1][1])
-        label = contour.label if seen.any() else f'{contour.label} (outside)'
+        inside = (x >= ends[0][0]) & (x <= ends[0][1]) & (y >= ends[1][0]) & (y <= ends[1][1])
+        label = contour.label if inside.any() else f'{contour.label} (outside)'
         axes.plot(x, y, style, color=_MARK, lw=2.2, label=label, path_effects=_OUTLINE)
     axes.set_xlim(*ends[0])
     axes.set_ylim(*ends[1])
 
 
 def _label(axis: Axis) -> str:
-    (row,) = (one for one in rows(SimulationSettings()) if one.name == axis.name)
+    (row,) = (row for row in rows(SimulationSettings()) if row.name == axis.name)
     return textwrap.fill(f'{row.doc} [{row.unit}]' if row.unit else row.doc, _LABEL_WIDTH)

@@ -1,4 +1,7 @@
-"""Check that an existing bag is the one that an import would make."""
+"""Check that an existing bag is the one that an import would make.
+
+Tested by ``test/studies/film_import/test_import_each.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Settings of an import, opening of films, and checks that the parts of a film fit together."""
+"""Settings of an import, opening of films, and checks that the parts of a film fit together.
+
+Tested by ``test/studies/film_import/test_import_times.py``.
+"""
 
 from __future__ import annotations
 

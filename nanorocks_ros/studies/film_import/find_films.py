@@ -1,4 +1,7 @@
-"""Find films by paths: videos, and folders of videos or images."""
+"""Find films by paths: videos, and folders of videos or images.
+
+Tested by ``test/studies/film_import/test_import_each.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Result of an import of films: counts, time range, notices and provenance."""
+"""Result of an import of films: counts, time range, notices and provenance.
+
+Tested by ``test/studies/film_import/test_import_each.py``.
+"""
 
 from __future__ import annotations
 

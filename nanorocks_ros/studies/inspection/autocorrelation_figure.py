@@ -1,4 +1,7 @@
-"""Figure of growing clusters: tray images, autocorrelations, and cluster sizes over time."""
+"""Figure of growing clusters: tray images, autocorrelations, and cluster sizes over time.
+
+Tested by ``test/studies/inspection/test_autocorrelations.py``.
+"""
 
 from __future__ import annotations
 

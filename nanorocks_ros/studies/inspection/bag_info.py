@@ -1,4 +1,7 @@
-"""Contents of a recording and its problems: topics, gaps, camera, calibration, damage."""
+"""Contents of a recording and its problems: topics, gaps, camera, calibration, damage.
+
+Tested by ``test/recordings/bag/test_salvage.py``.
+"""
 
 from __future__ import annotations
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import SpeedEstimate
 from nanorocks_ros.settings import with_values
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 from nanorocks_ros.studies.analysis.bag_images import BagImages
 from nanorocks_ros.wire.array_layouts import NS
 
@@ -163,7 +163,7 @@ def compare_speeds(
     images = BagImages(path, settings, image_topic)
     truth = images.bag.truth(images.epoch_ns)
     estimators = {
-        (number, method): SpeedEstimator(
+        (number, method): TrayMeasurement(
             with_values(images.settings, {'speed.method': method}, 'speeds'), tray
         )
         for number, tray in images.trays.items()

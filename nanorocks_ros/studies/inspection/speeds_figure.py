@@ -1,4 +1,7 @@
-"""Figure of the speeds of one cycle by every method, with the ground truth if it is known."""
+"""Figure of the speeds of one cycle by every method, with the ground truth if it is known.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Figure of the preprocessing of a frame: eight steps for each tray."""
+"""Figure of the preprocessing of a frame: eight steps for each tray.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 

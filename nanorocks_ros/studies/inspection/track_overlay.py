@@ -1,4 +1,7 @@
-"""Overlay of bead tracks on a tray image, as in [B19] fig. 3c."""
+"""Overlay of bead tracks on a tray image, as in [B19] fig. 3c.
+
+Tested by ``test/studies/analysis/test_bag_tracks.py``.
+"""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 Every run has its own sticking speed, so that all sizes occur, and its own effects of camera, light
 and dust, from none to 1.5 times those in flight: the scatter of the widths includes them.
 
-Tested in test_cluster_simulations.py.
+Tested by ``test/studies/libraries/test_cluster_simulations.py``.
 """
 
 from __future__ import annotations

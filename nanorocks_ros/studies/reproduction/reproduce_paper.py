@@ -1,8 +1,9 @@
-"""The paper again, from simulated films: every figure and table, beside what is true."""
+"""The report that reproduces the figures and tables of the paper from simulated films."""
 
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import __version__
@@ -11,13 +12,13 @@ from nanorocks_ros.outputs.html_report import Section, Table, write_report
 from nanorocks_ros.studies.reproduction.chapters.chapter_context import Chapter, Context
 from nanorocks_ros.studies.reproduction.chapters.cluster_chapter import (
     cluster_chapter,
-    onset_chapter,
     packing_chapter,
 )
 from nanorocks_ros.studies.reproduction.chapters.experiment_chapter import (
     experiment_chapter,
     processing_chapter,
 )
+from nanorocks_ros.studies.reproduction.chapters.onset_chapter import onset_chapter
 from nanorocks_ros.studies.reproduction.chapters.restitution_chapter import (
     restitution_chapter,
     simulation_chapter,
@@ -27,14 +28,14 @@ from nanorocks_ros.studies.reproduction.chapters.speed_chapter import speed_chap
 from nanorocks_ros.studies.reproduction.simulated_campaign import prepare_campaign, run_campaign
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from nanorocks_ros.jobs.tasks import Workers
-    from nanorocks_ros.studies.reproduction.simulated_campaign import CampaignPlan
+    from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan
 
-# CPU time for a second of film, and its two analyses.
-_SECONDS = 5.0
+# CPU time of one second of film with its two analyses, [s].
+_CPU_SECONDS = 5.0
 REPORT, PICTURES = 'report.html', 'pictures'
 _CHAPTERS: dict[str, Callable[[Context], Chapter]] = {
     'experiment': experiment_chapter,
@@ -59,7 +60,7 @@ def reproduce(
 ) -> Path:
     """Simulate, film and analyse a campaign, and write the report.
 
-    What an earlier call left in the folder is taken up again.
+    Finished cycles and searches of an earlier call in the folder are reused.
 
     Parameters
     ----------
@@ -67,30 +68,30 @@ def reproduce(
     plan : CampaignPlan
     workers : Workers
     runs : int
-        At each point of the searches.
+        Simulated runs at each point of a search.
     progress : callable
-        Called with what is being done and the part of it that is done, 0 to 1.
+        Called with the name of a chapter and the part of it that is done, 0 to 1.
     notice : callable
-        Called with what the user should know, one line each.
+        Called with messages for the user, one line each.
 
     Returns
     -------
     Path
-        Of the report.
+        The report.
 
     Raises
     ------
     RecordingError
-        When the folder holds something else, or cannot be written.
+        When the folder holds other files, or cannot be written.
     KeyboardInterrupt
-        Ctrl-C; what is complete is kept.
+        On Ctrl-C; finished cycles are kept.
     """
     prepare_campaign(folder, plan)
     cycles = run_campaign(folder, plan, workers, lambda done: progress('films', done))
     pictures = folder / PICTURES
     pictures.mkdir(exist_ok=True)
     chapters = []
-    for name, make in _CHAPTERS.items():
+    for name in _CHAPTERS:
         context = Context(
             folder=pictures,
             plan=plan,
@@ -98,44 +99,53 @@ def reproduce(
             workers=workers,
             runs=runs,
             notice=notice,
-            progress=lambda done, name=name: progress(name, done),  # type: ignore[misc]
+            progress=partial(progress, name),
         )
-        progress(name, 0.0)
-        try:
-            chapters.append(make(context))
-        except (FitError, RecordingError) as error:
-            # Too short a campaign for one chapter is none for the others.
-            notice(f'{name}: {error}')
-            missing = Section(title=name.capitalize(), parts=[f'Could not be made: {error}.'])
-            chapters.append(Chapter(section=missing))
-        progress(name, 1.0)
+        chapters.append(_make_chapter(name, context))
     path = folder / REPORT
-    differences = [row for chapter in chapters for row in chapter.differences]
-    first = Section(
-        title='Differences to the paper',
-        parts=[
-            Table(
-                head=('', 'the paper', 'its method, on our films', 'ours', 'truth'),
-                rows=differences,
-                caption='What the paper reports of its flight, what its own method makes of our '
-                'films, what our default makes of them, and what was put in.',
-            )
-        ],
-    )
     cycle = 'cycle' if plan.cycles == 1 else 'cycles'
     write_report(
         path,
         'NanoRocks, reproduced',
         f'nanorocks_ros {__version__}: {plan.cycles} {cycle} without and {plan.cycles} with '
-        f'sticking, {plan.seconds:g} s of film each, seed {plan.seed}; {runs} runs at every '
+        f'sticking, {plan.seconds:g} s of film each, seed {plan.seed}; {runs} runs at each '
         'point of the searches.',
-        [first, *(chapter.section for chapter in chapters)],
+        [_differences(chapters), *(chapter.section for chapter in chapters)],
     )
     return path
 
 
+def _make_chapter(name: str, context: Context) -> Chapter:
+    """A chapter of the report; a note instead where the campaign is too short for it."""
+    context.progress(0.0)
+    try:
+        chapter = _CHAPTERS[name](context)
+    except (FitError, RecordingError) as error:
+        # The campaign may still be long enough for the other chapters.
+        context.notice(f'{name}: {error}')
+        missing = Section(title=name.capitalize(), parts=[f'Could not be made: {error}.'])
+        chapter = Chapter(section=missing)
+    context.progress(1.0)
+    return chapter
+
+
+def _differences(chapters: Sequence[Chapter]) -> Section:
+    rows = [row for chapter in chapters for row in chapter.differences]
+    return Section(
+        title='Differences to the paper',
+        parts=[
+            Table(
+                head=('', 'the paper', 'its method, on our films', 'ours', 'truth'),
+                rows=rows,
+                caption='Values of the flight in the paper; the method of the paper on our films; '
+                'our default method on our films; values of the simulation.',
+            )
+        ],
+    )
+
+
 def minutes(plan: CampaignPlan, cores: int) -> int:
-    """About how long the films and their analysis take."""
+    """Approximate time of the films and their analysis, [min]."""
     return math.ceil(
-        2 * plan.cycles * plan.seconds * _SECONDS / max(min(cores, 2 * plan.cycles), 1) / 60
+        2 * plan.cycles * plan.seconds * _CPU_SECONDS / max(min(cores, 2 * plan.cycles), 1) / 60
     )

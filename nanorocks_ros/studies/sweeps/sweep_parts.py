@@ -1,6 +1,6 @@
 """Runs of a sweep as tasks, and as parts of its result.
 
-Tested in test_sweep_runs.py.
+Tested by ``test/studies/sweeps/test_sweep_runs.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Film of a simulated tray as a bag: compressed camera images, epoch, truth.
 
-Tested in test_simulated_runs.py.
+Tested by ``test/studies/synthetic/test_simulated_runs.py``.
 """
 
 from __future__ import annotations

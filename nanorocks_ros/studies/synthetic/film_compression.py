@@ -1,6 +1,6 @@
 """Compression of a simulated film: JPEG of given quality or size, or an H.264 stream.
 
-Tested in test_film_scene.py.
+Tested by ``test/studies/synthetic/test_film_scene.py``.
 """
 
 from __future__ import annotations

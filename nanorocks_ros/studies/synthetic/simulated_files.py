@@ -1,6 +1,6 @@
 """Output files of simulated runs: checked before the simulation, written after it.
 
-Tested in test_simulate.py.
+Tested by ``test/cli/simulation/test_simulate.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Plan of simulated runs of a tray: settings, times, what is kept.
 
-Tested in test_simulated_runs.py.
+Tested by ``test/studies/synthetic/test_simulated_runs.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Simulated runs of a tray: decays, beads and collisions of each, and their means.
 
-Tested in test_simulated_runs.py.
+Tested by ``test/studies/synthetic/test_simulated_runs.py``.
 """
 
 from __future__ import annotations

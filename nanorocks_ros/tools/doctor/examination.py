@@ -1,4 +1,7 @@
-"""The examination: every point in turn."""
+"""The checks of the machine, its ROS and a running graph, in their order.
+
+Tested by ``test/tools/doctor/test_machine_checks.py``.
+"""
 
 from __future__ import annotations
 
@@ -12,21 +15,21 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 _CAMERAS = {topics.RAW.name, topics.RAW_COMPRESSED.name}
-_OF_ALL = {'/rosout', '/parameter_events', '/diagnostics'}
+_SYSTEM_TOPICS = {'/rosout', '/parameter_events', '/diagnostics'}
 
 
 def examine(announce: Callable[[str], None]) -> Iterator[Finding]:
-    """Look at this machine and its ROS.
+    """Check this machine and its ROS.
 
     Parameters
     ----------
     announce : callable
-        Told what is being done where that takes seconds.
+        Called with the name of each check that takes seconds.
 
     Yields
     ------
     Finding
-        As soon as it is known.
+        Each as soon as its check is finished.
     """
     yield package_checks.python()
     yield from package_checks.libraries()
@@ -52,37 +55,37 @@ def examine(announce: Callable[[str], None]) -> Iterator[Finding]:
     yield ros_probe_client.loopback()
 
 
-def examine_graph(found: list[dict[str, Any]]) -> list[Finding]:
-    """What is wrong between the nodes that run now.
+def examine_graph(graph: list[dict[str, Any]]) -> list[Finding]:
+    """Check the connections between the running nodes.
 
     Parameters
     ----------
-    found : list of dict
-        As `children.graph` returns it.
+    graph : list of dict
+        The topics, from `ros_probe_client.graph`.
 
     Returns
     -------
     list of Finding
-        One for each topic of the graph.
+        One for each topic of the graph; a warning where there is no node.
     """
-    if not found:
+    if not graph:
         return [
             Finding(
                 name='graph',
                 status=Status.WARNING,
-                found='no node is heard',
+                found='no node was discovered',
                 remedy='start one; compare ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE with '
                 'those of its shell',
             )
         ]
-    return [_topic_finding(topic) for topic in found if topic['name'] not in _OF_ALL]
+    return [_topic_finding(topic) for topic in graph if topic['name'] not in _SYSTEM_TOPICS]
 
 
 def _topic_finding(topic: dict[str, Any]) -> Finding:
     name = topic['name']
     senders = [publisher['node'] for publisher in topic['publishers']]
     listeners = [subscription['node'] for subscription in topic['subscriptions']]
-    found = f'{_named(senders)} -> {_named(listeners)}'
+    found = f'{_node_names(senders)} -> {_node_names(listeners)}'
     if topic['mismatches']:
         pairs = '; '.join(
             f'{mismatch["publisher"]} -> {mismatch["subscription"]}: {mismatch["reason"]}'
@@ -92,8 +95,8 @@ def _topic_finding(topic: dict[str, Any]) -> Finding:
             name=name,
             status=Status.PROBLEM,
             found=f'no data: {pairs}',
-            remedy=f'of our nodes: -p qos_overrides.{name}.subscription.reliability:=best_effort, '
-            'or .durability:=volatile; of others: ask for what is offered',
+            remedy=f'for our nodes: -p qos_overrides.{name}.subscription.reliability:='
+            'best_effort, or .durability:=volatile; for other nodes: request the offered QoS',
         )
     if not senders:
         return Finding(
@@ -106,11 +109,11 @@ def _topic_finding(topic: dict[str, Any]) -> Finding:
         return Finding(
             name=name,
             status=Status.WARNING,
-            found=f'{found}: frames of {len(senders)} cameras mix',
-            remedy='end one, or move it into a namespace of its own',
+            found=f'{found}: frames of {len(senders)} cameras are mixed',
+            remedy='stop one, or start it in another namespace',
         )
     return Finding(name=name, found=found)
 
 
-def _named(nodes: list[str]) -> str:
-    return ', '.join(sorted(nodes)) or 'nobody'
+def _node_names(nodes: list[str]) -> str:
+    return ', '.join(sorted(nodes)) or 'no node'

@@ -1,4 +1,7 @@
-"""What an examination of this machine has found, point by point."""
+"""Findings of the checks of this machine.
+
+Tested by ``test/tools/doctor/test_machine_checks.py``.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from enum import Enum
 
 
 class Status(Enum):
-    """How good a finding is."""
+    """Severity of a finding."""
 
     OK = 'ok'
     WARNING = 'warning'
@@ -16,18 +19,18 @@ class Status(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One point that was looked at.
+    """The result of one check.
 
     Parameters
     ----------
     name : str
-        Of the point.
+        Name of the check.
     status : Status
-        PROBLEM where the graph cannot be used, WARNING where part of it suffers.
+        PROBLEM where a graph cannot run, WARNING where a part of it is impaired.
     found : str
-        What is there.
+        The state that was found.
     remedy : str
-        What to do about it; empty where nothing is to be done.
+        What to do; empty for OK.
     """
 
     name: str
@@ -37,6 +40,8 @@ class Finding:
 
 
 def worst(findings: list[Finding]) -> Status:
-    """The status of the whole."""
+    """The most severe status of all findings."""
     statuses = {finding.status for finding in findings}
-    return next((one for one in (Status.PROBLEM, Status.WARNING) if one in statuses), Status.OK)
+    return next(
+        (status for status in (Status.PROBLEM, Status.WARNING) if status in statuses), Status.OK
+    )

@@ -1,4 +1,4 @@
-"""The machine: disk, shared memory, socket buffers, compiled kernels, OpenCV."""
+"""Checks of the machine: disk, shared memory, socket buffers, compiled kernels, OpenCV."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import nanorocks_ros
 from nanorocks_ros.tools.doctor.findings import Finding, Status
 
 _GB = 1e9
-# A minute of 1080p JPEGs at quality 85 has about half a gigabyte.
-_ROOM_FOR_A_MINUTE_GB = 0.5
-_ROOM_TO_WORK_GB = 5.0
-# The shared-memory segment of one node, and of a graph of six with some to spare.
+# A minute of 1080p JPEGs at quality 85 takes about half a gigabyte.
+_MINUTE_GB = 0.5
+_RECOMMENDED_GB = 5.0
+# The shared-memory segment of one node, and the sum for a graph of six with a margin.
 _SEGMENT_GB = 0.064
 _SEGMENTS_GB = 0.5
 _FRAME_BYTES = 1920 * 1080 * 3
@@ -23,30 +23,30 @@ _RECEIVE_BUFFER = Path('/proc/sys/net/core/rmem_max')
 
 
 def disk() -> Finding:
-    """Room for recordings where the command was called."""
+    """Free space for recordings in the working folder."""
     folder = Path.cwd()
     free = shutil.disk_usage(folder).free / _GB
     found = f'{free:.1f} GB free in {folder}'
-    if free >= _ROOM_TO_WORK_GB:
+    if free >= _RECOMMENDED_GB:
         return Finding(name='disk', found=found)
-    little = free < _ROOM_FOR_A_MINUTE_GB
+    too_small = free < _MINUTE_GB
     return Finding(
         name='disk',
-        status=Status.PROBLEM if little else Status.WARNING,
-        found=f'{found}; a minute of the camera takes about {_ROOM_FOR_A_MINUTE_GB:g} GB',
-        remedy='make room, or work elsewhere',
+        status=Status.PROBLEM if too_small else Status.WARNING,
+        found=f'{found}; a minute of the camera takes about {_MINUTE_GB:g} GB',
+        remedy='free some space, or work in another folder',
     )
 
 
 def shared_memory(folder: Path = _SHARED_MEMORY) -> Finding:
-    """Room for the segments through which frames go from node to node."""
+    """Free shared memory for the segments that carry frames between nodes."""
     name = 'shared memory'
     if not folder.is_dir():
         return Finding(
             name=name,
             status=Status.WARNING,
-            found=f'there is no {folder}',
-            remedy='frames of 1080p will be lost: mount a tmpfs there',
+            found=f'{folder} does not exist: frames of 1080p will be lost',
+            remedy=f'mount a tmpfs on {folder}',
         )
     free = shutil.disk_usage(folder).free / _GB
     found = f'{free:.2f} GB free in {folder}'
@@ -56,14 +56,14 @@ def shared_memory(folder: Path = _SHARED_MEMORY) -> Finding:
     return Finding(
         name=name,
         status=Status.PROBLEM if blocked else Status.WARNING,
-        found=f'{found}; each node takes {_SEGMENT_GB:g} GB, which has to be writable',
+        found=f'{found}; each node needs {_SEGMENT_GB:g} GB of writable memory',
         remedy='in a container: docker run --shm-size=1g; elsewhere: delete old '
-        f'{folder}/fastrtps_* when no node runs',
+        f'{folder}/fastrtps_* while no node runs',
     )
 
 
 def receive_buffer(path: Path = _RECEIVE_BUFFER) -> Finding:
-    """What the kernel keeps of UDP for a subscriber that is busy, between machines."""
+    """Limit of the UDP receive buffer, which holds frames between machines."""
     name = 'socket buffers'
     try:
         size = int(path.read_text(encoding='ascii'))
@@ -82,25 +82,25 @@ def receive_buffer(path: Path = _RECEIVE_BUFFER) -> Finding:
 
 
 def compiled_kernels() -> Finding:
-    """Whether what numba compiles is still there at the next start."""
+    """Whether kernels compiled by numba can be cached for the next start."""
     name = 'compiled kernels'
     package = Path(nanorocks_ros.__file__).parent
     chosen = os.environ.get('NUMBA_CACHE_DIR')
     places = [Path(chosen)] if chosen else [package, Path.home() / '.cache']
     usable = [place for place in places if _writable(place)]
     if usable:
-        return Finding(name=name, found=f'kept in {usable[0]}')
+        return Finding(name=name, found=f'cached in {usable[0]}')
     return Finding(
         name=name,
         status=Status.WARNING,
-        found=f'nowhere to keep them: {" and ".join(map(str, places))} cannot be written; every '
+        found=f'cannot be cached: {" and ".join(map(str, places))} cannot be written; every '
         'start compiles for a minute',
         remedy='export NUMBA_CACHE_DIR=/a/folder/of/yours',
     )
 
 
 def _writable(folder: Path) -> bool:
-    """Whether a file can be made there, or the folder itself."""
+    """Whether a file can be written in a folder that exists or can be made."""
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
     try:
@@ -111,7 +111,7 @@ def _writable(folder: Path) -> bool:
 
 
 def opencv() -> Finding:
-    """The release of OpenCV and the threads it takes."""
+    """The version of OpenCV and its number of threads."""
     try:
         import cv2
     except ImportError as error:

@@ -1,4 +1,7 @@
-"""Python, and the libraries that the package asks for."""
+"""Checks of Python and of the required libraries.
+
+Tested by ``test/tools/doctor/test_machine_checks.py``.
+"""
 
 from __future__ import annotations
 
@@ -14,17 +17,17 @@ if TYPE_CHECKING:
 
 _PACKAGE = 'nanorocks_ros'
 _OLDEST_PYTHON = (3, 10)
-_FOR_DEVELOPERS = {'ros', 'test', 'dev'}
+_DEVELOPER_EXTRAS = {'ros', 'test', 'dev'}
 _PURPOSES = {
-    'cluster': 'work handed to other machines (--scheduler)',
+    'cluster': 'work on other machines (--scheduler)',
     'dashboard': 'the live page (nanorocks dashboard)',
     'parquet': 'tables as .parquet files',
-    'video': 'videos read (nanorocks import) and written as .mp4',
+    'video': 'reading videos (nanorocks import) and writing .mp4',
 }
 
 
 def python() -> Finding:
-    """The interpreter."""
+    """The version of the interpreter."""
     found = f'{platform.python_version()} at {sys.executable}'
     if sys.version_info < _OLDEST_PYTHON:
         return Finding(
@@ -37,7 +40,7 @@ def python() -> Finding:
 
 
 def libraries() -> list[Finding]:
-    """What the package needs, and each of its extras."""
+    """The required libraries, and those of each extra."""
     try:
         requirements = _requirements()
     except importlib.metadata.PackageNotFoundError:
@@ -52,14 +55,14 @@ def libraries() -> list[Finding]:
     needed = [requirement for requirement in requirements if _applies(requirement, '')]
     findings = [_library_finding('libraries', needed, Status.PROBLEM, 'everything')]
     extras = importlib.metadata.metadata(_PACKAGE).get_all('Provides-Extra') or []
-    for extra in sorted(set(extras) - _FOR_DEVELOPERS):
-        wanted = [
+    for extra in sorted(set(extras) - _DEVELOPER_EXTRAS):
+        additional = [
             requirement
             for requirement in requirements
             if _applies(requirement, extra) and requirement not in needed
         ]
         purpose = _PURPOSES.get(extra, 'an extra')
-        findings.append(_library_finding(f'extra [{extra}]', wanted, Status.WARNING, purpose))
+        findings.append(_library_finding(f'extra [{extra}]', additional, Status.WARNING, purpose))
     return findings
 
 
@@ -76,29 +79,29 @@ def _applies(requirement: Requirement, extra: str) -> bool:
 def _library_finding(
     name: str, requirements: list[Requirement], status: Status, purpose: str
 ) -> Finding:
-    found: dict[str, str] = {}
-    lacking = {}
+    versions: dict[str, str] = {}
+    missing = {}
     for requirement in requirements:
         try:
-            found[requirement.name] = importlib.metadata.version(requirement.name)
+            versions[requirement.name] = importlib.metadata.version(requirement.name)
         except importlib.metadata.PackageNotFoundError:
-            lacking[requirement.name] = f'{requirement.name} is not there'
+            missing[requirement.name] = f'{requirement.name} is not installed'
             continue
-        if not requirement.specifier.contains(found[requirement.name], prereleases=True):
-            lacking[requirement.name] = (
-                f'{requirement.name} {found[requirement.name]} is not {requirement.specifier}'
+        if not requirement.specifier.contains(versions[requirement.name], prereleases=True):
+            missing[requirement.name] = (
+                f'{requirement.name} {versions[requirement.name]} is not {requirement.specifier}'
             )
-    if not lacking:
-        versions = ', '.join(f'{key} {value}' for key, value in sorted(found.items()))
-        return Finding(name=name, found=versions)
-    asked = ' '.join(
+    if not missing:
+        listed = ', '.join(f'{key} {value}' for key, value in sorted(versions.items()))
+        return Finding(name=name, found=listed)
+    packages = ' '.join(
         f"'{requirement.name}{requirement.specifier}'"
         for requirement in requirements
-        if requirement.name in lacking
+        if requirement.name in missing
     )
     return Finding(
         name=name,
         status=status,
-        found=f'{", ".join(lacking.values())}; for {purpose}',
-        remedy=f'pip install {asked}',
+        found=f'{", ".join(missing.values())}; for {purpose}',
+        remedy=f'pip install {packages}',
     )

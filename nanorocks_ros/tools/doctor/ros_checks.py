@@ -1,4 +1,7 @@
-"""ROS 2: which one, its variables, what it needs to find the nodes. Nothing here imports it."""
+"""Checks of ROS 2: its installation, its variables, its executables; without importing it.
+
+Tested by ``test/tools/doctor/test_machine_checks.py``.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +18,13 @@ _DISTRIBUTION = 'jazzy'
 _BOOTSTRAP = '_ROS_WHEELS_BOOTSTRAP_COMPLETE'
 _RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 _PROFILES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')
-# Above it the ports of the domain reach into those that the system gives to anybody.
+# Above it the ports of the domain overlap the ephemeral ports of the system.
 _LAST_SAFE_DOMAIN = 101
 _LAST_DOMAIN = 232
 
 
 def has_ros() -> bool:
-    """Whether nodes can be started at all."""
+    """Whether rclpy is installed."""
     return importlib.util.find_spec('rclpy') is not None
 
 
@@ -34,22 +37,22 @@ def _has_wheels() -> bool:
 
 
 def installation() -> Finding:
-    """Where ROS 2 comes from: wheels, or a sourced one, never both."""
+    """The installation of ROS 2: wheels or a sourced one, never both."""
     sourced, wheels = os.environ.get('ROS_DISTRO'), _has_wheels()
     if not has_ros():
         return Finding(
             name='ROS 2',
             status=Status.PROBLEM,
-            found='none here: nodes cannot run; the offline commands can',
+            found='not installed: nodes cannot run; the offline commands can',
             remedy="source /opt/ros/jazzy/setup.bash, or pip install 'nanorocks_ros[ros]'",
         )
     if sourced and wheels:
         return Finding(
             name='ROS 2',
             status=Status.PROBLEM,
-            found=f'{sourced} is sourced, and wheels of ROS are in {sys.prefix}: one loads '
-            'libraries of the other',
-            remedy='use a shell in which no ROS is sourced, or an environment without wheels',
+            found=f'{sourced} is sourced, and wheels of ROS are in {sys.prefix}: their '
+            'libraries conflict',
+            remedy='use a shell without a sourced ROS, or an environment without the wheels',
         )
     if sourced and sourced != _DISTRIBUTION:
         return Finding(
@@ -63,7 +66,7 @@ def installation() -> Finding:
 
 
 def bootstrap() -> Finding:
-    """Whether the wheels found their libraries, or were told that somebody else's are theirs."""
+    """Whether the libraries of the ROS wheels are on the library path."""
     name = 'libraries of the wheels'
     if not _has_wheels():
         return Finding(name=name, found='no wheels')
@@ -81,7 +84,7 @@ def bootstrap() -> Finding:
 
 
 def domain() -> Finding:
-    """Which other programs are heard."""
+    """Whether the DDS domain is valid."""
     name = 'ROS_DOMAIN_ID'
     text = os.environ.get(name, '')
     if not text:
@@ -90,21 +93,21 @@ def domain() -> Finding:
         return Finding(
             name=name,
             status=Status.PROBLEM,
-            found=f'{text!r} is no domain',
+            found=f'{text!r} is not a valid domain',
             remedy=f'export {name}=0, or another up to {_LAST_SAFE_DOMAIN}',
         )
     if int(text) > _LAST_SAFE_DOMAIN:
         return Finding(
             name=name,
             status=Status.WARNING,
-            found=f'{text}: its ports may be taken by other programs',
+            found=f'{text}: its ports may be used by other programs',
             remedy=f'use one up to {_LAST_SAFE_DOMAIN}',
         )
     return Finding(name=name, found=text)
 
 
 def discovery() -> Finding:
-    """How far this graph reaches."""
+    """Whether the discovery range is valid."""
     value = os.environ.get(_RANGE, '')
     if os.environ.get('ROS_LOCALHOST_ONLY') == '1':
         return Finding(
@@ -113,26 +116,26 @@ def discovery() -> Finding:
             found='ROS_LOCALHOST_ONLY=1, which is deprecated, overrides it',
             remedy=f'unset ROS_LOCALHOST_ONLY; export {_RANGE}=LOCALHOST',
         )
-    known = ('SUBNET', 'LOCALHOST', 'OFF', 'SYSTEM_DEFAULT')
-    if value and value not in known:
+    ranges = ('SUBNET', 'LOCALHOST', 'OFF', 'SYSTEM_DEFAULT')
+    if value and value not in ranges:
         return Finding(
             name=_RANGE,
             status=Status.WARNING,
-            found=f'{value!r} is none of {", ".join(known)}, and counts as SUBNET',
+            found=f'{value!r} is none of {", ".join(ranges)}, and is taken as SUBNET',
             remedy=f'export {_RANGE}=LOCALHOST',
         )
     if value == 'OFF':
         return Finding(
             name=_RANGE,
             status=Status.PROBLEM,
-            found='OFF: no node finds another',
+            found='OFF: nodes do not discover each other',
             remedy=f'export {_RANGE}=LOCALHOST',
         )
-    return Finding(name=_RANGE, found=value or 'not set: SUBNET, heard in the whole network')
+    return Finding(name=_RANGE, found=value or 'not set: SUBNET, visible in the whole network')
 
 
 def profile() -> Finding:
-    """Whether frames of 1080p go through shared memory."""
+    """Whether a Fast DDS profile sends frames of 1080p through shared memory."""
     name = 'Fast DDS profile'
     rmw = os.environ.get('RMW_IMPLEMENTATION') or 'rmw_fastrtps_cpp'
     if 'fastrtps' not in rmw:
@@ -144,28 +147,28 @@ def profile() -> Finding:
         return Finding(
             name=name,
             status=Status.PROBLEM,
-            found=f'{chosen} is not there',
+            found=f'{chosen} does not exist',
             remedy=f'unset {" ".join(_PROFILES)}',
         )
     if chosen:
         return Finding(name=name, found=chosen)
     if os.environ.get(_RANGE) == 'LOCALHOST':
-        return Finding(name=name, found='that of the package: segments of 64 MB')
+        return Finding(name=name, found='profile of the package: segments of 64 MB')
     return Finding(
         name=name,
         status=Status.WARNING,
-        found=f'none, since {_RANGE} is not LOCALHOST: frames of 1080p go in pieces over UDP',
-        remedy=f'on one machine: export {_RANGE}=LOCALHOST; between machines a profile of your '
-        f'own in {_PROFILES[-1]}',
+        found=f'none, since {_RANGE} is not LOCALHOST: frames of 1080p are fragmented over UDP',
+        remedy=f'on one machine: export {_RANGE}=LOCALHOST; between machines set your own '
+        f'profile in {_PROFILES[-1]}',
     )
 
 
 def executables(names: tuple[str, ...]) -> Finding:
-    """Whether ``ros2 run`` finds the nodes, on the prefixes it looks at."""
+    """Whether ``ros2 run`` finds the executables on AMENT_PREFIX_PATH."""
     name = 'executables'
     prefixes = [Path(part) for part in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)]
     marker = Path('share/ament_index/resource_index/packages') / _PACKAGE
-    holders = [
+    installed = [
         prefix for prefix in prefixes if prefix.is_absolute() and (prefix / marker).is_file()
     ]
     installed_here = (Path(sys.prefix) / marker).is_file()
@@ -174,21 +177,21 @@ def executables(names: tuple[str, ...]) -> Finding:
         if installed_here
         else 'source install/setup.bash of the colcon workspace'
     )
-    instead = 'python -m nanorocks_ros.nodes NAME works as well'
-    if not holders:
+    alternative = 'python -m nanorocks_ros.nodes NAME works as well'
+    if not installed:
         return Finding(
             name=name,
             status=Status.WARNING,
-            found='ros2 run finds none: no prefix of AMENT_PREFIX_PATH holds the package',
-            remedy=f'{remedy}; {instead}',
+            found='ros2 run finds none: the package is on no prefix of AMENT_PREFIX_PATH',
+            remedy=f'{remedy}; {alternative}',
         )
-    folder = holders[0] / 'lib' / _PACKAGE
-    lacking = [one for one in names if not os.access(folder / one, os.X_OK)]
-    if lacking:
+    folder = installed[0] / 'lib' / _PACKAGE
+    missing = [program for program in names if not os.access(folder / program, os.X_OK)]
+    if missing:
         return Finding(
             name=name,
             status=Status.WARNING,
-            found=f'{", ".join(lacking)} cannot be run in {folder}',
-            remedy=f'install again; {instead}',
+            found=f'{", ".join(missing)} cannot be run in {folder}',
+            remedy=f'install again; {alternative}',
         )
     return Finding(name=name, found=f'{len(names)} in {folder}')

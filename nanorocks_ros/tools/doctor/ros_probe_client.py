@@ -1,4 +1,7 @@
-"""What only a process that imports ROS can tell: `nanorocks_ros.nodes.probe`, and its answers."""
+"""Checks that need ROS, run in processes of `nanorocks_ros.nodes.probe`.
+
+Tested by ``test/tools/doctor/test_machine_checks.py``.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,12 @@ from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.tools.doctor.findings import Finding, Status
 
 _PROBE = (sys.executable, '-m', 'nanorocks_ros.nodes.probe')
-_PATIENCE_S = 60.0
+_TIMEOUT_S = 60.0
 _FRAMES = 5
 _LOCAL = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
 
 
-def _started(*task: str, **variables: str) -> subprocess.Popen[str]:
+def _start_probe(*task: str, **variables: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [*_PROBE, *task],
         env={**os.environ, **variables},
@@ -27,20 +30,20 @@ def _started(*task: str, **variables: str) -> subprocess.Popen[str]:
     )
 
 
-def _answer(process: subprocess.Popen[str]) -> dict[str, Any]:
-    """The last line that a child printed.
+def _read_answer(process: subprocess.Popen[str]) -> dict[str, Any]:
+    """The last line that a probe printed, as JSON.
 
     Raises
     ------
     NanorocksError
-        With its last words when it failed, or did not end.
+        With its last line of standard error when it failed or did not end.
     """
     try:
-        output, errors = process.communicate(timeout=_PATIENCE_S)
+        output, errors = process.communicate(timeout=_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         process.kill()
         process.communicate()
-        output, errors = '', f'no answer within {_PATIENCE_S:g} s'
+        output, errors = '', f'no answer within {_TIMEOUT_S:g} s'
     if process.returncode == 0 and output.strip():
         answer: dict[str, Any] = json.loads(output.strip().splitlines()[-1])
         return answer
@@ -48,32 +51,32 @@ def _answer(process: subprocess.Popen[str]) -> dict[str, Any]:
     raise NanorocksError(
         'ROS 2',
         words[-1].strip() if words else f'a node ended with code {process.returncode}',
-        'see what "ROS 2" and the variables above say',
+        'see the findings "ROS 2" and of the variables above',
     )
 
 
 def imported() -> tuple[Finding, tuple[str, ...]]:
-    """Whether rclpy and the messages load, with which middleware; the nodes that there are."""
+    """Whether rclpy and the messages can be imported, and the names of the executables."""
     try:
-        answer = _answer(_started('import'))
+        answer = _read_answer(_start_probe('import'))
     except NanorocksError as error:
-        found = f'a process that loads it fails: {error.what}'
+        found = f'import failed: {error.what}'
         return Finding(name='rclpy', status=Status.PROBLEM, found=found, remedy=error.do), ()
-    found = f'loads from {answer["where"]}, with {answer["rmw"]}'
+    found = f'imported from {answer["where"]}, with {answer["rmw"]}'
     return Finding(name='rclpy', found=found), tuple(answer['executables'])
 
 
 def loopback() -> Finding:
-    """Whether frames of 1080p really arrive, all of them, from one process in another."""
+    """Whether all frames of 1080p from one process arrive in another."""
     name = 'frames over loopback'
-    # A name that no graph uses: others on this domain are left alone.
+    # A name that no graph uses, so that running nodes are not disturbed.
     topic = f'/nanorocks_doctor_{os.getpid()}/image'
-    receiver = _started('receive', topic, str(_FRAMES), **_LOCAL)
+    receiver = _start_probe('receive', topic, str(_FRAMES), **_LOCAL)
     sender = None
     try:
         _wait_for_line(receiver.stdout)
-        sender = _started('send', topic, str(_FRAMES), **_LOCAL)
-        sent, received = _answer(sender), _answer(receiver)
+        sender = _start_probe('send', topic, str(_FRAMES), **_LOCAL)
+        sent, received = _read_answer(sender), _read_answer(receiver)
     except NanorocksError as error:
         return Finding(name=name, status=Status.PROBLEM, found=error.what, remedy=error.do)
     finally:
@@ -81,28 +84,28 @@ def loopback() -> Finding:
             if process is not None and process.poll() is None:
                 process.kill()
                 process.communicate()
-    return judged(name, sent, received)
+    return loopback_finding(name, sent, received)
 
 
 def _wait_for_line(stream: IO[str] | None) -> None:
-    """Until the child listens; an end of its output is reported by its answer."""
+    """Wait until the probe listens; `_read_answer` reports a probe that ended."""
     if stream is not None:
         stream.readline()
 
 
-def judged(name: str, sent: dict[str, Any], received: dict[str, Any]) -> Finding:
-    """What became of the frames, by what the sender and the receiver say."""
+def loopback_finding(name: str, sent: dict[str, Any], received: dict[str, Any]) -> Finding:
+    """The finding from the counts of the sender and the receiver."""
     size, arrived, seconds = sent['frame_bytes'], received['received'], received['seconds']
     whole = arrived == _FRAMES and received['bytes'] == _FRAMES * size
     if sent['sent'] == 0:
-        found = 'two processes of this machine did not find each other'
+        found = 'two processes of this machine did not discover each other'
         remedy = (
-            'allow UDP and multicast on lo (ip link set lo multicast on), look at firewall, '
+            'allow UDP and multicast on lo (ip link set lo multicast on), check the firewall, '
             'ROS_DOMAIN_ID and the Fast DDS profile'
         )
     elif not whole:
         found = f'{arrived} of {_FRAMES} frames of {size} bytes arrived'
-        remedy = 'look at "shared memory" and "Fast DDS profile"'
+        remedy = 'see the findings "shared memory" and "Fast DDS profile"'
     else:
         found = f'{arrived} of {_FRAMES} frames of {size} bytes arrived in {seconds:.2f} s'
         return Finding(name=name, found=found)
@@ -110,12 +113,12 @@ def judged(name: str, sent: dict[str, Any], received: dict[str, Any]) -> Finding
 
 
 def graph(seconds: float) -> list[dict[str, Any]]:
-    """Every topic of the running graph: ``name, types, publishers, subscriptions, mismatches``.
+    """The topics of the graph: ``name, types, publishers, subscriptions, mismatches``.
 
     Raises
     ------
     NanorocksError
-        Where ROS cannot be asked.
+        When the probe fails.
     """
-    topics: list[dict[str, Any]] = _answer(_started('graph', f'{seconds:g}'))['topics']
+    topics: list[dict[str, Any]] = _read_answer(_start_probe('graph', f'{seconds:g}'))['topics']
     return topics

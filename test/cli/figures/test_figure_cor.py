@@ -1,4 +1,4 @@
-"""The command ``nanorocks figure cor``: the paper's figures of one tray, by one command."""
+"""The command ``nanorocks figure cor``: figures 7, 12 and 13 of one tray."""
 
 from __future__ import annotations
 
@@ -43,57 +43,57 @@ def draw(source, folder, *more):
 @pytest.fixture(scope='module')
 def folder(table, tmp_path_factory):
     """All figures, drawn once."""
-    found = tmp_path_factory.mktemp('drawn') / 'new' / 'figures'
-    assert draw(table, found) == 0
-    return found
+    figures = tmp_path_factory.mktemp('drawn') / 'new' / 'figures'
+    assert draw(table, figures) == 0
+    return figures
 
 
 def colours(path):
     picture = cv2.imread(str(path))
     assert min(picture.shape[:2]) > 400
-    return {tuple(one) for one in picture.reshape(-1, 3).tolist()}
+    return {tuple(colour) for colour in picture.reshape(-1, 3).tolist()}
 
 
-def test_all_figures_are_drawn_and_their_numbers_printed(table, folder, capsys):
+def test_all_figures_are_drawn_and_their_values_printed(table, folder, capsys):
     for name in FIGURES:
         (folder / name).unlink()
     searches = {path: path.stat().st_mtime_ns for path in folder.glob('*.npz')}
     assert len(searches) == 2
     assert draw(table, folder, '--json') == 0
-    # What was searched once is drawn again, but not searched again.
+    # The figures are drawn again from the finished search.
     assert {path: path.stat().st_mtime_ns for path in folder.glob('*.npz')} == searches
-    printed, said = capsys.readouterr()
-    found = json.loads(printed)
-    assert (found['tray'], found['cycles']) == (1, 18)
-    assert (found['first'], found['last']) == (1.75, 20.0)
+    printed, error = capsys.readouterr()
+    values = json.loads(printed)
+    assert (values['tray'], values['cycles']) == (1, 18)
+    assert (values['first'], values['last']) == (1.75, 20.0)
     for name in FIGURES:
         assert len(colours(folder / name)) > 20
-    # The valley holds the truth, 0.89 and 0.99, and rises on either side.
-    walls = found['walls']
+    # The minimum is at the truth, 0.89 and 0.99; chi square rises on both sides.
+    walls = values['walls']
     across = np.array(walls['chi_square'])[:, walls['wall_restitution'].index(0.99)]
     beads = np.array(walls['restitution'])
     assert abs(beads[across.argmin()] - 0.89) < 0.06
     assert across[0] > 4.0 * across.min()
     assert across[-1] > 4.0 * across.min()
-    # Towards walls that take more, it runs to beads that take less.
-    others = np.array(walls['chi_square'])[:, walls['wall_restitution'].index(0.95)]
-    assert beads[others.argmin()] >= beads[across.argmin()]
-    assert abs(found['width']['best']['restitution'] - 0.89) < 0.06
-    library = found['decay']['library']
+    # With more dissipative walls the minimum moves to less dissipative beads.
+    more_dissipative = np.array(walls['chi_square'])[:, walls['wall_restitution'].index(0.95)]
+    assert beads[more_dissipative.argmin()] >= beads[across.argmin()]
+    assert abs(values['width']['best']['restitution'] - 0.89) < 0.06
+    library = values['decay']['library']
     assert library['restitution_lower'] < 0.89 < library['restitution_upper']
     assert library['wall_restitution_lower'] < 0.99 < library['wall_restitution_upper'] + 0.01
-    assert len(found['instantaneous']['local_speed']) == 8
-    assert 'best at' in said
+    assert len(values['instantaneous']['local_speed']) == 8
+    assert 'best at' in error
 
 
-def test_a_search_of_other_values_in_the_same_folder_is_not_mixed_in(table, folder, capsys):
+def test_a_search_of_other_values_in_the_same_folder_is_rejected(table, folder, capsys):
     assert draw(table, folder, '--walls', '0.9,0.99') == 1
     error = capsys.readouterr().err
     assert 'holds another sweep' in error
     assert 'pass another --output' in error
 
 
-def test_ctrl_c_keeps_what_was_drawn_and_searched(table, tmp_path):
+def test_ctrl_c_keeps_figures_and_finished_runs(table, tmp_path):
     folder = tmp_path / 'figures'
     command = Path(sysconfig.get_path('scripts')) / 'nanorocks'
     arguments = ['figure', 'cor', str(table), '-o', str(folder), *SMALL, '--runs', '4000']
@@ -101,18 +101,18 @@ def test_ctrl_c_keeps_what_was_drawn_and_searched(table, tmp_path):
         [command, *arguments], stderr=subprocess.PIPE, text=True, start_new_session=True
     )
     parts = folder / 'walls_4000_runs.npz.parts'
-    end = time.monotonic() + 120.0
+    deadline = time.monotonic() + 120.0
     while len(list(parts.glob('[0-9]*.npz'))) < 2:
         assert process.poll() is None
-        assert time.monotonic() < end
+        assert time.monotonic() < deadline
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGINT)
-    said = process.communicate(timeout=60.0)[1]
+    error = process.communicate(timeout=60.0)[1]
     assert process.returncode == 130
-    assert 'interrupted; ' in said
-    assert 'the same command goes on from there' in said
-    assert 'Traceback' not in said
-    # What was drawn before stays, and so does what was searched.
+    assert 'interrupted; ' in error
+    assert 'the same command goes on from there' in error
+    assert 'Traceback' not in error
+    # Finished figures and finished parts of the search remain.
     assert (folder / 'decay.png').is_file()
     assert len(list(parts.glob('[0-9]*.npz'))) >= 2
 
@@ -120,19 +120,19 @@ def test_ctrl_c_keeps_what_was_drawn_and_searched(table, tmp_path):
 def test_a_mixture_shows_each_species_in_its_colour(mixture, tmp_path, capsys):
     output = tmp_path / 'decay.png'
     assert main(['figure', 'decay', str(mixture), '-o', str(output), '--json']) == 0
-    found = json.loads(capsys.readouterr().out)
-    glass, copper = found['species']
+    values = json.loads(capsys.readouterr().out)
+    glass, copper = values['species']
     assert (glass['material'], copper['material']) == ('glass', 'copper')
-    for one in (glass, copper):
-        assert 0.0 < one['initial_speed_error'] < 0.2 * one['initial_speed']
-        assert 0.0 < one['haff_time_error'] < 0.3 * one['haff_time']
-    # Light beads are faster, but not as fast as equipartition would have them.
+    for species in (glass, copper):
+        assert 0.0 < species['initial_speed_error'] < 0.2 * species['initial_speed']
+        assert 0.0 < species['haff_time_error'] < 0.3 * species['haff_time']
+    # Light beads are faster, but slower than in equipartition.
     assert glass['initial_speed'] > 1.3 * copper['initial_speed']
-    assert found['energy_ratio'] + 3.0 * found['energy_ratio_error'] < 1.0
+    assert values['energy_ratio'] + 3.0 * values['energy_ratio_error'] < 1.0
     # Lines of both, in blue, green, red.
-    shown = np.array(sorted(colours(output)))
+    drawn = np.array(sorted(colours(output)))
     for line in ((140, 42, 21), (36, 80, 129)):
-        assert np.abs(shown - line).max(axis=1).min() <= 1
+        assert np.abs(drawn - line).max(axis=1).min() <= 1
 
 
 def test_a_tray_of_one_species_has_no_second_panel(table, tmp_path, capsys):
@@ -142,51 +142,54 @@ def test_a_tray_of_one_species_has_no_second_panel(table, tmp_path, capsys):
 
 
 def test_the_window_is_that_of_the_analysis(table, tmp_path, capsys):
-    own = tmp_path / 'tray_1_speed.csv'
-    own.write_bytes(table.read_bytes())
+    speeds = tmp_path / 'tray_1_speed.csv'
+    speeds.write_bytes(table.read_bytes())
     fields = ('status', 'window_start', 'window_end', 'cooling_start')
     # The third is a live estimate.
     rows = [(2, 4.0, 18.0, 2.25), (2, 4.5, 19.0, 2.75), (1, 9.0, 9.0, 9.0), (2, 4.4, 17.0, 2.5)]
     write_csv(tmp_path / 'tray_1_cor.csv', fields, ('1', 's', 's', 's'), rows)
-    assert draw(own, tmp_path / 'a', '--json') == 0
-    found = json.loads(capsys.readouterr().out)
-    assert (found['first'], found['last']) == (4.4, 18.0)
+    assert draw(speeds, tmp_path / 'a', '--json') == 0
+    values = json.loads(capsys.readouterr().out)
+    assert (values['first'], values['last']) == (4.4, 18.0)
 
 
-def test_a_tray_that_swung_on_is_drawn_from_when_it_was_calm(table, tmp_path, capsys):
-    own = tmp_path / 'tray_1_speed.csv'
-    own.write_bytes(table.read_bytes())
+def test_an_oscillating_tray_is_fitted_from_the_start_of_the_cooling(table, tmp_path, capsys):
+    oscillating = tmp_path / 'tray_1_speed.csv'
+    oscillating.write_bytes(table.read_bytes())
     write_csv(
         tmp_path / 'tray_1_cor.csv',
         ('status', 'window_start', 'window_end', 'cooling_start'),
         ('1', 's', 's', 's'),
         [(2, 8.0, 20.0, 6.25)],
     )
-    found = {}
-    for source in (table, own):
+    values = {}
+    for source in (table, oscillating):
         output = tmp_path / 'a.png'
         assert main(['figure', 'decay', str(source), '-o', str(output), '--json', '--force']) == 0
-        found[source] = json.loads(capsys.readouterr().out)
-    assert found[table]['cooling_start'] == 0.0
-    assert found[own]['cooling_start'] == 6.25
-    # The speed when the tray came to rest, not that at the shaking event.
-    early = found[table]['initial_speed'] / (1.0 + 6.25 / found[table]['haff_time'])
-    assert found[own]['initial_speed'] == pytest.approx(early, rel=0.15)
-    assert main(['figure', 'instantaneous', str(own), '-o', str(output), '--json', '--force']) == 0
+        values[source] = json.loads(capsys.readouterr().out)
+    assert values[table]['cooling_start'] == 0.0
+    assert values[oscillating]['cooling_start'] == 6.25
+    # The initial speed is that at the start of the cooling.
+    early = values[table]['initial_speed'] / (1.0 + 6.25 / values[table]['haff_time'])
+    assert values[oscillating]['initial_speed'] == pytest.approx(early, rel=0.15)
+    assert (
+        main(['figure', 'instantaneous', str(oscillating), '-o', str(output), '--json', '--force'])
+        == 0
+    )
     speeds = json.loads(capsys.readouterr().out)['collision_speed']
-    assert max(speeds) < 2.2 * found[own]['initial_speed']
+    assert max(speeds) < 2.2 * values[oscillating]['initial_speed']
 
 
 def test_a_bag_is_analysed_first(tmp_path, capsys):
     folder = tmp_path / 'figures'
     assert draw(SAMPLE, folder, '--tray', '1', '--json') == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found['cycles'] == 1
-    assert found['first'] == pytest.approx(1.75, abs=0.2)
+    values = json.loads(capsys.readouterr().out)
+    assert values['cycles'] == 1
+    assert values['first'] == pytest.approx(1.75, abs=0.2)
     assert all((folder / name).is_file() for name in FIGURES)
     assert (folder / 'results' / 'tray_1_speed.csv').is_file()
     assert draw(SAMPLE, tmp_path / 'other') == 2
-    assert '--tray: is needed with a bag' in capsys.readouterr().err
+    assert '--tray: is required with a bag' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -212,14 +215,14 @@ def test_a_wrong_call_is_named_in_one_line(table, tmp_path, capsys, more, code, 
     assert error.count('\n') == 1
 
 
-def test_a_folder_of_something_else_is_left_alone(table, tmp_path, capsys):
+def test_a_folder_with_other_files_is_not_changed(table, tmp_path, capsys):
     (tmp_path / 'mine.txt').write_text('mine')
     assert draw(table, tmp_path) == 1
-    assert 'holds no figures of ours' in capsys.readouterr().err
+    assert 'holds no figures of this command' in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ['mine.txt']
 
 
-def test_speeds_that_rise_are_no_decay(tmp_path, capsys):
+def test_rising_speeds_are_an_error(tmp_path, capsys):
     rows = [(0.1 * k, 1, 0.0, 1e-3 + 1e-5 * k, 1e-4, 0.3) for k in range(1, 220)]
     assert draw(write_rows(tmp_path / 'tray_1_speed.csv', rows), tmp_path / 'a') == 1
     error = capsys.readouterr().err

@@ -17,18 +17,18 @@ def draw(*arguments):
 def test_the_papers_points_and_measured_ones_are_drawn_with_the_curves(tmp_path, capsys):
     output = tmp_path / 'a.svg'
     assert draw('-o', output, '--measured', '1:0.003:0.002:0.004', '--json') == 0
-    found = json.loads(capsys.readouterr().out)
-    assert [point['tray'] for point in found['points']] == [1, 3, 5, 1]
-    measured = found['points'][-1]
+    values = json.loads(capsys.readouterr().out)
+    assert [point['tray'] for point in values['points']] == [1, 3, 5, 1]
+    measured = values['points'][-1]
     assert measured['sticking_speed'] == 0.003
     assert measured['sticking_speed_lower'] == 0.002
     assert measured['mass'] == load_trays()[1].mean_mass
-    assert found['collapse_time_factor'] == pytest.approx(4.81, abs=0.01)
-    assert all(not curve['verified'] for curve in found['curves'])
+    assert values['collapse_time_factor'] == pytest.approx(4.81, abs=0.01)
+    assert all(not curve['verified'] for curve in values['curves'])
     assert output.stat().st_size > 10_000
 
 
-def test_what_is_printed_says_what_is_unverified(tmp_path, capsys):
+def test_unverified_curves_are_marked_in_the_text(tmp_path, capsys):
     assert draw('-o', tmp_path / 'a.png') == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith('tray 1: 10.4 mm/s at 4.94 mg (the paper')
@@ -48,11 +48,11 @@ def test_elastic_particles_never_collapse(tmp_path, capsys):
     [
         (('--measured', '1'), 'TRAY:SPEED'),
         (('--measured', 'x:0.01'), 'cannot be read'),
-        (('--measured', '1:0.01:0.02'), 'half an interval'),
+        (('--measured', '1:0.01:0.02'), 'one end of an interval'),
         (('--measured', '1:0.01:0.02:0.03'), 'not within'),
         (('--measured', '1:-0.01'), 'positive'),
         (('--measured', '9:0.01'), 'tray 9'),
-        (('--no-paper',), 'there is none'),
+        (('--no-paper',), 'there are none'),
         (('--restitution', '2'), 'from 0 to 1'),
         (('--trays', 'nowhere.yaml'), 'nowhere.yaml'),
     ],

@@ -29,17 +29,17 @@ def folders(tmp_path_factory):
 def test_a_campaign_is_drawn_and_written_as_a_table(folders, tmp_path, capsys):
     picture, table = tmp_path / 'a.png', tmp_path / 'a.csv'
     assert draw(*folders, '-o', picture, '--table', table, '--json') == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found['cycles'] == 30
-    (period,) = found['quiet_periods']
+    values = json.loads(capsys.readouterr().out)
+    assert values['cycles'] == 30
+    (period,) = values['quiet_periods']
     assert (period['first'], period['last']) == (19, 24)
-    assert len(found['trays']['3']['restitution']) == 30
-    assert found['trays']['1']['trends']['peak_speed']['cycles'] == 30
+    assert len(values['trays']['3']['restitution']) == 30
+    assert values['trays']['1']['trends']['peak_speed']['cycles'] == 30
     assert min(cv2.imread(str(picture)).shape[:2]) > 600
     assert len(table.read_text().splitlines()) == 61
 
 
-def test_people_read_trends_and_periods(folders, tmp_path, capsys):
+def test_trends_and_quiet_periods_are_printed(folders, tmp_path, capsys):
     assert draw(*folders, '-o', tmp_path / 'a.png') == 0
     text = capsys.readouterr()
     assert 'tray 1, peak speed: ' in text.out
@@ -56,7 +56,7 @@ def test_a_single_cycle_has_no_trend_but_a_picture(tmp_path, capsys):
     assert 'no quiet period' in out
 
 
-def test_without_restitutions_their_panel_says_so(tmp_path, capsys):
+def test_missing_restitutions_are_reported_as_unknown(tmp_path, capsys):
     folder = write_recording(tmp_path / 'r', (1,), 6, np.full(6, SIZE))
     (folder / 'tray_1_cor.csv').unlink()
     assert draw(folder, '-o', tmp_path / 'a.svg') == 0

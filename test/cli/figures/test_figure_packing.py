@@ -22,15 +22,15 @@ def results(tmp_path):
     return write_results(tmp_path / 'results', areas)
 
 
-def test_simulated_clusters_are_drawn_beside_the_truth(tmp_path, capsys):
-    given = '--simulate', '--trays', '1', '--cycles', '1', '--sticking-speed', '0.01'
-    assert draw(*given, '-o', tmp_path / 'a.png', '--json') == 0
-    found = json.loads(capsys.readouterr().out)
-    one = found['trays']['1']
-    assert one['paper_filling'] == pytest.approx(2 * one['layer_filling'])
-    assert one['filling_in_space'] < one['layer_filling'] < 0.6046
-    assert one['true_compaction'] < 0.02 < one['apparent_compaction']
-    assert one['paper_compaction'] == 0.066
+def test_simulated_clusters_are_compared_with_the_truth(tmp_path, capsys):
+    flags = '--simulate', '--trays', '1', '--cycles', '1', '--sticking-speed', '0.01'
+    assert draw(*flags, '-o', tmp_path / 'a.png', '--json') == 0
+    values = json.loads(capsys.readouterr().out)
+    tray = values['trays']['1']
+    assert tray['paper_filling'] == pytest.approx(2 * tray['layer_filling'])
+    assert tray['filling_in_space'] < tray['layer_filling'] < 0.6046
+    assert tray['true_compaction'] < 0.02 < tray['apparent_compaction']
+    assert tray['paper_compaction'] == 0.066
     assert min(cv2.imread(str(tmp_path / 'a.png')).shape[:2]) > 400
 
 
@@ -63,7 +63,7 @@ def test_a_wrong_call_is_named_in_one_line(tmp_path, monkeypatch, capsys, more, 
     assert not list(tmp_path.glob('*.png'))
 
 
-def test_a_table_that_is_broken_is_named(results, tmp_path, capsys):
+def test_a_table_without_a_column_is_named(results, tmp_path, capsys):
     (results / 'tray_1_cluster.csv').write_text('time [s],cycle [1]\n1,2\n')
     assert draw(results, '-o', tmp_path / 'a.png') == 1
     assert 'no column level_area' in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""``nanorocks simulate`` as people and programs call it."""
+"""The command ``nanorocks simulate``."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from nanorocks_ros.studies.synthetic.film_bag import START_NS
 
 SMALL = ('--width-px', '64', '--height-px', '64', '--pixels-per-metre', '4000')
 QUICK = ('--duration', '1', '--times', '6')
-# Said where the engine has not been compiled yet.
-ONCE = 'compiling'
+# Printed when the engine is compiled, on its first use.
+COMPILING = 'compiling'
 OWN = """
 materials: {steel: {density_g_cm3: 7.8, color_bgr: [150, 150, 150]}}
 trays:
@@ -35,10 +35,10 @@ def simulate(capsys, *arguments):
     """Exit code, standard output, and the lines of standard error."""
     try:
         code = main(['simulate', *arguments])
-    except SystemExit as end:
-        code = end.code
-    said = capsys.readouterr()
-    return code, said.out, [line for line in said.err.splitlines() if ONCE not in line]
+    except SystemExit as ending:
+        code = ending.code
+    printed = capsys.readouterr()
+    return code, printed.out, [line for line in printed.err.splitlines() if COMPILING not in line]
 
 
 def result(capsys, *arguments):
@@ -53,14 +53,14 @@ def own_trays(tmp_path, count=20):
     return str(path)
 
 
-def test_the_contract_holds_without_a_bag(capsys):
+def test_the_json_contract_holds_without_a_bag(capsys):
     flags = ('--restitution', '0.8', '--wall-restitution', '0.9', '--sticking-speed', '0.001')
-    found = result(capsys, '--tray', '3', '--runs', '4', '--seed', '7', '--duration', '6', *flags)
-    assert (found['tray'], found['runs'], found['seed']) == (3, 4, 7)
-    assert found['settings']['wall_restitution'] == 0.9
-    assert isinstance(found['events'], int)
-    assert 0.0 < found['cpu_seconds'] < 10.0
-    curves = [found[name] for name in ('time', 'mean_speed', 'mean_projected_speed', 'bodies')]
+    values = result(capsys, '--tray', '3', '--runs', '4', '--seed', '7', '--duration', '6', *flags)
+    assert (values['tray'], values['runs'], values['seed']) == (3, 4, 7)
+    assert values['settings']['wall_restitution'] == 0.9
+    assert isinstance(values['events'], int)
+    assert 0.0 < values['cpu_seconds'] < 10.0
+    curves = [values[name] for name in ('time', 'mean_speed', 'mean_projected_speed', 'bodies')]
     assert [len(curve) for curve in curves] == [181] * 4
     time_, speed, projected, bodies = map(np.array, curves)
     assert time_[0] == 0.0
@@ -72,20 +72,20 @@ def test_the_contract_holds_without_a_bag(capsys):
 
 
 def test_runs_are_averaged(capsys):
-    one = result(capsys, *QUICK)
-    more = result(capsys, '--runs', '3', *QUICK)
-    assert one['mean_speed_error'] is None
-    assert len(more['mean_speed_error']) == 6
-    assert more['mean_speed'] != one['mean_speed']
-    assert more['events'] > 2 * one['events']
+    single = result(capsys, *QUICK)
+    averaged = result(capsys, '--runs', '3', *QUICK)
+    assert single['mean_speed_error'] is None
+    assert len(averaged['mean_speed_error']) == 6
+    assert averaged['mean_speed'] != single['mean_speed']
+    assert averaged['events'] > 2 * single['events']
 
 
-def test_a_seed_repeats_itself(capsys):
+def test_the_same_seed_gives_the_same_speeds(capsys):
     first, again, other = (result(capsys, *QUICK, '--seed', seed) for seed in '336')
     assert first['mean_speed'] == again['mean_speed'] != other['mean_speed']
 
 
-def test_people_get_a_table(capsys):
+def test_without_json_a_table_is_printed(capsys):
     code, out, err = simulate(capsys, '--tray', '3', '--duration', '20', '--runs', '2')
     assert (code, err) == (0, [])
     rows = {line[:17].strip(): line[17:] for line in out.splitlines()}
@@ -98,12 +98,12 @@ def test_people_get_a_table(capsys):
     assert 'written' not in rows
 
 
-def test_a_tray_of_your_own(capsys, tmp_path):
-    found = result(capsys, '--trays-file', own_trays(tmp_path), *QUICK)
-    assert (found['tray'], found['beads']) == (4, 20)
+def test_a_custom_tray_is_simulated(capsys, tmp_path):
+    values = result(capsys, '--trays-file', own_trays(tmp_path), *QUICK)
+    assert (values['tray'], values['beads']) == (4, 20)
 
 
-def test_everything_at_once(capsys, tmp_path):
+def test_all_outputs_are_written_together(capsys, tmp_path):
     files = {'trajectory': 't.npz', 'events': 'e.npz', 'picture': 'p.png', 'video': 'v.avi'}
     paths = {name: str(tmp_path / file) for name, file in files.items()}
     flags = [text for name, path in paths.items() for text in (f'--{name}', path)]
@@ -121,21 +121,21 @@ def test_everything_at_once(capsys, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {*files.values(), 'bag', 'own.yaml'}
 
 
-def test_a_bag_says_what_it_holds_beside_the_contract(capsys, tmp_path):
+def test_a_bag_adds_its_frames_to_the_json(capsys, tmp_path):
     bag = str(tmp_path / 'bag')
-    found = result(capsys, *QUICK, *SMALL, '--bag', bag)
-    assert (found['frames'], found['duration'], found['bag']) == (30, 1.0, bag)
-    assert len(found['mean_speed']) == 6
-    assert found['files'] == {'bag': bag}
+    values = result(capsys, *QUICK, *SMALL, '--bag', bag)
+    assert (values['frames'], values['duration'], values['bag']) == (30, 1.0, bag)
+    assert len(values['mean_speed']) == 6
+    assert values['files'] == {'bag': bag}
 
 
 def noise_in(folder):
-    """Spread of the surroundings of the tray, of which a clean picture is even."""
+    """Standard deviation of the image outside the tray, which is 0 without noise."""
     frame = next(BagFrames(folder).frames())
     return float(np.std(frame.image[:2].astype(float), axis=1).mean())
 
 
-def test_effects_may_be_left_out(capsys, tmp_path):
+def test_effects_can_be_switched_off(capsys, tmp_path):
     spreads = []
     for effects in ('all', 'none'):
         bag = tmp_path / effects
@@ -148,7 +148,7 @@ def test_effects_may_be_left_out(capsys, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ('arguments', 'code', 'said'),
+    ('arguments', 'code', 'message'),
     [
         (['--runs', '0'], 2, '--runs: 0; give 1 or more'),
         (['--times', '1'], 2, '--times: 1; give 2 or more'),
@@ -166,22 +166,22 @@ def test_effects_may_be_left_out(capsys, tmp_path):
         (['--bag', 'bag', '--width-px', '50'], 1, 'in a picture of 50 x 1080'),
     ],
 )
-def test_a_wrong_call_is_one_line(capsys, tmp_path, monkeypatch, arguments, code, said):
+def test_a_wrong_call_is_one_line(capsys, tmp_path, monkeypatch, arguments, code, message):
     monkeypatch.chdir(tmp_path)
-    found, out, err = simulate(capsys, *arguments)
-    assert (found, out, len(err)) == (code, '', 1)
-    assert said in err[0]
+    exit_code, out, err = simulate(capsys, *arguments)
+    assert (exit_code, out, len(err)) == (code, '', 1)
+    assert message in err[0]
     assert err[0].startswith('nanorocks: ')
     assert list(tmp_path.iterdir()) == []
 
 
-def test_beads_that_do_not_fit_are_input_that_cannot_be_used(capsys, tmp_path):
+def test_beads_that_do_not_fit_are_unusable_input(capsys, tmp_path):
     code, _, err = simulate(capsys, '--trays-file', own_trays(tmp_path, count=900))
     assert code == 1
     assert len(err) == 1
 
 
-def test_files_that_exist_stay_unless_forced(capsys, tmp_path):
+def test_existing_files_are_replaced_only_with_force(capsys, tmp_path):
     path = tmp_path / 'run.npz'
     path.write_bytes(b'mine')
     code, _, err = simulate(capsys, *QUICK, '--trajectory', str(path))
@@ -192,7 +192,7 @@ def test_files_that_exist_stay_unless_forced(capsys, tmp_path):
     assert path.read_bytes() != b'mine'
 
 
-def test_ctrl_c_ends_it_and_says_what_is_left(tmp_path):
+def test_ctrl_c_names_the_files_that_remain(tmp_path):
     command = [sys.executable, '-c', 'from nanorocks_ros.cli.main import main; exit(main())']
     files = ('--trajectory', 'run.npz', '--bag', 'bag', *SMALL)
     process = subprocess.Popen(
@@ -203,18 +203,18 @@ def test_ctrl_c_ends_it_and_says_what_is_left(tmp_path):
         env={**os.environ, 'OPENBLAS_NUM_THREADS': '1'},
     )
     try:
-        # Until there are frames in it: the first ones wait for the camera to be compiled.
+        # The first frames follow after the camera is compiled.
         film = tmp_path / 'bag' / 'bag.mcap'
         while not film.exists() or film.stat().st_size < 100_000:
             assert process.poll() is None
             time.sleep(0.05)
         process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=30)
+        _, error = process.communicate(timeout=30)
     finally:
         process.kill()
     assert process.returncode == 130
-    assert said.splitlines()[-1] == (
-        'nanorocks: interrupted; complete: run.npz; what bag holds until now can be read'
+    assert error.splitlines()[-1] == (
+        'nanorocks: interrupted; complete: run.npz; bag can be read up to the last frame written'
     )
     assert len(BagFrames(tmp_path / 'bag').truth(START_NS)[1]) > 0
     assert {path.name for path in tmp_path.iterdir()} == {'run.npz', 'bag'}

@@ -1,4 +1,4 @@
-"""``nanorocks simulate --scene`` as people and programs call it."""
+"""The command ``nanorocks simulate --scene``."""
 
 from __future__ import annotations
 
@@ -18,10 +18,14 @@ QUICK = ('--scene', '--duration', '0.2', '--scene-trays', '1', *SMALL)
 def simulate(capsys, *arguments):
     try:
         code = main(['simulate', *arguments])
-    except SystemExit as end:
-        code = end.code
-    said = capsys.readouterr()
-    return code, said.out, [line for line in said.err.splitlines() if 'compiling' not in line]
+    except SystemExit as ending:
+        code = ending.code
+    printed = capsys.readouterr()
+    return (
+        code,
+        printed.out,
+        [line for line in printed.err.splitlines() if 'compiling' not in line],
+    )
 
 
 def test_a_scene_is_filmed_into_a_bag_a_video_and_a_picture(capsys, tmp_path):
@@ -29,26 +33,26 @@ def test_a_scene_is_filmed_into_a_bag_a_video_and_a_picture(capsys, tmp_path):
     flags = ('--bag', paths['bag'], '--picture', paths['scene.png'], '--video', paths['scene.avi'])
     code, out, err = simulate(capsys, *QUICK, *flags, '--seed', '3', '--json')
     assert (code, err) == (0, [])
-    found = json.loads(out)
-    assert found['trays'] == [1]
-    assert (found['frames'], found['duration'], found['seed']) == (6, 0.2, 3)
-    assert found['bag'] == paths['bag']
-    assert set(found['files']) == {'bag', 'picture', 'video'}
-    assert found['settings']['scene']['pixels_per_metre'] == 5600
+    values = json.loads(out)
+    assert values['trays'] == [1]
+    assert (values['frames'], values['duration'], values['seed']) == (6, 0.2, 3)
+    assert values['bag'] == paths['bag']
+    assert set(values['files']) == {'bag', 'picture', 'video'}
+    assert values['settings']['scene']['pixels_per_metre'] == 5600
     assert cv2.imread(paths['scene.png']).shape == (480, 640, 3)
     frames = list(BagFrames(paths['bag']).frames())
     assert len(frames) == 6
     assert frames[0].image.shape == (480, 640, 3)
 
 
-def test_people_are_told_what_was_written(capsys, tmp_path):
+def test_the_written_files_are_printed(capsys, tmp_path):
     path = str(tmp_path / 'scene.png')
     code, out, err = simulate(capsys, *QUICK, '--picture', path)
     assert (code, err) == (0, [])
     assert out.splitlines()[-1].split(maxsplit=1) == ['written', path]
 
 
-def test_no_effects_is_a_quiet_picture_and_single_effects_can_be_added(capsys, tmp_path):
+def test_single_effects_can_be_added_to_none(capsys, tmp_path):
     pictures = []
     for name, flags in (('none', ()), ('noise', ('--scene-noise', '4'))):
         path = tmp_path / f'{name}.png'
@@ -57,23 +61,23 @@ def test_no_effects_is_a_quiet_picture_and_single_effects_can_be_added(capsys, t
         )
         assert (code, err) == (0, [])
         pictures.append(cv2.imread(str(path)).astype(float))
-    # Beside the plate it is dark, and even but for the noise.
+    # Beside the plate the image is dark, and uniform without noise.
     noise = (pictures[1] - pictures[0])[200:280, :60]
     assert np.std(noise) == pytest.approx(4.0, rel=0.05)
 
 
 @pytest.mark.parametrize(
-    ('arguments', 'code', 'said'),
+    ('arguments', 'code', 'message'),
     [
-        (['--scene'], 2, '--scene: makes nothing but films; name a --bag, --video or --picture'),
+        (['--scene'], 2, '--scene: has no output; name a --bag, --video or --picture'),
         (
             ['--scene', '--bag', 'b', '--tray', '3'],
             2,
-            '--tray: is of one tray alone; use --scene-',
+            '--tray: is a setting of one tray; use --scene-',
         ),
-        (['--scene', '--bag', 'b', '--noise', '3'], 2, '--noise: is of one tray alone; use'),
-        (['--scene', '--bag', 'b', '--runs', '3'], 2, '--runs: is of one tray alone'),
-        (['--scene', '--bag', 'b', '--events', 'e.npz'], 2, '--events: is of one tray alone'),
+        (['--scene', '--bag', 'b', '--noise', '3'], 2, '--noise: is a setting of one tray; use'),
+        (['--scene', '--bag', 'b', '--runs', '3'], 2, '--runs: is a setting of one tray'),
+        (['--scene', '--bag', 'b', '--events', 'e.npz'], 2, '--events: is a setting of one tray'),
         (['--scene', '--bag', 'b', '--duration', '0'], 2, '--duration: 0'),
         (['--scene', '--bag', 'b', '--quality', '0'], 2, '--quality: 0'),
         (['--scene', '--bag', 'b', '--scene-glare', 'much'], 2, '--scene-glare: '),
@@ -87,13 +91,17 @@ def test_no_effects_is_a_quiet_picture_and_single_effects_can_be_added(capsys, t
             2,
             'lies outside a picture of 300 x 1080',
         ),
-        (['--scene-noise', '3', '--bag', 'b'], 2, '--scene-noise: is of the whole plate; add'),
+        (
+            ['--scene-noise', '3', '--bag', 'b'],
+            2,
+            '--scene-noise: is a setting of the whole plate; add',
+        ),
     ],
 )
-def test_a_wrong_call_is_one_line(capsys, tmp_path, monkeypatch, arguments, code, said):
+def test_a_wrong_call_is_one_line(capsys, tmp_path, monkeypatch, arguments, code, message):
     monkeypatch.chdir(tmp_path)
-    found, out, err = simulate(capsys, *arguments)
-    assert (found, out, len(err)) == (code, '', 1)
-    assert said in err[0]
+    exit_code, out, err = simulate(capsys, *arguments)
+    assert (exit_code, out, len(err)) == (code, '', 1)
+    assert message in err[0]
     assert err[0].startswith('nanorocks: ')
     assert list(tmp_path.iterdir()) == []

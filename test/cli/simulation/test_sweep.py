@@ -22,7 +22,7 @@ GRID = ['--restitution', '0.6:0.9:3', '--wall-restitution', '0.9,0.99']
 
 
 def start(*arguments):
-    """The command as a shell starts it, in a process group of its own."""
+    """Start the command in its own process group, as a shell does."""
     return subprocess.Popen(
         [Path(sysconfig.get_path('scripts')) / 'nanorocks', 'sweep', *arguments],
         stderr=subprocess.PIPE,
@@ -58,7 +58,7 @@ def test_a_sweep_prints_curves_and_writes_them(tmp_path, capsys):
     assert float(lines[-1]['mean_projected_speed [m/s]']) == sweep.mean_projected_speed[2, 1, 2]
 
 
-def test_what_is_not_known_is_null(tmp_path, capsys):
+def test_unknown_values_are_null(tmp_path, capsys):
     output = str(tmp_path / 'a.npz')
     assert main(['sweep', '--runs', '1', '--times', '0,1', '-o', output, '--json']) == 0
     printed = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
@@ -101,14 +101,17 @@ def test_a_map_is_drawn_against_a_point_or_a_file(tmp_path, capsys):
         (['--workers', '2', '--scheduler', 'tcp://127.0.0.1:1'], 'leave it out with --scheduler'),
         (['--scheduler', 'nowhere'], "--scheduler: 'nowhere' is no address; give tcp://host:port"),
         (['--task-seconds', 'nan'], '--task-seconds: nan; give a time above 0'),
-        (['--figure', 'a.png'], '--figure: goes with --reference; give both or neither'),
-        (['--figure', 'a.xyz', '--reference', '1'], "--figure: 'a.xyz' is no picture; end it in"),
+        (['--figure', 'a.png'], '--figure: needs --reference; give both or neither'),
+        (
+            ['--figure', 'a.xyz', '--reference', '1'],
+            "--figure: 'a.xyz' is no picture file; end it in",
+        ),
         (['--figure', 'a.png', '--reference', '1'], '--figure: the grid is a single point'),
         ([*GRID, '--figure', 'a.png', '--reference', 'x'], "--reference: 'x' cannot be read"),
         ([*GRID, '--figure', 'a.png', '--reference', '0.6,0.5'], 'choose one of 0.9, 0.99'),
     ],
 )
-def test_a_wrong_call_is_told_in_one_line(tmp_path, capsys, arguments, message):
+def test_a_wrong_call_is_one_line(tmp_path, capsys, arguments, message):
     output = tmp_path / 'a.npz'
     assert main(['sweep', '--runs', '2', '--times', '0,1', '-o', str(output), *arguments]) == 2
     printed = capsys.readouterr()
@@ -120,14 +123,14 @@ def test_a_wrong_call_is_told_in_one_line(tmp_path, capsys, arguments, message):
 
 
 @pytest.mark.parametrize('option', ['--nothing', '--noise'])
-def test_flags_there_are_not_are_refused(option, capsys):
+def test_unknown_flags_are_rejected(option, capsys):
     with pytest.raises(SystemExit) as ending:
         main(['sweep', '-o', 'a.npz', option, '1'])
     assert ending.value.code == 2
     assert 'unrecognized arguments' in capsys.readouterr().err
 
 
-def test_files_that_cannot_be_used_are_told(tmp_path, capsys):
+def test_unusable_files_are_named(tmp_path, capsys):
     output = tmp_path / 'a.npz'
     output.write_text('mine')
     assert main(['sweep', *SMALL, '-o', str(output)]) == 1
@@ -137,7 +140,7 @@ def test_files_that_cannot_be_used_are_told(tmp_path, capsys):
     assert 'no.csv: cannot be read (No such file or directory)' in capsys.readouterr().err
 
 
-def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(tmp_path):
+def test_ctrl_c_keeps_finished_runs_and_the_same_command_resumes(tmp_path):
     arguments = [
         '--restitution',
         '0.6:0.9:4',
@@ -155,31 +158,31 @@ def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(tmp_path):
     while len(list(folder.glob('[0-9]*.npz'))) < 6:
         assert process.poll() is None, process.communicate()[1]
         time.sleep(0.005)
-    # As a terminal does: to the command and all its workers.
+    # A terminal sends the signal to the command and all its workers.
     os.killpg(process.pid, signal.SIGINT)
-    _, said = process.communicate()
+    _, error = process.communicate()
     assert process.returncode == 130
-    kept = int(said.split('interrupted; ')[1].split(' of 1200')[0])
-    # The last line; another may tell that the simulation was compiled.
-    assert said.splitlines()[-1] == (
-        f'nanorocks: interrupted; {kept} of 1200 runs are kept in {folder}; '
+    runs = int(error.split('interrupted; ')[1].split(' of 1200')[0])
+    # An earlier line may report the compilation of the simulation.
+    assert error.splitlines()[-1] == (
+        f'nanorocks: interrupted; {runs} of 1200 runs are kept in {folder}; '
         'the same command goes on from there'
     )
-    assert 0 < kept < 1200
+    assert 0 < runs < 1200
     assert not output.exists()
 
     again = start(*arguments, *quick, '-o', str(output))
-    _, said = again.communicate()
-    assert again.returncode == 0, said
+    _, error = again.communicate()
+    assert again.returncode == 0, error
     assert not folder.exists()
     straight = tmp_path / 'straight.npz'
     assert main(['sweep', *arguments, '-o', str(straight), '--workers', '1']) == 0
-    one, other = Sweep.load(output), Sweep.load(straight)
+    resumed, uninterrupted = Sweep.load(output), Sweep.load(straight)
     for name in (*CURVES, 'pair_collisions', 'wall_collisions'):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        np.testing.assert_array_equal(getattr(resumed, name), getattr(uninterrupted, name))
 
 
-def test_a_terminated_command_leaves_no_workers_and_can_go_on(tmp_path):
+def test_a_terminated_command_leaves_no_workers_and_keeps_its_parts(tmp_path):
     output = tmp_path / 'a.npz'
     arguments = ['--runs', '20000', '--times', '0,20', '--task-seconds', '0.02', '--workers', '2']
     process = start(*arguments, '-o', str(output))
@@ -189,13 +192,13 @@ def test_a_terminated_command_leaves_no_workers_and_can_go_on(tmp_path):
         time.sleep(0.005)
     process.terminate()
     process.communicate()
-    # The group is empty when the last of its processes has gone.
-    end = time.monotonic() + 60.0
+    # The process group is empty when its last process has ended.
+    deadline = time.monotonic() + 60.0
     while True:
         try:
             os.killpg(process.pid, 0)
         except ProcessLookupError:
             break
-        assert time.monotonic() < end
+        assert time.monotonic() < deadline
         time.sleep(0.05)
     assert len(list(folder.glob('[0-9]*.npz'))) >= 4

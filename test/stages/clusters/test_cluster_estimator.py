@@ -35,8 +35,8 @@ def images(until, step=0.1):
 
 def estimates(records):
     stage = ClusterEstimator(PipelineSettings(), TRAY)
-    found = [one for record in records for one in stage.push(record)]
-    return [one for one in (*found, *stage.flush()) if isinstance(one, ClusterEstimate)]
+    results = [item for record in records for item in stage.push(record)]
+    return [item for item in (*results, *stage.flush()) if isinstance(item, ClusterEstimate)]
 
 
 def as_they_come(records, delays):
@@ -58,12 +58,12 @@ def test_estimates_come_two_seconds_later_with_what_tracks_say_of_the_instant():
     first = min(record.stamp_ns for record in records if isinstance(record, Merge)) / NS
     seen = 0
     for record in records:
-        for one in stage.push(record):
-            if isinstance(one, ClusterEstimate):
+        for item in stage.push(record):
+            if isinstance(item, ClusterEstimate):
                 seen += 1
-                assert record.stamp_ns - one.stamp_ns >= 2 * NS
-                assert one.bodies.value == true[one.stamp_ns]
-                assert math.isnan(one.onset) == (one.stamp_ns < first * NS)
+                assert record.stamp_ns - item.stamp_ns >= 2 * NS
+                assert item.bodies.value == true[item.stamp_ns]
+                assert math.isnan(item.onset) == (item.stamp_ns < first * NS)
     assert seen > 40
     (*_, last) = stage.flush()
     assert last.onset == pytest.approx(first)
@@ -73,23 +73,23 @@ def test_estimates_come_two_seconds_later_with_what_tracks_say_of_the_instant():
 
 def test_they_do_not_depend_on_the_order_in_which_records_come_in():
     records = [*cooling(until=12.0), *images(12.0)]
-    one = estimates(as_they_come(records, {BodyEstimate: 1.0}))
+    estimate = estimates(as_they_come(records, {BodyEstimate: 1.0}))
     other = estimates(as_they_come(records, {BodyEstimate: 1.6, Merge: 0.9}))
-    assert [repr(each) for each in one] == [repr(each) for each in other]
+    assert [repr(item) for item in estimate] == [repr(record) for record in other]
 
 
 def test_without_tracks_the_autocorrelation_speaks_alone():
-    found = estimates(images(5.0))
-    assert len(found) > 20
-    for one in found:
-        assert math.isnan(one.bodies.value)
-        assert math.isnan(one.onset)
-        assert one.sticking_status is StickingStatus.UNKNOWN
-        assert one.level_area > 0.0
+    results = estimates(images(5.0))
+    assert len(results) > 20
+    for record in results:
+        assert math.isnan(record.bodies.value)
+        assert math.isnan(record.onset)
+        assert record.sticking_status is StickingStatus.UNKNOWN
+        assert record.level_area > 0.0
 
 
 def test_sizes_by_both_are_weighted_by_their_errors():
-    (body, *_) = (one for one in cooling() if isinstance(one, BodyEstimate))
+    (body, *_) = (record for record in cooling() if isinstance(record, BodyEstimate))
     by_tracks = [
         replace(body, stamp_ns=image.stamp_ns, weighted_size=3.0, weighted_size_error=0.5)
         for image in images(5.0)
@@ -105,18 +105,20 @@ def test_sizes_by_both_are_weighted_by_their_errors():
 def test_the_image_is_sent_at_once_while_somebody_looks():
     stage = ClusterEstimator(PipelineSettings(), TRAY)
     stage.emit_image = True
-    found = [(one, record) for record in images(3.0) for one in stage.push(record)]
-    pictures = [(one, record) for one, record in found if isinstance(one, Autocorrelation)]
+    records = [(item, record) for record in images(3.0) for item in stage.push(record)]
+    pictures = [(item, record) for item, record in records if isinstance(item, Autocorrelation)]
     assert pictures
     assert all(autocorrelation.stamp_ns == record.stamp_ns for autocorrelation, record in pictures)
 
 
 def test_time_that_goes_back_gives_out_what_was_held():
     stage = ClusterEstimator(PipelineSettings(), load_trays()[1])
-    once = [one for record in images(5.0) for one in stage.push(record)]
+    once = [item for record in images(5.0) for item in stage.push(record)]
     back = stage.push(images(0.3)[0])
-    held = [one for one in back if isinstance(one, ClusterEstimate)]
-    stamps = [one.stamp_ns for one in (*once, *held) if isinstance(one, ClusterEstimate)]
+    held = [item for item in back if isinstance(item, ClusterEstimate)]
+    stamps = [
+        estimate.stamp_ns for estimate in (*once, *held) if isinstance(estimate, ClusterEstimate)
+    ]
     assert stamps == sorted(stamps)
     assert stamps[-1] > ns(4.5)
 
@@ -130,15 +132,15 @@ def test_where_the_scale_is_wrong_nothing_is_said_of_clusters_and_sticking():
         else record
         for record in records
     ]
-    found = estimates(wrong)
-    assert len(found) > 40
-    for one in found:
-        assert math.isnan(one.cluster_size.value)
-        assert math.isnan(one.combined_size.value)
-        assert math.isnan(one.bodies.value)
-        assert math.isnan(one.onset)
-        assert one.sticking_status is StickingStatus.UNKNOWN
-        assert math.isnan(one.sticking_speed.value)
+    results = estimates(wrong)
+    assert len(results) > 40
+    for item in results:
+        assert math.isnan(item.cluster_size.value)
+        assert math.isnan(item.combined_size.value)
+        assert math.isnan(item.bodies.value)
+        assert math.isnan(item.onset)
+        assert item.sticking_status is StickingStatus.UNKNOWN
+        assert math.isnan(item.sticking_speed.value)
 
 
 def test_a_cycle_with_a_wrong_scale_tells_no_sticking_speed_even_once_it_is_right_again():
@@ -146,8 +148,8 @@ def test_a_cycle_with_a_wrong_scale_tells_no_sticking_speed_even_once_it_is_righ
     first = next(k for k, record in enumerate(records) if isinstance(record, SpeedEstimate))
     records[first] = replace(records[first], quality=Quality.WRONG_SCALE)
     stage = ClusterEstimator(PipelineSettings(), TRAY)
-    found = [one for record in records for one in stage.push(record)]
-    assert {one.sticking_status for one in found if isinstance(one, ClusterEstimate)} == {
+    results = [item for record in records for item in stage.push(record)]
+    assert {item.sticking_status for item in results if isinstance(item, ClusterEstimate)} == {
         StickingStatus.UNKNOWN
     }
     assert stage.cycles == ()

@@ -56,15 +56,15 @@ def test_half_the_resolution_hardly_changes_the_width():
     fine = correlated(disc_image(25), 8999.0)
     half = correlated(disc_image(25), 9000.0)
     assert (fine.side, half.side) == pytest.approx((1.0 / 8999.0, 2.0 / 9000.0))
-    one, other = (seen.region(0.5).area * seen.side**2 for seen in (fine, half))
-    assert other == pytest.approx(one, rel=0.03)
+    first, other = (seen.region(0.5).area * seen.side**2 for seen in (fine, half))
+    assert other == pytest.approx(first, rel=0.03)
 
 
 def rods(angle):
     picture = np.full((200, 200), 160, np.uint8)
     corner = np.array([math.cos(angle), math.sin(angle)]) * 30.0
     for middle in ((60, 60), (140, 130)):
-        ends = [tuple(round(one) for one in middle + sign * corner) for sign in (-1, 1)]
+        ends = [tuple(round(pixel) for pixel in middle + sign * corner) for sign in (-1, 1)]
         cv2.line(picture, *ends, 60, 9, cv2.LINE_AA)
     return picture
 
@@ -115,11 +115,11 @@ def test_beads_pushed_together_are_a_larger_cluster_than_the_same_beads_apart():
         cv2.circle(together, (40 + 26 * (k % 4), 40 + 26 * (k // 4)), 13, 50, -1, cv2.LINE_AA)
     sizes = []
     for gray in (apart, together):
-        (one,) = pushed(ClusterAutocorrelator(PipelineSettings(), load_trays()[1]), gray)
+        (estimate,) = pushed(ClusterAutocorrelator(PipelineSettings(), load_trays()[1]), gray)
         sizes.append(
-            one.cluster_size.value
-            if math.isfinite(one.cluster_size.value)
-            else one.cluster_size.lower
+            estimate.cluster_size.value
+            if math.isfinite(estimate.cluster_size.value)
+            else estimate.cluster_size.lower
         )
     assert sizes[0] < 1.5
     assert sizes[1] > 3.0

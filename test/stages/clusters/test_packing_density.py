@@ -58,8 +58,10 @@ def test_the_error_is_what_clusters_scatter_by():
         )
 
     several = [drawn() for _ in range(60)]
-    scatter = np.std([one.filling for one in several])
-    assert np.mean([one.filling_error for one in several]) == pytest.approx(scatter, rel=0.3)
+    scatter = np.std([packing.filling for packing in several])
+    assert np.mean([packing.filling_error for packing in several]) == pytest.approx(
+        scatter, rel=0.3
+    )
 
 
 def test_without_clusters_there_is_no_packing():
@@ -68,8 +70,8 @@ def test_without_clusters_there_is_no_packing():
 
 
 def test_pairs_that_stick_make_bodies_through_beads_that_are_not_seen():
-    found = bodies_of_pairs(np.array([7, 3, 5, 8]), [(8, 4), (3, 4), (5, 6)])
-    assert found.tolist() == [7, 3, 5, 3]
+    labels = bodies_of_pairs(np.array([7, 3, 5, 8]), [(8, 4), (3, 4), (5, 6)])
+    assert labels.tolist() == [7, 3, 5, 3]
 
 
 def test_other_shapes_are_refused():

@@ -24,7 +24,7 @@ def frame(number, image=None, step=STEP, encoding='bgr8'):
 
 def judged(frames):
     checks = FrameChecks('cam')
-    verdicts = [checks.push(one) for one in frames]
+    verdicts = [checks.push(picture) for picture in frames]
     return checks, verdicts, [notice.text for verdict in verdicts for notice in verdict.notices]
 
 
@@ -130,4 +130,4 @@ def test_gray_pictures_are_flagged_whether_they_are_called_gray_or_not():
     copies = [np.repeat(picture(k, 'mono8')[..., None], 3, axis=2) for k in range(3)]
     _, called_color, _ = judged([frame(k, copy) for k, copy in enumerate(copies)])
     _, called_gray, _ = judged([frame(k, encoding='mono8') for k in range(3)])
-    assert all(one.quality == Quality.GRAY_CAMERA for one in (*called_color, *called_gray))
+    assert all(verdict.quality == Quality.GRAY_CAMERA for verdict in (*called_color, *called_gray))

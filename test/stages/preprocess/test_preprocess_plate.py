@@ -15,7 +15,7 @@ from nanorocks_ros.experiment.lens import Camera
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import View
 from nanorocks_ros.pipeline.composition import Pipeline, trays_of
-from nanorocks_ros.records import Frame, Notice, Quality, TrayImage
+from nanorocks_ros.records import ClusterEstimate, Frame, Notice, Quality, TrayImage
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.tray_camera.tray_film import film
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
@@ -29,7 +29,7 @@ def preprocessor(view=None, **values):
 
 
 def pushed(stage, frames):
-    records = [one for frame in frames for one in stage.push(frame)]
+    records = [item for frame in frames for item in stage.push(frame)]
     images = [record for record in records if isinstance(record, TrayImage)]
     return images, [record.text for record in records if isinstance(record, Notice)]
 
@@ -52,12 +52,12 @@ def test_the_trays_are_held_still_and_their_motion_is_told(swinging):
     assert [image.tray for image in images[:8]] == list(range(1, 9))
     for number in (2, 5, 8):
         own = [image for image in images if image.tray == number]
-        moved = np.array([one.displacement for one in own]) * SCALE
+        moved = np.array([record.displacement for record in own]) * SCALE
         assert moved == pytest.approx(np.array([swing(k) for k in range(16)]), abs=0.1)
         speed = np.diff(moved, axis=0) * 30 / SCALE
-        assert np.array([one.velocity for one in own[1:]]) == pytest.approx(speed, abs=1e-9)
+        assert np.array([record.velocity for record in own[1:]]) == pytest.approx(speed, abs=1e-9)
         first = own[0].gray.astype(float)
-        assert max(np.abs(one.gray - first).mean() for one in own) < 3.0
+        assert max(np.abs(record.gray - first).mean() for record in own) < 3.0
 
 
 def test_without_stabilisation_the_trays_move_in_their_pictures(swinging):
@@ -70,7 +70,7 @@ def test_without_stabilisation_the_trays_move_in_their_pictures(swinging):
         for images in (steady, moving)
     ]
     assert change[1] > 1.5 * change[0]
-    assert all(math.isnan(one.displacement[0]) for one in moving)
+    assert all(math.isnan(speed.displacement[0]) for speed in moving)
 
 
 def test_all_trays_count_the_shake_of_the_plate_together(swinging):
@@ -85,7 +85,12 @@ def test_the_pipeline_hands_the_count_on_to_its_stages(swinging):
     pipeline = Pipeline(settings(), 'cam', View(camera=LENS))
     for frame in swinging:
         pipeline.push(frame)
-    assert {tray.clusters._images._shakes.cycle for tray in pipeline.trays.values()} == {1}
+    clusters = [record for record in pipeline.flush() if isinstance(record, ClusterEstimate)]
+    last_ns = max(estimate.stamp_ns for estimate in clusters)
+    cycles = {
+        (estimate.tray, estimate.cycle) for estimate in clusters if estimate.stamp_ns == last_ns
+    }
+    assert cycles == {(tray, 1) for tray in range(1, 9)}
 
 
 def test_a_lens_of_another_size_is_refused(plate):
@@ -117,7 +122,7 @@ def test_a_tray_that_is_hidden_is_flagged_and_moves_with_its_plate(plate):
     frames[1] = replace(frames[1], image=hidden)
     images, _ = pushed(preprocessor(), frames)
     lost = [image for image in images if image.quality & Quality.STABILISATION_LOST]
-    assert [(one.tray, one.stamp_ns) for one in lost] == [(3, frames[1].stamp_ns)]
+    assert [(record.tray, record.stamp_ns) for record in lost] == [(3, frames[1].stamp_ns)]
     assert np.array(lost[0].displacement) * SCALE == pytest.approx([1.5, 0.5], abs=0.1)
     assert lost[0].quality & Quality.LOW_CONTRAST
 
@@ -159,8 +164,8 @@ def test_glare_is_flagged_with_the_share_that_it_hides(plate):
 
 def test_a_gray_camera_works_in_gray_and_says_so(plate):
     frames = [
-        Frame(stamp_ns=one.stamp_ns, encoding='mono8', image=one.image[:, :, 1].copy())
-        for one in (plate.frame(k, (0.3 * k, 0.0)) for k in range(3))
+        Frame(stamp_ns=record.stamp_ns, encoding='mono8', image=record.image[:, :, 1].copy())
+        for record in (plate.frame(k, (0.3 * k, 0.0)) for k in range(3))
     ]
     images, _ = pushed(preprocessor(), frames)
     assert all(image.color is None and image.quality == Quality.GRAY_CAMERA for image in images)
@@ -187,10 +192,10 @@ def test_a_wrong_scale_or_map_is_told_with_the_number_that_looks_wrong(plate, va
     elif values == 'tray 5':
         regions[5][0], regions[5][1] = 370, 300
     if isinstance(values, str):
-        flat = [one for number in range(1, 9) for one in regions[number]]
+        flat = [side for number in range(1, 9) for side in regions[number]]
         values = {'preprocess.regions_px': flat}
     images, texts = pushed(preprocessor(**values), [plate.frame(k) for k in range(18)])
-    (text,) = [one for one in texts if 'looks wrong' in one]
+    (text,) = [message for message in texts if 'looks wrong' in message]
     assert re.search(message, text)
     assert any(image.quality & Quality.WRONG_SCALE for image in images[-8:])
 
@@ -207,13 +212,13 @@ def test_the_scale_of_a_film_from_close_by_is_found(noise):
     shots = [frame for frame, _ in film(camera, load_trays()[1], 18)]
     chosen = with_values(PipelineSettings(), {}, 'test')
     images, texts = pushed(Preprocessor(chosen, trays_of(chosen), 'cam', None), shots)
-    (text,) = [one for one in texts if 'looks wrong' in one]
+    (text,) = [message for message in texts if 'looks wrong' in message]
     assert float(text.split(' px/m')[0].split()[-1]) == pytest.approx(38700.0, rel=0.01)
     assert images[-1].quality & Quality.WRONG_SCALE
     values = {'preprocess.check_tray_positions': False}
     chosen = with_values(PipelineSettings(), values, 'test')
     images, texts = pushed(Preprocessor(chosen, trays_of(chosen), 'cam', None), shots)
-    assert not [one for one in texts if 'looks wrong' in one]
+    assert not [message for message in texts if 'looks wrong' in message]
     assert not images[-1].quality & Quality.WRONG_SCALE
 
 

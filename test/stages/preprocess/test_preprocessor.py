@@ -26,33 +26,33 @@ def frame(stamp_ns=0, encoding='bgr8', size=(240, 320), seed=0):
 
 
 def test_a_single_tray_is_cropped_from_the_centre():
-    one = frame()
-    (image,) = preprocessor().push(one)
+    first = frame()
+    (image,) = preprocessor().push(first)
     side = round(15e-3 * 13500)
     top, left = (240 - side) // 2, (320 - side) // 2
     assert image.gray.shape == (side, side)
-    assert np.array_equal(image.color, one.image[top : top + side, left : left + side])
+    assert np.array_equal(image.color, first.image[top : top + side, left : left + side])
 
 
 def test_the_gray_mix_is_the_weighted_sum_of_the_channels():
-    one = frame()
-    (image,) = preprocessor(**{'preprocess.gray_mix': [0.2, 0.5, 0.3]}).push(one)
+    first = frame()
+    (image,) = preprocessor(**{'preprocess.gray_mix': [0.2, 0.5, 0.3]}).push(first)
     expected = image.color.astype(float) @ np.array([0.2, 0.5, 0.3])
     assert np.abs(image.gray - expected).max() <= 0.51
 
 
 def test_rgb_and_bgr_frames_of_one_scene_give_the_same_tray():
-    one = frame()
-    swapped = Frame(stamp_ns=0, encoding='rgb8', image=one.image[:, :, ::-1].copy())
-    (from_bgr,) = preprocessor().push(one)
+    first = frame()
+    swapped = Frame(stamp_ns=0, encoding='rgb8', image=first.image[:, :, ::-1].copy())
+    (from_bgr,) = preprocessor().push(first)
     (from_rgb,) = preprocessor().push(swapped)
     assert np.array_equal(from_bgr.gray, from_rgb.gray)
     assert np.array_equal(from_bgr.color, from_rgb.color)
 
 
 def test_a_gray_camera_gives_gray_trays_without_colour():
-    one = frame(encoding='mono8')
-    (image,) = preprocessor().push(one)
+    first = frame(encoding='mono8')
+    (image,) = preprocessor().push(first)
     assert image.color is None
     assert image.gray.shape == (202, 202)
 

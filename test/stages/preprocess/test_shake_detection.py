@@ -39,15 +39,15 @@ def jumps(speeds, error=2e-5):
 
 @pytest.mark.parametrize('frequency', [0.4, 1.5, 6.0])
 def test_the_plate_is_shaken_once_however_long_it_swings(frequency):
-    found = jumps(swing(25.0, amplitude=1e-3, frequency=frequency))
-    assert len([k for k in found if k > 60]) == 0
-    assert found[0] in (31, 32)
+    jump_frames = jumps(swing(25.0, amplitude=1e-3, frequency=frequency))
+    assert len([k for k in jump_frames if k > 60]) == 0
+    assert jump_frames[0] in (31, 32)
 
 
 def test_a_plate_shaken_again_is_found_again():
-    found = jumps(swing(80.0, shakes=(1.0, 61.0)))
-    assert [k for k in found if k > 1800]
-    assert not [k for k in found if 200 < k < 1800]
+    jump_frames = jumps(swing(80.0, shakes=(1.0, 61.0)))
+    assert [k for k in jump_frames if k > 1800]
+    assert not [k for k in jump_frames if 200 < k < 1800]
 
 
 def test_noise_of_the_registration_is_no_shaking():
@@ -63,7 +63,7 @@ def test_events_are_counted_once_when_half_of_the_trays_jump():
     counter = ShakeCounter(5.0)
     votes = {10: (True, False, False), 20: (True, True, False), 40: (True, True, True)}
     shaken = [counter.push(k * STEP, votes.get(k, (False,) * 3)) for k in range(60)]
-    assert [k for k, one in enumerate(shaken) if one] == [20]
+    assert [k for k, jump in enumerate(shaken) if jump] == [20]
     assert counter.cycle == 1
     assert counter.cycle_start_ns == 19 * STEP
 
@@ -78,13 +78,13 @@ def test_the_plate_alone_is_enough_and_nobody_is_none():
 def images(count=80, shake=40):
     rng = np.random.default_rng(5)
     still = rng.integers(90, 140, (60, 60)).astype(float)
-    found = []
+    images = []
     for k in range(count):
         gray = still + rng.normal(0, 2, still.shape)
         if k >= shake:
             gray = np.roll(gray, 3 * k, axis=1)
-        found.append(TrayImage(stamp_ns=k * STEP, tray=1, gray=gray.astype(np.uint8)))
-    return found
+        images.append(TrayImage(stamp_ns=k * STEP, tray=1, gray=gray.astype(np.uint8)))
+    return images
 
 
 def test_who_is_told_the_cycle_knows_what_the_images_say():

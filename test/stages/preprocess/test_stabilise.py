@@ -9,7 +9,7 @@ from plates import SCALE, Plate
 from nanorocks_ros.experiment.lens import Camera
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.experiment.view import IdentityLens, View
-from nanorocks_ros.stages.preprocess.stabilise import Shift, TrayFollower
+from nanorocks_ros.stages.preprocess.stabilise import Shift, TrayRegistration
 
 MIX = np.array([0.3, 0.4, 0.3])
 
@@ -17,7 +17,7 @@ MIX = np.array([0.3, 0.4, 0.3])
 def follower(plate, tray=3, camera=None):
     straight = IdentityLens(width=plate.shape[1], height=plate.shape[0])
     view = View(camera=camera or straight)
-    return TrayFollower(plate.regions[tray], view, 0.002 * SCALE, MIX)
+    return TrayRegistration(plate.regions[tray], view, 0.002 * SCALE, MIX)
 
 
 def swing(count, amplitude=2.0):
@@ -27,8 +27,12 @@ def swing(count, amplitude=2.0):
 
 
 def errors(plate, tracker, shifts, **values):
-    found = [tracker.push(plate.picture(d, seed=k, **values), None) for k, d in enumerate(shifts)]
-    return np.array([[one.x - d[0], one.y - d[1]] for one, d in zip(found, shifts, strict=True)])
+    measured = [
+        tracker.push(plate.picture(d, seed=k, **values), None) for k, d in enumerate(shifts)
+    ]
+    return np.array(
+        [[shift.x - d[0], shift.y - d[1]] for shift, d in zip(measured, shifts, strict=True)]
+    )
 
 
 @pytest.mark.parametrize('tray', [1, 3, 7])
@@ -52,25 +56,25 @@ def test_beads_that_fly_past_the_tray_do_not_carry_it_along(plate):
     worst = 0.0
     for k in range(20):
         moved = [(a + 1.5 * k % 20, b, 5.0) for a, b in beads]
-        inside = [one for one in moved if one[0] < x + width - 6]
-        found = tracker.push(plate.picture(seed=k, beads=inside), None)
-        worst = max(worst, abs(found.x), abs(found.y))
+        inside = [bead for bead in moved if bead[0] < x + width - 6]
+        shift = tracker.push(plate.picture(seed=k, beads=inside), None)
+        worst = max(worst, abs(shift.x), abs(shift.y))
     assert worst < 0.05
 
 
 def test_light_that_changes_is_no_motion(plate):
     tracker = follower(plate)
     tracker.push(plate.picture(seed=1), None)
-    found = tracker.push(plate.picture(seed=2, light=0.8), None)
-    assert max(abs(found.x), abs(found.y)) < 0.05
+    shift = tracker.push(plate.picture(seed=2, light=0.8), None)
+    assert max(abs(shift.x), abs(shift.y)) < 0.05
 
 
 def test_a_jump_of_many_pixels_between_two_frames_is_found(plate):
     tracker = follower(plate)
     tracker.push(plate.picture(seed=1), None)
-    found = tracker.push(plate.picture((11.3, -7.6), seed=2), None)
-    assert found.x == pytest.approx(11.3, abs=0.1)
-    assert found.y == pytest.approx(-7.6, abs=0.1)
+    shift = tracker.push(plate.picture((11.3, -7.6), seed=2), None)
+    assert shift.x == pytest.approx(11.3, abs=0.1)
+    assert shift.y == pytest.approx(-7.6, abs=0.1)
 
 
 def test_a_picture_without_the_tray_is_a_loss_and_the_next_with_it_is_not(plate):
@@ -78,20 +82,20 @@ def test_a_picture_without_the_tray_is_a_loss_and_the_next_with_it_is_not(plate)
     tracker.push(plate.picture(seed=1), None)
     rng = np.random.default_rng(3)
     assert tracker.push(rng.integers(0, 256, (*plate.shape, 3), dtype=np.uint8), None) is None
-    found = tracker.push(plate.picture((1.0, 0.0), seed=2), None)
-    assert found.x == pytest.approx(1.0, abs=0.05)
+    shift = tracker.push(plate.picture((1.0, 0.0), seed=2), None)
+    assert shift.x == pytest.approx(1.0, abs=0.05)
 
 
 def test_what_a_neighbour_says_helps_after_a_jump(plate):
     tracker = follower(plate)
     tracker.push(plate.picture(seed=1), None)
-    found = tracker.push(plate.picture((25.0, 0.0), seed=2), Shift(24.5, 0.2, 0.02))
-    assert found.x == pytest.approx(25.0, abs=0.1)
+    shift = tracker.push(plate.picture((25.0, 0.0), seed=2), Shift(24.5, 0.2, 0.02))
+    assert shift.x == pytest.approx(25.0, abs=0.1)
 
 
 def test_without_walls_there_is_nothing_to_follow():
     view = View(camera=IdentityLens(width=120, height=100))
-    tracker = TrayFollower(Region(20, 20, 60, 50), view, 8.0, np.ones(1))
+    tracker = TrayRegistration(Region(20, 20, 60, 50), view, 8.0, np.ones(1))
     flat = np.full((100, 120, 1), 120, np.uint8)
     assert tracker.push(flat, None) is None
     assert tracker.push(flat, None) is None
@@ -101,6 +105,6 @@ def test_the_error_that_is_stated_covers_what_is_seen(plate):
     tracker = follower(plate, 5)
     pulls = []
     for k, d in enumerate(swing(25)):
-        found = tracker.push(plate.picture(d, seed=k), None)
-        pulls += [(found.x - d[0]) / found.error, (found.y - d[1]) / found.error]
+        shift = tracker.push(plate.picture(d, seed=k), None)
+        pulls += [(shift.x - d[0]) / shift.error, (shift.y - d[1]) / shift.error]
     assert 0.2 < np.std(pulls) < 1.5

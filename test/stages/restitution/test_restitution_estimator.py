@@ -24,14 +24,14 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.ensemble import cooling_runs
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
 NS = 1_000_000_000
 TRAY = load_trays()[1]
 
 
 def fitter(**values):
-    return HaffFitter(with_values(PipelineSettings(), values, 'test'), TRAY)
+    return RestitutionEstimator(with_values(PipelineSettings(), values, 'test'), TRAY)
 
 
 def speed(time, value, cycle=1, start=0.0):
@@ -79,7 +79,7 @@ def rebounds(rng, n, first, last, wall=0.97):
 
 
 def all_estimates(stage, speeds):
-    return [one for item in speeds for one in stage.push(item)]
+    return [record for item in speeds for record in stage.push(item)]
 
 
 def simulated_cycle(cycle=1, start=0.0, restitution=0.89, wall=0.97):
@@ -116,11 +116,13 @@ def test_both_restitutions_of_a_simulated_gas_lie_in_their_intervals():
 
 def test_the_window_begins_when_the_tray_has_come_to_rest():
     speeds = [
-        replace(one, tray_speed=5e-3 * math.exp(-0.3 * one.stamp_ns / NS))
-        for one in simulated_cycle()
+        replace(record, tray_speed=5e-3 * math.exp(-0.3 * record.stamp_ns / NS))
+        for record in simulated_cycle()
     ]
     *_, final = all_estimates(fitter(), speeds)
-    by_hand = next(one for one in speeds if one.tray_speed < 0.05 * one.mean_projected_speed.value)
+    by_hand = next(
+        record for record in speeds if record.tray_speed < 0.05 * record.mean_projected_speed.value
+    )
     assert final.window_start == pytest.approx(by_hand.stamp_ns / NS)
     assert final.window_start > 8.0
     assert final.cooling_start == pytest.approx(final.window_start - 1.75, abs=0.01)
@@ -150,7 +152,10 @@ def test_a_window_from_the_shake_to_the_next_day_is_no_trouble():
 
 def test_a_tray_that_swings_to_the_end_gives_no_estimate():
     stage = fitter()
-    assert all_estimates(stage, [replace(one, tray_speed=0.01) for one in simulated_cycle()]) == []
+    assert (
+        all_estimates(stage, [replace(record, tray_speed=0.01) for record in simulated_cycle()])
+        == []
+    )
     assert stage.flush() == ()
 
 
@@ -169,22 +174,22 @@ def test_walls_that_are_known_leave_the_beads_to_be_found():
 
 
 def test_the_interval_tightens_as_the_gas_cools():
-    found = all_estimates(fitter(), simulated_cycle())
-    widths = [one.restitution.upper - one.restitution.lower for one in found]
-    assert len(found) > 20
-    assert [one.status for one in found].count(CorStatus.FINAL) == 1
+    estimates = all_estimates(fitter(), simulated_cycle())
+    widths = [record.restitution.upper - record.restitution.lower for record in estimates]
+    assert len(estimates) > 20
+    assert [record.status for record in estimates].count(CorStatus.FINAL) == 1
     assert widths[-1] < 0.7 * widths[0]
 
 
 def test_a_decay_that_tells_too_little_says_so():
     vague = [
         replace(
-            one,
+            record,
             mean_projected_speed=Measured(
-                one.mean_projected_speed.value, 0.5 * one.mean_projected_speed.value
+                record.mean_projected_speed.value, 0.5 * record.mean_projected_speed.value
             ),
         )
-        for one in simulated_cycle()
+        for record in simulated_cycle()
     ]
     first, *_ = all_estimates(fitter(), vague)
     assert first.status is CorStatus.UNDETERMINED
@@ -202,11 +207,13 @@ def test_what_was_wrong_with_the_pictures_goes_with_the_estimate():
 
 def test_of_trays_that_are_not_where_the_settings_say_nothing_is_told():
     stage = fitter()
-    wrong = [replace(one, quality=Quality.WRONG_SCALE) for one in simulated_cycle()]
-    found = all_estimates(stage, wrong)
-    assert {one.status for one in found} == {CorStatus.UNDETERMINED}
-    assert all((one.restitution.lower, one.restitution.upper) == (0.0, 1.0) for one in found)
-    assert found[-1].quality is Quality.WRONG_SCALE
+    wrong = [replace(record, quality=Quality.WRONG_SCALE) for record in simulated_cycle()]
+    estimates = all_estimates(stage, wrong)
+    assert {record.status for record in estimates} == {CorStatus.UNDETERMINED}
+    assert all(
+        (record.restitution.lower, record.restitution.upper) == (0.0, 1.0) for record in estimates
+    )
+    assert estimates[-1].quality is Quality.WRONG_SCALE
     assert stage.evidence is None
 
 
@@ -217,7 +224,7 @@ def test_a_cycle_that_the_next_shake_cuts_short_is_final_then():
         for estimate in all_estimates(fitter(), speeds)
         if estimate.status is CorStatus.FINAL
     ]
-    assert [one.cycle for one in finals] == [1]
+    assert [record.cycle for record in finals] == [1]
 
 
 def test_the_end_of_the_recording_ends_the_cycle():
@@ -238,7 +245,7 @@ def test_the_mean_of_the_paper_is_over_the_final_estimates():
             for estimate in all_estimates(stage, speeds)
             if estimate.status is CorStatus.FINAL
         ]
-    values = [one.restitution.value for one in finals]
+    values = [record.restitution.value for record in finals]
     assert finals[-1].mean_restitution.value == pytest.approx(np.mean(values))
     assert finals[-1].mean_restitution.error == pytest.approx(np.std(values, ddof=1) / 3**0.5)
 
@@ -261,7 +268,7 @@ def test_many_cycles_together_say_more():
 def test_another_tray_than_that_of_the_library_is_refused_at_once():
     tray = replace(TRAY, dimensions=(0.02, 0.02, 0.003))
     with pytest.raises(ConfigurationError, match='nanorocks library --tray 1'):
-        HaffFitter(PipelineSettings(), tray)
+        RestitutionEstimator(PipelineSettings(), tray)
 
 
 def test_nothing_is_said_before_the_first_shake():
@@ -334,7 +341,7 @@ def test_rebounds_fix_the_walls_and_through_the_valley_the_beads():
 
 
 def by_stamp(records):
-    return sorted(records, key=lambda one: one.stamp_ns)
+    return sorted(records, key=lambda record: record.stamp_ns)
 
 
 def test_it_does_not_matter_when_in_two_seconds_a_contact_comes_in():
@@ -342,26 +349,44 @@ def test_it_does_not_matter_when_in_two_seconds_a_contact_comes_in():
     seen = list(rebounds(np.random.default_rng(1), 40, 1.0, 22.0))
     late = sorted(
         [*speeds, *seen],
-        key=lambda one: one.stamp_ns + int(1.9 * NS) * isinstance(one, Rebound),
+        key=lambda record: record.stamp_ns + int(1.9 * NS) * isinstance(record, Rebound),
     )
-    found = all_estimates(fitter(), by_stamp([*speeds, *seen]))
-    assert all_estimates(fitter(), late) == found
-    *_, final = found
+    estimates = all_estimates(fitter(), by_stamp([*speeds, *seen]))
+    assert all_estimates(fitter(), late) == estimates
+    *_, final = estimates
     first, last = 1.75 * NS, (final.window_end - 2.0) * NS
-    assert final.rebounds == sum(first <= one.stamp_ns <= last for one in seen) < 40
+    assert final.rebounds == sum(first <= contact.stamp_ns <= last for contact in seen) < 40
+
+
+def test_at_the_end_of_a_recording_contacts_count_up_to_the_last_speed():
+    speeds = [estimate for estimate in simulated_cycle() if estimate.stamp_ns < 15 * NS]
+    seen = list(rebounds(np.random.default_rng(1), 40, 2.0, 16.0))
+    last_ns = speeds[-1].stamp_ns
+    expected = sum(contact.stamp_ns <= last_ns for contact in seen)
+    ripe = sum(contact.stamp_ns <= last_ns - 2 * NS for contact in seen)
+    assert ripe < expected < 40
+    ended, interrupted = fitter(), fitter()
+    for record in by_stamp([*speeds, *seen]):
+        ended.push(record)
+        interrupted.push(record)
+    (final,) = ended.flush()
+    assert final.rebounds == expected
+    # After a loop or a seek it is not known which contacts are still on their way.
+    (final,) = interrupted.push(speeds[0])
+    assert final.rebounds == ripe
 
 
 def test_contacts_in_a_tray_that_swings_count_though_speeds_do_not():
     swinging = [
-        replace(one, tray_speed=1.0 if one.stamp_ns < 8.0 * NS else 0.0)
-        for one in simulated_cycle()
+        replace(record, tray_speed=1.0 if record.stamp_ns < 8.0 * NS else 0.0)
+        for record in simulated_cycle()
     ]
     seen = list(rebounds(np.random.default_rng(1), 60, 0.5, 20.0))
     *_, final = all_estimates(fitter(), by_stamp([*swinging, *seen]))
     assert final.window_start == pytest.approx(8.0, abs=0.11)
     last = (final.window_end - 2.0) * NS
-    expected = sum(1.75 * NS <= one.stamp_ns <= last for one in seen)
-    assert final.rebounds == expected > sum(one.stamp_ns > 8.0 * NS for one in seen)
+    expected = sum(1.75 * NS <= contact.stamp_ns <= last for contact in seen)
+    assert final.rebounds == expected > sum(contact.stamp_ns > 8.0 * NS for contact in seen)
 
 
 def test_rebounds_that_the_decay_cannot_go_with_are_flagged():
@@ -382,9 +407,9 @@ def test_contacts_of_all_cycles_count_in_the_mean():
             *simulated_cycle(cycle, start),
             *rebounds(rng, 30, start + 2.0, start + 17.0),
         ]
-        found = all_estimates(stage, by_stamp(records))
-        finals += [one for one in found if one.status is CorStatus.FINAL]
-    assert [one.rebounds for one in finals] == [30] * 4
+        estimates = all_estimates(stage, by_stamp(records))
+        finals += [record for record in estimates if record.status is CorStatus.FINAL]
+    assert [estimate.rebounds for estimate in finals] == [30] * 4
     first, last = finals[0], finals[-1]
     assert last.mean_wall_restitution.value == pytest.approx(
         0.97, abs=3.0 * last.mean_wall_restitution.error
@@ -406,15 +431,16 @@ def merge(time, cycle=1, known=1.0):
 
 def as_known(records):
     return sorted(
-        records, key=lambda one: one.known_ns if isinstance(one, Merge) else one.stamp_ns
+        records,
+        key=lambda record: record.known_ns if isinstance(record, Merge) else record.stamp_ns,
     )
 
 
 def test_the_window_ends_with_the_first_merge():
     speeds = simulated_cycle()
     *_, cut = all_estimates(fitter(**{'cooling.duration': 12.0}), speeds)
-    found = all_estimates(fitter(), as_known([*speeds, merge(12.05), merge(14.0)]))
-    finals = [one for one in found if one.status is CorStatus.FINAL]
+    estimates = all_estimates(fitter(), as_known([*speeds, merge(12.05), merge(14.0)]))
+    finals = [record for record in estimates if record.status is CorStatus.FINAL]
     assert len(finals) == 1
     assert finals[0] == cut
     *_, later = all_estimates(fitter(**{'cooling.until_merge': False}), [*speeds, merge(12.05)])
@@ -448,7 +474,7 @@ def test_speeds_of_grains_by_their_pictures_alone_say_nothing():
         speeds = [
             replace(speed(t, v), tray=8, method=method) for t, v in zip(times, values, strict=True)
         ]
-        stage = HaffFitter(PipelineSettings(), tray)
+        stage = RestitutionEstimator(PipelineSettings(), tray)
         *_, estimates[method] = [*all_estimates(stage, speeds), *stage.flush()]
     grains, beads = estimates.values()
     assert grains.status is CorStatus.UNDETERMINED

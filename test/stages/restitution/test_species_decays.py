@@ -19,7 +19,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 from nanorocks_ros.stages.restitution.species_decays import species_decays
 
 NS = 1_000_000_000
@@ -47,14 +47,16 @@ def lawful(noise=0.02):
     speeds = [
         haff_speed(TIMES, *law) * (1.0 + noise * rng.normal(size=TIMES.size)) for law in LAWS
     ]
-    return [estimate(*one, noise) for one in zip(TIMES, *speeds, strict=True)]
+    return [estimate(*speed, noise) for speed in zip(TIMES, *speeds, strict=True)]
 
 
 def final_of(speeds, tray=TRAY, **values):
-    stage = HaffFitter(with_values(PipelineSettings(), values, 'test'), tray)
-    estimates = [one for speed in speeds for one in stage.push(speed)] + list(stage.flush())
-    (final,) = [one for one in estimates if one.status in (CorStatus.FINAL, CorStatus.NO_DECAY)]
-    live = [one for one in estimates if one.status is CorStatus.COOLING]
+    stage = RestitutionEstimator(with_values(PipelineSettings(), values, 'test'), tray)
+    estimates = [record for speed in speeds for record in stage.push(speed)] + list(stage.flush())
+    (final,) = [
+        record for record in estimates if record.status in (CorStatus.FINAL, CorStatus.NO_DECAY)
+    ]
+    live = [record for record in estimates if record.status is CorStatus.COOLING]
     return final, live
 
 
@@ -70,8 +72,8 @@ def test_each_species_gets_its_own_law_in_the_final_estimate():
 def test_live_estimates_do_not_take_the_time_for_it():
     _, live = final_of(lawful())
     assert live
-    assert {one.species_initial_speeds for one in live} == {()}
-    assert {one.species_haff_times for one in live} == {()}
+    assert {record.species_initial_speeds for record in live} == {()}
+    assert {record.species_haff_times for record in live} == {()}
 
 
 def test_a_species_that_is_not_known_leaves_the_other_alone():
@@ -99,7 +101,9 @@ def test_a_few_speeds_of_a_species_are_no_decay():
 
 def test_a_species_that_speeds_up_has_no_law():
     time = TIMES[TIMES > 1.75]
-    rising = [estimate(one, 1e-3 * (1.0 + 0.1 * one), 4e-3 / (1.0 + one)) for one in time]
+    rising = [
+        estimate(instant, 1e-3 * (1.0 + 0.1 * instant), 4e-3 / (1.0 + instant)) for instant in time
+    ]
     initial_speeds, haff_times = species_decays(TRAY, time, rising, 8)
     assert (initial_speeds[0], haff_times[0]) == (UNKNOWN_MEASURED, UNKNOWN_MEASURED)
     assert initial_speeds[1].known
@@ -116,17 +120,19 @@ def test_species_of_a_simulated_mixture_share_the_haff_time_but_not_the_speed(nu
     settings = SimulationSettings(
         tray=number, mean_speed=0.01, first_shake=0.0, frame_rate=5.0, seed=4
     )
-    species = np.repeat(np.arange(2), [one.count for one in tray.species])
+    species = np.repeat(np.arange(2), [kind.count for kind in tray.species])
     times = 0.2 * np.arange(1, 101)
     speeds = np.zeros((2, times.size))
     cycles = 12
     for run in range(cycles):
         for k, moment in enumerate(ShakenTray(settings, tray, run).moments(times.size + 1)):
-            each = np.hypot(*moment.velocities[:, :2].T)
+            projected = np.hypot(*moment.velocities[:, :2].T)
             if k:
-                speeds[:, k - 1] += [each[species == one].mean() / cycles for one in (0, 1)]
+                speeds[:, k - 1] += [projected[species == kind].mean() / cycles for kind in (0, 1)]
     late = times >= 1.75
-    rows = [estimate(*one, noise=0.01) for one in zip(times[late], *speeds[:, late], strict=True)]
+    rows = [
+        estimate(*speed, noise=0.01) for speed in zip(times[late], *speeds[:, late], strict=True)
+    ]
     initial_speeds, haff_times = species_decays(tray, times[late], rows, 8)
     ratio = haff_times[0].value / haff_times[1].value
     assert abs(math.log(ratio)) < 0.2

@@ -13,7 +13,7 @@ from nanorocks_ros.records import (
     SpeedMethod,
     TrayImage,
 )
-from nanorocks_ros.stages.speed.tray_oscillation import SwingMeter
+from nanorocks_ros.stages.speed.tray_oscillation import TrayOscillation
 
 NS = 1_000_000_000
 GRAY = np.zeros((8, 8), dtype=np.uint8)
@@ -38,7 +38,7 @@ def estimate(time):
 
 
 def test_the_root_mean_square_of_a_swing_is_found_whatever_its_phase():
-    meter = SwingMeter()
+    meter = TrayOscillation()
     for time in np.arange(0.0, 4.0, 1 / 30):
         meter.push(image(time, (3e-3 * math.cos(9.4 * time), 0.0), 1e-6))
     for time in (1.0, 1.2, 1.45, 2.0):
@@ -47,15 +47,15 @@ def test_the_root_mean_square_of_a_swing_is_found_whatever_its_phase():
 
 def test_noise_is_no_swing():
     random = np.random.default_rng(1)
-    meter = SwingMeter()
+    meter = TrayOscillation()
     for time in np.arange(0.0, 6.0, 1 / 30):
         meter.push(image(time, tuple(1e-4 * random.standard_normal(2))))
-    found = [meter.speed(estimate(time)) for time in np.arange(0.5, 5.5, 0.5)]
-    assert np.mean(found) < 2e-5
+    results = [meter.speed(estimate(time)) for time in np.arange(0.5, 5.5, 0.5)]
+    assert np.mean(results) < 2e-5
 
 
 def test_a_tray_that_was_not_followed_has_no_speed():
-    meter = SwingMeter()
+    meter = TrayOscillation()
     assert math.isnan(meter.speed(estimate(1.0)))
     meter.push(image(1.0, (math.nan, math.nan), math.nan))
     assert math.isnan(meter.speed(estimate(1.0)))

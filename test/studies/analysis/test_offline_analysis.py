@@ -318,7 +318,7 @@ def test_a_bag_cut_short_is_analysed_up_to_the_cut(capsys, tmp_path):
     whole = analyse(SAMPLE, PipelineSettings()).frames
     assert 0.4 * whole < results['frames'] < 0.8 * whole
     assert not results['complete']
-    assert 'is cut short; ' in printed.err
+    assert any('is cut short' in line for line in printed.err.splitlines())
 
 
 @pytest.mark.parametrize('key', ['import', 'salvage'])

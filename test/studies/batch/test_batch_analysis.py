@@ -177,7 +177,7 @@ def test_the_same_command_again_does_only_what_failed(done, capsys):
     assert main([*call, '--workers', '1']) == 1
     printed = capsys.readouterr()
     assert json.loads(printed.out)['trays'] == report['trays']
-    assert '4 of 7 recordings are done already' in printed.err
+    assert '4 of 7 recordings are finished and unchanged' in printed.err
     assert before == {path: path.stat().st_mtime_ns for path in results.glob('bags/*/bag.json')}
     table = parquet.read_table(results / 'trays.parquet')
     assert table['restitution'].to_pylist() == [report['trays']['1']['restitution']]
@@ -334,7 +334,7 @@ def test_what_is_done_outlives_an_interruption_and_a_full_disk(tiny, films, tmp_
     ('arguments', 'code', 'message'),
     [
         (('{tmp}/none*', '-o', '{tmp}/out'), 1, 'none*: matches nothing'),
-        (('{tiny}', '{tiny}'), 2, '--output: is where results of many recordings are kept'),
+        (('{tiny}', '{tiny}'), 2, '--output: is required for many recordings'),
         (('{tiny}', '--workers', '0', '-o', '{tmp}/out'), 2, '--workers: 0'),
         (('{tiny}', '--workers', '1', '-o', '/proc/out'), 1, '/proc/out: cannot be written'),
         (('{tiny}', '--workers', '1', '-o', '{tmp}'), 1, 'holds no batch of ours'),

@@ -85,7 +85,12 @@ def test_a_calibration_that_is_set_already_is_no_part_of_the_next(bag, marks, tm
 def test_people_are_told_the_flags_and_what_they_rest_on(bag, marks, capsys):
     assert main(call(bag, marks)) == 0
     stdout = capsys.readouterr().out
-    for text in ('windows, by hand', '--speed-area-factor', '--speed-area-offset', 'chi square'):
+    for text in (
+        'windows, manual speeds',
+        '--speed-area-factor',
+        '--speed-area-offset',
+        'chi square',
+    ):
         assert text in stdout
 
 

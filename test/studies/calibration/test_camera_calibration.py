@@ -154,7 +154,7 @@ def test_a_recording_of_something_else_is_refused(capsys, tmp_path):
     [
         (('--scale', '2', '1'), '--scale: 2 to 1'),
         (('--show', '/no/such.yaml'), '/no/such.yaml: No such file'),
-        (('--show', 'x.yaml', '-o', 'y.yaml'), '--show: together with --output'),
+        (('--show', 'x.yaml', '-o', 'y.yaml'), '--show: cannot be used with --output'),
         (('--trays', '9'), 'tray 9: does not exist'),
     ],
 )

@@ -16,7 +16,7 @@ from nanorocks_ros.records import (
     SpeedMethod,
 )
 from nanorocks_ros.settings import PipelineSettings
-from nanorocks_ros.stages.restitution.restitution_estimator import HaffFitter
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 from nanorocks_ros.studies.decays.best_fit_decay import library_decay
 from nanorocks_ros.studies.decays.cooling_curves import mean_cycle, read_cycles
 
@@ -46,7 +46,7 @@ def test_it_goes_through_the_speeds_and_its_intervals_hold_the_truth(cycles):
 
 def test_it_says_of_a_cycle_what_the_stage_says(cycles):
     cycle = cycles[0]
-    stage = HaffFitter(PipelineSettings(), TRAY)
+    stage = RestitutionEstimator(PipelineSettings(), TRAY)
     for time, speed in zip(cycle.times, cycle.speed, strict=True):
         stage.push(
             SpeedEstimate(

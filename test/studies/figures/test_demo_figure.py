@@ -1,4 +1,4 @@
-"""The picture of a cooling cycle."""
+"""The figure of a cooling cycle."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def test_the_figure_of_a_cycle_is_drawn(tmp_path):
     results = analyse(SAMPLE, PipelineSettings()).trays[1]
     path = tmp_path / 'cooling.png'
     speeds = [speed for speed in results.speeds if speed.cycle == 1]
-    truth = [one for one in results.truth if one.cycle == 1]
+    truth = [state for state in results.truth if state.cycle == 1]
     cooling_figure(path, load_trays()[1], speeds, results.cors, truth)
     picture = cv2.imread(str(path))
     assert min(picture.shape[:2]) > 500
-    # Measured points, fit and truth each have a colour of their own.
-    colours = {tuple(one) for one in picture.reshape(-1, 3)[::7].tolist()}
+    # Colours of the measured points and of the fit.
+    colours = {tuple(state) for state in picture.reshape(-1, 3)[::7].tolist()}
     assert {(0x6F, 0x50, 0x30), (0x22, 0x3B, 0xC2)} <= colours

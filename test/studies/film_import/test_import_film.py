@@ -432,7 +432,7 @@ def test_an_interrupted_import_leaves_a_bag_that_can_be_read(tmp_path):
     folder, bag = many_images(tmp_path / 'images'), tmp_path / 'bag'
     options = ('--rate', '30', '--start', '2023-11-14T22:13:20Z')
     line = interrupted([str(folder), '-o', str(bag), *options], bag)
-    assert line.startswith('nanorocks: interrupted; what was written until now')
+    assert line.startswith('nanorocks: interrupted; files written so far')
     left = open_bag(bag)
     assert not left.complete
     assert left.notices == (

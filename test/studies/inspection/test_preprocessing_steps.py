@@ -10,6 +10,7 @@ import pytest
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
@@ -21,7 +22,6 @@ from nanorocks_ros.settings import (
     SimulationSettings,
     with_values,
 )
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 from nanorocks_ros.studies.analysis.bag_images import BagImages
 from nanorocks_ros.studies.analysis.bag_tracks import track_bag
 from nanorocks_ros.studies.inspection.preprocessing_steps import steps_of_bag
@@ -63,7 +63,7 @@ def steps(bag, settings):
 
 
 def test_the_mask_and_the_tracks_are_those_of_the_analysis(bag, settings, steps):
-    estimator = SpeedEstimator(settings, load_trays()[3])
+    estimator = TrayMeasurement(settings, load_trays()[3])
     estimator.emit_mask = True
     masks = [
         record

@@ -140,7 +140,7 @@ def test_the_command_draws_one_cycle_and_writes_all_speeds(bag, bag_speeds, tmp_
 
 def test_a_missing_cycle_and_a_wrong_extension_are_usage_errors(bag, tmp_path, capsys):
     assert main(['speeds', str(bag), '--cycle', '7']) == 2
-    assert '--cycle: 7, and speeds were measured in 0, 1' in capsys.readouterr().err
+    assert '--cycle: 7, but speeds were measured in 0, 1' in capsys.readouterr().err
     assert main(['speeds', str(bag), '-o', str(tmp_path / 'speeds.pdf')]) == 2
     assert 'ends in none of .png' in capsys.readouterr().err
     assert main(['speeds', str(tmp_path / 'nowhere')]) == 1

@@ -1,4 +1,4 @@
-"""The campaign and its report, on films of a few seconds."""
+"""The simulated campaign and its report, with films of a few seconds."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ import pytest
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.tasks import Workers
+from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan, plate_settings
 from nanorocks_ros.studies.reproduction.reproduce_paper import reproduce
 from nanorocks_ros.studies.reproduction.simulated_campaign import (
-    CampaignPlan,
     parts_done,
-    plate_settings,
     prepare_campaign,
     run_campaign,
 )
@@ -25,58 +24,58 @@ ALONE = Workers(processes=1)
 @pytest.fixture(scope='module')
 def campaign(tmp_path_factory):
     """A folder with a short campaign."""
-    folder = tmp_path_factory.mktemp('campaign') / 'it'
+    folder = tmp_path_factory.mktemp('campaign') / 'new'
     prepare_campaign(folder, PLAN)
-    # What an interrupted call left.
-    broken = folder / '.sticking_001.part'
-    broken.mkdir()
-    (broken / 'done').write_text('0.4')
+    # The part of a cycle that an interrupted call left.
+    interrupted = folder / '.sticking_001.part'
+    interrupted.mkdir()
+    (interrupted / 'done').write_text('0.4')
     assert parts_done(folder, PLAN) == pytest.approx(0.2)
     run_campaign(folder, PLAN, ALONE, lambda done: None)
     return folder
 
 
-def test_every_cycle_is_filmed_analysed_twice_and_knows_its_truth(campaign):
+def test_each_cycle_has_a_film_two_analyses_and_the_truth(campaign):
     for kind in ('bouncing', 'sticking'):
         folder = campaign / f'{kind}_001'
-        found = json.loads((folder / 'summary.json').read_text())
-        assert set(found['default']['trays']) == {str(k) for k in range(1, 9)}
-        truth = found['default']['trays']['1']['truth']
+        summary = json.loads((folder / 'summary.json').read_text())
+        assert set(summary['default']['trays']) == {str(k) for k in range(1, 9)}
+        truth = summary['default']['trays']['1']['truth']
         assert truth['restitution'] == pytest.approx(PLAN.restitution)
         assert (truth['sticking_speed'] > 0.0) == (kind == 'sticking')
-        assert set(found['paper']['trays']['1']['method']) == {'binarised_area'}
-        assert found['clusters']['1']['bodies'][0] == 15
+        assert set(summary['paper']['trays']['1']['method']) == {'binarised_area'}
+        assert summary['clusters']['1']['bodies'][0] == 15
         assert (folder / 'film').exists()
     assert parts_done(campaign, PLAN) == 1.0
     assert not list(campaign.glob('.*.part'))
 
 
-def test_what_is_there_is_not_made_again(campaign):
+def test_finished_cycles_are_reused(campaign):
     before = (campaign / 'bouncing_001' / 'summary.json').stat().st_mtime_ns
     cycles = run_campaign(campaign, PLAN, ALONE, lambda done: None)
     assert [cycle.kind for cycle in cycles] == ['bouncing', 'sticking']
     assert (campaign / 'bouncing_001' / 'summary.json').stat().st_mtime_ns == before
 
 
-def test_the_report_has_every_chapter_even_of_films_too_short_for_some(campaign):
+def test_the_report_has_all_chapters_even_with_short_films(campaign):
     notices = []
     path = reproduce(campaign, PLAN, ALONE, 2, lambda name, done: None, notices.append)
     text = path.read_text('utf-8')
     assert text.count('<section') == 10
-    # Nothing cools for long enough in three seconds.
+    # Three seconds of cooling are too short for a restitution.
     assert any(notice.startswith('restitution: ') for notice in notices)
     assert 'Could not be made' in text
     for name in ('Table 1', 'Table 2', 'Figure 1b', 'Figure 2:', 'Figure 4', 'Figure 11'):
         assert name in text
 
 
-def test_a_folder_of_something_else_or_of_another_plan_is_left_alone(campaign, tmp_path):
+def test_a_folder_with_other_files_or_another_plan_is_not_changed(campaign, tmp_path):
     with pytest.raises(RecordingError, match='other settings'):
         prepare_campaign(campaign, CampaignPlan(cycles=1, seconds=5.0))
     (tmp_path / 'mine.txt').write_text('')
     with pytest.raises(RecordingError, match='holds no campaign'):
         prepare_campaign(tmp_path, PLAN)
-    # More cycles may follow later.
+    # A later call may add cycles.
     prepare_campaign(campaign, CampaignPlan(cycles=5, seconds=3.0, seed=2))
 
 
@@ -95,7 +94,7 @@ def test_wrong_calls_are_named(flags, named, tmp_path, capsys):
     assert not (tmp_path / 'out').exists()
 
 
-def test_films_are_analysed_as_the_plate_that_they_show():
+def test_films_are_analysed_with_the_layout_of_the_plate():
     settings = plate_settings(trays=[1])
     assert settings.preprocess.layout == 'plate'
     assert settings.trays == (1,)

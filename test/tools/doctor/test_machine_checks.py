@@ -1,4 +1,4 @@
-"""Findings about a machine: what is missing is named, with what to do."""
+"""Findings about a machine, with their remedies."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from nanorocks_ros.tools.doctor import machine_checks, package_checks, ros_checks
 from nanorocks_ros.tools.doctor.examination import examine_graph
 from nanorocks_ros.tools.doctor.findings import Finding, Status, worst
-from nanorocks_ros.tools.doctor.ros_probe_client import judged
+from nanorocks_ros.tools.doctor.ros_probe_client import loopback_finding
 
 GB = 10**9
 RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
@@ -49,7 +49,7 @@ def test_small_socket_buffers_matter_between_machines_only(monkeypatch, tmp_path
     assert machine_checks.receive_buffer(limit).status is Status.OK
 
 
-def test_kernels_that_cannot_be_kept_are_found(monkeypatch, tmp_path):
+def test_kernels_that_cannot_be_cached_are_found(monkeypatch, tmp_path):
     monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path / 'new'))
     assert machine_checks.compiled_kernels().status is Status.OK
     (tmp_path / 'file').write_text('')
@@ -59,7 +59,7 @@ def test_kernels_that_cannot_be_kept_are_found(monkeypatch, tmp_path):
     assert 'NUMBA_CACHE_DIR' in finding.remedy
 
 
-def test_a_library_that_is_too_old_is_named_with_what_is_asked_for(monkeypatch):
+def test_an_outdated_library_is_named_with_the_required_version(monkeypatch):
     real = importlib.metadata.version
     monkeypatch.setattr(
         importlib.metadata, 'version', lambda name: '0.1' if name == 'mcap' else real(name)
@@ -70,7 +70,7 @@ def test_a_library_that_is_too_old_is_named_with_what_is_asked_for(monkeypatch):
     assert everything.remedy == "pip install 'mcap>=1.2.1'"
 
 
-def test_an_extra_that_is_missing_is_a_warning_that_says_for_what(monkeypatch):
+def test_a_missing_extra_is_a_warning_with_its_purpose(monkeypatch):
     real = importlib.metadata.version
 
     def version(name):
@@ -89,7 +89,7 @@ def test_an_extra_that_is_missing_is_a_warning_that_says_for_what(monkeypatch):
     ('value', 'status'),
     [('', Status.OK), ('42', Status.OK), ('150', Status.WARNING), ('-1', Status.PROBLEM)],
 )
-def test_a_domain_that_cannot_be_is_found(monkeypatch, value, status):
+def test_an_invalid_domain_is_found(monkeypatch, value, status):
     monkeypatch.setenv('ROS_DOMAIN_ID', value)
     assert ros_checks.domain().status is status
 
@@ -98,13 +98,13 @@ def test_a_domain_that_cannot_be_is_found(monkeypatch, value, status):
     ('value', 'status'),
     [('LOCALHOST', Status.OK), ('localhost', Status.WARNING), ('OFF', Status.PROBLEM)],
 )
-def test_the_reach_of_discovery_is_judged(monkeypatch, value, status):
+def test_the_discovery_range_is_checked(monkeypatch, value, status):
     monkeypatch.delenv('ROS_LOCALHOST_ONLY', raising=False)
     monkeypatch.setenv(RANGE, value)
     assert ros_checks.discovery().status is status
 
 
-def test_a_profile_that_is_not_there_is_a_problem(monkeypatch):
+def test_a_missing_profile_is_a_problem(monkeypatch):
     monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', '/no/such/profile.xml')
     finding = ros_checks.profile()
     assert finding.status is Status.PROBLEM
@@ -142,10 +142,10 @@ def test_two_cameras_on_one_topic_are_found():
     }
     (finding,) = examine_graph([topic])
     assert finding.status is Status.WARNING
-    assert 'frames of 2 cameras mix' in finding.found
+    assert 'frames of 2 cameras are mixed' in finding.found
 
 
-def test_an_empty_graph_says_what_to_compare():
+def test_an_empty_graph_names_the_variables_to_compare():
     (finding,) = examine_graph([])
     assert finding.status is Status.WARNING
     assert 'ROS_DOMAIN_ID' in finding.remedy
@@ -153,10 +153,10 @@ def test_an_empty_graph_says_what_to_compare():
 
 @pytest.mark.parametrize(
     ('sent', 'received', 'named'),
-    [(0, 0, 'did not find each other'), (5, 3, '3 of 5 frames')],
+    [(0, 0, 'did not discover each other'), (5, 3, '3 of 5 frames')],
 )
 def test_frames_that_do_not_arrive_are_a_problem(sent, received, named):
-    finding = judged(
+    finding = loopback_finding(
         'frames',
         {'sent': sent, 'frame_bytes': 100},
         {'received': received, 'bytes': 100 * received, 'seconds': 0.1},

@@ -1,4 +1,7 @@
-"""Friction of rough spheres: the tangential impulse of a contact, which makes beads spin."""
+"""Friction of rough spheres: the tangential impulse of a contact, which makes beads spin.
+
+Tested by ``test/simulation/engine/collision/test_conservation_ledger.py``.
+"""
 
 from __future__ import annotations
 

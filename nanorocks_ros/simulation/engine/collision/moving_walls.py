@@ -1,4 +1,7 @@
-"""Walls that move with the tray: where they are, and when a bead meets one."""
+"""Walls that move with the tray: where they are, and when a bead meets one.
+
+Tested by ``test/simulation/engine/collision/test_conservation_ledger.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Collisions of beads with walls, at rest or moving: their times and their outcome."""
+"""Collisions of beads with walls, at rest or moving: their times and their outcome.
+
+Tested by ``test/simulation/engine/collision/test_conservation_ledger.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Sizes of neighbour lists and cells: skin, order of the beads, room."""
+"""Sizes of neighbour lists and cells: skin, order of the beads, room.
+
+Tested by ``test/simulation/engine/neighbours/test_neighbour_lists.py``.
+"""
 
 from __future__ import annotations
 

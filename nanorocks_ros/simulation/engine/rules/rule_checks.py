@@ -1,4 +1,7 @@
-"""Checks of the rules of collisions; every error names the rule and the value."""
+"""Checks of the rules of collisions; every error names the rule and the value.
+
+Tested by ``test/simulation/engine/rules/test_collision_rules.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Motion of the walls of the tray: a damped sine that starts and ends."""
+"""Motion of the walls of the tray: a damped sine that starts and ends.
+
+Tested by ``test/simulation/engine/rules/test_collision_rules.py``.
+"""
 
 from __future__ import annotations
 

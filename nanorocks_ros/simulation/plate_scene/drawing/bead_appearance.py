@@ -1,4 +1,7 @@
-"""Appearance of the bodies of a tray: colour, shape, orientation, dust; drawn once per body."""
+"""Appearance of the bodies of a tray: colour, shape, orientation, dust; drawn once per body.
+
+Tested by ``test/simulation/plate_scene/test_plate_film.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Chalk dust: patches on floor and walls, and a pattern for the beads."""
+"""Chalk dust: patches on floor and walls, and a pattern for the beads.
+
+Tested by ``test/simulation/plate_scene/test_plate_camera.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Drawing of grains: an outline of a few lobes, and flat facets."""
+"""Drawing of grains: an outline of a few lobes, and flat facets.
+
+Tested by ``test/simulation/plate_scene/test_plate_camera.py``.
+"""
 
 from __future__ import annotations
 

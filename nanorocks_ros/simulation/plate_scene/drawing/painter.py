@@ -1,4 +1,7 @@
-"""Painter of the beads of all trays and their shadows, through the lens."""
+"""Painter of the beads of all trays and their shadows, through the lens.
+
+Tested by ``test/simulation/plate_scene/test_plate_camera.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Drawing of all bodies of the scene, from the lowest to the highest."""
+"""Drawing of all bodies of the scene, from the lowest to the highest.
+
+Tested by ``test/simulation/plate_scene/test_plate_camera.py``.
+"""
 
 from __future__ import annotations
 

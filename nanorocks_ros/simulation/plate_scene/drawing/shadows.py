@@ -1,4 +1,7 @@
-"""Shadows of the bodies on the floor."""
+"""Shadows of the bodies on the floor.
+
+Tested by ``test/simulation/plate_scene/test_plate_camera.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Drawing of beads: spheres and ovals with shading, a highlight, and dust."""
+"""Drawing of beads: spheres and ovals with shading, a highlight, and dust.
+
+Tested by ``test/simulation/plate_scene/test_plate_camera.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Edges of a bead: steps of the darkness or the hue along rays from its centre."""
+"""Edges of a bead: steps of the darkness or the hue along rays from its centre.
+
+Tested by ``test/stages/tracking/detection/test_bead_detector.py``.
+"""
 
 from __future__ import annotations
 

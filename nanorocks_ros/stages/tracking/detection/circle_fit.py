@@ -1,4 +1,7 @@
-"""Circle fit: the outline of a bead with sub-pixel accuracy."""
+"""Circle fit: the outline of a bead with sub-pixel accuracy.
+
+Tested by ``test/stages/tracking/detection/test_bead_detector.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Scores of disc candidates: the pixels that a disc of each position and size would cover."""
+"""Scores of disc candidates: the pixels that a disc of each position and size would cover.
+
+Tested by ``test/stages/tracking/detection/test_bead_detector.py``.
+"""
 
 from __future__ import annotations
 

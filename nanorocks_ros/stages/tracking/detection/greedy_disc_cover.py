@@ -1,4 +1,7 @@
-"""Greedy cover of the pixels of a species by discs: the highest score first, hidden beads last."""
+"""Greedy cover of the pixels of a species by discs: the highest score first, hidden beads last.
+
+Tested by ``test/stages/tracking/detection/test_bead_detector.py``.
+"""
 
 from __future__ import annotations
 

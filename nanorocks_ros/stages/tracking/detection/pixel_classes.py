@@ -4,6 +4,8 @@ A bead of any species is darker than the gray floor in at least one channel: acr
 glass in red, copper in blue, JSC-1 in all three. The darkness in the darkest channel is nearly
 constant over the disc of a bead, whatever its shading, so that half of it marks the outline. Red
 minus blue over their sum gives the species; shading does not change it.
+
+Tested by ``test/stages/tracking/detection/test_bead_detector.py``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Samples of an image along the rays of a circle, and the edges on them."""
+"""Samples of an image along the rays of a circle, and the edges on them.
+
+Tested by ``test/stages/tracking/detection/test_bead_detector.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Link probabilities between known beads and the detections of a frame."""
+"""Link probabilities between known beads and the detections of a frame.
+
+Tested by ``test/stages/tracking/test_tracker.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Predicted positions of the tracks in the next frame."""
+"""Predicted positions of the tracks in the next frame.
+
+Tested by ``test/stages/tracking/test_tracker.py``.
+"""
 
 from __future__ import annotations
 

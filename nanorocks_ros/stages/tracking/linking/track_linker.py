@@ -1,4 +1,7 @@
-"""Linking of detections to tracks for one species."""
+"""Linking of detections to tracks for one species.
+
+Tested by ``test/stages/tracking/test_tracker.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Snapshot of the confirmed tracks of a tray at one time."""
+"""Snapshot of the confirmed tracks of a tray at one time.
+
+Tested by ``test/stages/tracking/test_tracker.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Track store of one species: flight, size and visibility of each track."""
+"""Track store of one species: flight, size and visibility of each track.
+
+Tested by ``test/stages/tracking/test_tracker.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,16 +1,14 @@
-"""What every chapter of the report starts from, and what it returns."""
+"""Input and result of the chapters of the report.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-from nanorocks_ros.studies.reproduction.simulated_campaign import (
-    BOUNCING,
-    STICKING,
-    CycleFiles,
-    of_kind,
-)
+from nanorocks_ros.studies.reproduction.campaign_plan import BOUNCING, STICKING
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -18,17 +16,18 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.outputs.html_report import Section
-    from nanorocks_ros.studies.reproduction.simulated_campaign import CampaignPlan
+    from nanorocks_ros.studies.reproduction.campaign_cycle import CycleFiles
+    from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan
 
 
 class Difference(NamedTuple):
-    """A row of the table of differences; each a text, empty where there is nothing.
+    """A row of the table of differences; an unknown value is an empty text.
 
-    `what`; `paper`: what it reports; `its_method`: the same method on our films; `ours`: our
-    default; `truth`: what was put in.
+    `quantity`: its name and unit; `paper`: the published value; `its_method`: the paper's method
+    on our films; `ours`: the default method; `truth`: the value of the simulation.
     """
 
-    what: str
+    quantity: str
     paper: str
     its_method: str
     ours: str
@@ -37,19 +36,19 @@ class Difference(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Context:
-    """What is there when the campaign is over.
+    """A finished campaign, from which the chapters are made.
 
     Parameters
     ----------
     folder : Path
-        For pictures and searches, of the report.
+        Folder of the pictures and searches of the report.
     plan : CampaignPlan
     cycles : sequence of CycleFiles
     workers : Workers
     runs : int
-        At each point of a search.
+        Simulated runs at each point of a search.
     notice : callable
-        Called with what the user should know.
+        Called with messages for the user.
     progress : callable
         Called with the part of the chapter that is done, 0 to 1.
     """
@@ -64,30 +63,33 @@ class Context:
 
     @property
     def bouncing(self) -> list[CycleFiles]:
-        """Cycles in which nothing sticks."""
-        return of_kind(self.cycles, BOUNCING)
+        """Cycles without sticking."""
+        return self._of_kind(BOUNCING)
 
     @property
     def sticking(self) -> list[CycleFiles]:
-        """Cycles in which beads stick."""
-        return of_kind(self.cycles, STICKING)
+        """Cycles with sticking."""
+        return self._of_kind(STICKING)
+
+    def _of_kind(self, kind: str) -> list[CycleFiles]:
+        return [cycle for cycle in self.cycles if cycle.kind == kind]
 
     def film(self, kind: str = BOUNCING) -> Path:
-        """The film that was kept."""
-        return next(one.film for one in of_kind(self.cycles, kind) if one.film is not None)
+        """The film of the first cycle of a kind, the only one that is kept."""
+        return next(cycle.film for cycle in self._of_kind(kind) if cycle.film is not None)
 
     def picture(self, name: str) -> Path:
-        """Where a picture goes."""
+        """The path of a picture."""
         return self.folder / name
 
     def count(self, done: int, total: int) -> None:
-        """So many of all steps of the chapter are done."""
+        """Report the steps of the chapter that are done."""
         self.progress(done / max(total, 1))
 
 
 @dataclass(slots=True, kw_only=True)
 class Chapter:
-    """A section of the report, and the rows it adds to the table of differences."""
+    """A section of the report, and its rows of the table of differences."""
 
     section: Section
     differences: list[Difference] = field(default_factory=list)

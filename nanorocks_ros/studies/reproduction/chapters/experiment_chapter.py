@@ -1,4 +1,7 @@
-"""The experiment: its trays, the film, the steps of the processing, how many are followed."""
+"""Chapters on the experiment and its processing: Tables 1 and 2, Figures 1, 3 and 4.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +20,8 @@ from nanorocks_ros.studies.analysis.bag_tracks import track_bag
 from nanorocks_ros.studies.inspection.preprocessing_steps import steps_of_bag
 from nanorocks_ros.studies.inspection.steps_figure import steps_figure
 from nanorocks_ros.studies.inspection.track_overlay import overlay
+from nanorocks_ros.studies.reproduction.campaign_plan import STICKING, plate_settings
 from nanorocks_ros.studies.reproduction.chapters.chapter_context import Chapter, Difference
-from nanorocks_ros.studies.reproduction.simulated_campaign import STICKING, plate_settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,7 +32,7 @@ if TYPE_CHECKING:
 
 _WIDTH = 1100
 _FRAME = 60
-# After the shaking event, when many beads move.
+# Time of the frame shown, soon after the shaking event, when many beads move, [s].
 _STEPS_AT = 2.5
 
 
@@ -38,17 +41,17 @@ def experiment_chapter(context: Context) -> Chapter:
     section = Section(title='The experiment (Table 1, Figure 1)')
     trays = load_trays()
     section.parts += [
-        'Eight trays of beads on one plate, filmed by one camera. Everything below was made from '
-        'simulated films of that plate: an event-driven simulation of the beads, drawn through '
-        'the lens of the flight camera with glare, chalk, noise, JPEG and a plate that swings on '
-        'its springs. They went through the same stages as a recording from flight.',
+        'Eight trays of beads on one plate, filmed by one camera. This report uses simulated '
+        'films of that plate: an event-driven simulation of the beads, rendered through the lens '
+        'of the flight camera with glare, chalk, noise, JPEG and a plate that oscillates on its '
+        'springs. They are processed by the same stages as a recording from flight.',
         Table(
             head=('tray', 'inner size [mm]', 'content', 'chalk'),
             rows=[
                 (str(k), _size(tray), _content(tray), 'yes' if tray.chalk else '')
                 for k, tray in trays.items()
             ],
-            caption='Table 1: the trays, as the package knows them.',
+            caption='Table 1: the trays.',
         ),
     ]
     path = context.picture('plate.jpg')
@@ -65,18 +68,20 @@ def processing_chapter(context: Context) -> Chapter:
     film = context.film()
     steps = context.picture('steps.png')
     settings = plate_settings(trays=[3])
-    found = steps_of_bag(film, settings, time=_STEPS_AT, progress=_first_half(context))
-    steps_figure(steps, found, settings.speed)
+    frame_steps = steps_of_bag(film, settings, time=_STEPS_AT, progress=_first_half(context))
+    steps_figure(steps, frame_steps, settings.speed)
     section.parts.append(
-        Picture(path=steps, caption='Figure 4: one picture of tray 3 through every step.')
+        Picture(
+            path=steps, caption='Figure 4: one image of tray 3 after each step of the processing.'
+        )
     )
     tracks = context.picture('tracks.png')
     _draw_tracks(context, tracks)
     section.parts.append(
         Picture(
             path=tracks,
-            caption='Figure 3: beads of tray 1 that were found, and the ways they came, at the '
-            'end of a cycle in which beads stick.',
+            caption='Figure 3: detected beads of tray 1 and their paths at the end of a cycle '
+            'with sticking.',
         )
     )
     rows, differences = [], []
@@ -90,21 +95,20 @@ def processing_chapter(context: Context) -> Chapter:
             ours += f' ± {number(scatter, 2, 100.0)}'
         rows.append((str(tray), reported, ours))
         if tray in (1, 4):
-            what = f'beads followed, tray {tray} [%]'
-            differences.append(Difference(what, reported, '', ours, '100'))
+            quantity = f'beads tracked, tray {tray} [%]'
+            differences.append(Difference(quantity, reported, '', ours, '100'))
     section.parts += [
         Table(
             head=('tray', 'the paper [%]', 'here [%]'),
             rows=rows,
-            caption='Table 2: beads followed, of those in the tray; mean over the time after '
-            'shaking, ± scatter of the cycles. Grains of trays 6 and 8 are not followed one by '
-            'one.',
+            caption='Table 2: tracked beads as a share of those in the tray; mean over the time '
+            'after shaking, ± scatter of the cycles. Grains of trays 6 and 8 are not tracked.',
         ),
         Erratum(
             text='The paper could not track JSC-1 and lost half of the beads outside tray 1; '
-            'more than 100 % are found where one bead is counted twice. Speeds and sizes below '
-            'rest on tracks where nearly all beads are followed, and on the structure function '
-            'or the autocorrelation elsewhere; which one is said with every number.'
+            'more than 100 % means that a bead was counted twice. Speeds and sizes below '
+            'come from tracks where nearly all beads are tracked, and from the structure function '
+            'or the autocorrelation elsewhere; each number names its method.'
         ),
     ]
     return Chapter(section=section, differences=differences)
@@ -120,15 +124,19 @@ def _size(tray: Tray) -> str:
 
 def _content(tray: Tray) -> str:
     return '; '.join(
-        f'{one.count} {one.material}, {1e3 * one.diameter_low:g}'
-        + (f' to {1e3 * one.diameter_high:g}' if one.diameter_high > one.diameter_low else '')
+        f'{species.count} {species.material}, {1e3 * species.diameter_low:g}'
+        + (
+            f' to {1e3 * species.diameter_high:g}'
+            if species.diameter_high > species.diameter_low
+            else ''
+        )
         + ' mm'
-        for one in tray.species
+        for species in tray.species
     )
 
 
 def _write_frame(film: Path, path: Path) -> None:
-    """One frame of a film, smaller, as a JPEG."""
+    """Write one frame of a film as a smaller JPEG."""
     bag = BagFrames(film, '')
     for k, frame in enumerate(bag.frames()):
         if isinstance(frame, FrameError) or k < _FRAME:

@@ -1,4 +1,7 @@
-"""The coefficient of restitution: figures 7, 11, 12 and 13, and the closed forms."""
+"""Chapters on the restitution and its simulation: Figures 7, 11, 12 and 13, closed forms.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 
@@ -40,20 +43,19 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.studies.reproduction.chapters.chapter_context import Context
-    from nanorocks_ros.studies.reproduction.simulated_campaign import CycleFiles
 
 _TRAY = 1
 _SPAN = (1.75, 20.0)
 _DURATION, _SAMPLES = 30.0, 301
 _BEADS = tuple(0.5 + 0.02 * k for k in range(26))
 _WALLS = tuple(0.8 + 0.02 * k for k in range(11))
-# A restitution at which what the paper's form makes of a decay is said.
-_LOW = 0.8
+# Restitution of the decay to which the closed form of the paper is applied in the errata.
+_EXAMPLE = 0.8
 _WIDTHS = (0.0, 0.04, 0.08, 0.12, 0.16)
 
 
 def restitution_chapter(context: Context) -> Chapter:
-    """Figures 7, 12 and 13, and what every tray gives."""
+    """Figures 7, 12 and 13, and the restitutions of each tray."""
     section = Section(title='The coefficient of restitution (Figures 7, 12 and 13)')
     folder = context.folder / 'cor'
     prepare_folder(folder)
@@ -66,7 +68,7 @@ def restitution_chapter(context: Context) -> Chapter:
         context.progress(0.5 * sum(maps.values()))
 
     reports = Reports(progress=progress, notice=context.notice)
-    found = cor_figures(folder, data, search, context.workers, reports)
+    values = cor_figures(folder, data, search, context.workers, reports)
     rows, differences = _by_tray(context)
     section.parts += [
         Picture(
@@ -81,23 +83,23 @@ def restitution_chapter(context: Context) -> Chapter:
             caption='Restitution by tray, mean over the cycles without sticking. Truth: beads '
             f'{context.plan.restitution:g}, walls {context.plan.wall_restitution:g}. The paper: '
             f'{reported.PAPER_RESTITUTION:g} for tray 1, {reported.PAPER_RESTITUTION_RANGE[0]:g} '
-            f'to {reported.PAPER_RESTITUTION_RANGE[1]:g} over all trays. A dash: nothing that '
-            'could be relied upon, as of speeds of grains by their pictures alone.',
+            f'to {reported.PAPER_RESTITUTION_RANGE[1]:g} over all trays. A dash: no reliable '
+            'value, as for grains, which are not tracked.',
         ),
         *_errata(),
         Picture(
             path=folder / WALLS,
-            caption='Figure 12: which restitutions of beads and walls agree with the decay. They '
-            'form a valley; rebounds and collisions seen in the tracks choose the place in it.',
+            caption='Figure 12: chi square of the decay over the restitutions of beads and walls. '
+            'Its minimum is a valley; rebounds and collisions in the tracks select a point in it.',
         ),
         Picture(path=folder / WIDTH, caption='Figure 12: the same for a distribution of '
-                'restitutions and its width, which the decay does not tell.'),
+                'restitutions and its width, which the decay does not determine.'),
     ]  # fmt: skip
-    if isinstance(found['instantaneous'], InstantaneousCor):
+    if isinstance(values['instantaneous'], InstantaneousCor):
         section.parts.append(
             Picture(
                 path=folder / SPEED,
-                caption='Figure 13: restitution against speed, and what noise alone makes of it.',
+                caption='Figure 13: restitution against speed, and the effect of noise alone.',
             )
         )
     else:
@@ -129,9 +131,9 @@ def simulation_chapter(context: Context) -> Chapter:
     section = Section(
         title='The simulation (Figure 11)',
         parts=[
-            f'{reported.PAPER_RUNS} simulated runs of tray 1 with the restitutions that the paper '
-            'arrives at, 0.89 and 0.99. The paper simulated with soft spheres; here collisions '
-            'are events, so that energy is lost at collisions and nowhere else.',
+            f'{reported.PAPER_RUNS} simulated runs of tray 1 with the restitutions of the paper, '
+            '0.89 and 0.99. The paper simulated with soft spheres; here collisions '
+            'are events, so energy is lost only at collisions.',
             Picture(path=path, caption='Figure 11: runs, and their mean.'),
         ],
     )
@@ -140,8 +142,8 @@ def simulation_chapter(context: Context) -> Chapter:
 
 def _data(context: Context) -> CorData:
     cycles, spans, starts = [], [], []
-    for one in context.bouncing:
-        table, _ = speed_table(one.results, _TRAY)
+    for cycle in context.bouncing:
+        table, _ = speed_table(cycle.results, _TRAY)
         cycles += list(read_cycles(table))
         window = cooling_window(table)
         spans.append((window.first, window.last) if window else _SPAN)
@@ -160,21 +162,23 @@ def _by_tray(context: Context) -> tuple[list[Sequence[str]], list[Difference]]:
     rows: list[Sequence[str]] = []
     differences = []
     for tray in load_trays():
-        ours = [_first_cycle(one, tray, 'default') for one in context.bouncing]
-        paper = [_first_cycle(one, tray, 'paper') for one in context.bouncing]
-        own = number(mean_of([one.get('restitution') for one in paper])[0])
-        of_ours = number(mean_of([one.get('paper_restitution') for one in ours])[0])
-        known = [one for one in ours if one.get('restitution') is not None]
+        ours = [cycle.first_cycle(tray, 'default') for cycle in context.bouncing]
+        paper = [cycle.first_cycle(tray, 'paper') for cycle in context.bouncing]
+        paper_method = number(mean_of([cycle.get('restitution') for cycle in paper])[0])
+        paper_formula = number(mean_of([cycle.get('paper_restitution') for cycle in ours])[0])
+        known = [cycle for cycle in ours if cycle.get('restitution') is not None]
         beads = _with_interval(known, 'restitution')
         walls = _with_interval(known, 'wall_restitution')
-        rows.append((str(tray), own, of_ours, beads, walls, f'{len(known)} of {len(ours)}'))
+        rows.append(
+            (str(tray), paper_method, paper_formula, beads, walls, f'{len(known)} of {len(ours)}')
+        )
         if tray in (1, 3, 5):
-            said = f'{reported.PAPER_RESTITUTION:g}' if tray == 1 else ''
+            reported_value = f'{reported.PAPER_RESTITUTION:g}' if tray == 1 else ''
             differences.append(
                 Difference(
                     f'restitution of the beads, tray {tray}',
-                    said,
-                    own,
+                    reported_value,
+                    paper_method,
                     beads,
                     f'{context.plan.restitution:g}',
                 )
@@ -182,17 +186,13 @@ def _by_tray(context: Context) -> tuple[list[Sequence[str]], list[Difference]]:
     return rows, differences
 
 
-def _first_cycle(one: CycleFiles, tray: int, how: str) -> dict[str, Any]:
-    cycles = one.tray(tray, how)['cycles']
-    return dict(cycles[0]) if cycles else {}
-
-
 def _with_interval(cycles: Sequence[dict[str, Any]], name: str) -> str:
-    """Mean value, and mean ends of the intervals."""
+    """Mean value and mean ends of the intervals, as text."""
     if not cycles:
         return '–'
     value, lower, upper = (
-        mean_of([cycle.get(name + end) for cycle in cycles])[0] for end in ('', '_lower', '_upper')
+        mean_of([cycle.get(name + suffix) for cycle in cycles])[0]
+        for suffix in ('', '_lower', '_upper')
     )
     if math.isnan(value):
         return '–'
@@ -217,20 +217,20 @@ def _errata() -> list[Erratum]:
     gas, walls = confined_gas(tray), reported.PAPER_WALL_RESTITUTION
     rate = _rate(tray)
     expected = gas.decay_rate(reported.PAPER_RESTITUTION, walls)
-    made = paper_restitution_of_decay(
-        gas.decay_rate(_LOW, walls), tray.diameter, tray.number_density
+    by_closed_form = paper_restitution_of_decay(
+        gas.decay_rate(_EXAMPLE, walls), tray.diameter, tray.number_density
     )
     ellipse = paper_wall_ellipse(*decay, max(tray.dimensions))
     printed = reported.PAPER_ELLIPSE
     return [
         Erratum(
             text='Its closed form loses a factor of 2 between the loss of energy and the decay '
-            'time, takes beads for a dilute gas in a large box, and leaves out the walls, which '
-            'in tray 1 take more energy than the beads. Of the decay that kinetic theory between '
-            f'walls gives for a restitution of {_LOW:g} it makes {made:.2f}. Its worked example '
-            f'gives {paper_restitution(*decay):.3f} here as printed, from a decay rate of '
-            f'{rate:.0f} /m, {rate / expected:.1f} times that of a gas with such beads and walls: '
-            'beads that stick cool so fast, and so do beads that rub on floor and lid '
+            'time, assumes a dilute gas in a large box, and neglects the walls, which take more '
+            'energy than the beads in tray 1. Applied to the decay of the kinetic theory between '
+            f'walls for a restitution of {_EXAMPLE:g}, it gives {by_closed_form:.2f}. Its worked '
+            f'example gives {paper_restitution(*decay):.3f} as printed, from a decay rate of '
+            f'{rate:.0f} /m, {rate / expected:.1f} times that of a gas with such beads and '
+            'walls. Beads that stick cool as fast, and so do beads that rub on floor and lid '
             '(docs/method/rotation.md).'
         ),
         Erratum(

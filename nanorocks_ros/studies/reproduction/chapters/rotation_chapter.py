@@ -1,4 +1,7 @@
-"""Rotation: whether it widens the restitutions below 5 mm/s, or noise does."""
+"""Chapter on rotation: whether rotation or noise widens the restitutions below 5 mm/s.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ _TANGENTIAL = (-0.5, 0.0, 0.5)
 
 
 def rotation_chapter(context: Context) -> Chapter:
-    """What rotation does to the decay, and what the camera could see of it."""
+    """The effect of rotation on the decay, and its size in the images."""
     context.progress(1.0)
     diameter = load_trays()[1].diameter
     spins = [math.degrees(rms_spin(speed, diameter)) for speed in _SPEEDS]
@@ -34,32 +37,32 @@ def rotation_chapter(context: Context) -> Chapter:
         parts=[
             Table(
                 head=('mean projected speed [mm/s]', 'spin in equipartition [degrees/s]',
-                      'between two pictures [degrees]'),
+                      'between two frames [degrees]'),
                 rows=[
                     (f'{1e3 * speed:g}', number(spin), number(spin / _RATE, 2))
                     for speed, spin in zip(_SPEEDS, spins, strict=True)
                 ],
-                caption='Beads of tray 1. Round beads of one colour show the camera none of it.',
+                caption='Beads of tray 1. The rotation of round beads of one colour is invisible.',
             ),
             Table(
                 head=('tangential restitution', 'rotational over translational temperature',
                       'restitution of smooth beads that cool alike'),
                 rows=[
-                    (f'{one:g}', number(rough_temperature_ratio(_TRUTH, one)),
-                     number(smooth_equivalent(_TRUTH, one)))
-                    for one in _TANGENTIAL
+                    (f'{tangential:g}', number(rough_temperature_ratio(_TRUTH, tangential)),
+                     number(smooth_equivalent(_TRUTH, tangential)))
+                    for tangential in _TANGENTIAL
                 ],
-                caption=f'Rough beads of restitution {_TRUTH:g}, by kinetic theory, once they '
-                'have come to their final ratio: rough beads that are taken for smooth read too '
-                'low, at every speed alike.',
+                caption=f'Rough beads of restitution {_TRUTH:g}, by kinetic theory, after the '
+                'ratio has become constant: the restitution of rough beads that are taken for '
+                'smooth ones is too low, equally at all speeds.',
             ),
             Erratum(
                 text='The paper takes the wider spread of its restitutions below 5 mm/s for '
-                'energy from rotation. Constant friction and tangential restitution single out '
-                'no speed, so rotation cannot set in at one. Noise of the mean speed does: the '
-                'band of Figure 13 holds no rotation at all and widens just so. '
-                'docs/method/rotation.md '
-                'works it out with simulated rough beads, and says what could not be decided.'
+                'energy from rotation. Constant friction and tangential restitution define '
+                'no speed at which rotation could begin. Noise of the mean speed explains the '
+                'spread: the band of Figure 13 is without rotation and widens in the same way. '
+                'docs/method/rotation.md has the details, with simulated rough beads, and names '
+                'the questions that remain open.'
             ),
         ],
     )  # fmt: skip

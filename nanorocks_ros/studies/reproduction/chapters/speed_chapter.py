@@ -1,4 +1,7 @@
-"""How fast the beads are: figures 2, 5 and 6."""
+"""Chapter on the speeds of the beads: Figures 2, 5 and 6.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +20,15 @@ from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table, 
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.studies.inspection.speed_comparison import compare_speeds
 from nanorocks_ros.studies.inspection.speeds_figure import speeds_figure
+from nanorocks_ros.studies.reproduction.campaign_plan import plate_settings
 from nanorocks_ros.studies.reproduction.chapters.chapter_context import Chapter, Difference
-from nanorocks_ros.studies.reproduction.simulated_campaign import plate_settings
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from nanorocks_ros.studies.inspection.speed_comparison import ComparedSpeeds
+    from nanorocks_ros.studies.reproduction.campaign_cycle import CycleFiles
     from nanorocks_ros.studies.reproduction.chapters.chapter_context import Context
-    from nanorocks_ros.studies.reproduction.simulated_campaign import CycleFiles
 
 _MM = 1e3
 _SHOWN = (('tracking', '#30506f', 'o'), ('structure_function', '#2a9d8f', 's'),
@@ -35,9 +38,9 @@ _NAMES = {
     'structure_function': 'structure function',
     'binarised_area': "the paper's binarised area",
 }
-# Peaks are looked for in so much time after the shaking event, [s].
-_PEAK = 3.0
-_HOW = 'default', 'paper', 'truth'
+# Time after the shaking event in which the peak is searched, [s].
+_PEAK_WINDOW = 3.0
+_SOURCES = 'default', 'paper', 'truth'
 
 
 def speed_chapter(context: Context) -> Chapter:
@@ -45,29 +48,30 @@ def speed_chapter(context: Context) -> Chapter:
     section = Section(title='Speeds (Figures 2, 5 and 6)')
     settings = plate_settings(trays=[1])
     speeds = compare_speeds(context.film(), settings, progress=context.count)
-    one = speeds.trays[1]
+    tray_speeds = speeds.trays[1]
     cycle = speeds.first_cycle()
     over_time, ratios = context.picture('speeds.png'), context.picture('speed_ratios.png')
     speeds_figure(over_time, speeds, cycle)
-    _draw_ratios(ratios, one, cycle)
+    _draw_ratios(ratios, tray_speeds, cycle)
     section.parts += [
-        Picture(path=over_time, caption='Figure 2: tray 1 by every method over one cycle, with '
-                'the truth.'),
-        Picture(path=ratios, caption='Figure 5, its outcome: speed over the true one, against '
-                'the true one. A method that holds stays at 1.'),
+        Picture(path=over_time, caption='Figure 2: speed in tray 1 by each method over one cycle, '
+                'with the truth.'),
+        Picture(path=ratios, caption='Result of Figure 5: ratio of measured to true speed '
+                'against the true speed. The ratio of an unbiased method is 1.'),
         Erratum(
-            text='The area that moves between two pictures is a measure of speed only while '
-            'noise, shading and the choice of the threshold do not move with it; its factor has '
-            'to be found by hand for each tray and speed. Printed, the recipe leaves open the '
-            'sign of the difference, the averaging and the threshold, and its readings differ '
-            'from each other by more than from the truth.'
+            text='The area that changes between two images measures the speed only while noise, '
+            'shading and threshold do not change with the speed; its factor has to be found by '
+            'hand for each tray and speed. The paper leaves open the sign of the difference, the '
+            'averaging and the threshold, and possible readings of it differ from each other by '
+            'more than from the truth.'
         ),
     ]  # fmt: skip
     rows, differences = [], []
     peaks: dict[int, tuple[float, float, float]] = {}
     for tray in load_trays():
         ours, paper, truth = (
-            mean_of([_peak(each, tray, how) for each in context.cycles])[0] for how in _HOW
+            mean_of([_peak(film, tray, source) for film in context.cycles])[0]
+            for source in _SOURCES
         )
         peaks[tray] = ours, paper, truth
         reported = f'{_MM * PAPER_PEAK_SPEED:g}' if tray == 1 else ''
@@ -78,43 +82,43 @@ def speed_chapter(context: Context) -> Chapter:
     path = context.picture('peaks.png')
     _draw_peaks(path, peaks)
     section.parts += [
-        Picture(path=path, caption='Figure 6: the fastest mean projected speed after a shaking '
-                'event, by tray.'),
+        Picture(path=path, caption='Figure 6: the highest mean projected speed after a '
+                'shaking event, by tray.'),
         Table(
             head=('tray', 'the paper', 'its method here', 'ours', 'truth'),
             rows=rows,
             caption='Peak mean projected speed after a shaking event [mm/s], mean of the cycles. '
-            'How hard the flight tray was shaken is not known: here the magnet leaves the beads '
-            f'with {_MM * SimulationSettings().mean_speed:g} mm/s in three dimensions.',
+            'The strength of the shaking in flight is unknown: here it gives the beads a mean '
+            f'speed of {_MM * SimulationSettings().mean_speed:g} mm/s in three dimensions.',
         ),
     ]  # fmt: skip
     return Chapter(section=section, differences=differences)
 
 
-def _peak(cycle: CycleFiles, tray: int, how: str) -> float:
-    """The fastest speed soon after the shaking event, [m/s]; NaN where none is known."""
+def _peak(cycle: CycleFiles, tray: int, source: str) -> float:
+    """The highest speed soon after the shaking event, [m/s]; NaN where unknown."""
     truth = cycle.tray(tray)['truth']
     true_time = np.array(truth['time'])
     true_speed = np.array(truth['mean_projected_speed'], dtype=np.float64)
     start = float(true_time[int(np.argmax(np.diff(true_speed))) + 1])
-    if how == 'truth':
+    if source == 'truth':
         time, speed = true_time, true_speed
     else:
-        found = cycle.tray(tray, how)
-        time = np.array(found['time'])
-        speed = np.array(found['mean_projected_speed'], dtype=np.float64)
-    near = (time >= start) & (time < start + _PEAK) & np.isfinite(speed)
+        results = cycle.tray(tray, source)
+        time = np.array(results['time'])
+        speed = np.array(results['mean_projected_speed'], dtype=np.float64)
+    near = (time >= start) & (time < start + _PEAK_WINDOW) & np.isfinite(speed)
     return float(speed[near].max()) if near.any() else math.nan
 
 
-def _draw_ratios(path: Path, found: ComparedSpeeds, cycle: int) -> None:
+def _draw_ratios(path: Path, tray_speeds: ComparedSpeeds, cycle: int) -> None:
     figure = Figure(figsize=(8.0, 4.5), layout='constrained')
     axes = figure.subplots()
     for method, colour, marker in _SHOWN:
-        speeds = [speed for speed in found.speeds[method] if speed.cycle == cycle]
+        speeds = [speed for speed in tray_speeds.speeds[method] if speed.cycle == cycle]
         if not speeds:
             continue
-        true = found.true_speeds(speeds)
+        true = tray_speeds.true_speeds(speeds)
         ratio = np.array([speed.mean_projected_speed.value for speed in speeds]) / true
         axes.plot(_MM * true, ratio, marker, color=colour, ms=3, alpha=0.6, label=_NAMES[method])
     axes.axhline(1.0, color='0.5', lw=1)

@@ -1,4 +1,4 @@
-"""The command ``nanorocks figure``."""
+"""The commands ``nanorocks figure decay`` and ``nanorocks figure instantaneous``."""
 
 from __future__ import annotations
 
@@ -24,34 +24,32 @@ def draw(kind, table, output, *more):
 def colours(path):
     picture = cv2.imread(str(path))
     assert min(picture.shape[:2]) > 400
-    return {tuple(one) for one in picture.reshape(-1, 3)[::3].tolist()}
+    return {tuple(colour) for colour in picture.reshape(-1, 3)[::3].tolist()}
 
 
 def test_the_decay_is_drawn_with_both_fits(table, tmp_path, capsys):
     assert draw('decay', table, tmp_path / 'a.png', '--json') == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found['cycles'] == 18
-    assert found['confined'] == pytest.approx(0.89, abs=0.02)
-    assert found['confined_error'] < 0.02
-    # What the paper's closed form says of a gas whose restitution is 0.89.
-    assert 0.96 < found['paper'] < 0.99
+    values = json.loads(capsys.readouterr().out)
+    assert values['cycles'] == 18
+    assert values['confined'] == pytest.approx(0.89, abs=0.02)
+    assert values['confined_error'] < 0.02
+    # The closed form of the paper for a gas of restitution 0.89.
+    assert 0.96 < values['paper'] < 0.99
     # The two fits, in blue, green, red.
     assert {(0x22, 0x3B, 0xC2), (0x3C, 0xB9, 0xE8)} <= colours(tmp_path / 'a.png')
 
 
-def test_the_restitution_is_drawn_against_speed_with_what_noise_makes_of_it(
-    table, tmp_path, capsys
-):
+def test_the_restitution_is_drawn_with_the_effect_of_noise(table, tmp_path, capsys):
     assert draw('instantaneous', table, tmp_path / 'a.png', '--json') == 0
-    found = json.loads(capsys.readouterr().out)
-    paper = np.array(found['paper_restitution'])
-    low, high = np.array(found['noise_and_gas_95'])
+    values = json.loads(capsys.readouterr().out)
+    paper = np.array(values['paper_restitution'])
+    low, high = np.array(values['noise_and_gas_95'])
     assert np.mean((paper > low) & (paper < high)) > 0.85
-    assert len(found['local_speed']) == 8
+    assert len(values['local_speed']) == 8
     assert {(0x22, 0x3B, 0xC2), (0x6F, 0x50, 0x30)} <= colours(tmp_path / 'a.png')
 
 
-def test_a_folder_of_results_will_do(table, tmp_path, capsys):
+def test_a_folder_of_results_is_accepted(table, tmp_path, capsys):
     assert draw('decay', table.parent, tmp_path / 'a.pdf') == 0
     assert (tmp_path / 'a.pdf').read_bytes().startswith(b'%PDF')
     assert '18 cycles of tray 1' in capsys.readouterr().err
@@ -93,15 +91,15 @@ def test_a_picture_that_exists_is_not_overwritten(table, tmp_path, capsys):
     assert draw('decay', table, tmp_path / 'a.png', '--force') == 0
 
 
-def test_a_table_whose_tray_is_not_known_asks_for_it(table, tmp_path, capsys):
-    other = tmp_path / 'speeds.csv'
-    other.write_bytes(table.read_bytes())
-    assert draw('decay', other, tmp_path / 'a.png') == 2
+def test_a_table_without_a_tray_number_needs_the_flag(table, tmp_path, capsys):
+    unnamed = tmp_path / 'speeds.csv'
+    unnamed.write_bytes(table.read_bytes())
+    assert draw('decay', unnamed, tmp_path / 'a.png') == 2
     assert '--tray' in capsys.readouterr().err
-    assert draw('decay', other, tmp_path / 'a.png', '--tray', '1') == 0
+    assert draw('decay', unnamed, tmp_path / 'a.png', '--tray', '1') == 0
 
 
-def test_speeds_that_rise_are_no_decay(tmp_path, capsys):
+def test_rising_speeds_are_an_error(tmp_path, capsys):
     rows = [(0.1 * k, 1, 0.0, 1e-3 + 1e-5 * k, 1e-4, 0.3) for k in range(1, 200)]
     table = write_rows(tmp_path / 'tray_1_speed.csv', rows)
     for kind in ('decay', 'instantaneous'):
@@ -109,7 +107,7 @@ def test_speeds_that_rise_are_no_decay(tmp_path, capsys):
         assert 'do not fall' in capsys.readouterr().err
 
 
-def test_a_tray_too_crowded_for_the_theory_says_what_to_use(tmp_path, capsys):
+def test_a_tray_too_dense_for_the_theory_names_the_alternative(tmp_path, capsys):
     rows = [(0.1 * k, 1, 0.0, 0.01 / (1.0 + 0.05 * k), 1e-5, 0.3) for k in range(1, 220)]
     table = write_rows(tmp_path / 'tray_1_speed.csv', rows)
     trays = tmp_path / 'trays.yaml'

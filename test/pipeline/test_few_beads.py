@@ -29,7 +29,7 @@ SETTINGS = with_values(PipelineSettings(), {'cooling.relation': 'paper'}, 'test'
 
 
 def records_of(stages, images):
-    return [*(one for image in images for one in stages.push(image)), *stages.flush()]
+    return [*(record for image in images for record in stages.push(image)), *stages.flush()]
 
 
 @pytest.mark.filterwarnings('error')
@@ -39,20 +39,20 @@ def test_of_one_or_two_beads_there_is_a_speed_and_nothing_confident_else(beads):
     simulation = SimulationSettings(width_px=210, height_px=210, first_shake=0.5, seed=3)
     stage = Preprocessor(SETTINGS, {1: tray}, 'test')
     images = [
-        one
+        record
         for frame, _ in film(simulation, tray, 150)
-        for one in stage.push(frame)
-        if isinstance(one, TrayImage)
+        for record in stage.push(frame)
+        if isinstance(record, TrayImage)
     ]
-    found = records_of(TrayStages(SETTINGS, tray), images)
-    assert any(isinstance(one, SpeedEstimate) for one in found)
-    assert not any(isinstance(one, Merge) for one in found)
-    for one in found:
-        if isinstance(one, CorEstimate) and not math.isnan(one.restitution.value):
-            assert one.restitution.lower <= one.restitution.value <= one.restitution.upper
-        if isinstance(one, ClusterEstimate):
-            assert not one.bodies.value > beads
-            assert one.sticking_status in (StickingStatus.UNKNOWN, StickingStatus.NO_MERGE)
+    records = records_of(TrayStages(SETTINGS, tray), images)
+    assert any(isinstance(record, SpeedEstimate) for record in records)
+    assert not any(isinstance(record, Merge) for record in records)
+    for item in records:
+        if isinstance(item, CorEstimate) and not math.isnan(item.restitution.value):
+            assert item.restitution.lower <= item.restitution.value <= item.restitution.upper
+        if isinstance(item, ClusterEstimate):
+            assert not item.bodies.value > beads
+            assert item.sticking_status in (StickingStatus.UNKNOWN, StickingStatus.NO_MERGE)
 
 
 @pytest.mark.filterwarnings('error')
@@ -73,13 +73,17 @@ def test_of_an_empty_tray_nothing_is_said():
                 noise_power=2.0,
             )
         )
-    found = records_of(TrayStages(PipelineSettings(), FLOWN), images)
-    clusters = [one for one in found if isinstance(one, ClusterEstimate)]
+    records = records_of(TrayStages(PipelineSettings(), FLOWN), images)
+    clusters = [record for record in records if isinstance(record, ClusterEstimate)]
     assert clusters
     for cluster in clusters:
         assert cluster.size_status is SizeStatus.NOTHING
         assert math.isnan(cluster.combined_size.value)
         assert math.isnan(cluster.bodies.value)
         assert cluster.sticking_status is StickingStatus.UNKNOWN
-    assert not any(isinstance(one, Merge) for one in found)
-    assert all(math.isnan(one.restitution.value) for one in found if isinstance(one, CorEstimate))
+    assert not any(isinstance(record, Merge) for record in records)
+    assert all(
+        math.isnan(record.restitution.value)
+        for record in records
+        if isinstance(record, CorEstimate)
+    )

@@ -9,13 +9,13 @@ import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.pipeline.composition import trays_of
+from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import Frame, Quality, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
 from nanorocks_ros.simulation.tray_camera.tray_renderer import TrayCamera
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.shake_detection import NoiseMeter
-from nanorocks_ros.stages.speed.speed_estimator import SpeedEstimator
 
 NS = 1e9
 SCALE = 12500.0
@@ -48,7 +48,7 @@ def filmed(number, mean_speed, frames, noise=2.0):
     for k, moment in enumerate(shaken.moments(frames)):
         picture = camera.picture(moment.positions, k)
         frame = Frame(stamp_ns=moment.truth.stamp_ns, encoding='bgr8', image=picture)
-        images += [one for one in crop.push(frame) if isinstance(one, TrayImage)]
+        images += [record for record in crop.push(frame) if isinstance(record, TrayImage)]
         truth.append((moment.truth.stamp_ns, moment.truth.mean_projected_speed))
     return images, np.array(truth)
 
@@ -65,7 +65,7 @@ def mixture():
 
 
 def pushed(images, number, method, **values):
-    estimator = SpeedEstimator(settings_of(number, method, **values), load_trays()[number])
+    estimator = TrayMeasurement(settings_of(number, method, **values), load_trays()[number])
     return [
         record
         for image in images
@@ -78,28 +78,28 @@ def ratios(estimates, truth):
     moving = [
         estimate for estimate in estimates if estimate.cycle > 0 and estimate.stamp_ns > 1.0 * NS
     ]
-    true = np.interp([one.stamp_ns for one in moving], *truth.T)
-    return np.array([one.mean_projected_speed.value for one in moving]) / true, moving
+    true = np.interp([speed.stamp_ns for speed in moving], *truth.T)
+    return np.array([speed.mean_projected_speed.value for speed in moving]) / true, moving
 
 
 def test_speeds_from_tracks_of_grains_that_come_as_far_as_the_next_one_are_flagged(grains):
     images, _ = grains
-    moving = [one for one in pushed(images, 7, 'tracking') if one.stamp_ns > 1.0 * NS]
+    moving = [speed for speed in pushed(images, 7, 'tracking') if speed.stamp_ns > 1.0 * NS]
     assert moving
-    assert all(one.quality & Quality.UNCERTAIN for one in moving)
+    assert all(speed.quality & Quality.UNCERTAIN for speed in moving)
 
 
 def test_speeds_from_tracks_of_beads_that_are_well_apart_are_not_flagged(mixture):
     images, truth = mixture
-    ratio, found = ratios(pushed(images, 3, 'tracking'), truth)
+    ratio, speeds = ratios(pushed(images, 3, 'tracking'), truth)
     assert ratio.mean() == pytest.approx(1.0, abs=0.05)
-    assert not any(one.quality for one in found)
+    assert not any(record.quality for record in speeds)
 
 
 def test_the_structure_function_is_chosen_for_crowded_fast_grains_and_is_right(grains):
     images, truth = grains
-    ratio, found = ratios(pushed(images, 7, 'auto'), truth)
-    assert {one.method for one in found} == {SpeedMethod.STRUCTURE_FUNCTION}
+    ratio, speeds = ratios(pushed(images, 7, 'auto'), truth)
+    assert {record.method for record in speeds} == {SpeedMethod.STRUCTURE_FUNCTION}
     assert ratio.mean() == pytest.approx(1.0, abs=0.1)
 
 
@@ -113,17 +113,17 @@ def test_the_noise_of_grains_in_motion_is_that_of_grains_at_rest(grains):
 def test_the_papers_recipe_is_flagged_until_it_is_calibrated(mixture):
     images, _ = mixture
     plain = pushed(images, 3, 'binarised_area')
-    assert all(one.quality & Quality.UNCALIBRATED for one in plain)
+    assert all(speed.quality & Quality.UNCALIBRATED for speed in plain)
     known = pushed(images, 3, 'binarised_area', **{'speed.area_factor': 0.7})
-    assert not any(one.quality & Quality.UNCALIBRATED for one in known)
+    assert not any(speed.quality & Quality.UNCALIBRATED for speed in known)
 
 
 def test_the_papers_recipe_is_flagged_where_the_area_is_saturated():
     images, _ = filmed(1, 15e-3, 60)
     known = {'speed.area_factor': 0.7}
-    fast = [one for one in pushed(images, 1, 'binarised_area', **known) if one.stamp_ns > NS]
+    fast = [speed for speed in pushed(images, 1, 'binarised_area', **known) if speed.stamp_ns > NS]
     assert fast
-    assert all(one.quality & Quality.UNCERTAIN for one in fast)
+    assert all(speed.quality & Quality.UNCERTAIN for speed in fast)
 
 
 def test_a_picture_without_colour_in_between_is_left_out_and_flagged(mixture):
@@ -132,17 +132,17 @@ def test_a_picture_without_colour_in_between_is_left_out_and_flagged(mixture):
         replace(image, color=None) if k in (90, 91, 120) else image
         for k, image in enumerate(images)
     ]
-    ratio, found = ratios(pushed(some, 3, 'structure_function'), truth)
+    ratio, speeds = ratios(pushed(some, 3, 'structure_function'), truth)
     assert ratio.mean() == pytest.approx(1.0, abs=0.1)
-    assert any(one.quality & Quality.GRAY_CAMERA for one in found)
-    assert not all(one.quality & Quality.GRAY_CAMERA for one in found)
+    assert any(record.quality & Quality.GRAY_CAMERA for record in speeds)
+    assert not all(record.quality & Quality.GRAY_CAMERA for record in speeds)
 
 
 def test_when_colour_is_gone_for_good_all_beads_are_seen_as_one_and_the_error_flags_it(mixture):
     images, _ = mixture
     gone = [replace(image, color=None) if k >= 60 else image for k, image in enumerate(images)]
-    found = pushed(gone, 3, 'structure_function')
-    last = found[-1]
+    speeds = pushed(gone, 3, 'structure_function')
+    last = speeds[-1]
     assert not last.species_speeds
     assert last.quality & Quality.UNCERTAIN
     assert last.stamp_ns > 5.0 * NS
@@ -152,8 +152,8 @@ def test_a_species_that_never_shows_does_not_silence_the_structure_function(mixt
     images, truth = mixture
     # A gray camera whose driver says that it gives colour.
     dull = [replace(image, color=np.repeat(image.gray[:, :, None], 3, axis=2)) for image in images]
-    found = pushed(dull, 3, 'structure_function')
-    assert found
-    assert not any(one.species_speeds for one in found)
-    ratio, _ = ratios(found, truth)
+    speeds = pushed(dull, 3, 'structure_function')
+    assert speeds
+    assert not any(record.species_speeds for record in speeds)
+    ratio, _ = ratios(speeds, truth)
     assert ratio.mean() == pytest.approx(1.0, abs=0.35)

@@ -1,0 +1,105 @@
+"""``nanorocks figure decay | instantaneous SPEEDS``: figures 7 and 13 of measured decays."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    import argparse
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.studies.decays.cooling_curves import CycleSpeeds
+
+_PICTURES = ('.png', '.pdf', '.svg')
+_SPAN = (0.5, 20.0)
+_KINDS = {
+    'decay': "energy of the cooling beads, with our fit and the paper's (figure 7)",
+    'instantaneous': 'restitution against speed, with the effect of noise alone (figure 13)',
+}
+
+
+def add_parser(kinds: Any) -> None:
+    """Add both kinds to those of ``nanorocks figure``."""
+    for kind, text in _KINDS.items():
+        parser = kinds.add_parser(kind, help=text, description=text)
+        parser.add_argument(
+            'speeds', help='folder of results of `nanorocks analyse`, or a table of speeds'
+        )
+        parser.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
+        parser.add_argument(
+            '--tray', type=int, help='number of the tray; required with several trays'
+        )
+        parser.add_argument(
+            '--wall-restitution',
+            type=float,
+            default=0.99,
+            help='restitution of the walls; default 0.99',
+        )
+        parser.add_argument(
+            '--first',
+            type=float,
+            help='[s] start of the fit, since the shaking event; default 0.5, or as analysed '
+            'where the tray kept oscillating',
+        )
+        parser.add_argument(
+            '--last', type=float, help='[s] end of the fit; default 20, or as analysed'
+        )
+        parser.add_argument('--trays', default='', help='YAML file of trays; default: as flown')
+        parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+        parser.add_argument('--force', action='store_true', help='replace a picture that exists')
+        parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Read, draw and print, and return the exit code."""
+    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+    from nanorocks_ros.outputs.atomic_files import check_outputs
+    from nanorocks_ros.studies.decays.cooling_curves import read_cycles, speed_table
+
+    path = Path(options.output)
+    check_outputs({'--output': path}, {'--output': _PICTURES}, force=options.force)
+    table, number = speed_table(Path(options.speeds), options.tray)
+    if number is None:
+        raise ConfigurationError('--tray', 'cannot be read from the file name', 'name the tray')
+    tray = tray_by_number(load_trays(options.trays), number)
+    cycles = read_cycles(table)
+    values = _draw_figure(options, table, tray, cycles)
+    if options.json:
+        printed = {'tray': number, 'cycles': len(cycles), **values}
+        print(json.dumps(printed, allow_nan=False))
+    cycles_text = f'{len(cycles)} cycles' if len(cycles) > 1 else 'a cycle'
+    print(f'nanorocks: {cycles_text} of tray {number} in {path}', file=sys.stderr)
+    return 0
+
+
+def _draw_figure(
+    options: argparse.Namespace, table: Path, tray: Tray, cycles: tuple[CycleSpeeds, ...]
+) -> dict[str, Any]:
+    """Draw the picture, and return its numbers."""
+    from nanorocks_ros.studies.decays.cooling_curves import cooling_part, species_cycles
+    from nanorocks_ros.studies.decays.cooling_windows import cooling_window, span_of
+    from nanorocks_ros.studies.figures.decay_figure import decay_figure
+    from nanorocks_ros.studies.figures.instantaneous_figure import (
+        instantaneous_figure,
+        instantaneous_values,
+    )
+
+    path, walls = Path(options.output), options.wall_restitution
+    window = cooling_window(table)
+    start = window.start if window else 0.0
+    default_span = (window.first, window.last) if window and start > 0.0 else _SPAN
+    span = span_of(options.first, options.last, default_span)
+    if options.kind == 'decay':
+        species = species_cycles(table, tray)
+        return decay_figure(
+            path, tray, cycles, wall_restitution=walls, span=span, species=species, start=start
+        )
+    cycles, span = cooling_part(cycles, span, start)
+    return instantaneous_values(
+        instantaneous_figure(path, tray, cycles, wall_restitution=walls, span=span)
+    )

@@ -1,0 +1,135 @@
+"""Chapter on the onset of clustering and the sticking speed: Figure 14.
+
+Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.numerics.sample_mean import mean_of
+from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table, number
+from nanorocks_ros.physics.dust_models import PAPER_STICKING_SPEEDS, collapse_time_factor
+from nanorocks_ros.physics.paper_clusters import paper_onset
+from nanorocks_ros.studies.analysis.result_tables import read_columns
+from nanorocks_ros.studies.figures.dust_figure import (
+    dust_figure,
+    paper_thresholds,
+    threshold_of_tray,
+)
+from nanorocks_ros.studies.reproduction.campaign_plan import FIRST_SHAKE
+from nanorocks_ros.studies.reproduction.chapters.chapter_context import Chapter, Difference
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.studies.reproduction.campaign_cycle import CycleFiles
+    from nanorocks_ros.studies.reproduction.chapters.chapter_context import Context
+
+_MM = 1e3
+_TRAYS = (1, 3, 5)
+_COLUMNS = ('time', 'cycle', 'level_area', 'combined_size', 'cluster_size', 'weighted_size')
+
+
+def onset_chapter(context: Context) -> Chapter:
+    """Onset of clustering and sticking speed; figure 14."""
+    section = Section(title='Onset of sticking (Figure 14)')
+    rows, differences, points = [], [], []
+    trays = load_trays()
+    for tray in _TRAYS:
+        onset = mean_of([cycle.first_cycle(tray).get('onset') for cycle in context.sticking])[0]
+        true_onset = mean_of([_true_onset(cycle, tray) for cycle in context.sticking])[0]
+        paper, threshold = _paper_onsets(context.sticking, tray)
+        control, control_threshold = _paper_onsets(context.bouncing, tray)
+        false_onsets = [cycle.first_cycle(tray).get('onset') for cycle in context.bouncing]
+        alarms = sum(onset is not None for onset in false_onsets)
+        speed, lower, upper = _sticking_speed(context, tray)
+        speed_text = '–' if math.isnan(speed) else number(speed, 3, _MM)
+        rows.append(
+            (
+                str(tray), number(paper), number(control), number(onset),
+                f'{alarms} of {len(false_onsets)}', number(true_onset),
+                f'{_MM * PAPER_STICKING_SPEEDS[tray]:g}', number(threshold, 3, _MM),
+                number(control_threshold, 3, _MM),
+                f'{speed_text} [{number(lower, 3, _MM)}, {number(upper, 3, _MM)}]',
+            )
+        )  # fmt: skip
+        differences.append(
+            Difference(
+                f'sticking speed, tray {tray} [mm/s]',
+                f'{_MM * PAPER_STICKING_SPEEDS[tray]:g}',
+                number(threshold, 3, _MM),
+                f'{speed_text} [{number(lower, 3, _MM)}, {number(upper, 3, _MM)}]',
+                f'{_MM * context.plan.sticking_speed:g}',
+            )
+        )
+        if not math.isnan(speed):
+            points.append(threshold_of_tray(trays[tray], speed, (lower, upper), 'simulated films'))
+    path = context.picture('dust.png')
+    dust_figure(path, [*points, *paper_thresholds(trays)])
+    section.parts += [
+        Table(
+            head=('tray', "paper's rule: onset [s]", 'the same, nothing sticks', 'ours [s]',
+                  'ours, nothing sticks', 'truth [s]', 'the paper: speed [mm/s]',
+                  "paper's rule here", 'the same, nothing sticks', 'ours [95 %]'),
+            rows=rows,
+            caption='Onset of sticking, and sticking speed; the true sticking speed is '
+            f'{_MM * context.plan.sticking_speed:g} mm/s along the line of centres.',
+        ),
+        Erratum(
+            text='Its onset is where the derivative of the cluster size becomes positive. '
+            'Any fluctuation meets this rule at once: it finds an onset without sticking as well '
+            '(third column), and twice the mean speed at that time is no threshold.'
+        ),
+        Picture(
+            path=path,
+            caption='Figure 14: sticking thresholds against mass, beside published dust collision '
+            'models; those whose constants could not be traced are marked as unverified.',
+        ),
+        'Collapse of a cloud of such particles takes longer by a factor (1 − restitution²)⁻¹: '
+        f'{collapse_time_factor(0.89):.2f} for 0.89, as the paper says.',
+    ]  # fmt: skip
+    return Chapter(section=section, differences=differences)
+
+
+def _true_onset(cycle: CycleFiles, tray: int) -> float:
+    """First loss of a body since the shaking event, [s]."""
+    truth = cycle.tray(tray)['truth']
+    bodies = np.array(truth['bodies'])
+    losses = np.flatnonzero(bodies < bodies[0])
+    return float(truth['time'][losses[0]]) - FIRST_SHAKE if losses.size else math.nan
+
+
+def _cluster_table(cycle: CycleFiles, tray: int) -> dict[str, NDArray[np.float64]]:
+    return read_columns(cycle.results / f'tray_{tray}_cluster.csv', _COLUMNS)
+
+
+def _paper_onsets(cycles: list[CycleFiles], tray: int) -> tuple[float, float]:
+    """Mean onset by the paper's rule, [s], and mean of twice the mean speed then, [m/s]."""
+    onsets, speeds = [], []
+    for cycle in cycles:
+        table = _cluster_table(cycle, tray)
+        onset = paper_onset(table['time'], table['level_area'], FIRST_SHAKE)
+        if math.isnan(onset):
+            continue
+        onsets.append(onset - FIRST_SHAKE)
+        results = cycle.tray(tray)
+        speeds.append(
+            2.0 * float(np.interp(onset, results['time'], results['mean_projected_speed']))
+        )
+    return mean_of(onsets)[0], mean_of(speeds)[0]
+
+
+def _sticking_speed(context: Context, tray: int) -> tuple[float, float, float]:
+    """Sticking speed and ends of its interval, [m/s]; means over the cycles that have one."""
+    ends = [cycle.first_cycle(tray) for cycle in context.sticking]
+    names = ('sticking_speed', 'sticking_speed_lower', 'sticking_speed_upper')
+    known_ends = [end for end in ends if end.get('sticking_speed') is not None]
+    speed, lower, upper = (
+        mean_of([end.get(name) for end in known_ends or ends])[0] for name in names
+    )
+    return speed, lower, upper

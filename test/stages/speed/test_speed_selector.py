@@ -1,0 +1,99 @@
+"""Which speeds are given out: by the setting, and by how reliable the tracks are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.records import Measured, Quality, SpeedEstimate, SpeedMethod
+from nanorocks_ros.settings import PipelineSettings, with_values
+from nanorocks_ros.stages.speed.speed_selector import SpeedSelector
+from nanorocks_ros.stages.speed.track_reliability import TrackReliability
+
+NS = 1_000_000_000
+TRAY = load_trays()[1]
+
+
+def speed(time, method, value=1e-3, error=1e-5):
+    return SpeedEstimate(
+        stamp_ns=round(time * NS),
+        tray=1,
+        cycle=1,
+        cycle_start_ns=0,
+        mean_projected_speed=Measured(value, error),
+        window=0.1,
+        method=method,
+    )
+
+
+def by_tracks(time, **values):
+    return speed(time, SpeedMethod.TRACKING, **values)
+
+
+def by_structure(time, **values):
+    return speed(time, SpeedMethod.STRUCTURE_FUNCTION, **values)
+
+
+def selector(method='auto', crowded=False):
+    settings = with_values(PipelineSettings(), {'speed.method': method}, 'test')
+    tracks = TrackReliability(TRAY, crowded=crowded)
+    return SpeedSelector(settings.speed, tracks), tracks
+
+
+def test_speeds_from_tracks_wait_until_the_tracks_are_judged():
+    stage, tracks = selector()
+    assert stage.push([by_tracks(1.0)]) == ()
+    assert stage.push([by_tracks(1.1)]) == ()
+    tracks.judged = tracks.reliable = True
+    assert stage.push([by_tracks(1.2)]) == (by_tracks(1.0), by_tracks(1.1), by_tracks(1.2))
+
+
+def test_speeds_from_tracks_that_turn_out_unreliable_are_dropped():
+    stage, tracks = selector()
+    stage.push([by_tracks(1.0)])
+    tracks.without_colour()
+    assert stage.uses_structure
+    assert stage.push([by_tracks(1.1), by_structure(1.1)]) == (by_structure(1.1),)
+
+
+@pytest.mark.parametrize('reliable', [True, False])
+def test_a_recording_that_ends_gives_out_what_was_held_if_the_tracks_are_reliable(reliable):
+    stage, tracks = selector()
+    stage.push([by_tracks(1.0)])
+    tracks.judged, tracks.reliable = True, reliable
+    assert stage.flush() == ((by_tracks(1.0),) if reliable else ())
+    assert stage.flush() == ()
+
+
+def test_no_speed_is_earlier_than_the_one_before_by_another_method():
+    stage, tracks = selector()
+    tracks.judged = tracks.reliable = True
+    assert stage.push([by_tracks(2.0)]) == (by_tracks(2.0),)
+    tracks.reliable = False
+    assert stage.push([by_structure(1.9), by_structure(2.1)]) == (by_structure(2.1),)
+
+
+@pytest.mark.parametrize(
+    ('method', 'chosen'), [('tracking', by_tracks(1.0)), ('structure_function', by_structure(1.0))]
+)
+def test_a_method_that_is_set_is_the_only_one(method, chosen):
+    stage, _ = selector(method)
+    assert stage.push([by_tracks(1.0), by_structure(1.0)]) == (chosen,)
+    assert stage.uses_tracks == stage.uses_contacts == (method == 'tracking')
+    assert stage.uses_structure == (method == 'structure_function')
+
+
+def test_a_crowded_tray_is_not_tracked():
+    stage, _ = selector(crowded=True)
+    assert not stage.uses_tracks
+    assert stage.uses_structure
+
+
+def test_a_speed_known_to_less_than_20_per_cent_is_flagged_unless_the_beads_rest():
+    stage, _ = selector('tracking')
+    vague = by_tracks(1.0, value=1e-3, error=3e-4)
+    at_rest = by_tracks(2.0, value=1e-5, error=3e-5)
+    assert stage.push([vague]) == (replace(vague, quality=Quality.UNCERTAIN),)
+    assert stage.push([at_rest]) == (at_rest,)
