@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
 
 # A relative velocity u, Gaussian in two components, stays within a box of full width 2 x over a
-# time T when |u_i| T < 2 x: 16 x^2 / (2 pi W^2), W being the way sigma T of a component.
+# time T when |u_i| T < 2 x: 16 x^2 / (2 pi W^2), W being the path sigma T of a component.
 _BOX = 8.0 / math.pi
 # Slow pairs are more frequent than a Gaussian says: inelastic neighbours move alike, and mixtures
 # and starts with even speeds are peaked. Together with the next number it is not below what gases
