@@ -9,6 +9,8 @@ without sticking are controls, in which no compaction is possible.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from benchmarks.contacts import true_tracks
@@ -61,7 +63,8 @@ def _from_tracks(number: int, speed: float) -> None:
         moments = gas.moments(_PICTURES)
         for tracks in true_tracks(tray, settings, run, _PICTURES):
             moment = next(moments)
-            merges = [record for record in counter.push(tracks, 1) if isinstance(record, Merge)]
+            records = counter.push(replace(tracks, cycle=1))
+            merges = [record for record in records if isinstance(record, Merge)]
             pairs += [tuple(merge.tracks.tolist()) for merge in merges]
         height = tray.dimensions[2]
         truth = packing_of_clusters(moment.positions[:, :2], gas.radii, gas.bodies, height)

@@ -79,7 +79,7 @@ def report() -> None:
             if tray_image.tray in trackers:
                 (tracks,) = clock.timed('tracking', trackers[tray_image.tray].push, tray_image)
                 clock.timed('contacts', finders[tray_image.tray].push, tracks)
-                clock.timed('bodies', counters[tray_image.tray].push, tracks, 1)
+                clock.timed('bodies', counters[tray_image.tray].push, tracks)
     cv2.setNumThreads(threads)
     _print(clock, len(shots) - _WARM_UP, sorted(trackers))
 

@@ -7,7 +7,7 @@ True positions at 30 Hz with errors as in tracking, 58 s after a shaking event a
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -78,7 +78,7 @@ def course(tray: Tray, pictures: Iterable[tuple[Tracks, np.ndarray, float]]) -> 
     records: list[BodyEstimate | Merge] = []
     rows = []
     for tracks, bodies, speed in pictures:
-        records += counter.push(tracks, 1)
+        records += counter.push(replace(tracks, cycle=1))
         sizes = np.unique(bodies, return_counts=True)[1]
         rows.append((tracks.stamp_ns / _NS, sizes.size, (sizes**2).sum() / sizes.sum(), speed))
     records += counter.flush()

@@ -143,7 +143,9 @@ def _counted(name: str) -> list[Counted]:
     for film in pickle.loads((folder() / name).read_bytes()):
         counter = BodyCounter(PipelineSettings(), film.cell)
         records = [
-            record for cycle, tracks in film.tracks for record in counter.push(tracks, cycle)
+            record
+            for cycle, tracks in film.tracks
+            for record in counter.push(replace(tracks, cycle=cycle))
         ]
         first_cycle = [record for record in (*records, *counter.flush()) if record.cycle == 1]
         cells.append(

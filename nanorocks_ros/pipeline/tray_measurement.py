@@ -97,7 +97,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
             for tracks in self._tracker.push(image):
                 pictures += [tracks] if self.emit_tracks else []
                 events += self._contacts_in(tracks)
-                events += self._bodies.push(tracks, image.cycle or 0)
+                events += self._bodies.push(tracks)
                 speeds += self._track_speed.push(tracks)
         speeds += self._structure_speeds(image)
         return (*pictures, *self._selected(speeds), *self._reliable(events))

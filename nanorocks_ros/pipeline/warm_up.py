@@ -140,9 +140,10 @@ def warm_up_contacts() -> None:
             radius_errors=np.full(3, 1e-6),
             seen=np.ones(3, dtype=np.bool_),
             expected=np.array([3], dtype=np.int32),
+            cycle=1,
         )
         finder.push(tracks)
-        counter.push(tracks, 1)
+        counter.push(tracks)
     finder.flush()
 
 

@@ -45,6 +45,8 @@ class Tracks:
         Beads of each species that the tray should show.
     quality : Quality
         That of the image, and FEW_BEADS where much of a species is not seen.
+    cycle : int
+        Number of shaking events before the image.
     """
 
     stamp_ns: int
@@ -61,6 +63,7 @@ class Tracks:
     seen: NDArray[np.bool_]
     expected: NDArray[np.int32]
     quality: Quality = NOTHING_WRONG
+    cycle: int = 0
 
     def __post_init__(self) -> None:
         freeze_arrays(self)

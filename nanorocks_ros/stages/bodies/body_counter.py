@@ -13,7 +13,7 @@ from nanorocks_ros.inference.sticking.chance_proximity import (
     encounter_rate,
     max_chance_probability,
 )
-from nanorocks_ros.records import BodyEstimate, Merge
+from nanorocks_ros.records import BodyEstimate, Merge, Tracks
 from nanorocks_ros.stages.bodies.body_sizes import bodies_of, possible_merges, size_fields
 from nanorocks_ros.stages.bodies.bonds import Bond, BondFinder
 from nanorocks_ros.stages.bodies.comoving_bodies import ComovingBodies
@@ -23,12 +23,12 @@ from nanorocks_ros.stages.bodies.new_tracks import NewTracks
 from nanorocks_ros.stages.bodies.occluded_beads import OccludedBeads
 from nanorocks_ros.stages.bodies.reappearing_beads import ReappearingBeads
 from nanorocks_ros.stages.bodies.touching_pairs import SeenBeads
+from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.records import Tracks
     from nanorocks_ros.settings import PipelineSettings
 
 _NS = 1e9
@@ -44,8 +44,11 @@ _COMOVING_CHANCE_SHARE = 0.3
 _MAX_TRACK_BREAK_TIME = 5.0
 
 
-class BodyCounter:
+class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
     """Counts the bodies of one tray.
+
+    Tracks give the new merges and the estimates that are due. A new cycle starts with single
+    beads.
 
     Parameters
     ----------
@@ -58,6 +61,8 @@ class BodyCounter:
         If the rate of false alarms is out of range.
     """
 
+    clock = Tracks
+
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.bodies
         self._tray = tray
@@ -69,10 +74,10 @@ class BodyCounter:
         self._bond_finder = BondFinder(partial(chance_probability, rate=self._encounter_rate))
         self.reset()
 
-    def reset(self) -> None:
+    def _restart(self, stamp_ns: int | None = None) -> None:
         """Forget all tracks and bodies; estimates that are held back are lost."""
+        del stamp_ns
         self._first_ns = 0
-        self._last_ns: int | None = None
         self._new_tracks = NewTracks()
         self._start_cycle(0)
 
@@ -96,38 +101,27 @@ class BodyCounter:
         self._path = 0.0
         self._energies = np.zeros(len(self._tray.species))
 
-    def push(self, tracks: Tracks, cycle: int = 0) -> tuple[BodyEstimate | Merge, ...]:
-        """Add the tracks of the next frame; return new merges and the estimates that are due.
-
-        Parameters
-        ----------
-        tracks : Tracks
-        cycle : int
-            Number of shaking events so far. A new cycle starts with single beads. A stamp that
-            goes back resets the stage.
-        """
-        if self._last_ns is not None and tracks.stamp_ns <= self._last_ns:
-            self.reset()
+    def _process(self, record: Tracks) -> tuple[BodyEstimate | Merge, ...]:
+        """Add the tracks of a frame; return new merges and the estimates that are due."""
         estimates: tuple[BodyEstimate | Merge, ...] = ()
-        if cycle != self._cycle:
+        if record.cycle != self._cycle:
             estimates = self.flush()
-            self._start_cycle(cycle)
+            self._start_cycle(record.cycle)
         if not self._frames:
-            self._first_ns = tracks.stamp_ns
-        self._last_ns = tracks.stamp_ns
-        time = (tracks.stamp_ns - self._first_ns) / _NS
-        ids = self._occluded.assign_ids(tracks, self._bonds)
-        self._new_tracks.push(tracks, ids)
-        beads = self._seen_beads(tracks, ids)
-        self._add_frame(time, tracks, beads, ids)
+            self._first_ns = record.stamp_ns
+        time = (record.stamp_ns - self._first_ns) / _NS
+        ids = self._occluded.assign_ids(record, self._bonds)
+        self._new_tracks.push(record, ids)
+        beads = self._seen_beads(record, ids)
+        self._add_frame(time, record, beads, ids)
         bonds, broken = self._bond_finder.push(time, beads, self._max_free_chance())
         for ids_of in broken:
             self._bonds.pop(ids_of, None)
-        bonds += self._comoving_bonds(time, tracks, beads)
-        due = self._due_estimates(tracks.stamp_ns)
+        bonds += self._comoving_bonds(time, record, beads)
+        due = self._due_estimates(record.stamp_ns)
         if self._tracks_break_often():
             return estimates
-        merges = [self._merge(bond, tracks.stamp_ns) for bond in self._without_doubles(bonds)]
+        merges = [self._merge(bond, record.stamp_ns) for bond in self._without_doubles(bonds)]
         return (*estimates, *merges, *due)
 
     def _comoving_bonds(self, time: float, tracks: Tracks, beads: SeenBeads) -> list[Bond]:

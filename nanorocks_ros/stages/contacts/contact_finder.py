@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.records import PairCollision, Rebound
+from nanorocks_ros.records import PairCollision, Rebound, Tracks
 from nanorocks_ros.stages.contacts.flight_segments import FlightSegments, VelocityJump
 from nanorocks_ros.stages.contacts.line_fits import Intersection, intersect_lines
 from nanorocks_ros.stages.contacts.pair_tests import MAX_SIGMAS, MIN_SIGNAL, is_isolated_collision
 from nanorocks_ros.stages.contacts.segmentation_kernels import MAX_FLIGHT_POINTS
 from nanorocks_ros.stages.contacts.tray_history import TrayHistory
 from nanorocks_ros.stages.contacts.unmatched_jumps import UnmatchedJumps
+from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.records import Tracks
 
 _NS = 1e9
 
@@ -38,40 +38,38 @@ _MIN_DISTANCE, _MAX_DISTANCE = 0.9, 1.05
 _TIME_TOLERANCE = 0.3
 
 
-class ContactFinder:
+class ContactFinder(RestartingStage[Tracks, Rebound | PairCollision]):
     """Finds rebounds and collisions in the tracks of one tray.
+
+    A contact is complete when the flight after it ends, or is 48 positions long: at most 1.6 s
+    later at 30 frames/s.
 
     Parameters
     ----------
     tray : Tray
     """
 
+    clock = Tracks
+
     def __init__(self, tray: Tray) -> None:
         self._tray = tray
         self.reset()
 
-    def reset(self) -> None:
+    def _restart(self, stamp_ns: int | None = None) -> None:
         """Forget all tracks; contacts that are held back are lost."""
-        self._first_ns = 0
-        self._last_ns: int | None = None
+        del stamp_ns
+        self._first_ns: int | None = None
         self._segments = FlightSegments(self._tray)
         self._history = TrayHistory(3 * MAX_FLIGHT_POINTS)
         self._unmatched = UnmatchedJumps()
 
-    def push(self, tracks: Tracks) -> tuple[Rebound | PairCollision, ...]:
-        """Add the tracks of the next frame and return the contacts that are complete now.
-
-        A contact is complete when the flight after it ends, or is 48 positions long: at most
-        1.6 s later at 30 frames/s. A stamp that goes back resets the stage.
-        """
-        if self._last_ns is not None and tracks.stamp_ns <= self._last_ns:
-            self.reset()
-        if self._last_ns is None:
-            self._first_ns = tracks.stamp_ns
-        self._last_ns = tracks.stamp_ns
-        time = (tracks.stamp_ns - self._first_ns) / _NS
-        self._history.push(time, tracks)
-        jumps = self._segments.push(time, tracks, _MAX_GAP_FRAMES * self._history.interval)
+    def _process(self, record: Tracks) -> tuple[Rebound | PairCollision, ...]:
+        """Add the tracks of a frame and return the contacts that are complete now."""
+        if self._first_ns is None:
+            self._first_ns = record.stamp_ns
+        time = (record.stamp_ns - self._first_ns) / _NS
+        self._history.push(time, record)
+        jumps = self._segments.push(time, record, _MAX_GAP_FRAMES * self._history.interval)
         self._unmatched.drop_before(time - 2 * MAX_FLIGHT_POINTS * self._history.interval)
         return tuple(contact for jump in jumps for contact in self._contact_at(jump))
 
@@ -111,7 +109,7 @@ class ContactFinder:
         return jump.last - slack < crossing.time < jump.first + slack
 
     def _stamp_ns(self, time: float) -> int:
-        return self._first_ns + round(time * _NS)
+        return (self._first_ns or 0) + round(time * _NS)
 
     def _rebound(self, jump: VelocityJump, crossing: Intersection) -> Rebound | None:
         x, y, variance = _contact_position(jump.lines, crossing.time)

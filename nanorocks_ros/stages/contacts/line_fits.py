@@ -63,10 +63,6 @@ class Line(NamedTuple):
         """The fields in an array, (LINE_SIZE,)."""
         return np.hstack(self)
 
-    def at(self, time: float) -> NDArray[np.float64]:
-        """Position at a time, (2,), [m]."""
-        return self.position + self.velocity * (time - self.time)
-
 
 @compiled
 def _chi_square(sums: NDArray[np.float64], first: int, end: int) -> float:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.records import Quality, Tracks, TrayImage
+from nanorocks_ros.stages.stage import RestartingStage
 from nanorocks_ros.stages.tracking.detection.bead_detector import BeadDetector
 from nanorocks_ros.stages.tracking.linking.track_linker import Linker
 from nanorocks_ros.stages.tracking.linking.track_snapshot import (
@@ -32,14 +33,18 @@ _MIN_VISIBLE_SHARE = 0.85
 _CROWDED_PX = 0.6
 
 
-class Tracker:
+class Tracker(RestartingStage[TrayImage, Tracks]):
     """Tracks the beads of one tray.
+
+    An image gives one record of tracks; a gray image none, since colour separates the species.
 
     Parameters
     ----------
     settings : PipelineSettings
     tray : Tray
     """
+
+    clock = TrayImage
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.tracking
@@ -48,12 +53,12 @@ class Tracker:
         self._expected = np.array([species.count for species in tray.species], dtype=np.int32)
         self.reset()
 
-    def reset(self) -> None:
+    def _restart(self, stamp_ns: int | None = None) -> None:
         """Forget the tracks and the background: the next image is the first one."""
+        del stamp_ns
         self._detector = BeadDetector(self._settings, self._tray, self._scale)
         self._linkers: list[Linker] = []
         self._first_ns = 0
-        self._last_ns: int | None = None
         self._next_id = 0
 
     @property
@@ -66,43 +71,29 @@ class Tracker:
         """Whether a species has too many grains to be tracked."""
         return self._detector.crowded
 
-    def push(self, image: TrayImage) -> tuple[Tracks, ...]:
-        """Detect and link the beads of the next image of the tray.
-
-        Returns
-        -------
-        tuple of Tracks
-            One record; none for a gray image, since colour separates the species. A stamp that
-            goes back resets the stage.
-        """
-        if image.color is None:
+    def _process(self, record: TrayImage) -> tuple[Tracks, ...]:
+        """Detect and link the beads of an image."""
+        if record.color is None:
             return ()
-        if self._last_ns is not None and image.stamp_ns <= self._last_ns:
-            self.reset()
         if not self._linkers:
-            self._first_ns = image.stamp_ns
+            self._first_ns = record.stamp_ns
             self._linkers = [
-                self._linker_of(species, image.gray.shape) for species in self._tray.species
+                self._linker_of(species, record.gray.shape) for species in self._tray.species
             ]
-        self._last_ns = image.stamp_ns
-        time = (image.stamp_ns - self._first_ns) / _NS
+        time = (record.stamp_ns - self._first_ns) / _NS
         # Beads fly straight in the camera frame, not in the frame of a swinging tray.
-        displacement = np.array([_zero_if_nan(value) for value in image.displacement])
+        displacement = np.array([_zero_if_nan(value) for value in record.displacement])
         shift = displacement * self._scale
-        registration = _zero_if_nan(image.displacement_error) * self._scale
+        registration = _zero_if_nan(record.displacement_error) * self._scale
         hints = [linker.hints(time, shift) for linker in self._linkers]
-        detected = self._detector.detect(image.color, hints)
+        detected = self._detector.detect(record.color, hints)
         for linker, detections in zip(self._linkers, detected, strict=True):
             errors = np.hypot(detections.position_errors, registration)
             shifted = replace(
                 detections, positions=detections.positions + shift, position_errors=errors
             )
             self._next_id += linker.push(time, shifted, shift, self._next_id)
-        return (self._tracks(image, time, displacement),)
-
-    def flush(self) -> tuple[Tracks, ...]:
-        """Give out nothing: `push` returns the tracks of an image at once."""
-        return ()
+        return (self._tracks(record, time, displacement),)
 
     def _linker_of(self, species: Species, shape: tuple[int, ...]) -> Linker:
         return Linker(
@@ -142,6 +133,7 @@ class Tracker:
             seen=beads.seen,
             expected=self._expected,
             quality=image.quality | self._quality_of(beads.species, beads.seen),
+            cycle=image.cycle or 0,
         )
 
     def _quality_of(self, species: NDArray[np.int32], seen: NDArray[np.bool_]) -> Quality:

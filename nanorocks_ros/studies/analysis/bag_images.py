@@ -1,4 +1,4 @@
-"""The tray images of a bag: its frames, preprocessed.
+"""From a bag to its frames and tray images.
 
 Tested by ``test/studies/inspection/test_preprocessing_steps.py``.
 """
@@ -18,7 +18,26 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
+    from nanorocks_ros.experiment.view import View
     from nanorocks_ros.settings import PipelineSettings
+
+
+class BagCamera(NamedTuple):
+    """The camera of a bag.
+
+    Parameters
+    ----------
+    bag : BagFrames
+    epoch_ns : int
+        What times count from.
+    view : View or None
+        What the bag says of the lens; None when it says nothing, or the settings name a
+        calibration file, which replaces it.
+    """
+
+    bag: BagFrames
+    epoch_ns: int
+    view: View | None
 
 
 class Shot(NamedTuple):
@@ -29,17 +48,119 @@ class Shot(NamedTuple):
     number : int
         Of the frame, counted from 0.
     frame : Frame
-    images : tuple of TrayImage
-        Of the trays that can be used; may be empty.
+    records : tuple of TrayImage and Notice
     """
 
     number: int
     frame: Frame
-    images: tuple[TrayImage, ...]
+    records: tuple[TrayImage | Notice, ...]
+
+    @property
+    def images(self) -> tuple[TrayImage, ...]:
+        """Images of the trays that can be used; may be empty."""
+        return tuple(record for record in self.records if isinstance(record, TrayImage))
+
+
+def open_camera(path: str | Path, settings: PipelineSettings, image_topic: str = '') -> BagCamera:
+    """Open a bag and read what is known of its camera.
+
+    Parameters
+    ----------
+    path : str or Path
+    settings : PipelineSettings
+    image_topic : str, optional
+        The camera's topic if it has another name than the graph's.
+
+    Raises
+    ------
+    RecordingError
+        When the bag cannot be read or holds no camera.
+    """
+    bag = BagFrames(path, image_topic)
+    epoch_ns = bag.epoch_ns()
+    if epoch_ns is None:
+        raise RecordingError(bag.where, 'holds no frame', 'pass another bag or --image-topic')
+    return BagCamera(bag, epoch_ns, None if settings.preprocess.calibration else bag.view())
+
+
+class PreprocessedFrames:
+    """The frames of a bag, pushed through a preprocessor.
+
+    Parameters
+    ----------
+    bag : BagFrames
+    stage : Preprocessor
+
+    Attributes
+    ----------
+    frames : int
+        Frames read so far, whether they could be used or not.
+    refused : int
+        Frames that could not be used so far.
+    error : FrameError or None
+        Why the first of them could not.
+    """
+
+    def __init__(self, bag: BagFrames, stage: Preprocessor) -> None:
+        self._bag = bag
+        self._stage = stage
+        self.frames = 0
+        self.refused = 0
+        self.error: FrameError | None = None
+
+    @property
+    def lens_notices(self) -> list[str]:
+        """A notice for the user when the lens is unknown."""
+        if self._stage.view is not None:
+            return []
+        return [
+            f'{self._bag.where}: no camera_info and no calibration file; the picture is taken as '
+            'straight'
+        ]
+
+    def shots(self, progress: Callable[[int, int], None] | None = None) -> Iterator[Shot]:
+        """Every frame that can be decoded, in order; once.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called with the frames done and the frames there are.
+
+        Raises
+        ------
+        FrameError
+            At the end, when no frame could be used.
+        """
+        any_images = False
+        for number, frame in enumerate(self._bag.frames()):
+            self.frames = number + 1
+            shot = self._shot(number, frame)
+            if shot is not None:
+                any_images = any_images or bool(shot.images)
+                yield shot
+            if progress is not None:
+                progress(number + 1, self._bag.count)
+        if not any_images:
+            raise self.error or FrameError(
+                self._bag.where,
+                'no frame can be used: all are black, white or broken',
+                'record it again',
+            )
+
+    def _shot(self, number: int, frame: Frame | FrameError) -> Shot | None:
+        """The preprocessed frame; None when it is refused."""
+        try:
+            if isinstance(frame, FrameError):
+                raise frame
+            return Shot(number, frame, self._stage.push(frame))
+        except FrameError as error:
+            self.refused += 1
+            self.error = self.error or error
+            return None
 
 
 class BagImages:
-    """Preprocesses the frames of a bag.
+    """The tray images of a bag, for a study without the whole pipeline.
 
     Parameters
     ----------
@@ -59,10 +180,6 @@ class BagImages:
     view : View or None
         What is known of the lens.
     stage : Preprocessor
-    frames : int
-        Frames read so far, whether they could be used or not.
-    refused : FrameError or None
-        Why the first of the frames that could not be used could not.
 
     Raises
     ------
@@ -73,66 +190,37 @@ class BagImages:
     """
 
     def __init__(self, path: Path, settings: PipelineSettings, image_topic: str = '') -> None:
-        self.bag = BagFrames(path, image_topic)
-        epoch_ns = self.bag.epoch_ns()
-        if epoch_ns is None:
-            raise RecordingError(
-                self.bag.where, 'holds no frame', 'pass another bag or --image-topic'
-            )
-        self.epoch_ns = epoch_ns
+        self.bag, self.epoch_ns, view = open_camera(path, settings, image_topic)
         self.settings = calibrated(settings)
         self.trays = trays_of(self.settings)
-        self.stage = Preprocessor(self.settings, self.trays, self.bag.where, self.bag.view())
+        self.stage = Preprocessor(self.settings, self.trays, self.bag.where, view)
         self.view = self.stage.view
-        self.frames = 0
-        self.refused: FrameError | None = None
+        self._frames = PreprocessedFrames(self.bag, self.stage)
         self._notices: list[str] = []
-        self._any = False
+
+    @property
+    def frames(self) -> int:
+        """Frames read so far, whether they could be used or not."""
+        return self._frames.frames
+
+    @property
+    def error(self) -> FrameError | None:
+        """Why the first of the frames that could not be used could not."""
+        return self._frames.error
 
     @property
     def notices(self) -> list[str]:
         """Notices for the user, complete once the frames have been read."""
-        notices = [*self.bag.reader.notices, *self._notices]
-        if self.refused is not None:
-            notices.append(str(self.refused))
-        if self.view is None:
-            notices.append(
-                f'{self.bag.where}: no camera_info and no calibration file; the picture is taken '
-                'as straight'
-            )
-        return notices
+        refusal = [] if self.error is None else [str(self.error)]
+        return [
+            *self.bag.reader.notices,
+            *self._notices,
+            *refusal,
+            *self._frames.lens_notices,
+        ]
 
     def shots(self, progress: Callable[[int, int], None] | None = None) -> Iterator[Shot]:
-        """Every frame that can be decoded, in order; once.
-
-        Parameters
-        ----------
-        progress : callable, optional
-            Called with the frames done and the frames there are.
-
-        Raises
-        ------
-        FrameError
-            At the end, when no frame could be used.
-        """
-        for number, frame in enumerate(self.bag.frames()):
-            self.frames = number + 1
-            try:
-                if isinstance(frame, FrameError):
-                    raise frame
-                records = self.stage.push(frame)
-            except FrameError as error:
-                self.refused = self.refused or error
-            else:
-                self._notices += [record.text for record in records if isinstance(record, Notice)]
-                images = tuple(record for record in records if isinstance(record, TrayImage))
-                self._any = self._any or bool(images)
-                yield Shot(number, frame, images)
-            if progress is not None:
-                progress(number + 1, self.bag.count)
-        if not self._any:
-            raise self.refused or FrameError(
-                self.bag.where,
-                'no frame can be used: all are black, white or broken',
-                'record it again',
-            )
+        """Every frame that can be decoded; see `PreprocessedFrames.shots`."""
+        for shot in self._frames.shots(progress):
+            self._notices += [record.text for record in shot.records if isinstance(record, Notice)]
+            yield shot

@@ -8,29 +8,27 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.outputs.disk_list import Spool, SpoolFile
 from nanorocks_ros.pipeline.composition import Pipeline
 from nanorocks_ros.records import (
     BodyEstimate,
     ClusterEstimate,
     CorEstimate,
-    Frame,
     GroundTruth,
     Merge,
     Notice,
     PairCollision,
     Rebound,
     SpeedEstimate,
-    TrayImage,
 )
-from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+from nanorocks_ros.studies.analysis.bag_images import PreprocessedFrames, open_camera
 from nanorocks_ros.wire.products import MEASURED, is_measured
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
+    from nanorocks_ros.errors import FrameError
     from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
     from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
     from nanorocks_ros.jobs.progress import Progress
@@ -216,11 +214,7 @@ def analyse(
     FrameError
         When no frame can be used.
     """
-    bag = BagFrames(path, image_topic)
-    epoch_ns = bag.epoch_ns()
-    if epoch_ns is None:
-        raise RecordingError(bag.where, 'holds no frame', 'pass another bag or --image-topic')
-    view = None if settings.preprocess.calibration else bag.view()
+    bag, epoch_ns, view = open_camera(path, settings, image_topic)
     pipeline = Pipeline(settings, bag.where, view)
     truth = bag.truth(epoch_ns)
     result = Analysis(
@@ -229,21 +223,16 @@ def analyse(
         complete=bag.reader.complete,
         metadata=bag.reader.metadata,
     )
-    for number, frame in enumerate(bag.frames(), start=1):
-        try:
-            if isinstance(frame, FrameError):
-                raise frame
-            _push(result, pipeline, frame)
-        except FrameError as error:
-            result.refused += 1
-            result.error = result.error or error
-        if progress is not None:
-            progress(number, bag.count)
-    if not result.stamps_ns:
-        raise result.error or FrameError(
-            bag.where, 'no frame can be used: all are black, white or broken', 'record it again'
-        )
-    result.notices += _remarks(pipeline, bag.where)
+    frames = PreprocessedFrames(bag, pipeline.preprocessor)
+    for shot in frames.shots(progress):
+        if shot.images:
+            result.stamps_ns.append(shot.frame.stamp_ns)
+        _keep(result, pipeline.follow(shot.records))
+    result.error, result.refused = frames.error, frames.refused
+    result.notices += frames.lens_notices
+    duplicates = pipeline.preprocessor.duplicates
+    if duplicates:
+        result.notices.append(f'{bag.where}: {duplicates} frames were stored twice and left out')
     if result.refused:
         result.notices.append(f'{bag.where}: {result.refused} frames could not be used')
         result.complete = False
@@ -263,26 +252,6 @@ def _empty(
     """Empty results of each tray."""
     file = None if scratch is None else SpoolFile(scratch)
     return {tray: TrayResults(truth=truth.get(tray), spool_file=file) for tray in trays}
-
-
-def _remarks(pipeline: Pipeline, where: str) -> list[str]:
-    """Notices on the frames as a whole."""
-    stage = pipeline.preprocessor
-    remarks = []
-    if stage.view is None:
-        remarks.append(
-            f'{where}: no camera_info and no calibration file; the picture is taken as straight'
-        )
-    if stage.duplicates:
-        remarks.append(f'{where}: {stage.duplicates} frames were stored twice and left out')
-    return remarks
-
-
-def _push(result: Analysis, pipeline: Pipeline, frame: Frame) -> None:
-    records = pipeline.push(frame)
-    if any(isinstance(record, TrayImage) for record in records):
-        result.stamps_ns.append(frame.stamp_ns)
-    _keep(result, records)
 
 
 def _keep(result: Analysis, records: Iterable[Result]) -> None:

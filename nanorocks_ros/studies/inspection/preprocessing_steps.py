@@ -165,7 +165,7 @@ def steps_of_bag(
             f'{value}, but the recording has {images.frames} frames',
             'choose an earlier frame',
         )
-    reason = f' ({images.refused.what})' if images.refused else ''
+    reason = f' ({images.error.what})' if images.error else ''
     raise FrameError(
         f'{images.bag.where}: frame {target if time is None else shot.number}',
         f'cannot be used{reason}',

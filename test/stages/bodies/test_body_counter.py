@@ -34,6 +34,7 @@ def _tracks(stamp_ns, positions, velocities, seen=None, ids=None):
         radius_errors=np.full(n, 1e-5),
         seen=np.ones(n, dtype=bool) if seen is None else seen,
         expected=np.array([15], dtype=np.int32),
+        cycle=1,
     )
 
 
@@ -51,9 +52,9 @@ def _gas(sticking_speed, seconds, seed=1, **values):
         )
 
 
-def _estimates_and_merges(frames, cycle=1, settings=None):
+def _estimates_and_merges(frames, settings=None):
     counter = BodyCounter(settings or PipelineSettings(), TRAY)
-    records = [record for tracks in frames for record in counter.push(tracks, cycle)]
+    records = [record for tracks in frames for record in counter.push(tracks)]
     records += counter.flush()
     return (
         [record for record in records if isinstance(record, BodyEstimate)],
@@ -166,12 +167,12 @@ def test_a_body_that_breaks_is_two_bodies(sticky):
 def test_a_shaking_event_separates_all_beads(sticky):
     counter = BodyCounter(PipelineSettings(), TRAY)
     for tracks, _ in sticky:
-        counter.push(tracks, 1)
+        counter.push(tracks)
     later = [
-        replace(tracks, stamp_ns=tracks.stamp_ns + sticky[-1][0].stamp_ns + 33_000_000)
+        replace(tracks, stamp_ns=tracks.stamp_ns + sticky[-1][0].stamp_ns + 33_000_000, cycle=2)
         for tracks, _ in _gas(0.0, 3.0, seed=3)
     ]
-    records = [record for tracks in later for record in counter.push(tracks, 2)]
+    records = [record for tracks in later for record in counter.push(tracks)]
     estimates = [
         record for record in records if isinstance(record, BodyEstimate) and record.cycle == 2
     ]
@@ -182,8 +183,7 @@ def test_a_shaking_event_separates_all_beads(sticky):
 def test_a_stamp_that_goes_back_resets_the_counter(sticky):
     counter = BodyCounter(PipelineSettings(), TRAY)
     runs = [
-        [record for tracks, _ in sticky[:120] for record in counter.push(tracks, 1)]
-        for _ in range(2)
+        [record for tracks, _ in sticky[:120] for record in counter.push(tracks)] for _ in range(2)
     ]
     assert [record.stamp_ns for record in runs[0]] == [record.stamp_ns for record in runs[1]]
 
@@ -196,7 +196,7 @@ def test_flush_gives_the_estimates_of_the_last_instants(sticky):
         record
         for tracks, _ in sticky
         if tracks.stamp_ns <= last.known_ns
-        for record in counter.push(tracks, 1)
+        for record in counter.push(tracks)
     ]
     before = [record for record in pushed if isinstance(record, BodyEstimate)]
     # The merge itself is not held back; the estimates of the bodies it makes are.
@@ -213,7 +213,7 @@ def test_reset_forgets_bodies_and_estimates(sticky):
     counter = BodyCounter(PipelineSettings(), TRAY)
     runs = []
     for _ in range(2):
-        records = [record for tracks, _ in sticky for record in counter.push(tracks, 1)]
+        records = [record for tracks, _ in sticky for record in counter.push(tracks)]
         runs.append([record.stamp_ns for record in records])
         counter.reset()
         assert counter.flush() == ()
@@ -255,7 +255,7 @@ def test_one_bead_is_one_body():
     estimates = [
         estimate
         for k in range(60)
-        for estimate in counter.push(_tracks(int(k * NS / RATE), positions, np.zeros((1, 2))), 1)
+        for estimate in counter.push(_tracks(int(k * NS / RATE), positions, np.zeros((1, 2))))
     ]
     assert {(estimate.bodies, estimate.bodies_error) for estimate in estimates} == {(1.0, 0.0)}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.experiment.calibration import CameraInfo
+from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, rectified_view
+from nanorocks_ros.experiment.calibration_file import write_calibration
+from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.bag.writer import BagWriter
@@ -18,8 +21,9 @@ from nanorocks_ros.recordings.messages.message_builders import (
     image_message,
     time_message,
 )
-from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+from nanorocks_ros.studies.analysis.bag_images import BagImages
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.wire import topics
 
@@ -103,6 +107,23 @@ def test_a_lens_that_is_not_known_is_refused_with_the_remedy(tmp_path, capsys):
     assert main(['analyse', str(path), '--no-output']) == 1
     line = capsys.readouterr().err.strip().splitlines()[-1]
     assert line.endswith('calibrate for equidistant or plumb_bob, or set preprocess.calibration')
+
+
+def test_a_calibration_file_replaces_a_lens_that_is_not_known(tmp_path):
+    path = bag_of(tmp_path / 'bag', [picture(k) for k in range(10)], info=lens('fov'))
+    file = tmp_path / 'lens.yaml'
+    info = replace(lens(), k=tuple(lens().k.ravel()))
+    calibration = Calibration(
+        info=info,
+        view=rectified_view(info, 'test'),
+        regions={1: Region(11, 11, 188, 188)},
+        pixels_per_metre=12503.25,
+        residual_px=0.125,
+    )
+    write_calibration(calibration, file, 'made by a test')
+    settings = with_values(PipelineSettings(), {'preprocess.calibration': str(file)}, 'test')
+    images = [image for shot in BagImages(path, settings).shots() for image in shot.images]
+    assert len(images) == analyse(path, settings).frames == 10
 
 
 def test_a_lens_of_pictures_of_another_size_is_refused(tmp_path, capsys):
