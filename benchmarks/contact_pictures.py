@@ -109,7 +109,10 @@ def _best(contacts: list, frames: Film) -> tuple[Rebound, PairCollision]:
     ]
     pairs = [contact for contact in straight if isinstance(contact, PairCollision)]
     return (
-        max(rebounds, key=lambda contact: contact.incoming + abs(contact.tangential_incoming)),
+        max(
+            rebounds,
+            key=lambda contact: contact.incoming.value + abs(contact.tangential_incoming),
+        ),
         max(pairs, key=lambda contact: float(np.hypot(*(contact.before[1] - contact.before[0])))),
     )
 
@@ -124,11 +127,12 @@ def write(folder: Path) -> None:
     left, right = figure.subplots(1, 2)
     _draw(left, frames, rebound, rebound.place)
     left.axvline(-0.5, color='black', lw=1.0)
-    ratio = rebound.outgoing / rebound.incoming
-    error = np.hypot(rebound.outgoing_error, rebound.incoming_error) / rebound.incoming
+    ratio = rebound.outgoing.value / rebound.incoming.value
+    error = np.hypot(rebound.outgoing.error, rebound.incoming.error) / rebound.incoming.value
     left.set_title(
-        f'A rebound: {1e3 * rebound.incoming:.2f} to the wall, {1e3 * rebound.outgoing:.2f} mm/s '
-        f'from it\nratio {ratio:.3f} ± {error:.3f} (true: {_WALLS})',
+        f'A rebound: {1e3 * rebound.incoming.value:.2f} to the wall, '
+        f'{1e3 * rebound.outgoing.value:.2f} mm/s from it\n'
+        f'ratio {ratio:.3f} ± {error:.3f} (true: {_WALLS})',
         fontsize=10,
     )
     _draw(right, frames, pair, pair.place + 0.5 * pair.separation)

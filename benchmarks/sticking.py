@@ -134,10 +134,10 @@ def compared(cycle: Course) -> tuple[np.ndarray, ...]:
     rows = [
         (
             count.stamp_ns / _NS,
-            count.bodies,
-            count.bodies_error,
-            count.weighted_size,
-            count.weighted_size_error,
+            count.bodies.value,
+            count.bodies.error,
+            count.weighted_size.value,
+            count.weighted_size.error,
         )
         for count in cycle.counts
     ]

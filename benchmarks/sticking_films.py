@@ -212,12 +212,15 @@ def _row(tray: int, speed: float, cells: list[Counted]) -> str:
 
 def _errors(cell: Counted) -> tuple[np.ndarray, np.ndarray]:
     """Errors of the number of bodies, and relative errors of the size, where known."""
-    counts = [count for count in cell.counts if math.isfinite(count.bodies)]
+    counts = [count for count in cell.counts if math.isfinite(count.bodies.value)]
     film = cell.film
     times = np.array([estimate.stamp_ns / _NS for estimate in counts])
     at = np.searchsorted(film.time, times - 0.5 / _RATE)
-    bodies = np.array([estimate.bodies for estimate in counts]) - film.bodies[at]
-    size = np.array([estimate.weighted_size for estimate in counts]) / film.weighted_size[at] - 1.0
+    bodies = np.array([estimate.bodies.value for estimate in counts]) - film.bodies[at]
+    size = (
+        np.array([estimate.weighted_size.value for estimate in counts]) / film.weighted_size[at]
+        - 1.0
+    )
     return bodies, size
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood
+from nanorocks_ros.records import UNKNOWN, UNKNOWN_MEASURED_INTERVAL, MeasuredInterval
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -124,27 +125,18 @@ class MeanRestitution:
     Parameters
     ----------
     cycles : int
-    restitution, restitution_error : float
-        Between beads: mean and standard deviation of the posterior.
-    restitution_lower, restitution_upper : float
-        Interval.
-    wall_restitution, wall_restitution_error : float
+    restitution : MeasuredInterval
+        Between beads: mean, standard deviation and interval of the posterior.
+    wall_restitution : MeasuredInterval
         Between beads and side walls.
-    wall_restitution_lower, wall_restitution_upper : float
     tension : float
         Standard deviations by which decays, rebounds and collisions disagree.
     rebounds, collisions : int
     """
 
     cycles: int
-    restitution: float
-    restitution_error: float
-    restitution_lower: float
-    restitution_upper: float
-    wall_restitution: float = np.nan
-    wall_restitution_error: float = np.nan
-    wall_restitution_lower: float = np.nan
-    wall_restitution_upper: float = np.nan
-    tension: float = np.nan
+    restitution: MeasuredInterval
+    wall_restitution: MeasuredInterval = UNKNOWN_MEASURED_INTERVAL
+    tension: float = UNKNOWN
     rebounds: int = 0
     collisions: int = 0

@@ -88,15 +88,12 @@ def warm_up_cooling() -> None:
         track=0,
         species=0,
         wall=0,
-        incoming=0.003,
-        incoming_error=1e-4,
-        outgoing=0.0028,
-        outgoing_error=1e-4,
+        incoming=Measured(0.003, 1e-4),
+        outgoing=Measured(0.0028, 1e-4),
         tangential_incoming=0.0,
         tangential_outgoing=0.0,
         tangential_error=1e-4,
-        wall_velocity=0.0,
-        wall_velocity_error=0.0,
+        wall_velocity=Measured(0.0, 0.0),
         place=np.zeros(2),
     )
     fitter.push(rebound)

@@ -149,14 +149,14 @@ class BodyEstimate:
         In the tray.
     followed : int
         Of these, known at that instant; numbers of bodies are scaled to all beads.
-    bodies, bodies_error : float
-    mean_size, mean_size_error : float
+    bodies : Measured
+    mean_size : Measured
         Beads of a body: mean over the bodies.
-    weighted_size, weighted_size_error : float
+    weighted_size : Measured
         Beads of the body of a bead: mean over the beads.
-    clustered_share, clustered_share_error : float, 0 to 1
+    clustered_share : Measured, 0 to 1
         Of the beads, in bodies of two and more.
-    clusters, clusters_error : float
+    clusters : Measured
         Bodies of two and more beads.
     sizes : ndarray (5,)
         Bodies of 1, 2, 3, 4 to 6, and 7 or more beads.
@@ -169,16 +169,11 @@ class BodyEstimate:
     cycle: int
     beads: int
     followed: int
-    bodies: float
-    bodies_error: float
-    mean_size: float
-    mean_size_error: float
-    weighted_size: float
-    weighted_size_error: float
-    clustered_share: float
-    clustered_share_error: float
-    clusters: float
-    clusters_error: float
+    bodies: Measured
+    mean_size: Measured
+    weighted_size: Measured
+    clustered_share: Measured
+    clusters: Measured
     sizes: NDArray[np.float64]
     first_merge_ns: int | None = None
 

@@ -15,6 +15,8 @@ from nanorocks_ros.records.quality_flags import freeze_arrays
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from nanorocks_ros.records.values import Measured
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rebound:
@@ -29,12 +31,11 @@ class Rebound:
     tray, cycle, track, species : int
     wall : int
         0 to 3: low and high along columns, low and high along rows.
-    incoming, outgoing : float, [m/s]
+    incoming, outgoing : Measured, [m/s]
         Speeds along the normal, to the wall before and from it after.
-    incoming_error, outgoing_error : float, [m/s]
     tangential_incoming, tangential_outgoing, tangential_error : float, [m/s]
         Along the wall; the error is that of their difference.
-    wall_velocity, wall_velocity_error : float, [m/s]
+    wall_velocity : Measured, [m/s]
         Of the wall along the normal, to the outside; its error is in both speeds.
     place : ndarray (2,), [m]
         Of the centre of the bead, from the corner of the tray.
@@ -46,15 +47,12 @@ class Rebound:
     track: int
     species: int
     wall: int
-    incoming: float
-    incoming_error: float
-    outgoing: float
-    outgoing_error: float
+    incoming: Measured
+    outgoing: Measured
     tangential_incoming: float
     tangential_outgoing: float
     tangential_error: float
-    wall_velocity: float
-    wall_velocity_error: float
+    wall_velocity: Measured
     place: NDArray[np.float64]
 
     def __post_init__(self) -> None:

@@ -13,7 +13,7 @@ from nanorocks_ros.numerics.small_cholesky import integrate
 from nanorocks_ros.numerics.splines import spline_at, spline_basis, spline_slopes
 from nanorocks_ros.physics.sticking_rates import _sum_slower
 from nanorocks_ros.pipeline.warm_up import warm_up_clusters, warm_up_cooling
-from nanorocks_ros.records import Rebound, SpeedEstimate
+from nanorocks_ros.records import Measured, Rebound, SpeedEstimate
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.stages.clusters.sticking_estimator import StickingEstimator
 from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
@@ -37,15 +37,12 @@ def rebound(time):
         track=0,
         species=0,
         wall=0,
-        incoming=2e-3,
-        incoming_error=1e-4,
-        outgoing=1.9e-3,
-        outgoing_error=1e-4,
+        incoming=Measured(2e-3, 1e-4),
+        outgoing=Measured(1.9e-3, 1e-4),
         tangential_incoming=0.0,
         tangential_outgoing=0.0,
         tangential_error=1e-4,
-        wall_velocity=0.0,
-        wall_velocity_error=0.0,
+        wall_velocity=Measured(0.0, 0.0),
         place=np.zeros(2),
     )
 

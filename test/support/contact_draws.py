@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from nanorocks_ros.records import PairCollision, Rebound
+from nanorocks_ros.records import Measured, PairCollision, Rebound
 
 RADIUS, HEIGHT = 1e-3, 3e-3
 
@@ -18,15 +18,12 @@ def drawn_rebound(incoming, outgoing, error, wall_error=0.0):
         track=0,
         species=0,
         wall=0,
-        incoming=incoming,
-        incoming_error=error,
-        outgoing=outgoing,
-        outgoing_error=error,
+        incoming=Measured(incoming, error),
+        outgoing=Measured(outgoing, error),
         tangential_incoming=0.0,
         tangential_outgoing=0.0,
         tangential_error=error,
-        wall_velocity=0.0,
-        wall_velocity_error=wall_error,
+        wall_velocity=Measured(0.0, wall_error),
         place=np.zeros(2),
     )
 

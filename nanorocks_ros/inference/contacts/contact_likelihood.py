@@ -93,8 +93,8 @@ def rebound_table(
         return np.zeros((len(_ERROR_SCALES), grid.size))
     columns = np.array(
         [
-            (rebound.incoming, rebound.outgoing, rebound.incoming_error, rebound.outgoing_error,
-             rebound.wall_velocity_error)
+            (rebound.incoming.value, rebound.outgoing.value, rebound.incoming.error,
+             rebound.outgoing.error, rebound.wall_velocity.error)
             for rebound in rebounds
         ]
     )  # fmt: skip

@@ -14,7 +14,7 @@ from nanorocks_ros.inference.sticking.chance_proximity import (
     max_chance_probability,
 )
 from nanorocks_ros.records import BodyEstimate, Merge, Tracks
-from nanorocks_ros.stages.bodies.body_sizes import bodies_of, possible_merges, size_fields
+from nanorocks_ros.stages.bodies.body_sizes import bodies_of, possible_merges, size_statistics
 from nanorocks_ros.stages.bodies.bonds import Bond, BondFinder
 from nanorocks_ros.stages.bodies.comoving_bodies import ComovingBodies
 from nanorocks_ros.stages.bodies.frame_history import BodyFrame, FrameHistory
@@ -280,6 +280,13 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
         body_of = bodies_of(frame.known_ids, [*bonds, *frame.attached])
         sizes = Counter(body_of.values())
         first = self._first_merge
+        statistics = size_statistics(
+            np.array(list(sizes.values()), dtype=np.int64),
+            self._tray.count,
+            possible_merges(
+                body_of, *self._bond_finder.unconfirmed(), self._merges_per_encounter()
+            ),
+        )
         return BodyEstimate(
             stamp_ns=frame.stamp_ns,
             tray=self._tray.number,
@@ -287,11 +294,10 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
             beads=self._tray.count,
             followed=len(frame.known_ids),
             first_merge_ns=first if first is not None and first <= frame.stamp_ns else None,
-            **size_fields(
-                np.array(list(sizes.values()), dtype=np.int64),
-                self._tray.count,
-                possible_merges(
-                    body_of, *self._bond_finder.unconfirmed(), self._merges_per_encounter()
-                ),
-            ),
+            bodies=statistics.bodies,
+            mean_size=statistics.mean_size,
+            weighted_size=statistics.weighted_size,
+            clustered_share=statistics.clustered_share,
+            clusters=statistics.clusters,
+            sizes=statistics.counts,
         )

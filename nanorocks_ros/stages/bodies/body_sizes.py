@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from nanorocks_ros.records import UNKNOWN_MEASURED, Measured
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -16,6 +19,26 @@ if TYPE_CHECKING:
 
 # Upper limits of the size classes; larger bodies are the last class.
 _SIZE_CLASSES = (1, 2, 3, 6)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SizeStatistics:
+    """Numbers and sizes of the bodies of a tray; see `BodyEstimate`.
+
+    Parameters
+    ----------
+    bodies, mean_size, weighted_size, clustered_share, clusters : Measured
+        NaN when no bead is known.
+    counts : ndarray (5,)
+        Bodies of 1, 2, 3, 4 to 6, and 7 or more beads.
+    """
+
+    bodies: Measured = UNKNOWN_MEASURED
+    mean_size: Measured = UNKNOWN_MEASURED
+    weighted_size: Measured = UNKNOWN_MEASURED
+    clustered_share: Measured = UNKNOWN_MEASURED
+    clusters: Measured = UNKNOWN_MEASURED
+    counts: NDArray[np.float64]
 
 
 def bodies_of(beads: Iterable[int], bonds: Iterable[tuple[int, int]]) -> dict[int, int]:
@@ -70,12 +93,12 @@ def possible_merges(
     return [(sizes[a], sizes[b], probability) for (a, b), probability in probabilities.items()]
 
 
-def size_fields(
+def size_statistics(
     sizes: NDArray[np.int64],
     beads: int,
     merges: Sequence[tuple[int, int, float]],
-) -> dict[str, Any]:
-    """Fields of a `BodyEstimate` for bodies of given sizes.
+) -> SizeStatistics:
+    """Statistics of bodies of given sizes, with standard errors.
 
     Parameters
     ----------
@@ -88,7 +111,7 @@ def size_fields(
     """
     counted = int(sizes.sum())
     if counted == 0:
-        return dict.fromkeys(_NUMBERS, math.nan) | {'sizes': np.full(5, math.nan)}
+        return SizeStatistics(counts=np.full(5, math.nan))
     scale = beads / counted
     share_single = np.count_nonzero(sizes == 1) / counted
     values = {
@@ -102,11 +125,10 @@ def size_fields(
     edges = (*(0, *_SIZE_CLASSES), np.inf)
     counts = [np.count_nonzero((sizes > low) & (sizes <= high)) for low, high in pairwise(edges)]
     errors = _errors(values, sizes.size, counted, beads, merges)
-    return values | errors | {'sizes': scale * np.array(counts, dtype=np.float64)}
-
-
-_VALUES = ('bodies', 'mean_size', 'weighted_size', 'clustered_share', 'clusters')
-_NUMBERS = (*_VALUES, *(f'{value}_error' for value in _VALUES))
+    return SizeStatistics(
+        **{name: Measured(value, errors[name]) for name, value in values.items()},
+        counts=scale * np.array(counts, dtype=np.float64),
+    )
 
 
 def _errors(
@@ -136,8 +158,8 @@ def _errors(
         'clusters': missing / (math.sqrt(12.0) * 2.0),
     }
     errors = {}
-    for name in _VALUES:
+    for name in values:
         expected = float(probability @ effects[name])
         variance = float((probability * (1.0 - probability)) @ effects[name] ** 2)
-        errors[f'{name}_error'] = math.sqrt(expected**2 + variance + unseen[name] ** 2)
+        errors[name] = math.sqrt(expected**2 + variance + unseen[name] ** 2)
     return errors

@@ -137,10 +137,10 @@ class ClusterEstimator(RestartingStage[Input, Clusters]):
         bodies = self._sticking.bodies(cycle, stamp_ns)
         if bodies is not None and stamp_ns - bodies.stamp_ns <= _RECENT_NS:
             fields = {
-                'bodies': Measured(bodies.bodies, bodies.bodies_error),
-                'mean_size': bodies.mean_size,
-                'weighted_size': Measured(bodies.weighted_size, bodies.weighted_size_error),
-                'clustered_share': bodies.clustered_share,
+                'bodies': bodies.bodies,
+                'mean_size': bodies.mean_size.value,
+                'weighted_size': bodies.weighted_size,
+                'clustered_share': bodies.clustered_share.value,
             }
         onset = self._sticking.onset(cycle, stamp_ns)
         if onset is not None:

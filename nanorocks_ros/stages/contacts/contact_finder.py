@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.records import PairCollision, Rebound, Tracks
+from nanorocks_ros.records import Measured, PairCollision, Rebound, Tracks
 from nanorocks_ros.stages.contacts.flight_segments import FlightSegments, VelocityJump
 from nanorocks_ros.stages.contacts.line_fits import Intersection, intersect_lines
 from nanorocks_ros.stages.contacts.pair_tests import MAX_SIGMAS, MIN_SIGNAL, is_isolated_collision
@@ -140,19 +140,18 @@ class ContactFinder(RestartingStage[Tracks, Rebound | PairCollision]):
             track=jump.track,
             species=jump.species,
             wall=wall,
-            incoming=outward * float(before[axis] - wall_motion[axis]),
-            incoming_error=incoming_error,
-            outgoing=outward * float(wall_motion[axis] - after[axis]),
-            outgoing_error=outgoing_error,
+            incoming=Measured(outward * float(before[axis] - wall_motion[axis]), incoming_error),
+            outgoing=Measured(outward * float(wall_motion[axis] - after[axis]), outgoing_error),
             tangential_incoming=float(before[1 - axis]),
             tangential_outgoing=float(after[1 - axis]),
             tangential_error=math.hypot(incoming_error, outgoing_error),
-            wall_velocity=outward * float(wall_motion[axis]),
-            wall_velocity_error=wall_error,
+            wall_velocity=Measured(outward * float(wall_motion[axis]), wall_error),
             place=position,
         )
         signal = MIN_SIGNAL * math.hypot(incoming_error, wall_error)
-        return rebound if rebound.incoming > signal and rebound.outgoing > 0.0 else None
+        return (
+            rebound if rebound.incoming.value > signal and rebound.outgoing.value > 0.0 else None
+        )
 
     def _is_isolated(self, crossing: Intersection, jumps: list[VelocityJump]) -> bool:
         beads = np.empty((len(jumps), 4))

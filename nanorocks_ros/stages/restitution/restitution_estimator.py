@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import partial, reduce
 from operator import or_
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from nanorocks_ros.errors import FitError
 from nanorocks_ros.records import (
     CorEstimate,
     CorStatus,
+    Measured,
     Merge,
     PairCollision,
     Quality,
@@ -23,8 +24,8 @@ from nanorocks_ros.records import (
 from nanorocks_ros.stages.contacts.cycle_contacts import CycleContacts
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 from nanorocks_ros.stages.preprocess.shake_detection import NS
+from nanorocks_ros.stages.restitution.cycle_restitution import UNDETERMINED, CycleRestitution
 from nanorocks_ros.stages.restitution.restitution_methods import (
-    UNDETERMINED,
     Decay,
     DecayLibraryMethod,
     PaperMethod,
@@ -221,49 +222,69 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
             return self._undetermined() if status is CorStatus.FINAL else ()
         last = self._samples[-1]
         shake_ns, start_ns = last.cycle_start_ns or 0, self._start_ns(self._samples[0])
-        decay = Decay(
-            time=np.array([(sample.stamp_ns - start_ns) / NS for sample in self._samples]),
-            speed=np.array([sample.mean_projected_speed.value for sample in self._samples]),
-            error=np.array([sample.mean_projected_speed.error for sample in self._samples]),
-            of_grains=self._grains
-            and any(sample.method is SpeedMethod.STRUCTURE_FUNCTION for sample in self._samples),
-        )
-        fields: dict[str, Any] = {'status': status}
-        final = status is CorStatus.FINAL
+        decay = self._decay(start_ns)
         quality = reduce(or_, {sample.quality for sample in self._samples})
-        try:
-            if quality & Quality.WRONG_SCALE:
-                # Errors of speeds and positions are unknown.
-                fields = _unknown(CorStatus.UNDETERMINED)
-            else:
-                fields.update(self._method.estimate(decay, self._contacts.terms, final=final))
-        except FitError:
-            # The restitution is published as unknown.
-            fields = _unknown(CorStatus.NO_DECAY)
+        outcome, result = self._cycle_restitution(decay, quality, status)
+        initial_speeds: tuple[Measured, ...] = ()
+        haff_times: tuple[Measured, ...] = ()
         if status is CorStatus.FINAL:
             few = self._settings.min_samples
-            decays = species_decays(self._tray, decay.time, self._samples, few)
-            fields['species_initial_speeds'], fields['species_haff_times'] = decays
-        if fields.get('tension', 0.0) > _TENSE:
+            initial_speeds, haff_times = species_decays(self._tray, decay.time, self._samples, few)
+        if result.tension > _TENSE:
             quality |= Quality.INCONSISTENT
         return (
             CorEstimate(
                 stamp_ns=last.stamp_ns,
                 tray=last.tray,
                 cycle=last.cycle,
+                status=outcome,
                 relation=self._method.relation,
+                restitution=result.restitution,
+                initial_speed=result.initial_speed,
+                haff_time=result.haff_time,
+                reduced_chi_square=result.reduced_chi_square,
                 samples=len(self._samples),
+                mean_restitution=result.mean_restitution,
+                wall_restitution=result.wall_restitution,
+                correlation=result.correlation,
+                paper_restitution=result.paper_restitution,
                 quality=Quality(quality),
                 window_start=(self._samples[0].stamp_ns - shake_ns) / NS,
                 window_end=(last.stamp_ns - shake_ns) / NS,
                 cooling_start=(start_ns - shake_ns) / NS,
-                **fields,
+                rebounds=result.rebounds,
+                collisions=result.collisions,
+                tension=result.tension,
+                mean_wall_restitution=result.mean_wall_restitution,
+                species_initial_speeds=initial_speeds,
+                species_haff_times=haff_times,
             ),
         )
 
+    def _decay(self, start_ns: int) -> Decay:
+        """The speeds of the cycle, with times since the gas began to cool."""
+        return Decay(
+            time=np.array([(sample.stamp_ns - start_ns) / NS for sample in self._samples]),
+            speed=np.array([sample.mean_projected_speed.value for sample in self._samples]),
+            error=np.array([sample.mean_projected_speed.error for sample in self._samples]),
+            of_grains=self._grains
+            and any(sample.method is SpeedMethod.STRUCTURE_FUNCTION for sample in self._samples),
+        )
 
-def _unknown(status: CorStatus) -> dict[str, Any]:
-    return {'status': status, 'restitution': UNDETERMINED}
+    def _cycle_restitution(
+        self, decay: Decay, quality: Quality, status: CorStatus
+    ) -> tuple[CorStatus, CycleRestitution]:
+        """The restitution of the cycle and the status of the estimate."""
+        if quality & Quality.WRONG_SCALE:
+            # Errors of speeds and positions are unknown.
+            return CorStatus.UNDETERMINED, CycleRestitution()
+        final = status is CorStatus.FINAL
+        try:
+            result = self._method.estimate(decay, self._contacts.terms, final=final)
+        except FitError:
+            # The restitution is published as unknown.
+            return CorStatus.NO_DECAY, CycleRestitution()
+        return status if result.determined else CorStatus.UNDETERMINED, result
 
 
 def _usable(speed: SpeedEstimate) -> bool:

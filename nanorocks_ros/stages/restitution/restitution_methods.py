@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from scipy import special
@@ -24,10 +24,11 @@ from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
 from nanorocks_ros.records import (
     UNKNOWN_MEASURED,
     CorRelation,
-    CorStatus,
     Interval,
     Measured,
+    MeasuredInterval,
 )
+from nanorocks_ros.stages.restitution.cycle_restitution import CycleRestitution
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,9 +40,6 @@ if TYPE_CHECKING:
 
 # Largest standard deviation of a restitution that is given: a uniform one from 0 to 1 has 0.29.
 _LARGEST_DEVIATION = 0.2
-UNDETERMINED = Interval(lower=0.0, upper=1.0)
-"""The restitution of a cycle that does not determine it: any."""
-_UNKNOWN_FIELDS = {'status': CorStatus.UNDETERMINED, 'restitution': UNDETERMINED}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,8 +67,8 @@ class RestitutionMethod(Protocol):
     relation: CorRelation
     evidence: CycleLikelihoods | None
 
-    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
-        """Fields of a CorEstimate; raises FitError where there is no decay."""
+    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> CycleRestitution:
+        """Restitution of a cycle; raises FitError where there is no decay."""
 
     def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
         """Mean restitution of the cycles of some evidence, also of other recordings."""
@@ -92,8 +90,8 @@ class PaperMethod:
         self._tray = tray
         self.evidence: CycleLikelihoods | None = None
 
-    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
-        """Fields of a CorEstimate; the method of the paper does not use contacts.
+    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> CycleRestitution:
+        """Restitution of a cycle; the method of the paper does not use contacts.
 
         Raises
         ------
@@ -113,16 +111,19 @@ class PaperMethod:
                 cycles=1, by_form=((value, (upper - lower) / (2.0 * quantile)),)
             )
             self.evidence = self.evidence + own if self.evidence else own
-        mean = self.mean_of(self.evidence) if self.evidence else None
-        return {
-            'restitution': Interval(value, lower, upper),
-            'paper_restitution': value,
-            'reduced_chi_square': fit.reduced_chi_square,
-            'mean_restitution': (
-                Measured(mean.restitution, mean.restitution_error) if mean else UNKNOWN_MEASURED
+        return CycleRestitution(
+            determined=True,
+            restitution=Interval(value, lower, upper),
+            paper_restitution=value,
+            reduced_chi_square=fit.reduced_chi_square,
+            mean_restitution=(
+                _measured(self.mean_of(self.evidence).restitution)
+                if self.evidence
+                else UNKNOWN_MEASURED
             ),
-            **_haff_fields(fit),
-        }
+            initial_speed=_initial_speed(fit),
+            haff_time=_haff_time(fit),
+        )
 
     def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
         """Mean and standard error by the scatter of the cycles; of one, its own error."""
@@ -134,10 +135,7 @@ class PaperMethod:
         reach = error * float(special.stdtrit(freedom, 0.5 + 0.5 * self._probability))
         return MeanRestitution(
             cycles=evidence.cycles,
-            restitution=mean,
-            restitution_error=error,
-            restitution_lower=mean - reach,
-            restitution_upper=mean + reach,
+            restitution=MeasuredInterval(mean, error, mean - reach, mean + reach),
         )
 
 
@@ -174,10 +172,10 @@ class DecayLibraryMethod:
         half = 0.5 * settings.cooling.probability
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
         self.evidence: CycleLikelihoods | None = None
-        self._mean_so_far: dict[str, Measured] = {}
+        self._means_so_far = UNKNOWN_MEASURED, UNKNOWN_MEASURED
 
-    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> dict[str, Any]:
-        """Fields of a CorEstimate.
+    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> CycleRestitution:
+        """Restitution of a cycle.
 
         Raises
         ------
@@ -189,27 +187,31 @@ class DecayLibraryMethod:
         if decay.of_grains and not contacts.rebounds and not contacts.collisions:
             # The bias of such speeds changes while grains slow down: intervals of filmed trays 6
             # and 8 missed the truth, and over many cycles that does not average out.
-            return {**self._speeds(decay, final=final), **_UNKNOWN_FIELDS}
+            return self._speeds(decay, final=final)
         likelihood = decay_likelihood(
             self._tables, decay.time, decay.speed, decay.error, self._camera[decay.of_grains]
         )
         integrated = likelihood.integrated()
         posterior = self._posterior(integrated, contacts)
         best = int(np.argmax(integrated))
-        fields = {
-            'rebounds': contacts.rebounds,
-            'collisions': contacts.collisions,
-            'tension': posterior.tension,
-            **self._speeds(decay, final=final),
-            'reduced_chi_square': likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
-        }
-        if math.sqrt(posterior.covariance[0, 0]) > _LARGEST_DEVIATION:
-            return {**fields, **_UNKNOWN_FIELDS, **self._mean(likelihood, contacts, final=final)}
-        return {
-            **fields,
-            **_restitution_fields(posterior, self._ends),
-            **self._mean(likelihood, contacts, final=final),
-        }
+        result = replace(
+            self._speeds(decay, final=final),
+            rebounds=contacts.rebounds,
+            collisions=contacts.collisions,
+            tension=posterior.tension,
+            reduced_chi_square=likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
+        )
+        if not math.sqrt(posterior.covariance[0, 0]) > _LARGEST_DEVIATION:
+            restitution, wall_restitution = _intervals(posterior, self._ends)
+            result = replace(
+                result,
+                determined=True,
+                restitution=restitution,
+                wall_restitution=wall_restitution,
+                correlation=_correlation(posterior),
+            )
+        mean, wall_mean = self._means(likelihood, contacts, final=final)
+        return replace(result, mean_restitution=mean, mean_wall_restitution=wall_mean)
 
     def _posterior(self, integrated: NDArray[np.float64], contacts: ContactTerms) -> Posterior:
         return posterior_of(
@@ -220,20 +222,17 @@ class DecayLibraryMethod:
             wall_likelihood=contacts.wall_likelihood(self._biases[1]),
         )
 
-    def _mean(
+    def _means(
         self, likelihood: DecayLikelihood, contacts: ContactTerms, *, final: bool
-    ) -> dict[str, Measured]:
-        """Mean restitution of all finished cycles; a final one is among them."""
+    ) -> tuple[Measured, Measured]:
+        """Mean restitutions of beads and of walls, of all finished cycles and a final one."""
         if not final:
-            return self._mean_so_far
+            return self._means_so_far
         own = CycleLikelihoods(cycles=1, decay=likelihood, contacts=contacts)
         self.evidence = self.evidence + own if self.evidence else own
         mean = self.mean_of(self.evidence)
-        self._mean_so_far = {
-            'mean_restitution': Measured(mean.restitution, mean.restitution_error),
-            'mean_wall_restitution': Measured(mean.wall_restitution, mean.wall_restitution_error),
-        }
-        return self._mean_so_far
+        self._means_so_far = _measured(mean.restitution), _measured(mean.wall_restitution)
+        return self._means_so_far
 
     def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
         """Mean restitution of several cycles, whose systematic errors are the same.
@@ -259,37 +258,36 @@ class DecayLibraryMethod:
         restitution, wall_restitution = _intervals(posterior, self._ends)
         return MeanRestitution(
             cycles=evidence.cycles,
-            restitution=posterior.mean[0],
-            restitution_error=error,
-            wall_restitution=posterior.mean[1],
-            wall_restitution_error=wall_error,
+            restitution=MeasuredInterval(
+                posterior.mean[0], error, restitution.lower, restitution.upper
+            ),
+            wall_restitution=MeasuredInterval(
+                posterior.mean[1], wall_error, wall_restitution.lower, wall_restitution.upper
+            ),
             tension=posterior.tension,
             rebounds=contacts.rebounds,
             collisions=contacts.collisions,
-            restitution_lower=restitution.lower,
-            restitution_upper=restitution.upper,
-            wall_restitution_lower=wall_restitution.lower,
-            wall_restitution_upper=wall_restitution.upper,
         )
 
-    def _speeds(self, decay: Decay, *, final: bool) -> dict[str, Any]:
+    def _speeds(self, decay: Decay, *, final: bool) -> CycleRestitution:
         """Initial speed and Haff time, with errors once the cycle is over."""
         if final:
             with suppress(FitError):
                 # Nearly elastic beads may have no Haff time, but have a restitution.
                 fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
-                return {
-                    **_haff_fields(fit),
-                    'paper_restitution': _paper_restitution(fit.decay_rate, self._tray),
-                }
+                return CycleRestitution(
+                    initial_speed=_initial_speed(fit),
+                    haff_time=_haff_time(fit),
+                    paper_restitution=_paper_restitution(fit.decay_rate, self._tray),
+                )
         # A straight line through 1/v, as Haff's law is one; a proper fit takes too long.
         slope, offset = (float(number) for number in np.polyfit(decay.time, 1.0 / decay.speed, 1))
         falling = slope > 0.0 and offset > 0.0
-        return {
-            'initial_speed': Measured(1.0 / offset if falling else math.nan),
-            'haff_time': Measured(offset / slope if falling else math.nan),
-            'paper_restitution': _paper_restitution(max(slope, 0.0), self._tray),
-        }
+        return CycleRestitution(
+            initial_speed=Measured(1.0 / offset if falling else math.nan),
+            haff_time=Measured(offset / slope if falling else math.nan),
+            paper_restitution=_paper_restitution(max(slope, 0.0), self._tray),
+        )
 
 
 def _intervals(posterior: Posterior, ends: NDArray[np.float64]) -> tuple[Interval, Interval]:
@@ -299,22 +297,22 @@ def _intervals(posterior: Posterior, ends: NDArray[np.float64]) -> tuple[Interva
     return Interval(value, lower, upper), Interval(wall, wall_lower, wall_upper)
 
 
-def _restitution_fields(posterior: Posterior, ends: NDArray[np.float64]) -> dict[str, Any]:
-    restitution, wall_restitution = _intervals(posterior, ends)
+def _correlation(posterior: Posterior) -> float:
     spread = posterior.covariance
     product = math.sqrt(spread[0, 0] * spread[1, 1])
-    return {
-        'restitution': restitution,
-        'wall_restitution': wall_restitution,
-        'correlation': float(spread[0, 1]) / product if product > 0.0 else 0.0,
-    }
+    return float(spread[0, 1]) / product if product > 0.0 else 0.0
 
 
-def _haff_fields(fit: HaffFit) -> dict[str, Measured]:
-    return {
-        'initial_speed': Measured(fit.initial_speed, fit.initial_speed_error),
-        'haff_time': Measured(fit.haff_time, fit.haff_time_error),
-    }
+def _measured(mean: MeasuredInterval) -> Measured:
+    return Measured(mean.value, mean.error)
+
+
+def _initial_speed(fit: HaffFit) -> Measured:
+    return Measured(fit.initial_speed, fit.initial_speed_error)
+
+
+def _haff_time(fit: HaffFit) -> Measured:
+    return Measured(fit.haff_time, fit.haff_time_error)
 
 
 def _paper_restitution(rate: float, tray: Tray) -> float:

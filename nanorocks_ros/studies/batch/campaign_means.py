@@ -6,7 +6,7 @@ Tested by ``test/studies/batch/test_batch_analysis.py``.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nanorocks_ros.errors import FitError, RecordingError
@@ -17,7 +17,7 @@ from nanorocks_ros.numerics.sample_mean import mean_of
 from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.outputs.npz_archive import read_archive
 from nanorocks_ros.pipeline.composition import TrayStages, trays_of
-from nanorocks_ros.records import Quality
+from nanorocks_ros.records import UNKNOWN_MEASURED_INTERVAL, MeasuredInterval, Quality
 from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleSummary
 from nanorocks_ros.studies.analysis.long_term import Campaign, campaign_of
 from nanorocks_ros.studies.analysis.results_folder import EVIDENCE
@@ -286,17 +286,13 @@ def means_as_json(tray: TrayMeans) -> dict[str, Any]:
     """
     fields_of_tray: dict[str, Any] = {'recordings': tray.recordings, 'cycles': tray.cycles}
     mean = tray.restitution
-    vague = mean is None or not mean.restitution_error <= _LEAST_KNOWN
-    names = [
-        f'{which}{part}'
-        for which in ('restitution', 'wall_restitution')
-        for part in ('', '_error', '_lower', '_upper')
-    ]
-    values = asdict(mean) if mean is not None else {}
-    for name in names:
-        unknown = mean is None or (vague and name in ('restitution', 'restitution_error'))
-        fields_of_tray[name] = None if unknown else finite_or_none(float(values[name]))
+    restitution = mean.restitution if mean else UNKNOWN_MEASURED_INTERVAL
+    if not restitution.error <= _LEAST_KNOWN:
+        restitution = replace(restitution, value=math.nan, error=math.nan)
+    wall_restitution = mean.wall_restitution if mean else UNKNOWN_MEASURED_INTERVAL
     fields_of_tray |= {
+        **_interval_as_json('restitution', restitution),
+        **_interval_as_json('wall_restitution', wall_restitution),
         'cycles_read': mean.cycles if mean else 0,
         'tension': finite_or_none(mean.tension) if mean else None,
         'rebounds': mean.rebounds if mean else 0,
@@ -318,3 +314,12 @@ def means_as_json(tray: TrayMeans) -> dict[str, Any]:
             f'{name}_cycles': value.cycles,
         }
     return fields_of_tray
+
+
+def _interval_as_json(name: str, quantity: MeasuredInterval) -> dict[str, float | None]:
+    return {
+        name: finite_or_none(float(quantity.value)),
+        f'{name}_error': finite_or_none(float(quantity.error)),
+        f'{name}_lower': finite_or_none(float(quantity.lower)),
+        f'{name}_upper': finite_or_none(float(quantity.upper)),
+    }

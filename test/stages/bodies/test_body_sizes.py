@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nanorocks_ros.stages.bodies.body_sizes import bodies_of, size_fields
+from nanorocks_ros.stages.bodies.body_sizes import bodies_of, size_statistics
 
 
 def test_beads_bonded_to_an_unlisted_bead_are_one_body():
@@ -13,25 +13,25 @@ def test_beads_bonded_to_an_unlisted_bead_are_one_body():
 
 
 def test_sizes_are_means_over_bodies_and_over_beads():
-    fields = size_fields(np.array([1, 1, 1, 2, 3, 7]), 15, [])
-    assert fields['bodies'] == 6.0
-    assert fields['mean_size'] == pytest.approx(2.5)
-    assert fields['weighted_size'] == pytest.approx((3 + 4 + 9 + 49) / 15)
-    assert fields['clustered_share'] == pytest.approx(12 / 15)
-    assert fields['clusters'] == 3.0
-    assert fields['sizes'].tolist() == [3.0, 1.0, 1.0, 0.0, 1.0]
-    assert fields['bodies_error'] == 0.0
+    statistics = size_statistics(np.array([1, 1, 1, 2, 3, 7]), 15, [])
+    assert statistics.bodies.value == 6.0
+    assert statistics.mean_size.value == pytest.approx(2.5)
+    assert statistics.weighted_size.value == pytest.approx((3 + 4 + 9 + 49) / 15)
+    assert statistics.clustered_share.value == pytest.approx(12 / 15)
+    assert statistics.clusters.value == 3.0
+    assert statistics.counts.tolist() == [3.0, 1.0, 1.0, 0.0, 1.0]
+    assert statistics.bodies.error == 0.0
 
 
 def test_a_merge_of_probability_one_half_sets_the_errors():
-    fields = size_fields(np.array([1, 1, 3]), 5, [(1, 3, 0.5)])
+    statistics = size_statistics(np.array([1, 1, 3]), 5, [(1, 3, 0.5)])
     # The mean shift and the scatter of one merge or none, in squares.
-    assert fields['bodies_error'] == pytest.approx(np.sqrt(0.5**2 + 0.25))
-    assert fields['weighted_size_error'] == pytest.approx(np.sqrt(0.5) * 2 * 3 / 5)
-    assert fields['clustered_share_error'] == pytest.approx(np.sqrt(0.5) / 5)
+    assert statistics.bodies.error == pytest.approx(np.sqrt(0.5**2 + 0.25))
+    assert statistics.weighted_size.error == pytest.approx(np.sqrt(0.5) * 2 * 3 / 5)
+    assert statistics.clustered_share.error == pytest.approx(np.sqrt(0.5) / 5)
 
 
 def test_double_detections_do_not_make_bodies_larger_than_the_tray_has_beads():
-    fields = size_fields(np.array([12]), 10, [])
-    assert fields['weighted_size'] == pytest.approx(10.0)
-    assert fields['bodies_error'] > 0.0
+    statistics = size_statistics(np.array([12]), 10, [])
+    assert statistics.weighted_size.value == pytest.approx(10.0)
+    assert statistics.bodies.error > 0.0

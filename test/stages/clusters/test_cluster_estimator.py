@@ -14,6 +14,7 @@ from nanorocks_ros.records import (
     Autocorrelation,
     BodyEstimate,
     ClusterEstimate,
+    Measured,
     Merge,
     Quality,
     SpeedEstimate,
@@ -53,7 +54,9 @@ def test_estimates_come_two_seconds_later_with_what_tracks_say_of_the_instant():
     stage = ClusterEstimator(PipelineSettings(), TRAY)
     records = as_they_come([*cooling(until=12.0), *images(12.0)], {BodyEstimate: 1.0})
     true = {
-        record.stamp_ns: record.bodies for record in records if isinstance(record, BodyEstimate)
+        record.stamp_ns: record.bodies.value
+        for record in records
+        if isinstance(record, BodyEstimate)
     }
     first = min(record.stamp_ns for record in records if isinstance(record, Merge)) / NS
     seen = 0
@@ -91,7 +94,7 @@ def test_without_tracks_the_autocorrelation_speaks_alone():
 def test_sizes_by_both_are_weighted_by_their_errors():
     (body, *_) = (record for record in cooling() if isinstance(record, BodyEstimate))
     by_tracks = [
-        replace(body, stamp_ns=image.stamp_ns, weighted_size=3.0, weighted_size_error=0.5)
+        replace(body, stamp_ns=image.stamp_ns, weighted_size=Measured(3.0, 0.5))
         for image in images(5.0)
     ]
     for estimate in estimates(as_they_come([*images(5.0), *by_tracks], {})):

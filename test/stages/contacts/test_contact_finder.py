@@ -56,20 +56,22 @@ def test_every_rebound_is_a_simulated_collision_with_that_wall(gas):
         hits = _events(events, 'wall', rebound.stamp_ns / 1e9)
         hit = hits[(hits['bead'] == rebound.track) & (hits['partner'] == rebound.wall)]
         assert hit.size == 1
-        assert rebound.incoming == pytest.approx(
-            hit['normal_speed'][0], abs=5.0 * rebound.incoming_error
+        assert rebound.incoming.value == pytest.approx(
+            hit['normal_speed'][0], abs=5.0 * rebound.incoming.error
         )
 
 
 def test_rebounds_return_the_restitution_of_the_wall_within_their_errors(gas):
     rebounds = [contact for contact in gas[1] if isinstance(contact, Rebound)]
     errors = np.array(
-        [math.hypot(rebound.outgoing_error, rebound.incoming_error) for rebound in rebounds]
+        [math.hypot(rebound.outgoing.error, rebound.incoming.error) for rebound in rebounds]
     )
-    misses = np.array([rebound.outgoing - WALLS * rebound.incoming for rebound in rebounds])
+    misses = np.array(
+        [rebound.outgoing.value - WALLS * rebound.incoming.value for rebound in rebounds]
+    )
     assert np.median(np.abs(misses / errors)) < 1.0
     assert np.median(
-        [rebound.outgoing / rebound.incoming for rebound in rebounds]
+        [rebound.outgoing.value / rebound.incoming.value for rebound in rebounds]
     ) == pytest.approx(WALLS, abs=0.01)
 
 
@@ -106,7 +108,7 @@ def test_the_same_tracks_give_the_same_contacts_again_after_going_back():
         finder.flush()
     )
     assert len(first) == 1
-    assert [contact.outgoing for contact in again] == [first[0].outgoing]
+    assert [contact.outgoing.value for contact in again] == [first[0].outgoing.value]
 
 
 def test_flush_gives_a_rebound_right_before_the_end_of_the_tracks():
@@ -117,7 +119,7 @@ def test_flush_gives_a_rebound_right_before_the_end_of_the_tracks():
     (rebound,) = finder.flush()
     assert isinstance(rebound, Rebound)
     assert rebound.stamp_ns == pytest.approx(0.4e9, abs=0.01e9)
-    assert rebound.outgoing / rebound.incoming == pytest.approx(0.9, abs=0.03)
+    assert rebound.outgoing.value / rebound.incoming.value == pytest.approx(0.9, abs=0.03)
     assert finder.flush() == ()
 
 
@@ -174,8 +176,8 @@ def test_a_rebound_is_measured_relative_to_the_swinging_wall():
         (rebound,) = _contacts_in(hidden)
         assert rebound.wall == 0
         true = -1.5e-4 * omega * np.cos(omega * at)
-        assert rebound.wall_velocity == pytest.approx(true, abs=3e-5)
-        assert rebound.outgoing / rebound.incoming == pytest.approx(0.9, abs=0.02)
+        assert rebound.wall_velocity.value == pytest.approx(true, abs=3e-5)
+        assert rebound.outgoing.value / rebound.incoming.value == pytest.approx(0.9, abs=0.02)
 
 
 def test_a_bead_that_is_hidden_at_the_wall_gives_no_rebound():
@@ -190,7 +192,7 @@ def test_a_bead_that_is_hidden_during_a_flight_gives_its_rebound():
     for hidden in (5, 20):
         records[hidden] = replace(records[hidden], seen=np.zeros(1, dtype=bool))
     (rebound,) = _contacts_in(records)
-    assert rebound.outgoing / rebound.incoming == pytest.approx(0.9, abs=0.01)
+    assert rebound.outgoing.value / rebound.incoming.value == pytest.approx(0.9, abs=0.01)
 
 
 def test_a_tangential_change_of_velocity_at_the_wall_is_no_rebound():

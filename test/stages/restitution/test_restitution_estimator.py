@@ -65,15 +65,12 @@ def rebounds(rng, n, first, last, wall=0.97):
             track=0,
             species=0,
             wall=0,
-            incoming=incoming + noise[0],
-            incoming_error=error,
-            outgoing=wall * incoming + noise[1],
-            outgoing_error=error,
+            incoming=Measured(incoming + noise[0], error),
+            outgoing=Measured(wall * incoming + noise[1], error),
             tangential_incoming=0.0,
             tangential_outgoing=0.0,
             tangential_error=error,
-            wall_velocity=0.0,
-            wall_velocity_error=0.0,
+            wall_velocity=Measured(0.0, 0.0),
             place=np.zeros(2),
         )
 

@@ -34,7 +34,6 @@ from nanorocks_ros.studies.batch.batch_analysis import BagResults, BatchPlan, ru
 from nanorocks_ros.studies.batch.campaign_means import combined
 from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
 from nanorocks_ros.studies.film_import.import_film import import_films
-from nanorocks_ros.wire.flat_records import flat_value
 
 HOSTILE = '<img src=x onerror=alert(1)>'
 
@@ -135,8 +134,12 @@ def test_each_bag_has_the_results_it_has_alone_and_a_tray_what_all_cycles_say(do
     ]
     mean = combined(batch, PipelineSettings()).trays[1].restitution
     last = alone.trays[1].cors[-1]
-    for name in ('restitution', 'restitution_error', 'wall_restitution', 'wall_restitution_error'):
-        assert getattr(mean, name) == pytest.approx(flat_value(last, f'mean_{name}'), rel=1e-4)
+    for together, running in (
+        (mean.restitution, last.mean_restitution),
+        (mean.wall_restitution, last.mean_wall_restitution),
+    ):
+        assert together.value == pytest.approx(running.value, rel=1e-4)
+        assert together.error == pytest.approx(running.error, rel=1e-4)
     # One filmed at a wrong scale, of which no size is known, costs the others none of theirs.
     wrong = copy.deepcopy(batch[0].summary)
     for cycle in wrong['trays']['1']['cycles']:

@@ -1,0 +1,51 @@
+"""The restitution of one cycle, as a method determines it.
+
+Tested by ``test/stages/restitution/test_restitution_estimator.py``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nanorocks_ros.records import (
+    UNKNOWN,
+    UNKNOWN_INTERVAL,
+    UNKNOWN_MEASURED,
+    Interval,
+    Measured,
+)
+
+UNDETERMINED = Interval(lower=0.0, upper=1.0)
+"""The restitution of a cycle that does not determine it: any."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CycleRestitution:
+    """What a method determines from one cycle; quantities as in `CorEstimate`.
+
+    Parameters
+    ----------
+    determined : bool
+        Whether the cycle determines the restitution of two beads.
+    restitution, wall_restitution : Interval
+    correlation : float
+    initial_speed : Measured, [m/s]
+    haff_time : Measured, [s]
+    reduced_chi_square, paper_restitution, tension : float
+    rebounds, collisions : int
+    mean_restitution, mean_wall_restitution : Measured
+    """
+
+    determined: bool = False
+    restitution: Interval = UNDETERMINED
+    wall_restitution: Interval = UNKNOWN_INTERVAL
+    correlation: float = UNKNOWN
+    initial_speed: Measured = UNKNOWN_MEASURED
+    haff_time: Measured = UNKNOWN_MEASURED
+    reduced_chi_square: float = UNKNOWN
+    paper_restitution: float = UNKNOWN
+    rebounds: int = 0
+    collisions: int = 0
+    tension: float = UNKNOWN
+    mean_restitution: Measured = UNKNOWN_MEASURED
+    mean_wall_restitution: Measured = UNKNOWN_MEASURED
