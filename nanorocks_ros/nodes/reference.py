@@ -161,6 +161,7 @@ def page() -> str:
 def main(root: str) -> None:
     """Write the page into a source tree."""
     os.chdir(root)
+    Path(PAGE).parent.mkdir(parents=True, exist_ok=True)
     Path(PAGE).write_text(page(), encoding='utf-8')
 
 

@@ -76,7 +76,7 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
         self._tray = tray
         method = DecayLibraryMethod if self._settings.relation == 'library' else PaperMethod
         self._make_method = partial(method, settings, tray)
-        self._grains = any(species.properties.hue == 0 for species in tray.species)
+        self._grains = any(species.properties.shape == 'grain' for species in tray.species)
         self._contacts = CycleContacts(self._settings)
         self.reset()
 

@@ -58,7 +58,7 @@ class TrackSpeed:
 
     def __init__(self, settings: PipelineSettings, tray: Tray, *, crowded: bool) -> None:
         self._interval_ns = round(settings.speed.interval * NS)
-        self._grains = any(species.properties.hue == 0 for species in tray.species)
+        self._grains = any(species.properties.shape == 'grain' for species in tray.species)
         path_px = _SHORTEST_GRAIN_PATH_PX if self._grains else _SHORTEST_PATH_PX
         self._shortest_path = path_px / settings.preprocess.pixels_per_metre
         self._tray = tray
