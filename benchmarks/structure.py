@@ -39,7 +39,8 @@ def report(commit: str = 'HEAD') -> None:
         print(f'| `{folder}` | {count} | {sizes[folder]} |')
     tests = {PurePosixPath(file) for file in files if file.startswith('test/')}
     untested = [module for module in counted if _own_test(module) not in tests]
-    recipe = _RECIPE.findall(_git('show', f'{commit}:CONTRIBUTING.md'))
+    _, _, section = _git('show', f'{commit}:CONTRIBUTING.md').partition('## Recipe: add a stage\n')
+    recipe = _RECIPE.findall(section.partition('\n## ')[0])
     print(f'\nmodules without a test file of their own: {len(untested)} of {len(counted)}')
     print(f'recipe for a stage: {len(recipe)} changes in {len(set(recipe))} existing files')
 
