@@ -50,9 +50,9 @@ def browser():
         pytest.skip(remedy)
     playwright = pytest.importorskip('playwright.sync_api')
     with playwright.sync_playwright() as driver:
-        one = driver.chromium.launch(executable_path=path, args=list(_SWITCHES))
-        yield one
-        one.close()
+        chromium = driver.chromium.launch(executable_path=path, args=list(_SWITCHES))
+        yield chromium
+        chromium.close()
 
 
 @pytest.fixture

@@ -35,8 +35,8 @@ def encoded(layer: str, image: NDArray[np.uint8]) -> bytes:
     scale = _LARGEST_PX / max(image.shape[:2])
     picture: Any = image
     if scale < 1.0:
-        # Of a strip something has to be left.
-        rows, columns = (max(1, round(scale * one)) for one in image.shape[:2])
+        # A narrow strip keeps at least one pixel.
+        rows, columns = (max(1, round(scale * side)) for side in image.shape[:2])
         picture = cv2.resize(image, (columns, rows), interpolation=cv2.INTER_AREA)
     return encode_jpeg(picture, _QUALITY)
 

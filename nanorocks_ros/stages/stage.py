@@ -29,7 +29,7 @@ class Stage(Protocol[_Taken_contra, Given]):
         """Everything that is held back, at the end of the recording."""
 
     def reset(self, stamp_ns: int | None = None) -> None:
-        """Start afresh; records from this stamp on, [ns], belong to the new start."""
+        """Start afresh, at a stamp that time went back to, [ns], if there is one."""
 
 
 class RestartingStage(ABC, Generic[Taken, Given]):
@@ -63,7 +63,8 @@ class RestartingStage(ABC, Generic[Taken, Given]):
         Parameters
         ----------
         stamp_ns : int, [ns], optional
-            Records that came in and are not later than this belong to the new start already.
+            The stamp that time went back to. Records that arrived ahead of it, with a stamp no
+            later, belong to the new start and are kept.
         """
         self._last_ns = None
         self._restart(stamp_ns)

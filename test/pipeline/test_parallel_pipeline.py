@@ -68,9 +68,9 @@ def _frame(number):
     return (_image(1, number), notice, _image(3, number))
 
 
-def _same(one, other):
-    assert type(one) is type(other)
-    np.testing.assert_equal(astuple(one), astuple(other))
+def _same(record, other):
+    assert type(record) is type(other)
+    np.testing.assert_equal(astuple(record), astuple(other))
 
 
 def test_records_are_those_of_one_process_in_the_same_order(workers):

@@ -275,7 +275,7 @@ def test_the_mask_shows_where_beads_moved_and_only_while_somebody_looks(run):
     assert min(shaken[1:]) > 0.01
     estimator.emit_mask = False
     later = [estimator.push(image) for image in images]
-    assert not any(isinstance(record, MotionMask) for found in later for record in found)
+    assert not any(isinstance(record, MotionMask) for records in later for record in records)
 
 
 def test_frozen_frames_after_motion_are_slow_and_no_shake(run):

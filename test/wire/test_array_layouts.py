@@ -42,9 +42,13 @@ EPOCH = 1_700_000_000_000_000_000
 
 # Elements that are part of an array in the record.
 WHOLE = {
-    **{f'{one}_{axis}': one for one in ('place', 'separation') for axis in 'xy'},
-    **{f'{one}_{k}_{axis}': one for one in ('before', 'after') for k in '12' for axis in 'xy'},
-    **{f'{one}_{k}_error': f'{one}_errors' for one in ('before', 'after', 'radius') for k in '12'},
+    **{f'{name}_{axis}': name for name in ('place', 'separation') for axis in 'xy'},
+    **{f'{name}_{k}_{axis}': name for name in ('before', 'after') for k in '12' for axis in 'xy'},
+    **{
+        f'{name}_{k}_error': f'{name}_errors'
+        for name in ('before', 'after', 'radius')
+        for k in '12'
+    },
     **{f'track_{k}': 'tracks' for k in '12'},
     **{f'species_{k}': 'species' for k in '12'},
     **{f'radius_{k}': 'radii' for k in '12'},

@@ -116,23 +116,25 @@ def _run_each(
     from nanorocks_ros.studies.film_import.import_each import import_each
 
     with Progress('importing') as progress:
-        found = find_films(paths)
+        search = find_films(paths)
         try:
-            batch = import_each(found.films, output, settings, lambda done, _: progress.part(done))
+            batch = import_each(
+                search.films, output, settings, lambda done, _: progress.part(done)
+            )
         except KeyboardInterrupt as interruption:
             raise KeyboardInterrupt(
                 'run the same command again to import the remaining videos'
             ) from interruption
-    batch.failed = found.failed | batch.failed
+    batch.failed = search.failed | batch.failed
     for imported in batch.imported:
         _print_notices(imported)
     if options.json:
-        print(json.dumps(_batch_as_json(batch, found.left_out)))
+        print(json.dumps(_batch_as_json(batch, search.left_out)))
     else:
         for imported in batch.imported:
             print(_text(imported))
         print(f'{len(batch.imported)} imported, {len(batch.skipped)} existed already')
-    _print_left_out(found.left_out)
+    _print_left_out(search.left_out)
     return _print_failures(batch)
 
 

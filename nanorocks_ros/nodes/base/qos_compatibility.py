@@ -41,12 +41,12 @@ def mismatches(offered: Sequence[QoSProfile], requested: Sequence[QoSProfile]) -
     list of Mismatch
         Without duplicates.
     """
-    found: dict[Mismatch, None] = {}
+    unique: dict[Mismatch, None] = {}
     for publisher in offered:
         for subscription in requested:
             for policy, order in _POLICIES.items():
                 offer, request = getattr(publisher, policy), getattr(subscription, policy)
                 comparable = offer in order and request in order
                 if comparable and order.index(offer) < order.index(request):
-                    found[Mismatch(policy, offer.name, request.name)] = None
-    return list(found)
+                    unique[Mismatch(policy, offer.name, request.name)] = None
+    return list(unique)

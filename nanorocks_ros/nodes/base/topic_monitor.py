@@ -98,13 +98,13 @@ class TopicMonitor:
             for endpoint in self._node.get_subscriptions_info_by_topic(topic)
             if endpoint.node_name == self._node.get_name()
         ]
-        found = mismatches(offered, requested)
+        differing = mismatches(offered, requested)
         differences = ', '.join(
             f'{mismatch.policy} {mismatch.offered} but this node requests {mismatch.requested}'
-            for mismatch in found
+            for mismatch in differing
         )
         overrides = ', '.join(
-            f'qos_overrides.{topic}.subscription.{mismatch.policy}' for mismatch in found
+            f'qos_overrides.{topic}.subscription.{mismatch.policy}' for mismatch in differing
         )
         self._warn(f'{topic}: no data, the publisher offers {differences}; set {overrides}')
 

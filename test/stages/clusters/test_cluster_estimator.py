@@ -43,9 +43,9 @@ def estimates(records):
 def as_they_come(records, delays):
     """In the order in which they are known, some kinds later by some seconds."""
 
-    def known_ns(one):
-        stamp_ns = one.known_ns if isinstance(one, Merge) else one.stamp_ns
-        return stamp_ns + ns(delays.get(type(one), 0.0))
+    def known_ns(record):
+        stamp_ns = record.known_ns if isinstance(record, Merge) else record.stamp_ns
+        return stamp_ns + ns(delays.get(type(record), 0.0))
 
     return sorted(records, key=known_ns)
 

@@ -186,8 +186,8 @@ def test_system_folders_are_ignored(tmp_path, monkeypatch):
     (folder / 'lost+found').mkdir(parents=True)
     film = write_video(folder / 'a.avi', range(3))
     close(monkeypatch, folder / 'lost+found')
-    found = find_films([folder])
-    assert (found.films, found.failed) == ([film], {})
+    search = find_films([folder])
+    assert (search.films, search.failed) == ([film], {})
 
 
 @pytest.mark.parametrize('passed', ['the folder', 'its content'])
