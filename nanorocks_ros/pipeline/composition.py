@@ -91,8 +91,11 @@ class TrayStages:
 
         Contacts first: they are part of the final restitution, as bodies are of the clusters.
         """
+        measured = self._estimates(self.measurement.flush())
+        # The scale may have been found wrong after the last speed.
+        self.restitution.flag_cycle(self.measurement.scale_flag)
         return (
-            *self._estimates(self.measurement.flush()),
+            *measured,
             *self.restitution.flush(),
             *self.clusters.flush(),
         )

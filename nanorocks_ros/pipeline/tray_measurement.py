@@ -10,7 +10,9 @@ from nanorocks_ros.records import (
     BodyEstimate,
     Merge,
     MotionMask,
+    Notice,
     PairCollision,
+    Quality,
     Rebound,
     SpeedEstimate,
     Tracks,
@@ -19,6 +21,7 @@ from nanorocks_ros.records import (
 from nanorocks_ros.stages.bodies.body_counter import BodyCounter
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
 from nanorocks_ros.stages.preprocess.shake_detection import CycleFollower
+from nanorocks_ros.stages.scale.scale_check import ScaleCheck
 from nanorocks_ros.stages.speed.area_speed import AreaSpeed
 from nanorocks_ros.stages.speed.speed_selector import SpeedSelector
 from nanorocks_ros.stages.speed.structure_speed import StructureSpeed
@@ -34,7 +37,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
 
 Event = Rebound | PairCollision | BodyEstimate | Merge
-TrayRecord = SpeedEstimate | MotionMask | Tracks | Event
+TrayRecord = SpeedEstimate | MotionMask | Tracks | Event | Notice
 
 
 class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
@@ -42,7 +45,8 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
 
     Speeds have the stamp of the middle of their window and come in order of time; those by the
     structure function are held back until the appearance of the beads is known, some seconds
-    after the first shaking event. A stamp that goes back starts all afresh.
+    after the first shaking event. Speeds are flagged while the rulers of the image scale disagree,
+    and a notice says which. A stamp that goes back starts all afresh.
 
     Parameters
     ----------
@@ -74,6 +78,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         self._tracker = Tracker(settings, tray)
         self._contacts = ContactFinder(tray)
         self._bodies = BodyCounter(settings, tray)
+        self._scale = ScaleCheck(settings, tray)
         self._track_speed = TrackSpeed(settings, tray, crowded=self._tracker.crowded)
         self._structure_speed = StructureSpeed(settings, tray)
         self._area_speed = AreaSpeed(settings, tray)
@@ -87,6 +92,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         pictures: list[MotionMask | Tracks] = []
         speeds: list[SpeedEstimate] = []
         events: list[Event] = []
+        notices: list[Notice] = []
         for measured in self._area_speed.push(image):
             if isinstance(measured, SpeedEstimate):
                 speeds.append(measured)
@@ -96,19 +102,34 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
             speeds += self._track_speed.push(image)
             for tracks in self._tracker.push(image):
                 pictures += [tracks] if self.emit_tracks else []
-                events += self._contacts_in(tracks)
+                contacts = self._contacts_in(tracks)
+                notices += self._scale_notices(tracks, contacts)
+                events += contacts
                 events += self._bodies.push(tracks)
                 speeds += self._track_speed.push(tracks)
         speeds += self._structure_speeds(image)
-        return (*pictures, *self._selected(speeds), *self._reliable(events))
+        return (*notices, *pictures, *self._selected(speeds), *self._reliable(events))
 
     def flush(self) -> tuple[TrayRecord, ...]:
         """Contacts and bodies of the last seconds, and speeds that were still held back."""
         self._track_speed.flush()
         speeds = self._structure_speed.flush() if self._selector.uses_structure else ()
-        contacts = sorted(self._contacts.flush(), key=attrgetter('stamp_ns'))
-        events = [*self._in_cycle(contacts), *self._bodies.flush()]
-        return (*self._selected(speeds), *self._reliable(events))
+        contacts = self._in_cycle(sorted(self._contacts.flush(), key=attrgetter('stamp_ns')))
+        notices = [*self._scale_notices(None, contacts), *self._scale.flush()]
+        events = [*contacts, *self._bodies.flush()]
+        return (*notices, *self._selected(speeds), *self._reliable(events))
+
+    @property
+    def scale_flag(self) -> Quality:
+        """What the rulers of the image scale say by now: 0 while they agree."""
+        return self._scale.flag
+
+    def _scale_notices(self, tracks: Tracks | None, contacts: Iterable[Event]) -> list[Notice]:
+        """Compare the rulers of the scale with the tracks of a frame and new contacts."""
+        for contact in contacts:
+            if isinstance(contact, PairCollision):
+                self._scale.push(contact)
+        return [] if tracks is None else list(self._scale.push(tracks))
 
     def _structure_speeds(self, image: TrayImage) -> tuple[SpeedEstimate, ...]:
         if self._selector.uses_structure:
@@ -136,7 +157,11 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
 
     def _selected(self, speeds: Iterable[SpeedEstimate]) -> list[SpeedEstimate]:
         return [
-            replace(speed, tray_speed=self._oscillation.speed(speed))
+            replace(
+                speed,
+                tray_speed=self._oscillation.speed(speed),
+                quality=speed.quality | self._scale.flag,
+            )
             for speed in self._selector.push(speeds)
         ]
 

@@ -80,6 +80,7 @@ class Quality(IntFlag):
     UNCERTAIN = 512
     UNCALIBRATED = 1024
     INCONSISTENT = 2048
+    DOUBTFUL_SCALE = 4096
 
     def names(self) -> list[str]:
         """Names of the flags that are set, in lower case."""

@@ -87,6 +87,7 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
         self._cycle = 0
         self._finished = True
         self._merged = False
+        self._flags = Quality(0)
         self._last_update_ns: int | None = None
         self._method: RestitutionMethod = self._make_method()
 
@@ -130,7 +131,7 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
             estimates = self._end_cycle()
             self._cycle, self._samples, self._finished = speed.cycle, [], False
             self._last_update_ns = None
-            self._merged = False
+            self._merged, self._flags = False, Quality(0)
             self._contacts.next_cycle()
         if speed.cycle_start_ns is None or self._finished:
             return estimates
@@ -173,6 +174,10 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
         # A tray that went on oscillating drove the gas until shortly before the window.
         late_ns = first.stamp_ns - shake_ns - round(self._settings.delay * NS)
         return shake_ns + (late_ns if late_ns > _LATE_NS else 0)
+
+    def flag_cycle(self, quality: Quality) -> None:
+        """Add flags to the estimates of the current cycle, beside those of its speeds."""
+        self._flags |= quality
 
     def flush(self) -> tuple[CorEstimate, ...]:
         """End the recording: the final estimate, with all contacts up to the last speed."""
@@ -223,7 +228,7 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
         last = self._samples[-1]
         shake_ns, start_ns = last.cycle_start_ns or 0, self._start_ns(self._samples[0])
         decay = self._decay(start_ns)
-        quality = reduce(or_, {sample.quality for sample in self._samples})
+        quality = reduce(or_, {sample.quality for sample in self._samples}, self._flags)
         outcome, result = self._cycle_restitution(decay, quality, status)
         initial_speeds: tuple[Measured, ...] = ()
         haff_times: tuple[Measured, ...] = ()
