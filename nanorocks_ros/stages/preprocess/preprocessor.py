@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
@@ -15,6 +16,7 @@ from nanorocks_ros.numerics.quantiles import median
 from nanorocks_ros.records import Frame, Notice, Quality, TrayImage
 from nanorocks_ros.stages.preprocess.frame_checks import FrameChecks
 from nanorocks_ros.stages.preprocess.gray_image_checks import picture_quality
+from nanorocks_ros.stages.preprocess.scale_advice import misfit_remedy
 from nanorocks_ros.stages.preprocess.shake_detection import PlateMeter, ShakeCounter
 from nanorocks_ros.stages.preprocess.stabilise import shift_of_plate
 from nanorocks_ros.stages.preprocess.tray_crop import TrayCrop
@@ -71,6 +73,7 @@ class Preprocessor:
         self._view = view
         self._shape: tuple[int, ...] | None = None
         self._encoding = ''
+        self._remedy = ''
         self._regions: tuple[Region, ...] = ()
         self._last_stamp_ns: int | None = None
         self._check_regions()
@@ -148,9 +151,9 @@ class Preprocessor:
         if self._frames not in _POSITION_CHECKS or not self._settings.check_tray_positions:
             return ()
         view = self._view or self._straight
-        image = np.ascontiguousarray(frame.image).reshape(*frame.image.shape[:2], -1)
-        numbers = [tray.number for tray in self._trays]
-        text, wrong = position_problem(image, view, self._regions, numbers, self._settings)
+        text, wrong = position_problem(
+            _blue_first(frame), view, self._regions, self._trays, self._pipeline
+        )
         before, self._suspects = self._suspects, wrong
         if self._frames != _POSITION_CHECKS[-1]:
             return ()
@@ -232,7 +235,7 @@ class Preprocessor:
             )
         if self._shape is None:
             self._check_lens(frame.image.shape)
-            self._regions = self._regions_in(frame.image.shape)
+            self._regions = self._regions_in(frame)
             self._shape, self._encoding = frame.image.shape, frame.encoding
             self._start()
         elif frame.encoding != self._encoding:
@@ -285,8 +288,8 @@ class Preprocessor:
                 'calibrate the camera at this size',
             )
 
-    def _regions_in(self, shape: tuple[int, ...]) -> tuple[Region, ...]:
-        height, width = shape[:2]
+    def _regions_in(self, frame: Frame) -> tuple[Region, ...]:
+        height, width = frame.image.shape[:2]
         if self._settings.layout == 'plate' and not self._settings.regions_px:
             scale = self._settings.pixels_per_metre
             on_plate = regions_on_plate(self._trays, (height, width), scale)
@@ -300,12 +303,31 @@ class Preprocessor:
                     self._camera,
                     f'tray {tray.number} at x={x} y={y} of {w}x{h} px does not lie inside '
                     f'the {width}x{height} px frame',
-                    'set preprocess.regions_px or preprocess.pixels_per_metre',
+                    self._misfit_remedy(frame, tray),
                 )
         return regions
+
+    def _misfit_remedy(self, frame: Frame, tray: Tray) -> str:
+        """What to do about a tray outside the frame; searched once, as all frames are refused."""
+        if not self._remedy:
+            straight = self._view is None and not self._settings.regions_px
+            self._remedy = (
+                misfit_remedy(_blue_first(frame), tray, self._pipeline)
+                if straight
+                else 'set preprocess.regions_px or preprocess.pixels_per_metre'
+            )
+        return self._remedy
 
     def _centred(self, width: int, height: int) -> tuple[int, ...]:
         sides = self._trays[0].dimensions
         w = round(sides[0] * self._settings.pixels_per_metre)
         h = round(sides[1] * self._settings.pixels_per_metre)
         return ((width - w) // 2, (height - h) // 2, w, h)
+
+
+def _blue_first(frame: Frame) -> NDArray[np.uint8]:
+    """The image of a frame with its channels in the order blue, green, red."""
+    image = np.ascontiguousarray(frame.image).reshape(*frame.image.shape[:2], -1)
+    if frame.encoding != 'rgb8':
+        return image
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2BGR), dtype=np.uint8)

@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
+from nanorocks_ros.experiment.view import IdentityLens
 from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.stages.preprocess.scale_advice import (
+    remedy_for,
+    scale_of_beads,
+    scale_source,
+    scale_text,
+)
+from nanorocks_ros.stages.scale.picture_scale import around
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,8 +27,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.plate import Region
+    from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.experiment.view import View
-    from nanorocks_ros.settings import PreprocessSettings
+    from nanorocks_ros.settings import PipelineSettings, PreprocessSettings
 
 # One pixel of the reduced picture is so many of the frame.
 _REDUCED = 4
@@ -148,23 +157,24 @@ def position_problem(
     image: NDArray[np.uint8],
     view: View,
     regions: Sequence[Region],
-    trays: Sequence[int],
-    settings: PreprocessSettings,
+    trays: Sequence[Tray],
+    settings: PipelineSettings,
 ) -> tuple[str, frozenset[int]]:
     """What looks wrong with scale or regions, in one line, and the trays; '' when nothing does.
 
     Only when the trays are clearly seen somewhere else: a picture without clear edges tells
-    nothing.
+    nothing. The edges of a single tray may be those of the outside of its rim, so that its beads
+    must tell the same scale.
 
     Parameters
     ----------
-    image : ndarray of uint8, (height, width, channels)
+    image : ndarray of uint8, (height, width, channels), blue first
     view : View
     regions : sequence of Region
-    trays : sequence of int
-        Their numbers.
-    settings : PreprocessSettings
+    trays : sequence of Tray
+    settings : PipelineSettings
     """
+    numbers = [tray.number for tray in trays]
     boxes = np.array(regions, dtype=np.float64) / _REDUCED
     ends = boxes[:, :2] + boxes[:, 2:]
     room = min(boxes[:, :2].min(), (np.array(image.shape[1::-1]) / _REDUCED - ends).min())
@@ -180,22 +190,21 @@ def position_problem(
     if share < (_FOUND if near else _FOUND_FAR):
         return '', frozenset()
     if own >= share - _CLEARLY:
-        return _one_tray(shares, trays, settings)
-    subject = _source(settings)
+        return _one_tray(shares, numbers, settings.preprocess)
+    subject = scale_source(settings.preprocess)
     extent = float((ends.max(axis=0) - boxes[:, :2].min(axis=0)).max())
     if abs(scale - 1.0) > max(_SCALE_MATTERS, _RESOLVED / extent):
-        set_to = settings.pixels_per_metre
-        text = (
-            f'{subject} looks wrong: the trays look as at {set_to * scale:.0f} px/m, '
-            f'not at {set_to:.0f}; {_remedy(settings, set_to * scale)}'
-        )
-        return text, frozenset(trays)
+        beads = None
+        if len(trays) == 1 and isinstance(view.camera, IdentityLens) and image.shape[2] == 3:
+            beads = scale_of_beads(around(image, regions[0]), trays[0], settings, scale)
+        text = scale_text(settings.preprocess, settings.preprocess.pixels_per_metre * scale, beads)
+        return text, frozenset(numbers if text else ())
     if max(abs(x), abs(y)) * _REDUCED > _SHIFT_MATTERS_PX:
         text = (
             f'{subject} looks wrong: the trays look shifted by {x * _REDUCED:.0f}, '
-            f'{y * _REDUCED:.0f} px; {_remedy(settings)}'
+            f'{y * _REDUCED:.0f} px; {remedy_for(settings.preprocess)}'
         )
-        return text, frozenset(trays)
+        return text, frozenset(numbers)
     return '', frozenset()
 
 
@@ -207,28 +216,7 @@ def _one_tray(
         return '', frozenset()
     names = ', '.join(str(tray) for tray in absent)
     text = (
-        f'{_source(settings)} looks wrong for tray {names}: no walls are seen around it; '
-        f'{_remedy(settings)}'
+        f'{scale_source(settings)} looks wrong for tray {names}: no walls are seen around it; '
+        f'{remedy_for(settings)}'
     )
     return text, frozenset(absent)
-
-
-def _source(settings: PreprocessSettings) -> str:
-    """The setting that gives the positions of the trays."""
-    if settings.calibration:
-        return settings.calibration
-    if settings.regions_px:
-        return 'preprocess.regions_px'
-    return 'preprocess.pixels_per_metre'
-
-
-def _remedy(settings: PreprocessSettings, scale: float = 0.0) -> str:
-    """What the user should do."""
-    if settings.calibration:
-        remedy = 'calibrate again'
-    elif scale and not settings.regions_px:
-        # Around the floor there may be a rim, which looks like a tray as well.
-        remedy = 'set it to about that and see with nanorocks look that the floor fills the crop'
-    else:
-        remedy = 'set preprocess.regions_px'
-    return f'{remedy}, or set preprocess.check_tray_positions to false'
