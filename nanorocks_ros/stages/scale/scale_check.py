@@ -71,6 +71,7 @@ class ScaleCheck(RestartingStage[Tracks | PairCollision, Notice]):
         self._first_ns: int | None = None
         self._next = _SOON
         self._flagged_at = math.inf
+        self._misplaced = False
         self._radii: list[list[np.ndarray]] = [[] for _ in self._tray.species]
         self._contacts: list[tuple[int, float, float]] = []
         self._turns = TurningPoints(0.5 * self._tray.diameter)
@@ -81,6 +82,8 @@ class ScaleCheck(RestartingStage[Tracks | PairCollision, Notice]):
             return ()
         if self._first_ns is None:
             self._first_ns = record.stamp_ns
+        # The preprocessor has said so already, and why.
+        self._misplaced = bool(record.quality & Quality.WRONG_SCALE)
         if not record.quality & Quality.STABILISATION_LOST:
             self._turns.push(record)
         self._add_radii(record)
@@ -118,7 +121,7 @@ class ScaleCheck(RestartingStage[Tracks | PairCollision, Notice]):
         self.flag = flag_of(rulers)
 
     def _notice(self, stamp_ns: int, age: float) -> tuple[Notice, ...]:
-        if not self.flag:
+        if not self.flag or self._misplaced:
             self._flagged_at = math.inf
             return ()
         self._flagged_at = min(self._flagged_at, age)

@@ -1,0 +1,24 @@
+"""Films that other code made, beside the checkout; tests that need them are skipped without."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import pytest
+
+FOREIGN = Path(__file__).resolve().parents[3] / 'shared' / 'data' / 'foreign'
+
+
+def first_picture(name):
+    """The first picture of a film, bgr."""
+    path = FOREIGN / f'{name}.mp4'
+    if not path.is_file():
+        pytest.skip(f'{path} is not there: the film is not part of the package')
+    video = cv2.VideoCapture(str(path))
+    try:
+        decoded, image = video.read()
+    finally:
+        video.release()
+    assert decoded
+    return image
