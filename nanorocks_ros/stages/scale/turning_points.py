@@ -29,8 +29,11 @@ _LEAST_TURNS, _LEAST_BEADS, _BEYOND = 6, 3, 0.1
 _STANDS_OUT = 4.0
 # Part of the tray on each side in which walls are looked for.
 _OUTER = 0.3
-# Places of turning that are kept for each side.
+# Places of turning that are kept for each side, and pictures whose outermost beads are.
 _KEPT = 2000
+# Share of the pictures that may show a bead beyond a wall, by more than this share of a radius:
+# beads that rest on the wall turn nowhere, and others turn at them.
+_BEYOND_RADII = 0.4
 
 
 @compiled
@@ -89,18 +92,30 @@ class TurningPoints:
         self._turns: dict[tuple[int, int], list[tuple[float, float]]] = {
             (axis, high): [] for axis in range(2) for high in range(2)
         }
+        self._outermost: dict[tuple[int, int], list[float]] = {key: [] for key in self._turns}
 
     def push(self, tracks: Tracks) -> None:
         """Follow the beads that are seen."""
         seen = tracks.seen
         ids = tracks.ids[seen]
         slots = np.array([self._slot(number) for number in ids.tolist()], dtype=np.int64)
+        places, radii = tracks.positions[seen], tracks.radii[seen]
+        self._add_outermost(places, radii)
         turns = np.empty((2 * slots.size, 4))
-        count = _turns(slots, tracks.positions[seen], tracks.radii[seen], self._state, turns)
+        count = _turns(slots, places, radii, self._state, turns)
         for axis, high, place, slot in turns[:count].tolist():
             side = self._turns[int(axis), int(high)]
             if len(side) < _KEPT:
                 side.append((place, slot))
+
+    def _add_outermost(self, places: NDArray[np.float64], radii: NDArray[np.float64]) -> None:
+        if not radii.size or len(self._outermost[0, 0]) >= _KEPT:
+            return
+        low = (places - radii[:, np.newaxis]).min(axis=0).tolist()
+        high = (places + radii[:, np.newaxis]).max(axis=0).tolist()
+        for axis in range(2):
+            self._outermost[axis, 0].append(low[axis])
+            self._outermost[axis, 1].append(high[axis])
 
     def _slot(self, number: int) -> int:
         slot = self._slots.setdefault(number, len(self._slots))
@@ -149,4 +164,10 @@ class TurningPoints:
         # half counts.
         outer, middle = np.quantile(inside, [0.1, 0.5])
         place = float(np.quantile(inside, 0.25))
+        outermost = np.array(self._outermost[axis, high])
+        beyond = (
+            expected - outermost if high else outermost
+        ) < place - _BEYOND_RADII * self._radius
+        if beyond.mean() > _BEYOND:
+            return None
         return (expected - place if high else place), float(middle - outer)
