@@ -19,6 +19,7 @@ ALL = (
     'dashboard',
     'recordings',
     'preprocess',
+    'scale',
     'scene',
     'tracking',
     'plate_cost',

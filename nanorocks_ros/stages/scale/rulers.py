@@ -19,6 +19,8 @@ TOLERANCE = 0.02
 """Relative difference that two rulers may have beside their errors."""
 LARGEST = 0.05
 """Relative difference beyond which no restitution is given."""
+AXES = 'columns', 'rows'
+"""Names of the axes of a picture."""
 # Standard errors of a difference that are left to chance: one-sided, once in 1000 for each pair.
 _SIGMAS = 3.0
 

@@ -13,7 +13,7 @@ import numpy as np
 from nanorocks_ros.records import Notice, PairCollision, Quality, Tracks
 from nanorocks_ros.stages.scale.bead_radii import alike, measurable, radius_scale
 from nanorocks_ros.stages.scale.contact_distances import contact_scale, is_flat
-from nanorocks_ros.stages.scale.rulers import Ruler, flag_of
+from nanorocks_ros.stages.scale.rulers import AXES, Ruler, flag_of
 from nanorocks_ros.stages.scale.scale_words import disagreement
 from nanorocks_ros.stages.scale.turning_points import TurningPoints
 from nanorocks_ros.stages.stage import RestartingStage
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _NS = 1e9
 # The rulers are compared once in so many seconds, more rarely after some time: nothing new comes.
 _SOON, _GROWTH, _RARELY = 1.0, 1.25, 30.0
-# Time that a notice waits for a second ruler, [s].
+# Time that a notice waits for other rulers, [s].
 _PATIENCE = 20.0
 # Pictures between two whose radii are kept, and pictures and contacts that are kept.
 _EVERY, _KEPT_PICTURES, _KEPT_CONTACTS = 5, 100, 400
@@ -34,7 +34,6 @@ _LEAST_PICTURES = 4
 _WALL_BIAS = 0.002
 # Rounding of a region to whole pixels, one standard error of its width, [px].
 _ROUNDING_PX = 0.5
-AXES = 'columns', 'rows'
 
 
 class ScaleCheck(RestartingStage[Tracks | PairCollision, Notice]):
@@ -125,8 +124,9 @@ class ScaleCheck(RestartingStage[Tracks | PairCollision, Notice]):
             self._flagged_at = math.inf
             return ()
         self._flagged_at = min(self._flagged_at, age)
-        sources = {ruler.source for ruler in self.rulers} - {'told'}
-        if self._said or (len(sources) < 2 and age < self._flagged_at + _PATIENCE):
+        sources = [ruler.source for ruler in self.rulers]
+        complete = 'beads' in sources and sources.count('walls') == len(AXES)
+        if self._said or not (complete or age >= self._flagged_at + _PATIENCE):
             return ()
         self._said = True
         text = disagreement(self.rulers, self._tray, self._settings)

@@ -5,10 +5,11 @@ Tested by ``test/stages/scale/test_scale_check.py``.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import Quality
-from nanorocks_ros.stages.scale.rulers import agree, flag_of, mean_ratio
+from nanorocks_ros.stages.scale.rulers import AXES, TOLERANCE, agree, flag_of, mean_ratio
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,31 +51,35 @@ def disagreement(rulers: Sequence[Ruler], tray: Tray, settings: PreprocessSettin
 
 
 def _remedy(rulers: Sequence[Ruler], tray: Tray, settings: PreprocessSettings) -> str:
-    told = [ruler for ruler in rulers if ruler.source == 'told']
+    told = rulers[0]
     beads = [ruler for ruler in rulers if ruler.source == 'beads']
     walls = [ruler for ruler in rulers if ruler.source == 'walls']
     measured = [*beads, *walls]
     if not measured:
         return 'set preprocess.pixels_per_metre or preprocess.regions_px so that they agree'
     scale = settings.pixels_per_metre * mean_ratio(measured)
-    if agree(measured):
-        if not flag_of([told[0], *measured]):
+    if agree(measured) and (not (beads and walls) or _near(beads, walls)):
+        if not flag_of([told, *measured]):
             sides = ' x '.join(f'{side * scale:.0f}' for side in tray.dimensions[:2])
             return f'give a region of {sides} px around the floor in preprocess.regions_px'
-        if beads and walls:
-            if settings.calibration:
-                return f'beads and walls support {scale:.0f} px/m: calibrate again'
-            return f'beads and walls agree: pass {scale_flag(scale)}'
-        return _one_source(scale, tray, of_beads=bool(beads))
-    if agree(beads) and agree(walls):
-        if walls and not flag_of([told[0], *walls]):
-            return _wrong_diameter(beads, tray)
-        if beads and not flag_of([told[0], *beads]):
-            return _wrong_dimensions(walls, tray)
+        if not (beads and walls):
+            return _one_source(scale, tray, of_beads=bool(beads))
+        if settings.calibration:
+            return f'beads and walls support {scale:.0f} px/m: calibrate again'
+        return f'beads and walls agree: pass {scale_flag(scale)}'
+    if walls and agree(walls) and _near([told], walls):
+        return _wrong_diameter(beads, tray)
+    if beads and agree(beads) and _near([told], beads):
+        return _wrong_dimensions(walls, tray)
     return (
         f'no scale fits: correct diameter_mm and dimensions_mm of tray {tray.number} in the trays '
         'file, and calibrate the camera with nanorocks calibrate'
     )
+
+
+def _near(some: Sequence[Ruler], others: Sequence[Ruler]) -> bool:
+    """Whether two groups agree whatever their errors: no value is advised on errors alone."""
+    return abs(math.log(mean_ratio(some) / mean_ratio(others))) <= TOLERANCE
 
 
 def _one_source(scale: float, tray: Tray, *, of_beads: bool) -> str:
@@ -87,26 +92,24 @@ def _one_source(scale: float, tray: Tray, *, of_beads: bool) -> str:
 
 
 def _wrong_diameter(beads: Sequence[Ruler], tray: Tray) -> str:
-    diameter = tray.species[0].diameter * mean_ratio(beads) / _MILLIMETRE
-    if len(tray.species) > 1:
-        factor = mean_ratio(beads)
-        return (
-            f'the scale fits the walls, and beads look {factor:.3f} times as large as told: '
-            f'correct diameter_mm of tray {tray.number} in the trays file'
-        )
+    factor = mean_ratio(beads)
+    size = f'{factor:.3f} times as large as told'
+    if len(tray.species) == 1:
+        size = f'{tray.diameter * factor / _MILLIMETRE:.2f} mm large'
     return (
-        f'the scale fits the walls, and beads look {diameter:.2f} mm large: correct diameter_mm '
-        f'of tray {tray.number} in the trays file'
+        f'the scale fits the walls, and beads look {size}: correct diameter_mm of tray '
+        f'{tray.number} in the trays file'
     )
 
 
 def _wrong_dimensions(walls: Sequence[Ruler], tray: Tray) -> str:
-    sides = []
-    for axis, name in enumerate(('columns', 'rows')):
-        own = [ruler for ruler in walls if ruler.name.endswith(name)]
-        factor = mean_ratio(own) if own else 1.0
-        sides.append(f'{tray.dimensions[axis] * factor / _MILLIMETRE:.2f}')
+    lengths = [
+        f'{tray.dimensions[axis] * ruler.ratio / _MILLIMETRE:.2f} mm along {name}'
+        for ruler in walls
+        for axis, name in enumerate(AXES)
+        if ruler.name.endswith(name)
+    ]
     return (
-        f'the scale fits the beads, and the floor looks {" x ".join(sides)} mm large: correct '
+        f'the scale fits the beads, and the floor looks {" and ".join(lengths)}: correct '
         f'dimensions_mm of tray {tray.number} in the trays file'
     )
