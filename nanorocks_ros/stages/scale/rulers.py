@@ -47,15 +47,20 @@ class Ruler:
     error: float
 
 
-def excess(first: Ruler, second: Ruler) -> float:
-    """Relative difference of two rulers beyond what their errors explain."""
-    difference = abs(math.log(first.ratio / second.ratio))
-    return difference - _SIGMAS * math.hypot(first.error, second.error)
+def difference(first: Ruler, second: Ruler) -> float:
+    """Relative difference of two rulers."""
+    return abs(math.log(first.ratio / second.ratio))
+
+
+def contradict(first: Ruler, second: Ruler) -> bool:
+    """Whether two rulers differ by more than their errors and the tolerance explain."""
+    errors = _SIGMAS * math.hypot(first.error, second.error)
+    return difference(first, second) - errors > TOLERANCE
 
 
 def agree(rulers: Sequence[Ruler]) -> bool:
-    """Whether all rulers agree with one another."""
-    return all(excess(*pair) <= TOLERANCE for pair in combinations(rulers, 2))
+    """Whether no two rulers contradict each other."""
+    return not any(contradict(*pair) for pair in combinations(rulers, 2))
 
 
 def mean_ratio(rulers: Sequence[Ruler]) -> float:
@@ -82,7 +87,8 @@ def flag_of(rulers: Sequence[Ruler]) -> Quality:
     if measured and agree(measured):
         together = joined(measured)
         pairs += [(ruler, together) for ruler in rulers if ruler.source == 'told']
-    largest = max((excess(*pair) for pair in pairs), default=0.0)
-    if largest <= TOLERANCE:
+    differences = [difference(*pair) for pair in pairs if contradict(*pair)]
+    if not differences:
         return Quality(0)
+    largest = max(differences)
     return Quality.WRONG_SCALE if largest > LARGEST else Quality.DOUBTFUL_SCALE
