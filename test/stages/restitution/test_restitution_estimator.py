@@ -202,6 +202,19 @@ def test_what_was_wrong_with_the_pictures_goes_with_the_estimate():
     assert final.quality is Quality.GLARE
 
 
+def test_a_flag_that_comes_after_the_last_speed_is_on_the_final_estimate_of_its_cycle_alone():
+    stage = fitter()
+    # Shorter than the window: the end of the recording ends the cycle.
+    all_estimates(stage, simulated_cycle()[:100])
+    stage.flag_cycle(Quality.DOUBTFUL_SCALE)
+    (final,) = stage.flush()
+    assert final.status is CorStatus.FINAL
+    assert final.quality is Quality.DOUBTFUL_SCALE
+    *_, following = all_estimates(stage, simulated_cycle(cycle=2, start=20.0))
+    assert following.cycle == 2
+    assert following.quality == 0
+
+
 def test_of_trays_that_are_not_where_the_settings_say_nothing_is_told():
     stage = fitter()
     wrong = [replace(record, quality=Quality.WRONG_SCALE) for record in simulated_cycle()]
