@@ -81,7 +81,7 @@ def read_truth(video: Path) -> FilmTruth:
     """
     with np.load(video.with_suffix('.npz')) as archive:
         arrays = dict(archive)
-    asked, drawn = (json.loads(str(arrays[name])) for name in ('sim', 'px'))
+    asked, scale, region = _asked(arrays)
     rate = float(arrays['fps'])
     displacement = arrays['D'].astype(np.float64)
     swing = rate * np.gradient(displacement, axis=0)
@@ -96,11 +96,25 @@ def read_truth(video: Path) -> FilmTruth:
         ideal=not (spread or friction),
         frame_rate=rate,
         shake=float(arrays['pre']),
-        scale=_PER_METRE * float(drawn.get('s', DEFAULT_SCALE)),
-        region=tuple(float(side) for side in drawn.get('region', ())),
+        scale=scale,
+        region=region,
         positions=arrays['P'][..., :2].astype(np.float64) - displacement[:, np.newaxis],
         velocities=arrays['V'][..., :2].astype(np.float64) - swing[:, np.newaxis],
         radii=arrays['rad'].astype(np.float64),
         species=arrays['sp'].astype(np.int64),
         merges=np.asarray(arrays['merges'], dtype=np.float64).reshape(-1, 3)[:, 0],
     )
+
+
+def _asked(
+    arrays: dict[str, NDArray[np.generic]],
+) -> tuple[dict[str, float], float, tuple[float, ...]]:
+    """What engine and renderer were asked for, scale [px/m], and region of the floor [px]."""
+    if 'settings' not in arrays:
+        asked, drawn = (json.loads(str(arrays[name])) for name in ('sim', 'px'))
+        return asked, _PER_METRE * float(drawn.get('s', DEFAULT_SCALE)), ()
+    simulation = json.loads(str(arrays['settings']))['simulation']
+    names = {'restitution': 'eps', 'wall_restitution': 'epsw', 'sticking_speed': 'vstick'}
+    asked = {short: float(simulation[name]) for name, short in names.items()}
+    region = tuple(float(side) for side in np.asarray(arrays['region'], dtype=np.float64))
+    return asked, float(np.asarray(arrays['scale'], dtype=np.float64)), region

@@ -26,7 +26,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.drawn import varied
-from benchmarks.drawn_films import write_drawn_film
 from benchmarks.film_measurement import DECADES, FilmResult, is_flagged, measure
 from benchmarks.film_truth import FilmTruth, read_truth
 from benchmarks.filmed_cycles import DRAWN_PAIRS, folder
@@ -36,6 +35,7 @@ from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.records import CorStatus, Quality
 from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_values
+from nanorocks_ros.studies.synthetic.drawn_film import write_drawn_film
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -114,7 +114,7 @@ def _draw(film: tuple[int, int]) -> None:
     simulation = with_values(SimulationSettings(), values, 'benchmark')
     stem = _stem(number_of_tray, number)
     stem.parent.mkdir(parents=True, exist_ok=True)
-    write_drawn_film(stem, tray, simulation, _SECONDS)
+    write_drawn_film(stem, tray, simulation, _SECONDS, 10 * number + number_of_tray)
 
 
 def _measured(videos: list[Path]) -> list[_Read]:
