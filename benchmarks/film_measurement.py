@@ -119,7 +119,7 @@ def settings_for(film: FilmTruth) -> PipelineSettings:
         'preprocess.pixels_per_metre': film.scale,
     }
     if film.region:
-        values['preprocess.regions_px'] = list(film.region)
+        values['preprocess.regions_px'] = [round(side) for side in film.region]
     return with_values(PipelineSettings(), values, 'benchmark')
 
 
