@@ -19,7 +19,12 @@ from nanorocks_ros.simulation.plate_scene.drawing.bead_appearance import turned_
 from nanorocks_ros.simulation.plate_scene.moving_plate import FURTHEST_PX
 from nanorocks_ros.simulation.plate_scene.plate_camera import Instant, SceneCamera
 from nanorocks_ros.simulation.plate_scene.plate_oscillation import plate_motion, wall_motion_of
-from nanorocks_ros.simulation.plate_scene.shutter import MOST, instants_for, shutter_times
+from nanorocks_ros.simulation.plate_scene.shutter import (
+    MOST,
+    grouped_path,
+    instants_for,
+    shutter_times,
+)
 from nanorocks_ros.simulation.shaken_tray import ShakenTray, check_settings
 
 if TYPE_CHECKING:
@@ -180,7 +185,8 @@ class SceneFilm:
         )
         instants += [instant, *(self._instant(later, number)[0] for later in after)]
         self._fastest = max(float(np.abs(state[1][:, :2]).max()) for state in states.values())
-        image = self.camera.exposed(instants, number, time=time, turned=turned)
+        shown = _with_fewer_plates(instants, self._scene.pixels_per_metre)
+        image = self.camera.exposed(shown, number, time=time, turned=turned)
         frame = Frame(stamp_ns=stamp_ns, encoding='bgr8', image=image)
         shift = instant.shift
         return SceneMoment(frame=frame, trays=trays, beads=beads, shift_px=shift)
@@ -234,6 +240,18 @@ class SceneFilm:
             species=self._species[tray],
             bodies=gas.bodies,
         )
+
+
+def _with_fewer_plates(instants: list[Instant], scale: float) -> list[Instant]:
+    """The instants with plates that are drawn once for several of them."""
+    if len(instants) == 1:
+        return [instants[0]._replace(plate_shift=instants[0].shift)]
+    plates = grouped_path(scale * np.array([instant.plate for instant in instants])) / scale
+    shifts = grouped_path(np.array([instant.shift for instant in instants]))
+    return [
+        instant._replace(plate=(plate[0], plate[1]), plate_shift=(shift[0], shift[1]))
+        for instant, plate, shift in zip(instants, plates.tolist(), shifts.tolist(), strict=True)
+    ]
 
 
 def _with_shared_settings(

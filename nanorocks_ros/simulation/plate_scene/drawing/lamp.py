@@ -22,6 +22,8 @@ LAMP_X, LAMP_Y, LAMP_Z, HALF_X, HALF_Y, HALF_Z, LAMP_ACROSS = range(7)
 # The lamp of the flight is so far from the vertical.
 _FLIGHT_ACROSS, _FLIGHT_HEIGHT = 0.60, 0.80
 _LEAST_ACROSS = 0.01
+# So that the angles of the flight's lamp give its vector to the last digit.
+_DIGITS = 12
 # Light on the chamfer of a hole by how far its face is turned to the lamp, -1 to 1.
 _FACING = (-1.0, -0.8, -0.6, 0.6, 0.8, 1.0)
 _CHAMFER = (0.40, 0.44, 0.50, 1.42, 1.55, 1.65)
@@ -55,12 +57,12 @@ class Lamp:
             [x, y, height, x / half, y / half, (1.0 + height) / half, least], dtype=np.float32
         )
         # 1 for the lamp of the flight, 0 for one at the zenith.
-        self._slant = across * _FLIGHT_HEIGHT / (_FLIGHT_ACROSS * height)
+        self._slant = round(across * _FLIGHT_HEIGHT / (_FLIGHT_ACROSS * height), _DIGITS)
         unit = np.array([math.cos(scene.lamp_azimuth), math.sin(scene.lamp_azimuth)])
         contrast = min(across / _FLIGHT_ACROSS, 1.0)
-        self._facing = contrast * (_NORMALS @ unit)
+        self._facing = np.round(contrast * (_NORMALS @ unit), _DIGITS)
         # Where the shadow of a bead falls, in heights of its centre.
-        self.cast: NDArray[np.float64] = -np.array([x, y]) / height
+        self.cast: NDArray[np.float64] = np.round(-np.array([x, y]) / height, _DIGITS)
 
     @property
     def facing(self) -> NDArray[np.float64]:
