@@ -15,8 +15,8 @@ from nanorocks_ros.simulation.plate_scene.frame_effects import add_light, expose
 from nanorocks_ros.simulation.plate_scene.glare import Glare, led_glare
 from nanorocks_ros.simulation.plate_scene.illumination import Illumination
 from nanorocks_ros.simulation.plate_scene.moving_plate import MovingPlate
+from nanorocks_ros.simulation.plate_scene.optics.raw_sensor import through_filters
 from nanorocks_ros.simulation.plate_scene.plate_oscillation import AT_REST
-from nanorocks_ros.simulation.plate_scene.raw_sensor import through_filters
 from nanorocks_ros.simulation.plate_scene.scene_geometry import SceneGeometry
 from nanorocks_ros.simulation.plate_scene.simd_rectangles import LEVEL
 

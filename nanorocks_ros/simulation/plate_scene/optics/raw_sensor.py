@@ -1,6 +1,6 @@
 """A sensor with colour filters: every pixel sees one colour, the others are interpolated.
 
-Tested by ``test/simulation/plate_scene/test_varied_camera.py``.
+Tested by ``test/simulation/plate_scene/test_optics.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Instants at which the shutter is open: their mean is the motion blur of a frame.
 
-Tested by ``test/simulation/plate_scene/test_varied_camera.py``.
+Tested by ``test/simulation/plate_scene/test_optics.py``.
 """
 
 from __future__ import annotations
