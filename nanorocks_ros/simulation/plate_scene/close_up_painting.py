@@ -128,7 +128,7 @@ def tray_layers(
 
 def _over(outside: Field, inside: Field, share: Field) -> Field:
     """The inside where its share is 1, the outside where that is 0."""
-    return outside + share[..., np.newaxis] * (inside - outside)
+    return np.asarray(outside + share[..., np.newaxis] * (inside - outside))
 
 
 def _covered(grid: _Grid, box: _Box) -> Field:

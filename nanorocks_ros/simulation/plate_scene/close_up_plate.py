@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.compiled import compiled, kernel
 from nanorocks_ros.simulation.plate_scene.close_up_painting import FULL, TrayLayers, tray_layers
 
 if TYPE_CHECKING:
@@ -50,9 +50,11 @@ class CloseUpPlate:
         self._still = np.empty_like(layers.around)
         cover(self._still, layers.around, layers.tray, layers.mask)
         shape = (3, *geometry.shape)
-        self._canvas = np.empty(shape, dtype=np.uint16)
-        self._tray = np.empty(shape, dtype=np.uint16)
+        self._empty, self._canvas, self._around, self._tray = (
+            np.empty(shape, dtype=np.uint16) for _ in range(4)
+        )
         self._mask = np.empty((1, *geometry.shape), dtype=np.uint16)
+        self._drawn: tuple[float, ...] = ()
 
     @property
     def layers(self) -> TrayLayers:
@@ -66,16 +68,23 @@ class CloseUpPlate:
 
         The caller draws on it.
         """
+        drawn = (*displacement, *shift)
+        if drawn != self._drawn:
+            self._draw(displacement, shift)
+            self._drawn = drawn
+        self._canvas[:] = self._empty
+        return self._canvas
+
+    def _draw(self, displacement: tuple[float, float], shift: tuple[float, float]) -> None:
         across, down = (self._scale * part for part in displacement)
         if across == 0.0 and down == 0.0:
-            shifted(self._canvas, self._still, *shift)
-            return self._canvas
+            shifted(self._empty, self._still, *shift)
+            return
         moved = shift[0] + across, shift[1] + down
-        shifted(self._canvas, self._layers.around, *shift)
+        shifted(self._around, self._layers.around, *shift)
         shifted(self._tray, self._layers.tray, *moved)
         shifted(self._mask, self._layers.mask, *moved)
-        cover(self._canvas, self._canvas, self._tray, self._mask)
-        return self._canvas
+        cover(self._empty, self._around, self._tray, self._mask)
 
 
 def shifted(
@@ -166,15 +175,24 @@ def cover(
     Parameters
     ----------
     target, below, above : ndarray of uint16, (3, rows, columns)
-        The first, which may be the second, is written.
+        The first is written.
     mask : ndarray of uint16, (1, rows, columns)
         `FULL`: only the picture above is seen.
     """
-    part = np.float32(1.0 / FULL)
     for channel in range(3):
         for i in range(target.shape[1]):
-            for j in range(target.shape[2]):
-                low = np.float32(below[channel, i, j])
-                share = np.float32(mask[0, i, j]) * part
-                value = low + share * (np.float32(above[channel, i, j]) - low)
-                target[channel, i, j] = np.uint16(np.int32(value + np.float32(0.5)))
+            _cover_row(target[channel, i], below[channel, i], above[channel, i], mask[0, i])
+
+
+@kernel
+def _cover_row(
+    target: NDArray[np.uint16],
+    below: NDArray[np.uint16],
+    above: NDArray[np.uint16],
+    mask: NDArray[np.uint16],
+) -> None:
+    part, half = np.float32(1.0 / FULL), np.float32(0.5)
+    for j in range(target.size):
+        low = np.float32(below[j])
+        value = low + part * np.float32(mask[j]) * (np.float32(above[j]) - low)
+        target[j] = np.uint16(np.int32(value + half))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -202,7 +202,7 @@ def _scene(draw: _Draws, tray: Tray, moving: float) -> SceneSettings:
         'gradient',
         'flicker',
     )
-    uniform = {name: draw.uniform(name) for name in names}
+    uniform: dict[str, Any] = {name: draw.uniform(name) for name in names}
     return SceneSettings(
         **uniform,
         trays=(tray.number,),

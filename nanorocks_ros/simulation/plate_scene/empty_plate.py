@@ -82,8 +82,8 @@ def empty_scene(
         for layer in (painted, opaque)
     )
     around = _housing(geometry.shape, rng)
-    scene = around + opacity[..., np.newaxis] * (colour - around)
-    levels = np.asarray(np.clip(scene, 0.0, 255.0) * LEVEL + 0.5, dtype=np.uint16)
+    blended = around + opacity[..., np.newaxis] * (colour - around)
+    levels = np.asarray(np.clip(blended, 0.0, 255.0) * LEVEL + 0.5, dtype=np.uint16)
     return np.ascontiguousarray(levels.transpose(2, 0, 1))
 
 

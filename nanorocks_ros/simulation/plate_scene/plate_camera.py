@@ -15,8 +15,8 @@ from nanorocks_ros.simulation.plate_scene.frame_effects import add_light, expose
 from nanorocks_ros.simulation.plate_scene.glare import Glare, led_glare
 from nanorocks_ros.simulation.plate_scene.illumination import Illumination
 from nanorocks_ros.simulation.plate_scene.moving_plate import MovingPlate
+from nanorocks_ros.simulation.plate_scene.optics.raw_sensor import through_filters
 from nanorocks_ros.simulation.plate_scene.plate_oscillation import AT_REST
-from nanorocks_ros.simulation.plate_scene.raw_sensor import through_filters
 from nanorocks_ros.simulation.plate_scene.scene_geometry import SceneGeometry
 from nanorocks_ros.simulation.plate_scene.simd_rectangles import LEVEL
 
@@ -37,15 +37,18 @@ class Instant(NamedTuple):
     ----------
     positions : mapping of int to ndarray (n, 3), [m]
         Of the beads of each tray, from the corner of its floor when the plate is at rest.
-    displacement : tuple of 2 floats, [m]
-        Of the plate.
+    plate : tuple of 2 floats, [m]
+        Displacement of the plate.
     shift : tuple of 2 floats, [px]
-        Of the whole picture, by the camera.
+        Of the beads in the picture, by the camera.
+    plate_shift : tuple of 2 floats, [px]
+        The same of everything else. Instants with equal values need not draw it again.
     """
 
     positions: Mapping[int, NDArray[np.float64]]
-    displacement: tuple[float, float]
-    shift: tuple[float, float]
+    plate: tuple[float, float]
+    shift: tuple[float, float] = (0.0, 0.0)
+    plate_shift: tuple[float, float] = (0.0, 0.0)
 
 
 class SceneCamera:
@@ -139,7 +142,7 @@ class SceneCamera:
         SimulationError
             For positions of another shape, or not finite.
         """
-        instant = Instant(positions, motion.displacement, (0.0, 0.0))
+        instant = Instant(positions, motion.displacement)
         return self.exposed([instant], number, time=time, turned=turned)
 
     def exposed(
@@ -163,8 +166,6 @@ class SceneCamera:
             For positions of another shape, or not finite.
         """
         canvas = self._mean_canvas(instants, turned)
-        if self._scene.close_up:
-            _blur(canvas, self._scene.defocus_px)
         if self._glare is not None:
             x, y, _, _ = self._glare.region
             add_light(canvas, self._glare.light, x, y)
@@ -181,23 +182,22 @@ class SceneCamera:
         return through_filters(picture, self._scene.bayer)
 
     def _mean_canvas(self, instants: Sequence[Instant], turned: float) -> NDArray[np.uint16]:
-        if len(instants) == 1:
+        """Mean of the canvases of some instants, in close-ups blurred by the lens."""
+        blur = self._scene.defocus_px if self._scene.close_up else 0.0
+        if len(instants) == 1 and blur == 0.0:
             return self._canvas(instants[0], turned)
         rows, columns = self.geometry.shape
         total = np.zeros((3 * rows, columns), dtype=np.float32)
         for instant in instants:
             cv2.accumulate(self._canvas(instant, turned).reshape(3 * rows, columns), total)
-        mean = np.rint(total * np.float32(1.0 / len(instants)))
-        return np.asarray(mean, dtype=np.uint16).reshape(3, rows, columns)
+        total *= np.float32(1.0 / len(instants))
+        mean = total.reshape(3, rows, columns)
+        if blur > 0.0:
+            for channel in mean:
+                cv2.GaussianBlur(channel, (0, 0), blur, dst=channel)
+        return np.asarray(np.rint(mean), dtype=np.uint16)
 
     def _canvas(self, instant: Instant, turned: float) -> NDArray[np.uint16]:
-        canvas = self._plate.displaced(instant.displacement, instant.shift)
-        self._painter.paint(canvas, instant.positions, instant.displacement, turned, instant.shift)
+        canvas = self._plate.displaced(instant.plate, instant.plate_shift)
+        self._painter.paint(canvas, instant.positions, instant.plate, turned, instant.shift)
         return canvas
-
-
-def _blur(canvas: NDArray[np.uint16], defocus: float) -> None:
-    """Blur every channel of a canvas in place with a Gaussian, [px]."""
-    if defocus > 0.0:
-        for channel in canvas:
-            channel[:] = cv2.GaussianBlur(channel, (0, 0), defocus)

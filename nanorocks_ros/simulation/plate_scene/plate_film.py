@@ -9,17 +9,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.errors import ConfigurationError, SimulationError
+from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.records import BeadsTruth, Frame, GroundTruth
-from nanorocks_ros.settings import problem, rows, with_values
+from nanorocks_ros.settings import with_values
 from nanorocks_ros.simulation.initial_state import inventory
-from nanorocks_ros.simulation.plate_scene.camera_shake import CameraShake
 from nanorocks_ros.simulation.plate_scene.drawing.bead_appearance import turned_angle
-from nanorocks_ros.simulation.plate_scene.moving_plate import FURTHEST_PX
+from nanorocks_ros.simulation.plate_scene.optics.camera_shake import CameraShake
+from nanorocks_ros.simulation.plate_scene.optics.shutter import (
+    MOST,
+    grouped_path,
+    instants_for,
+    shutter_times,
+)
 from nanorocks_ros.simulation.plate_scene.plate_camera import Instant, SceneCamera
 from nanorocks_ros.simulation.plate_scene.plate_oscillation import plate_motion, wall_motion_of
-from nanorocks_ros.simulation.plate_scene.shutter import MOST, instants_for, shutter_times
+from nanorocks_ros.simulation.plate_scene.scene_checks import check_motion, check_scene
 from nanorocks_ros.simulation.shaken_tray import ShakenTray, check_settings
 
 if TYPE_CHECKING:
@@ -122,7 +127,7 @@ class SceneFilm:
         check_scene(scene)
         for checked in (simulation, *gas_settings.values()):
             check_settings(checked)
-            _check_swing(checked, scene)
+            check_motion(checked, scene)
         self._simulation, self._scene = simulation, scene
         self._fastest = 0.0
         self._shake = CameraShake(scene, simulation.seed)
@@ -180,7 +185,8 @@ class SceneFilm:
         )
         instants += [instant, *(self._instant(later, number)[0] for later in after)]
         self._fastest = max(float(np.abs(state[1][:, :2]).max()) for state in states.values())
-        image = self.camera.exposed(instants, number, time=time, turned=turned)
+        shown = _with_fewer_plates(instants, self._scene.pixels_per_metre)
+        image = self.camera.exposed(shown, number, time=time, turned=turned)
         frame = Frame(stamp_ns=stamp_ns, encoding='bgr8', image=image)
         shift = instant.shift
         return SceneMoment(frame=frame, trays=trays, beads=beads, shift_px=shift)
@@ -236,6 +242,18 @@ class SceneFilm:
         )
 
 
+def _with_fewer_plates(instants: list[Instant], scale: float) -> list[Instant]:
+    """The instants with plates that are drawn once for several of them."""
+    if len(instants) == 1:
+        return [instants[0]._replace(plate_shift=instants[0].shift)]
+    plates = grouped_path(scale * np.array([instant.plate for instant in instants])) / scale
+    shifts = grouped_path(np.array([instant.shift for instant in instants]))
+    return [
+        instant._replace(plate=(plate[0], plate[1]), plate_shift=(shift[0], shift[1]))
+        for instant, plate, shift in zip(instants, plates.tolist(), shifts.tolist(), strict=True)
+    ]
+
+
 def _with_shared_settings(
     simulation: SimulationSettings, gas_settings: SimulationSettings
 ) -> SimulationSettings:
@@ -249,38 +267,3 @@ def _shaken_tray(simulation: SimulationSettings, scene: SceneSettings, tray: Tra
     swing = wall_motion_of(simulation, scene) if scene.swing_knocks else None
     settings = replace(simulation, tray=tray.number)
     return ShakenTray(settings, tray, run=tray.number, swing=swing)
-
-
-def _check_swing(simulation: SimulationSettings, scene: SceneSettings) -> None:
-    """Refuse an oscillation that cannot be drawn or simulated."""
-    furthest = FURTHEST_PX / scene.pixels_per_metre
-    if scene.swing >= furthest:
-        raise ConfigurationError(
-            'swing',
-            f'{scene.swing:g} m is {FURTHEST_PX} px or more in the picture',
-            f'give less than {furthest:.3g} m',
-        )
-    if scene.swing > 0.0 and simulation.wall_sticking_speed > 0.0:
-        raise ConfigurationError(
-            'wall_sticking_speed',
-            f'{simulation.wall_sticking_speed:g} m/s, but beads cannot stick to walls that swing',
-            'set it or the swing to 0',
-        )
-
-
-def check_scene(scene: SceneSettings) -> None:
-    """Refuse settings outside their ranges, all at once.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming every setting at fault.
-    """
-    problems = ((row.name, problem(row, row.default)) for row in rows(scene))
-    wrong = [f'{name}: {text}' for name, text in problems if text]
-    if not scene.trays or len(set(scene.trays)) != len(scene.trays):
-        wrong.append(f'trays: {scene.trays} is empty or has duplicates')
-    if wrong:
-        raise ConfigurationError(
-            'scene', '; '.join(wrong), 'see docs/reference/parameters.md for names and ranges'
-        )

@@ -1,6 +1,6 @@
 """The lamp over the plate: its direction, and the light on faces, beads and in shadows.
 
-Tested by ``test/simulation/plate_scene/test_varied_camera.py``.
+Tested by ``test/simulation/plate_scene/test_optics.py``.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ LAMP_X, LAMP_Y, LAMP_Z, HALF_X, HALF_Y, HALF_Z, LAMP_ACROSS = range(7)
 # The lamp of the flight is so far from the vertical.
 _FLIGHT_ACROSS, _FLIGHT_HEIGHT = 0.60, 0.80
 _LEAST_ACROSS = 0.01
+# So that the angles of the flight's lamp give its vector to the last digit.
+_DIGITS = 12
 # Light on the chamfer of a hole by how far its face is turned to the lamp, -1 to 1.
 _FACING = (-1.0, -0.8, -0.6, 0.6, 0.8, 1.0)
 _CHAMFER = (0.40, 0.44, 0.50, 1.42, 1.55, 1.65)
@@ -49,23 +51,24 @@ class Lamp:
     def __init__(self, scene: SceneSettings) -> None:
         across, height = math.cos(scene.lamp_elevation), math.sin(scene.lamp_elevation)
         x, y = across * math.cos(scene.lamp_azimuth), across * math.sin(scene.lamp_azimuth)
-        half = math.sqrt(x * x + y * y + (1.0 + height) ** 2)
         least = max(across, _LEAST_ACROSS)
-        self.row: NDArray[np.float32] = np.array(
-            [x, y, height, x / half, y / half, (1.0 + height) / half, least], dtype=np.float32
-        )
+        # In single precision throughout, as the kernels compute.
+        lamp = np.array([x, y, height], dtype=np.float32)
+        half = lamp + np.array([0.0, 0.0, 1.0], dtype=np.float32)
+        half = half / np.float32(math.sqrt(np.sum(half * half)))
+        self.row: NDArray[np.float32] = np.concatenate([lamp, half, [np.float32(least)]])
         # 1 for the lamp of the flight, 0 for one at the zenith.
-        self._slant = across * _FLIGHT_HEIGHT / (_FLIGHT_ACROSS * height)
+        self._slant = round(across * _FLIGHT_HEIGHT / (_FLIGHT_ACROSS * height), _DIGITS)
         unit = np.array([math.cos(scene.lamp_azimuth), math.sin(scene.lamp_azimuth)])
         contrast = min(across / _FLIGHT_ACROSS, 1.0)
-        self._facing = contrast * (_NORMALS @ unit)
+        self._facing = np.round(contrast * (_NORMALS @ unit), _DIGITS)
         # Where the shadow of a bead falls, in heights of its centre.
-        self.cast: NDArray[np.float64] = -np.array([x, y]) / height
+        self.cast: NDArray[np.float64] = np.round(-np.array([x, y]) / height, _DIGITS)
 
     @property
     def facing(self) -> NDArray[np.float64]:
         """How far the left, top, right and bottom walls of a hole face the lamp, -1 to 1."""
-        return self._facing
+        return np.asarray(self._facing)
 
     @property
     def chamfer(self) -> tuple[float, float, float, float]:

@@ -23,7 +23,7 @@ from nanorocks_ros.simulation.plate_scene.drawing.grains import LOBES
 from nanorocks_ros.simulation.plate_scene.drawing.lamp import Lamp
 from nanorocks_ros.simulation.plate_scene.drawing.scene_bodies import GRAIN, draw_bodies
 from nanorocks_ros.simulation.plate_scene.drawing.shadows import draw_shadows
-from nanorocks_ros.simulation.plate_scene.perspective import seen_spheres
+from nanorocks_ros.simulation.plate_scene.optics.perspective import seen_spheres
 from nanorocks_ros.simulation.plate_scene.simd_rectangles import PLACE, float32
 
 if TYPE_CHECKING:

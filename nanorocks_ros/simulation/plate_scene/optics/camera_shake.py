@@ -1,6 +1,6 @@
 """Motion of the camera: jitter from frame to frame, and a slow sway.
 
-Tested by ``test/simulation/plate_scene/test_varied_camera.py``.
+Tested by ``test/simulation/plate_scene/test_optics.py``.
 """
 
 from __future__ import annotations
@@ -12,6 +12,9 @@ from nanorocks_ros.numerics.counter_rng import Purpose, hashed, key_for, nearly_
 
 if TYPE_CHECKING:
     from nanorocks_ros.settings import SceneSettings
+
+FURTHEST_JITTER = 4.9
+"""No shift by jitter exceeds so many standard deviations (`nearly_normal`)."""
 
 
 class CameraShake:

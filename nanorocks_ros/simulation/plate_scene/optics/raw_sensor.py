@@ -1,6 +1,6 @@
 """A sensor with colour filters: every pixel sees one colour, the others are interpolated.
 
-Tested by ``test/simulation/plate_scene/test_varied_camera.py``.
+Tested by ``test/simulation/plate_scene/test_optics.py``.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+
+from nanorocks_ros.numerics.compiled import compiled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,8 +37,28 @@ def through_filters(picture: NDArray[np.uint8], pattern: str) -> NDArray[np.uint
     """
     if pattern == 'none':
         return picture
-    raw = np.empty(picture.shape[:2], dtype=np.uint8)
-    for place, colour in enumerate(pattern):
-        pixels = np.s_[place // 2 :: 2, place % 2 :: 2]
-        raw[pixels] = picture[(*pixels, _CHANNELS.index(colour))]
+    channels = np.array([_CHANNELS.index(colour) for colour in pattern])
+    raw = mosaic(picture, channels.reshape(2, 2))
     return np.asarray(cv2.demosaicing(raw, _CODES[pattern]), dtype=np.uint8)
+
+
+@compiled
+def mosaic(picture: NDArray[np.uint8], channels: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """The value of every pixel in the channel of its filter.
+
+    Parameters
+    ----------
+    picture : ndarray of uint8, (rows, columns, 3)
+    channels : ndarray of int64, (2, 2)
+        Of the upper left pixels.
+
+    Returns
+    -------
+    ndarray of uint8, (rows, columns)
+    """
+    rows, columns = picture.shape[:2]
+    raw = np.empty((rows, columns), dtype=np.uint8)
+    for i in range(rows):
+        for j in range(columns):
+            raw[i, j] = picture[i, j, channels[i & 1, j & 1]]
+    return raw

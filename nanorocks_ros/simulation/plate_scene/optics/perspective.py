@@ -1,6 +1,6 @@
 """Spheres seen by a camera at a finite height: exact ellipses.
 
-Tested by ``test/simulation/plate_scene/test_varied_camera.py``.
+Tested by ``test/simulation/plate_scene/test_optics.py``.
 """
 
 from __future__ import annotations
