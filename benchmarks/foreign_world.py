@@ -50,7 +50,7 @@ COUNT = 'NANOROCKS_FILM_COUNT'
 _TRAYS = (1, 3, 5, 7)
 _FILMS = 50
 _SHAKE = 1.0
-_SECONDS = 34.0
+_SECONDS = 26.0
 # Mean speeds after the kick, drawn with uniform logarithm, [m/s].
 _SPEEDS = (6e-3, 14e-3)
 _HALF_WIDTHS = 3.0
