@@ -24,6 +24,7 @@ ALL = (
     'tracking',
     'plate_cost',
     'recorder',
+    'foreign_world',
     'speed_trays',
     'speed_accuracy',
     'area_calibration',

@@ -28,7 +28,6 @@ _FRAMES = 60
 _KEPT = 3
 _QUALITY = 90
 _MEGA = 1e6
-_FLIGHT = 96e6 / 1800.0
 
 # Timed functions: label, module or class, name.
 _PARTS = (
@@ -132,7 +131,7 @@ def _print_compression(images, jpeg: float, decode: float) -> None:
     sizes = [len(content) for _, content in compressed(moments, flight, quality=1, frame_rate=30)]
     print(f'| JPEG of the rate of the flight | | {1800 * np.mean(sizes) / _MEGA:.0f} |')
     try:
-        stream = H264Stream(_FLIGHT, 30.0)
+        stream = H264Stream(CompressionSettings(codec='h264'), 30.0)
     except Exception as error:
         print(f'| H.264 | {error} | |')
         return

@@ -29,6 +29,11 @@ from nanorocks_ros.settings.restitution_settings import (
     PriorSettings,
     StickingSettings,
 )
+from nanorocks_ros.settings.scene_settings import (
+    CompressionSettings,
+    SceneFilmSettings,
+    SceneSettings,
+)
 from nanorocks_ros.settings.setting_fields import (
     Bounds,
     Scalar,
@@ -41,13 +46,7 @@ from nanorocks_ros.settings.setting_fields import (
     with_current_names,
     with_values,
 )
-from nanorocks_ros.settings.simulation_settings import (
-    CompressionSettings,
-    FilmSettings,
-    SceneFilmSettings,
-    SceneSettings,
-    SimulationSettings,
-)
+from nanorocks_ros.settings.simulation_settings import FilmSettings, SimulationSettings
 
 __all__ = [
     'BagSettings',

@@ -46,3 +46,15 @@ def camera_with_one(number, scene=PLAIN, simulation=SIMULATION, **bead):
 def empty_camera(scene=PLAIN, simulation=SIMULATION):
     """A camera over the plate without beads."""
     return SceneCamera(simulation, scene, TRAYS, {})
+
+
+NEAR = replace(PLAIN, trays=(1,), close_up=True, pixels_per_metre=13500.0)
+NEAR_SIMULATION = SimulationSettings(width_px=304, height_px=304)
+
+
+def near_camera(scene=NEAR, simulation=NEAR_SIMULATION, diameter=0.002, count=1):
+    """A camera near to tray 1 with some equal beads of acrylic."""
+    tray = with_one(1, diameter=diameter)[1]
+    tray = replace(tray, species=(replace(tray.species[0], count=count),))
+    radii = np.full(count, 0.5 * diameter)
+    return SceneCamera(simulation, scene, {1: tray}, {1: radii})

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.synthetic.simulated_result import SimulatedRuns
 
 _DURATION, _SAMPLES = 60.0, 301
+# Of the JPEGs in a bag.
+_QUALITY = 90
 _CAMERA = 'width_px', 'height_px', 'pixels_per_metre'
 _EPILOG = """\
 The first run is filmed. Results do not depend on the number of workers. Examples:
@@ -100,16 +102,16 @@ def _add_output_options(group: Any) -> None:
     group.add_argument('--bag', help='rosbag2 folder with the film of the first run and the truth')
     group.add_argument(
         '--effects',
-        choices=('all', 'none'),
+        choices=('all', 'none', 'drawn'),
         default='all',
         help='effects of the camera in bag and video; none: no sensor noise, and with --scene '
-        'only shaded beads on a clean plate at rest; default all',
+        'only shaded beads on a clean plate at rest; drawn: with --scene and one tray, a camera '
+        'near to it, drawn at random by --seed; default all',
     )
     group.add_argument(
         '--quality',
         type=int,
-        default=90,
-        help='quality of the JPEGs in the bag, 1 to 100; default 90',
+        help=f'quality of the JPEGs in the bag, 1 to 100; default {_QUALITY}, or as drawn',
     )
     group.add_argument('--force', action='store_true', help='replace files (not bags) that exist')
 
@@ -118,6 +120,8 @@ def run(options: argparse.Namespace) -> int:
     """Simulate, write, film and print, and return the exit code."""
     from nanorocks_ros.cli.simulation.simulate_scene import check_no_scene_flags, film_scene
 
+    if options.quality is None and options.effects != 'drawn':
+        options.quality = _QUALITY
     if options.scene:
         return film_scene(options)
     check_no_scene_flags(options)

@@ -14,8 +14,11 @@ from nanorocks_ros.settings import SceneFilmSettings, SimulationSettings, rows
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Mapping
 
+    from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
+    from nanorocks_ros.studies.synthetic.film_video import VideoQuality
 
 # Flags of the simulation of one tray, and the flags of the scene that replace some of them.
 _TRAY_FLAGS = 'tray', 'trajectory', 'events', 'times', 'workers', 'noise', 'pixels_per_metre'
@@ -32,8 +35,12 @@ def check_no_scene_flags(options: argparse.Namespace) -> None:
     Raises
     ------
     ConfigurationError
-        For the first such flag.
+        For the first such flag, or for effects of the plate alone.
     """
+    if options.effects == 'drawn':
+        raise ConfigurationError(
+            '--effects', 'drawn is a camera over the plate', 'add --scene --scene-trays 1'
+        )
     for row in rows(SceneFilmSettings()):
         if getattr(options, row.name) is not None:
             raise ConfigurationError(
@@ -54,7 +61,7 @@ def film_scene(options: argparse.Namespace) -> int:
             written.append(str(files['picture']))
         if 'video' in files:
             with Progress('filming the video') as bar:
-                recorder.into_video(files['video'], bar.count)
+                recorder.into_video(files['video'], bar.count, _video_quality(options, filmed))
             written.append(str(files['video']))
         if 'bag' in files:
             with Progress('filming the bag') as bar:
@@ -99,23 +106,55 @@ def _recorder(
     from dataclasses import replace
 
     from nanorocks_ros.experiment.trays import load_trays
-    from nanorocks_ros.simulation.plate_scene.plate_film import check_scene, without_effects
+    from nanorocks_ros.simulation.plate_scene.plate_film import without_effects
+    from nanorocks_ros.simulation.plate_scene.scene_checks import check_scene
     from nanorocks_ros.simulation.shaken_tray import check_settings
     from nanorocks_ros.studies.synthetic.film_bag import check_quality
     from nanorocks_ros.studies.synthetic.film_compression import check_codec
     from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
 
     check_quality(options.quality)
-    defaults = SceneFilmSettings()
+    trays = load_trays(options.trays_file)
+    defaults, simulation = SceneFilmSettings(), SimulationSettings()
+    if options.effects == 'drawn':
+        defaults, simulation = _drawn(options, trays)
     if options.effects == 'none':
         defaults = replace(defaults, scene=without_effects(defaults.scene))
     filmed = settings_from(options, defaults)
-    settings = settings_from(options, SimulationSettings())
+    settings = settings_from(options, simulation)
     check_settings(settings)
     check_scene(filmed.scene)
     check_codec(filmed.compression)
-    trays = load_trays(options.trays_file)
     return SceneRecorder(settings, filmed.scene, options.duration, trays), filmed, settings
+
+
+def _drawn(
+    options: argparse.Namespace, trays: Mapping[int, Tray]
+) -> tuple[SceneFilmSettings, SimulationSettings]:
+    """Settings of a camera drawn by the seed, which flags replace."""
+    from nanorocks_ros.experiment.trays import tray_by_number
+    from nanorocks_ros.simulation.plate_scene.drawn_camera import drawn_camera
+
+    chosen = settings_from(options, SceneFilmSettings()).scene.trays
+    if len(chosen) != 1:
+        raise ConfigurationError(
+            '--effects',
+            f'drawn is a camera over one tray, not over {len(chosen)}',
+            'add --scene-trays 1',
+        )
+    simulation = settings_from(options, SimulationSettings())
+    camera = drawn_camera(simulation.seed, tray_by_number(trays, chosen[0]), simulation)
+    if options.quality is None:
+        options.quality = camera.quality
+    settings = SceneFilmSettings(scene=camera.scene, compression=camera.compression)
+    return settings, camera.simulation
+
+
+def _video_quality(options: argparse.Namespace, filmed: SceneFilmSettings) -> VideoQuality:
+    from nanorocks_ros.studies.synthetic.film_video import VideoQuality
+
+    jpeg = options.quality if options.effects == 'drawn' else None
+    return VideoQuality(crf=filmed.compression.crf, jpeg=jpeg)
 
 
 def _print(

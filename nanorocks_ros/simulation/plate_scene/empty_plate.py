@@ -14,19 +14,21 @@ import numpy as np
 
 from nanorocks_ros.experiment.plate import PLATE
 from nanorocks_ros.simulation.plate_scene.drawing.chalk import dusted_floor
+from nanorocks_ros.simulation.plate_scene.drawing.lamp import Lamp
 from nanorocks_ros.simulation.plate_scene.simd_rectangles import LEVEL
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.plate import Region
+    from nanorocks_ros.settings import SceneSettings
     from nanorocks_ros.simulation.plate_scene.scene_geometry import SceneGeometry
 
     Picture = NDArray[np.float32]
 
 # Blue, green, red; aluminium is nearly gray.
-_TOP = np.array([141.0, 139.0, 135.0], np.float32)
-_FLOOR = np.array([160.0, 158.0, 154.0], np.float32)
+TOP = np.array([141.0, 139.0, 135.0], np.float32)
+FLOOR = np.array([160.0, 158.0, 154.0], np.float32)
 _HOUSING = np.array([33.0, 31.0, 30.0], np.float32)
 
 # Painted at so many times the scale of the picture.
@@ -34,26 +36,25 @@ _FINE = 2
 # What is painted around the plate, [m].
 _SURROUNDINGS = 0.004
 # Chamfer of a cell, and of the plate itself, [m].
-_CHAMFER, _EDGE = 0.0005, 0.0009
+CHAMFER, _EDGE = 0.0005, 0.0009
 # Places of the screws on the plate and their radius, [m].
 _SCREWS = ((3, 3), (77, 3), (3, 77), (77, 77), (3, 34), (77, 34), (14, 67), (66, 67))
 _SCREW = 0.0016
 # Standard deviation of noise that is enlarged rather than blurred further, [px].
 _SMOOTH = 3.0
-# Blur of a pixel's own width, [px].
-_PIXEL_BLUR = 0.36
+PIXEL_BLUR = 0.36
+"""Standard deviation of the blur of a pixel's own width, [px]."""
 
 
 def empty_scene(
-    geometry: SceneGeometry, *, defocus: float, chalk: dict[int, float], seed: int
+    geometry: SceneGeometry, scene: SceneSettings, *, chalk: dict[int, float], seed: int
 ) -> NDArray[np.uint16]:
     """The scene without beads.
 
     Parameters
     ----------
     geometry : SceneGeometry
-    defocus : float, [px]
-        Standard deviation of the blur.
+    scene : SceneSettings
     chalk : dict of int to float
         Dust in each tray, 0 to 2.
     seed : int
@@ -67,12 +68,12 @@ def empty_scene(
     left, top, _, _ = geometry.plate
     margin = round(_SURROUNDINGS * geometry.scale)
     corner = np.array([left - margin, top - margin])
-    painting = _Painting(geometry, margin, rng)
+    painting = _Painting(geometry, scene, margin, rng)
     for number, region in geometry.regions.items():
         # Each cell has its own random numbers: dust in one changes nothing in another.
         dice = np.random.default_rng([seed, number])
         painting.cell(region, corner, chalk.get(number, 0.0), dice)
-    painted, opaque = painting.finished(np.hypot(_PIXEL_BLUR, defocus) * _FINE)
+    painted, opaque = painting.finished(np.hypot(PIXEL_BLUR, scene.defocus_px) * _FINE)
     rows, columns = geometry.shape
     grid = np.mgrid[0:rows, 0:columns][::-1].transpose(1, 2, 0) + 0.5
     source = ((geometry.camera.rectified(grid) - corner) * _FINE - 0.5).astype(np.float32)
@@ -81,8 +82,8 @@ def empty_scene(
         for layer in (painted, opaque)
     )
     around = _housing(geometry.shape, rng)
-    scene = around + opacity[..., np.newaxis] * (colour - around)
-    levels = np.asarray(np.clip(scene, 0.0, 255.0) * LEVEL + 0.5, dtype=np.uint16)
+    blended = around + opacity[..., np.newaxis] * (colour - around)
+    levels = np.asarray(np.clip(blended, 0.0, 255.0) * LEVEL + 0.5, dtype=np.uint16)
     return np.ascontiguousarray(levels.transpose(2, 0, 1))
 
 
@@ -103,20 +104,30 @@ def streaks(
 class _Painting:
     """Painting of the plate in the rectified picture, at `_FINE` times its scale."""
 
-    def __init__(self, geometry: SceneGeometry, margin: int, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        geometry: SceneGeometry,
+        scene: SceneSettings,
+        margin: int,
+        rng: np.random.Generator,
+    ) -> None:
+        self._scene, self._lamp = scene, Lamp(scene)
         self._metre = geometry.scale * _FINE
         size = [round(side * geometry.scale + 2 * margin) * _FINE for side in PLATE]
         self._rows, self._columns = np.ogrid[0.5 : size[1], 0.5 : size[0]]
         shape = size[1], size[0]
         brushed = 1.0 + 0.022 * streaks(shape, rng, 60.0, 0.8) + 0.012 * streaks(shape, rng, 2, 2)
         brushed += 0.03 * streaks(shape, rng, 400.0, 250.0)
-        self._image: Picture = np.asarray(brushed[..., np.newaxis] * _TOP, dtype=np.float32)
+        if scene.floor_texture > 0.0:
+            brushed += self._pattern(shape, rng.spawn(1)[0])
+        top = scene.plate_shade * TOP
+        self._image: Picture = np.asarray(brushed[..., np.newaxis] * top, dtype=np.float32)
         self._opaque = np.zeros(shape, dtype=np.float32)
         edge = float(margin * _FINE)
         self._edges = edge, edge, size[0] - edge, size[1] - edge
         low = margin * _FINE
         self._opaque[low : size[1] - low, low : size[0] - low] = 1.0
-        self._bevel(*self._edges, -_EDGE, (1.25, 1.15, 0.72, 0.66))
+        self._bevel(*self._edges, -_EDGE, self._lamp.edge)
         for across, down in _SCREWS:
             self._screw(edge + across * 1e-3 * self._metre, edge + down * 1e-3 * self._metre)
 
@@ -133,14 +144,21 @@ class _Painting:
         )
         right, bottom = left + region.width * _FINE, top + region.height * _FINE
         # In a hole, the faces away from the lamp (upper left) are the lit ones.
-        self._bevel(left, top, right, bottom, _CHAMFER, (0.50, 0.44, 1.42, 1.55))
+        if self._scene.rim_width > 0.0:
+            rim = self._lamp.rim(self._scene.rim_shade)
+            self._bevel(left, top, right, bottom, self._scene.rim_width, rim)
+        else:
+            self._bevel(left, top, right, bottom, CHAMFER, self._lamp.chamfer)
         rows = slice(round(top), round(bottom))
         columns = slice(round(left), round(right))
         shape = rows.stop - rows.start, columns.stop - columns.start
         milled = 1.0 + 0.012 * streaks(shape, rng, 1.5, 1.5)
         milled += 0.02 * streaks(shape, rng, 90.0, 60.0)
         milled += 0.018 * self._mill_marks(shape, rng)
-        floor = (milled * self._wall_shadow(shape))[..., np.newaxis] * _FLOOR
+        if self._scene.floor_texture > 0.0:
+            milled += self._pattern(shape, rng.spawn(1)[0])
+        light = milled * self._wall_shadow(shape)
+        floor = light[..., np.newaxis] * (self._scene.floor_shade * FLOOR)
         if chalk > 0.0:
             floor = dusted_floor(floor, chalk, self._metre, rng)
             self._dust_around(left, top, right, bottom, chalk, rng)
@@ -195,11 +213,14 @@ class _Painting:
     def _wall_shadow(self, shape: tuple[int, int]) -> Picture:
         """Light on the floor between the walls: less near the walls at the lamp."""
         y, x = np.ogrid[0.5 : shape[0], 0.5 : shape[1]]
-        x, y = x / self._metre, y / self._metre
-        width, height = shape[1] / self._metre, shape[0] / self._metre
-        light = 1.0 - 0.34 * np.exp(-x / 0.0009) - 0.12 * np.exp(-(width - x) / 0.0004)
-        light = light * (1.0 - 0.38 * np.exp(-y / 0.0009) - 0.12 * np.exp(-(height - y) / 0.0004))
+        sides = shape[1] / self._metre, shape[0] / self._metre
+        light = self._lamp.floor_light(x / self._metre, y / self._metre, sides)
         return np.asarray(light, dtype=np.float32)
+
+    def _pattern(self, shape: tuple[int, int], rng: np.random.Generator) -> Picture:
+        """The additional pattern of the settings."""
+        length = self._scene.floor_texture_length * self._metre
+        return np.asarray(self._scene.floor_texture * streaks(shape, rng, length, length))
 
     def _dust_around(
         self,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.simulation.plate_scene.close_up_plate import MARGIN, shifted
 from nanorocks_ros.simulation.plate_scene.frame_effects import BLOCK, shift_blocks
 
 if TYPE_CHECKING:
@@ -64,31 +65,40 @@ class MovingPlate:
         ]
         self._drawn_on = list(drawn_on)
 
-    def displaced(self, displacement: tuple[float, float]) -> NDArray[np.uint16]:
-        """The canvas with the plate displaced, [m]; the caller draws on it.
+    def displaced(
+        self, displacement: tuple[float, float], shift: tuple[float, float] = (0.0, 0.0)
+    ) -> NDArray[np.uint16]:
+        """The canvas with the plate displaced [m] and the picture shifted [px].
+
+        The caller draws on it.
 
         Raises
         ------
         SimulationError
             When that is further than it can be drawn.
         """
-        shift = np.array(displacement) * self._scale
-        if not (np.abs(shift) < FURTHEST_PX).all():
+        moved = np.array(displacement) * self._scale
+        if not (np.abs(moved) < FURTHEST_PX).all():
             raise SimulationError(
                 'plate',
-                f'displaced by {np.abs(shift).max():.3g} px',
+                f'displaced by {np.abs(moved).max():.3g} px',
                 f'give less than {FURTHEST_PX} px: a weaker swing, or fewer pixels_per_metre',
             )
         self._renew(self._drawn_on)
-        if shift.any():
-            shift_blocks(self._canvas, self._still, self._lens @ shift, self._left, self._top)
+        if moved.any():
+            shift_blocks(self._canvas, self._still, self._lens @ moved, self._left, self._top)
             self._moved = True
         elif self._moved:
             self._canvas[:] = self._still
             self._moved = False
         else:
             self._renew(self._touched)
-        return self._canvas
+        if shift == (0.0, 0.0):
+            return self._canvas
+        edges = ((0, 0), (MARGIN, MARGIN), (MARGIN, MARGIN))
+        picture = np.empty_like(self._canvas)
+        shifted(picture, np.pad(self._canvas, edges, mode='edge'), *shift)
+        return picture
 
     def _renew(self, regions: list[Region]) -> None:
         for x, y, width, height in regions:

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.errors import ConfigurationError, SimulationError
+from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.records import BeadsTruth, Frame, GroundTruth
-from nanorocks_ros.settings import problem, rows, with_values
+from nanorocks_ros.settings import with_values
 from nanorocks_ros.simulation.initial_state import inventory
 from nanorocks_ros.simulation.plate_scene.drawing.bead_appearance import turned_angle
-from nanorocks_ros.simulation.plate_scene.moving_plate import FURTHEST_PX
-from nanorocks_ros.simulation.plate_scene.plate_camera import SceneCamera
+from nanorocks_ros.simulation.plate_scene.optics.camera_shake import CameraShake
+from nanorocks_ros.simulation.plate_scene.optics.shutter import (
+    MOST,
+    grouped_path,
+    instants_for,
+    shutter_times,
+)
+from nanorocks_ros.simulation.plate_scene.plate_camera import Instant, SceneCamera
 from nanorocks_ros.simulation.plate_scene.plate_oscillation import plate_motion, wall_motion_of
+from nanorocks_ros.simulation.plate_scene.scene_checks import check_motion, check_scene
 from nanorocks_ros.simulation.shaken_tray import ShakenTray, check_settings
 
 if TYPE_CHECKING:
@@ -25,6 +33,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import SceneSettings, SimulationSettings
     from nanorocks_ros.simulation.plate_scene.plate_oscillation import PlateMotion
+
+    _States = Mapping[int, tuple[np.ndarray, np.ndarray]]
 
 _NS = 1e9
 
@@ -42,6 +52,12 @@ _EFFECTS: tuple[str, ...] = (
     'irregularity',
     'turning',
     'swing',
+    'floor_texture',
+    'rim_width',
+    'camera_height',
+    'exposure',
+    'camera_jitter_px',
+    'camera_sway_px',
 )
 
 
@@ -65,11 +81,14 @@ class SceneMoment:
         Of each tray; speeds relative to the camera.
     beads : tuple of BeadsTruth
         Of each tray; relative to its floor.
+    shift_px : tuple of 2 floats, [px]
+        By which the camera has moved the whole picture.
     """
 
     frame: Frame
     trays: tuple[GroundTruth, ...]
     beads: tuple[BeadsTruth, ...]
+    shift_px: tuple[float, float] = (0.0, 0.0)
 
 
 class SceneFilm:
@@ -108,8 +127,10 @@ class SceneFilm:
         check_scene(scene)
         for checked in (simulation, *gas_settings.values()):
             check_settings(checked)
-            _check_swing(checked, scene)
-        self._simulation = simulation
+            check_motion(checked, scene)
+        self._simulation, self._scene = simulation, scene
+        self._fastest = 0.0
+        self._shake = CameraShake(scene, simulation.seed)
         cells = dict(trays or load_trays())
         self._swing = wall_motion_of(simulation, scene)
         self._gases = {
@@ -153,31 +174,51 @@ class SceneFilm:
             When that frame has passed already.
         """
         time = number / self._simulation.frame_rate
-        states = {tray: gas.at(time) for tray, gas in self._gases.items()}
-        events = self._events(time)
-        since = time - events[-1] if events else None
-        # A frame at the time of the event, within rounding, shows the tray after it.
-        motion = plate_motion(self._swing, None if since is None else max(since, 0.0))
-        image = self.camera.picture(
-            {tray: positions for tray, (positions, _) in states.items()},
-            number,
-            time=time,
-            motion=motion,
-            turned=turned_angle(time, events),
+        before, after = shutter_times(time, *self._exposure(time))
+        instants = [self._instant(instant, number)[0] for instant in before]
+        instant, states, motion = self._instant(time, number)
+        turned = turned_angle(time, self._events())
+        beads = tuple(self._truth(tray, stamp_ns, state, motion) for tray, state in states.items())
+        trays = tuple(
+            self._gases[tray].truth(stamp_ns, velocities)
+            for tray, (_, velocities) in states.items()
         )
-        return SceneMoment(
-            frame=Frame(stamp_ns=stamp_ns, encoding='bgr8', image=image),
-            trays=tuple(
-                self._gases[tray].truth(stamp_ns, velocities)
-                for tray, (_, velocities) in states.items()
-            ),
-            beads=tuple(
-                self._truth(tray, stamp_ns, state, motion) for tray, state in states.items()
-            ),
-        )
+        instants += [instant, *(self._instant(later, number)[0] for later in after)]
+        self._fastest = max(float(np.abs(state[1][:, :2]).max()) for state in states.values())
+        shown = _with_fewer_plates(instants, self._scene.pixels_per_metre)
+        image = self.camera.exposed(shown, number, time=time, turned=turned)
+        frame = Frame(stamp_ns=stamp_ns, encoding='bgr8', image=image)
+        shift = instant.shift
+        return SceneMoment(frame=frame, trays=trays, beads=beads, shift_px=shift)
 
-    def _events(self, time: float) -> list[float]:
-        """Shaking events up to a time, [s]."""
+    def _exposure(self, time: float) -> tuple[float, int]:
+        """How long the shutter is open for a frame, [s], and the number of instants to draw."""
+        opened = self._scene.exposure / self._simulation.frame_rate
+        if opened == 0.0:
+            return 0.0, 1
+        if self._shaken_within(time - 0.5 * opened, time + 0.5 * opened):
+            return opened, MOST
+        return opened, instants_for(self._fastest * self._scene.pixels_per_metre * opened)
+
+    def _shaken_within(self, start: float, end: float) -> bool:
+        first, period = self._simulation.first_shake, self._simulation.shake_period
+        return end >= first and math.floor((end - first) / period) > (start - first) / period
+
+    def _instant(self, time: float, number: int) -> tuple[Instant, _States, PlateMotion]:
+        states = {tray: gas.at(time) for tray, gas in self._gases.items()}
+        motion = self._motion(time)
+        positions = {tray: state[0] for tray, state in states.items()}
+        shift = self._shake.shift(number, time)
+        return Instant(positions, motion.displacement, shift), states, motion
+
+    def _motion(self, time: float) -> PlateMotion:
+        events = self._events()
+        # A frame at the time of the event, within rounding, shows the tray after it.
+        since = max(time - events[-1], 0.0) if events else None
+        return plate_motion(self._swing, since)
+
+    def _events(self) -> list[float]:
+        """Shaking events so far, [s]."""
         cycle = next(iter(self._gases.values())).cycle
         first, period = self._simulation.first_shake, self._simulation.shake_period
         return [first + k * period for k in range(cycle)]
@@ -201,6 +242,18 @@ class SceneFilm:
         )
 
 
+def _with_fewer_plates(instants: list[Instant], scale: float) -> list[Instant]:
+    """The instants with plates that are drawn once for several of them."""
+    if len(instants) == 1:
+        return [instants[0]._replace(plate_shift=instants[0].shift)]
+    plates = grouped_path(scale * np.array([instant.plate for instant in instants])) / scale
+    shifts = grouped_path(np.array([instant.shift for instant in instants]))
+    return [
+        instant._replace(plate=(plate[0], plate[1]), plate_shift=(shift[0], shift[1]))
+        for instant, plate, shift in zip(instants, plates.tolist(), shifts.tolist(), strict=True)
+    ]
+
+
 def _with_shared_settings(
     simulation: SimulationSettings, gas_settings: SimulationSettings
 ) -> SimulationSettings:
@@ -214,38 +267,3 @@ def _shaken_tray(simulation: SimulationSettings, scene: SceneSettings, tray: Tra
     swing = wall_motion_of(simulation, scene) if scene.swing_knocks else None
     settings = replace(simulation, tray=tray.number)
     return ShakenTray(settings, tray, run=tray.number, swing=swing)
-
-
-def _check_swing(simulation: SimulationSettings, scene: SceneSettings) -> None:
-    """Refuse an oscillation that cannot be drawn or simulated."""
-    furthest = FURTHEST_PX / scene.pixels_per_metre
-    if scene.swing >= furthest:
-        raise ConfigurationError(
-            'swing',
-            f'{scene.swing:g} m is {FURTHEST_PX} px or more in the picture',
-            f'give less than {furthest:.3g} m',
-        )
-    if scene.swing > 0.0 and simulation.wall_sticking_speed > 0.0:
-        raise ConfigurationError(
-            'wall_sticking_speed',
-            f'{simulation.wall_sticking_speed:g} m/s, but beads cannot stick to walls that swing',
-            'set it or the swing to 0',
-        )
-
-
-def check_scene(scene: SceneSettings) -> None:
-    """Refuse settings outside their ranges, all at once.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming every setting at fault.
-    """
-    problems = ((row.name, problem(row, row.default)) for row in rows(scene))
-    wrong = [f'{name}: {text}' for name, text in problems if text]
-    if not scene.trays or len(set(scene.trays)) != len(scene.trays):
-        wrong.append(f'trays: {scene.trays} is empty or has duplicates')
-    if wrong:
-        raise ConfigurationError(
-            'scene', '; '.join(wrong), 'see docs/reference/parameters.md for names and ranges'
-        )

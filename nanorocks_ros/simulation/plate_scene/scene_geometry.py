@@ -89,7 +89,43 @@ class SceneGeometry:
         self.camera = scene_camera(simulation, scene)
         self.scale = float(scene.pixels_per_metre)
         self.shape = simulation.height_px, simulation.width_px
+        self.height = float(scene.camera_height) * self.scale
+        """Of the camera over the floor, [px]; 0: infinitely far away."""
+        self._dimensions = {number: tray.dimensions for number, tray in trays.items()}
+        if 0.0 < scene.camera_height <= 2.0 * max(sides[2] for sides in self._dimensions.values()):
+            raise ConfigurationError(
+                'camera_height',
+                f'{scene.camera_height:g} m is within or close to the trays',
+                'give 0 or at least 0.05 m',
+            )
+        self.straight = scene.fisheye == 0.0 and scene.close_up
+        if scene.close_up:
+            self.regions, self._corners = _close_up(scene, trays, self.shape)
+            return
         self.regions = regions_on_plate(trays.values(), self.shape, self.scale)
+        self._corners = {
+            number: np.array([region.x, region.y], dtype=np.float64)
+            for number, region in self.regions.items()
+        }
+
+    def corner(self, tray: int) -> NDArray[np.float64]:
+        """Upper left corner of the floor of a tray in the rectified picture, (2,), [px]."""
+        return self._corners[tray]
+
+    def sides(self, tray: int) -> tuple[float, float]:
+        """Length and width of the floor of a tray in the rectified picture, [px]."""
+        length, width, _ = self._dimensions[tray]
+        return length * self.scale, width * self.scale
+
+    def rim_magnification(self, tray: int) -> float:
+        """How much larger things look at the top of the walls of a tray than on its floor."""
+        depth = self._dimensions[tray][2] * self.scale
+        return self.height / (self.height - depth) if self.height > 0.0 else 1.0
+
+    @property
+    def axis(self) -> NDArray[np.float64]:
+        """Where the optical axis meets the rectified picture, (2,), [px]."""
+        return np.array([0.5 * self.shape[1], 0.5 * self.shape[0]])
 
     @property
     def plate(self) -> tuple[float, float, float, float]:
@@ -111,9 +147,11 @@ class SceneGeometry:
         -------
         ndarray (n, 2), [px]
         """
-        region = self.regions[tray]
-        corner = np.array([region.x, region.y], dtype=np.float64)
-        return np.asarray(places)[:, :2] * self.scale + corner
+        return np.asarray(places)[:, :2] * self.scale + self._corners[tray]
+
+    def distorted(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points of the rectified picture in the picture, (n, 2), [px]."""
+        return points if self.straight else self.camera.distorted(points)
 
     def local_scales(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Jacobian of the distortion at points of the rectified picture.
@@ -127,6 +165,8 @@ class SceneGeometry:
         ndarray (n, 2, 2)
             Change of (column, row) in the picture, for a step along columns and along rows.
         """
+        if self.straight:
+            return np.broadcast_to(np.eye(2), (len(points), 2, 2))
         scales = np.empty((len(points), 2, 2))
         for axis in range(2):
             step = np.zeros(2)
@@ -147,3 +187,29 @@ class SceneGeometry:
         high = np.minimum(np.ceil(outline.max(axis=0)), self.shape[::-1]).astype(int)
         width, height = np.maximum(high - low, 0)
         return Region(int(low[0]), int(low[1]), int(width), int(height))
+
+
+def _close_up(
+    scene: SceneSettings, trays: Mapping[int, Tray], shape: tuple[int, int]
+) -> tuple[dict[int, Region], dict[int, NDArray[np.float64]]]:
+    """Region and exact corner of the only tray, whose middle is that of the picture."""
+    if len(scene.trays) != 1:
+        raise ConfigurationError(
+            'close_up', f'of the trays {scene.trays}', 'name one tray in scene.trays'
+        )
+    if scene.fisheye != 0.0:
+        raise ConfigurationError(
+            'close_up', f'through a fisheye lens of {scene.fisheye:g} rad', 'set fisheye to 0'
+        )
+    number = scene.trays[0]
+    sides = np.array(trays[number].dimensions[:2]) * scene.pixels_per_metre
+    corner = 0.5 * (np.array(shape[::-1]) - sides)
+    if (corner < 1.0).any():
+        raise ConfigurationError(
+            f'tray {number}',
+            f'{sides[0]:.0f} x {sides[1]:.0f} px in a picture of {shape[1]} x {shape[0]} px',
+            'lower scene.pixels_per_metre or enlarge the picture',
+        )
+    low, high = np.rint(corner).astype(int), np.rint(corner + sides).astype(int)
+    region = Region(int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1]))
+    return {number: region}, {number: corner}

@@ -49,9 +49,6 @@ def float32(value: float) -> float:
 ZERO, HALF, ONE, TWO, THREE = (float32(value) for value in (0.0, 0.5, 1.0, 2.0, 3.0))
 STEPS = float32(LEVEL)
 
-# Unit vector to the lamp; x right, y down, z up. (As in `drawing`.)
-LAMP_X, LAMP_Y, LAMP_Z = float32(-0.36), float32(-0.48), float32(0.80)
-
 
 @inlined
 def coverage(beyond: float, width: float) -> float:

@@ -29,6 +29,7 @@ _FRAMES_PER_MINUTE = 1800.0
 _QUALITIES = 1, 100
 # For the message without PyAV: what needs it, and the alternative.
 _H264 = '--compression-codec h264', 'take jpeg'
+_STREAMS = 'h264', 'h264_crf'
 # Accumulated relative excess of the size at which the quality changes.
 _TOLERANCE = 0.02
 
@@ -61,10 +62,8 @@ def compressed(
     ConfigurationError
         When PyAV, which makes H.264, is not installed.
     """
-    if compression.codec == 'h264':
-        yield from _h264_moments(
-            moments, compression.rate / _FRAMES_PER_MINUTE, quality, frame_rate
-        )
+    if compression.codec in _STREAMS:
+        yield from _h264_moments(moments, H264Stream(compression, frame_rate), quality)
         return
     quality_control = _QualityControl(compression.rate / _FRAMES_PER_MINUTE)
     for moment in moments:
@@ -82,7 +81,7 @@ def check_codec(compression: CompressionSettings) -> None:
     ConfigurationError
         When PyAV is needed and not installed.
     """
-    if compression.codec == 'h264':
+    if compression.codec in _STREAMS:
         pyav(*_H264)
 
 
@@ -124,9 +123,8 @@ class _QualityControl:
 
 
 def _h264_moments(
-    moments: Iterable[SceneMoment], size: float, quality: int, frame_rate: float
+    moments: Iterable[SceneMoment], stream: H264Stream, quality: int
 ) -> Iterator[tuple[SceneMoment, bytes]]:
-    stream = H264Stream(size, frame_rate)
     waiting: deque[SceneMoment] = deque()
     for moment in moments:
         waiting.append(moment)
@@ -148,8 +146,9 @@ class H264Stream:
 
     Parameters
     ----------
-    size : float, [bytes]
-        Mean size of a frame.
+    compression : CompressionSettings
+        `h264`: of its rate, without frames that need later ones, as from a camera; `h264_crf`:
+        of its constant rate factor, as in a file.
     frame_rate : float, [1/s]
 
     Raises
@@ -158,10 +157,12 @@ class H264Stream:
         When PyAV is not installed; at the first image, for an odd width or height.
     """
 
-    def __init__(self, size: float, frame_rate: float) -> None:
+    def __init__(self, compression: CompressionSettings, frame_rate: float) -> None:
+        self._compression = compression
         self._av = pyav(*_H264)
         self.bytes_written = 0
         self._rate = Fraction(frame_rate).limit_denominator(1000)
+        size = compression.rate / _FRAMES_PER_MINUTE
         self._bits = round(8.0 * size * frame_rate)
         self._encoder: Any = None
         self._decoder = self._av.CodecContext.create('h264', 'r')
@@ -200,10 +201,13 @@ class H264Stream:
         encoder = self._av.CodecContext.create('libx264', 'w')
         encoder.width, encoder.height, encoder.pix_fmt = width, height, 'yuv420p'
         encoder.framerate, encoder.time_base = self._rate, 1 / self._rate
-        encoder.bit_rate = self._bits
-        # One thread, so that the stream is the same on every machine; no look-ahead, as in a
-        # camera.
+        # One thread, so that the stream is the same on every machine.
         encoder.thread_count = 1
+        if self._compression.codec == 'h264_crf':
+            encoder.options = {'crf': f'{self._compression.crf:g}'}
+            return encoder
+        encoder.bit_rate = self._bits
+        # No look-ahead, as in a camera.
         buffer = str(self._bits)
         encoder.options = {
             'preset': 'veryfast',

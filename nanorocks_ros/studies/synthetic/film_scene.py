@@ -41,6 +41,7 @@ if TYPE_CHECKING:
         SimulationSettings,
     )
     from nanorocks_ros.simulation.plate_scene.plate_film import SceneMoment
+    from nanorocks_ros.studies.synthetic.film_video import VideoQuality
 
 CAMERA_MODEL = 'equidistant'
 
@@ -98,7 +99,9 @@ class SceneRecorder:
         _, content = cv2.imencode('.png', moment.frame.image, [cv2.IMWRITE_PNG_COMPRESSION, 9])
         write_bytes(path, content.tobytes())
 
-    def into_video(self, path: Path, progress: Progress) -> None:
+    def into_video(
+        self, path: Path, progress: Progress, quality: VideoQuality | None = None
+    ) -> None:
         """Write a video.
 
         Raises
@@ -110,7 +113,14 @@ class SceneRecorder:
         """
         moments = self._film().moments(self.frames)
         images = (moment.frame.image for moment in moments)
-        images_into_video(path, self._simulation, images, frames=self.frames, progress=progress)
+        images_into_video(
+            path,
+            self._simulation,
+            images,
+            frames=self.frames,
+            progress=progress,
+            quality=quality,
+        )
 
     def into_bag(
         self, path: Path, compression: CompressionSettings, quality: int, progress: Progress

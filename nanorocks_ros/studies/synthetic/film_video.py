@@ -6,7 +6,7 @@ import math
 from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -42,11 +42,24 @@ _WIDTH_PX, _HEIGHT_PX = 1280, 720
 # Margin around the floor of the tray, [m].
 _MARGIN = 1.5 * RIM
 _SCALES = 100.0, 1e6
-# Constant rate factor of x264; the loss at 20 is hardly visible.
-_QUALITY = '20'
 _TICKS = 1000
 # Alternative to a video that needs PyAV, for the message.
 _ALTERNATIVE = 'name a .avi file'
+
+
+class VideoQuality(NamedTuple):
+    """How much a video loses.
+
+    Parameters
+    ----------
+    crf : float
+        Constant rate factor of x264, for ``.mp4``; the loss at 20 is hardly visible.
+    jpeg : int or None, 1 to 100
+        Quality of the frames of ``.avi``; None for what OpenCV takes by default.
+    """
+
+    crf: float = 20.0
+    jpeg: int | None = None
 
 
 def check_video(path: Path) -> None:
@@ -121,8 +134,20 @@ def images_into_video(
     *,
     frames: int,
     progress: Progress,
+    quality: VideoQuality | None = None,
 ) -> None:
     """Write images of the size and at the rate of the settings into a video.
+
+    Parameters
+    ----------
+    path : Path
+        ``.mp4`` or ``.avi``.
+    settings : SimulationSettings
+    images : iterable of ndarray of uint8, (rows, columns, 3), bgr
+    frames : int
+    progress : callable
+        Called with the number of written frames and the number of frames.
+    quality : VideoQuality, optional
 
     Raises
     ------
@@ -132,14 +157,16 @@ def images_into_video(
         When the video cannot be written.
     """
     kind = _h264 if path.suffix == '.mp4' else _motion_jpeg
-    with atomic_file(path) as part, kind(part, settings) as write:
+    with atomic_file(path) as part, kind(part, settings, quality or VideoQuality()) as write:
         for done, image in enumerate(images, start=1):
             write(image)
             progress(done, frames)
 
 
 @contextmanager
-def _motion_jpeg(path: Path, settings: SimulationSettings) -> Iterator[Callable[[Picture], None]]:
+def _motion_jpeg(
+    path: Path, settings: SimulationSettings, quality: VideoQuality
+) -> Iterator[Callable[[Picture], None]]:
     """Write Motion JPEG with OpenCV, whose wheels have no H.264 encoder."""
     code = cv2.VideoWriter.fourcc(*'MJPG')
     size = settings.width_px, settings.height_px
@@ -151,7 +178,13 @@ def _motion_jpeg(path: Path, settings: SimulationSettings) -> Iterator[Callable[
         count += 1
 
     with _no_warnings():
-        writer = cv2.VideoWriter(str(path), code, settings.frame_rate, size)
+        if quality.jpeg is None:
+            writer = cv2.VideoWriter(str(path), code, settings.frame_rate, size)
+        else:
+            # The encoder of OpenCV itself, whose quality can be set.
+            own = cv2.CAP_OPENCV_MJPEG
+            writer = cv2.VideoWriter(str(path), own, code, settings.frame_rate, size)
+            writer.set(cv2.VIDEOWRITER_PROP_QUALITY, quality.jpeg)
         try:
             yield write
         finally:
@@ -175,13 +208,16 @@ def _no_warnings() -> Iterator[None]:
 
 
 @contextmanager
-def _h264(path: Path, settings: SimulationSettings) -> Iterator[Callable[[Picture], None]]:
+def _h264(
+    path: Path, settings: SimulationSettings, quality: VideoQuality
+) -> Iterator[Callable[[Picture], None]]:
     av = pyav(str(path), _ALTERNATIVE)
     # The index comes first, so that players in web pages start at once.
     with av.open(str(path), 'w', options={'movflags': '+faststart'}) as container:
         container.metadata['comment'] = f'nanorocks_ros {__version__}, seed {settings.seed}'
         rate = Fraction(settings.frame_rate).limit_denominator(_TICKS)
-        stream = container.add_stream('libx264', rate=rate, options={'crf': _QUALITY})
+        options = {'crf': f'{quality.crf:g}'}
+        stream = container.add_stream('libx264', rate=rate, options=options)
         # The yuv420p format, which players need, has even sides.
         stream.width, stream.height = settings.width_px // 2 * 2, settings.height_px // 2 * 2
         stream.pix_fmt = 'yuv420p'

@@ -134,7 +134,7 @@ def test_h264_keeps_the_frames_in_order_and_loses_detail():
 
 def test_a_stream_of_h264_has_the_size_asked_for():
     pytest.importorskip('av')
-    stream = H264Stream(30e3, 30.0)
+    stream = H264Stream(CompressionSettings(codec='h264', rate=30e3 * 1800), 30.0)
     decoded = [image for moment in film().moments(45) for image in stream.push(moment.frame.image)]
     decoded += stream.finish()
     assert len(decoded) == 45

@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import inlined, kernel
+from nanorocks_ros.simulation.plate_scene.drawing.lamp import LAMP_X, LAMP_Y, LAMP_Z
 from nanorocks_ros.simulation.plate_scene.simd_rectangles import (
     AMBIENT,
     COLUMN,
     COSINE,
     DIFFUSE,
-    LAMP_X,
-    LAMP_Y,
-    LAMP_Z,
     LEVELS,
     MATRIX,
     ONE,
@@ -129,6 +127,7 @@ def draw_grain(
     buffer: NDArray[np.float32],
     turned: NDArray[np.float32],
     levels: NDArray[np.float32],
+    lamp: NDArray[np.float32],
 ) -> None:
     """Draw a grain with facets; see `draw_bodies`."""
     cosine, sine = place[COSINE], place[SINE]
@@ -142,7 +141,9 @@ def draw_grain(
         n = LOBES + 4 * k
         right = shape[n] * cosine - shape[n + 1] * sine
         down = shape[n] * sine + shape[n + 1] * cosine
-        lambert = max(right * LAMP_X + down * LAMP_Y + shape[n + 2] * LAMP_Z, ZERO)
+        lambert = max(
+            right * lamp[LAMP_X] + down * lamp[LAMP_Y] + shape[n + 2] * lamp[LAMP_Z], ZERO
+        )
         levels[k] = STEPS * (look[AMBIENT] + look[DIFFUSE] * lambert) * shape[n + 3]
     left, top, columns, rows = drawn_rectangle(canvas, place, width)
     n = fill_coordinates(buffer, rows, columns, left + 0.5 - place[COLUMN], top + 0.5 - place[ROW])

@@ -20,8 +20,10 @@ from nanorocks_ros.simulation.plate_scene.drawing.bead_appearance import (
 )
 from nanorocks_ros.simulation.plate_scene.drawing.chalk import dust_pattern
 from nanorocks_ros.simulation.plate_scene.drawing.grains import LOBES
+from nanorocks_ros.simulation.plate_scene.drawing.lamp import Lamp
 from nanorocks_ros.simulation.plate_scene.drawing.scene_bodies import GRAIN, draw_bodies
 from nanorocks_ros.simulation.plate_scene.drawing.shadows import draw_shadows
+from nanorocks_ros.simulation.plate_scene.optics.perspective import seen_spheres
 from nanorocks_ros.simulation.plate_scene.simd_rectangles import PLACE, float32
 
 if TYPE_CHECKING:
@@ -36,8 +38,7 @@ if TYPE_CHECKING:
 # Outline of a sharp bead [px] and its standard deviation; that of a step this wide.
 _SHARP, _STEP_DEVIATION = 1.6, 0.2236
 
-# Towards the side away from the lamp, in heights: where the shadow of a bead falls.
-_CAST = np.array([0.45, 0.60])
+# Blur of the outline of a shadow, in heights and in radii at most.
 _SHADOW_BLUR, _WIDEST_BLUR = 0.5, 0.9
 
 
@@ -70,7 +71,7 @@ class BeadPainter:
     ) -> None:
         for number, radius in radii.items():
             _check_radii(trays[number], radius)
-        self._geometry, self._shadows = geometry, scene.shadows
+        self._geometry, self._shadows, self._lamp = geometry, scene.shadows, Lamp(scene)
         rng = np.random.default_rng(seed)
         self._dust = dust_pattern(rng)
         shapes = grain_shapes(scene.irregularity, rng)
@@ -91,9 +92,11 @@ class BeadPainter:
         self._radii_px = spheres / np.where(grain, size[shape_index], 1.0)
         self._offsets = np.where(grain[:, np.newaxis], -centroid[shape_index], 0.0)
         self._reach = np.where(grain, furthest[shape_index], 1.0)
-        self._width = float(np.hypot(_SHARP * _STEP_DEVIATION, scene.defocus_px) / _STEP_DEVIATION)
+        # The whole picture of a close-up is blurred, beads included, after it has been drawn.
+        blur = 0.0 if scene.close_up else scene.defocus_px
+        self._width = float(np.hypot(_SHARP * _STEP_DEVIATION, blur) / _STEP_DEVIATION)
         counts = list(self._counts.values())
-        corners = [geometry.regions[number][:2] for number in radii]
+        corners = [geometry.corner(number) for number in radii]
         floors = [_floor(geometry, number) for number in radii]
         self._corners, self._floors = (
             np.repeat(np.array(points, dtype=np.float64).reshape(-1, size), counts, axis=0)
@@ -106,17 +109,26 @@ class BeadPainter:
         positions: Mapping[int, NDArray[np.float64]],
         displacement: tuple[float, float],
         turned: float,
+        shift: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        """Draw shadows and beads on a canvas; see `SceneCamera.picture`."""
+        """Draw shadows and beads on a canvas; see `SceneCamera.picture`.
+
+        `shift` is where the camera has moved the whole picture, [px].
+        """
         places = self._checked(positions)
         if not len(places):
             return
         points = places[:, :2] * self._geometry.scale + self._corners
-        pixels = self._geometry.camera.distorted(points)
+        height = places[:, 2] * self._geometry.scale
         lens = self._geometry.local_scales(points)
         if self._shadows > 0.0:
-            height = places[:, 2] * self._geometry.scale
-            self._paint_shadows(canvas, points, height, lens, displacement)
+            self._paint_shadows(canvas, (points, height), lens, displacement, shift)
+        if self._geometry.height > 0.0:
+            points, stretch = seen_spheres(
+                points, height, self._radii_px, self._geometry.axis, self._geometry.height
+            )
+            lens = self._geometry.local_scales(points) @ stretch
+        pixels = self._geometry.distorted(points) + np.array(shift)
         look = self._look
         draw_bodies(
             canvas,
@@ -127,6 +139,7 @@ class BeadPainter:
             self._shapes,
             self._dust,
             float32(self._width),
+            self._lamp.row,
         )
 
     def _checked(self, positions: Mapping[int, NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -186,19 +199,20 @@ class BeadPainter:
     def _paint_shadows(
         self,
         canvas: NDArray[np.uint16],
-        points: NDArray[np.float64],
-        height: NDArray[np.float64],
+        centres: tuple[NDArray[np.float64], NDArray[np.float64]],
         lens: NDArray[np.float64],
         displacement: tuple[float, float],
+        shift: tuple[float, float],
     ) -> None:
-        geometry = self._geometry
+        geometry, (points, height) = self._geometry, centres
         local = np.sqrt(lens[:, 0, 0] * lens[:, 1, 1] - lens[:, 0, 1] * lens[:, 1, 0])
         spots = np.empty((len(points), 10))
-        spots[:, :2] = geometry.camera.distorted(points + height[:, np.newaxis] * _CAST)
+        fallen = points + height[:, np.newaxis] * self._lamp.cast
+        spots[:, :2] = geometry.distorted(fallen) + np.array(shift)
         spots[:, 2:5] = (self._radii_px * local)[:, np.newaxis]
         blur = self._width + _SHADOW_BLUR * height * local
         spots[:, 5] = np.minimum(blur, _WIDEST_BLUR * spots[:, 4])
-        across, down = np.array(displacement) * geometry.scale
+        across, down = np.array(displacement) * geometry.scale + np.array(shift)
         spots[:, 6:] = self._floors + np.array([across, across, down, down])
         draw_shadows(canvas, spots.astype(np.float32), float32(self._shadows))
 

@@ -37,6 +37,7 @@ def draw_bodies(
     shapes: NDArray[np.float32],
     dust: NDArray[np.float32],
     width: float,
+    lamp: NDArray[np.float32],
 ) -> None:
     """Draw bodies over the canvas and over each other.
 
@@ -60,6 +61,8 @@ def draw_bodies(
         Pattern of dust; each bead starts at another place of it.
     width : float32, [px]
         Of the outlines.
+    lamp : ndarray of float32, (7,)
+        See `Lamp.row`.
     """
     max_pixels = 0.0
     for k in range(order.size):
@@ -73,6 +76,6 @@ def draw_bodies(
         i = order[k]
         if kinds[i] == GRAIN:
             shape = shapes[i % shapes.shape[0]]
-            draw_grain(canvas, places[i], looks[i], shape, width, buffer, turned, levels)
+            draw_grain(canvas, places[i], looks[i], shape, width, buffer, turned, levels, lamp)
         else:
-            draw_bead(canvas, places[i], looks[i], dust, i * 7919, width, buffer)
+            draw_bead(canvas, places[i], looks[i], dust, i * 7919, width, buffer, lamp)

@@ -11,6 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import kernel
+from nanorocks_ros.simulation.plate_scene.drawing.lamp import (
+    HALF_X,
+    HALF_Y,
+    HALF_Z,
+    LAMP_ACROSS,
+    LAMP_X,
+    LAMP_Y,
+    LAMP_Z,
+)
 from nanorocks_ros.simulation.plate_scene.simd_rectangles import (
     ACROSS,
     AMBIENT,
@@ -23,9 +32,6 @@ from nanorocks_ros.simulation.plate_scene.simd_rectangles import (
     GLOW,
     HALF,
     HIGHLIGHT,
-    LAMP_X,
-    LAMP_Y,
-    LAMP_Z,
     LEVELS,
     LIT,
     MATRIX,
@@ -49,12 +55,6 @@ from nanorocks_ros.simulation.plate_scene.simd_rectangles import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Half way between the lamp and the camera a mirror would show the lamp.
-_HALF_LENGTH = math.sqrt(LAMP_X**2 + LAMP_Y**2 + (1.0 + LAMP_Z) ** 2)
-_HALF_X, _HALF_Y, _HALF_Z = (
-    float32(value / _HALF_LENGTH) for value in (LAMP_X, LAMP_Y, 1.0 + LAMP_Z)
-)
-_LAMP_ACROSS = float32(0.60)
 _CHALK = np.array([226.0, 229.0, 231.0], dtype=np.float32)
 
 # Squares of the pattern of dust to the radius of a bead.
@@ -67,6 +67,7 @@ def bead_pixels(
     n: int,
     place: NDArray[np.float32],
     look: NDArray[np.float32],
+    lamp: NDArray[np.float32],
     width: float,
 ) -> None:
     """Coverage and light of the pixels of a bead, without branches so that SIMD applies.
@@ -80,6 +81,8 @@ def bead_pixels(
         has turned.
     place : ndarray (12,)
     look : ndarray (9,)
+    lamp : ndarray (7,)
+        See `Lamp.row`.
     width : float, [px]
     """
     xx, xy, yx, yy = place[MATRIX], place[MATRIX + 1], place[MATRIX + 2], place[MATRIX + 3]
@@ -87,6 +90,9 @@ def bead_pixels(
     ambient, diffuse, darkening = look[AMBIENT], look[DIFFUSE], look[DARKENING]
     glow, sheen, highlight = look[GLOW], look[SHEEN], STEPS * look[HIGHLIGHT]
     blue, green, red = STEPS * look[0], STEPS * look[1], STEPS * look[2]
+    lamp_x, lamp_y, lamp_z = lamp[LAMP_X], lamp[LAMP_Y], lamp[LAMP_Z]
+    half_x, half_y, half_z = lamp[HALF_X], lamp[HALF_Y], lamp[HALF_Z]
+    lamp_across = lamp[LAMP_ACROSS]
     for j in range(n):
         dx, dy = out[X, j], out[Y, j]
         x, y = xx * dx + xy * dy, yx * dx + yy * dy
@@ -94,15 +100,15 @@ def bead_pixels(
         inward = ONE / max(distance, ONE)
         x, y = x * inward, y * inward
         z = math.sqrt(max(ONE - x * x - y * y, ZERO))
-        lamp = x * LAMP_X + y * LAMP_Y
-        lambert = max(lamp + z * LAMP_Z, ZERO)
-        mirror = max(x * _HALF_X + y * _HALF_Y + z * _HALF_Z, ZERO)
+        along = x * lamp_x + y * lamp_y
+        lambert = max(along + z * lamp_z, ZERO)
+        mirror = max(x * half_x + y * half_y + z * half_z, ZERO)
         mirror = mirror * mirror
         mirror = mirror * mirror
         broad = mirror * mirror
         narrow = broad * broad
         narrow = narrow * narrow
-        away = max(-lamp / _LAMP_ACROSS, ZERO)
+        away = max(-along / lamp_across, ZERO)
         light = (ambient + diffuse * lambert) * (ONE - darkening * (ONE - z) * (ONE - z))
         out[SHARE, j] = coverage((distance - ONE) * radius, width)
         light += glow * away * away * z + sheen * broad
@@ -139,11 +145,12 @@ def draw_bead(
     start: int,
     width: float,
     buffer: NDArray[np.float32],
+    lamp: NDArray[np.float32],
 ) -> None:
     """Draw a shaded sphere, or oval, under its dust; see `draw_bodies`."""
     left, top, columns, rows = drawn_rectangle(canvas, place, width)
     n = fill_coordinates(buffer, rows, columns, left + 0.5 - place[COLUMN], top + 0.5 - place[ROW])
-    bead_pixels(buffer, n, place, look, width)
+    bead_pixels(buffer, n, place, look, lamp, width)
     if place[DUST] > 0.0:
         put_dust(buffer, n, dust, start, place[DUST])
     blend_body(canvas, buffer, left, top, columns, rows)

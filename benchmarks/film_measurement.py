@@ -1,0 +1,228 @@
+"""What the pipeline measures in a video file, imported as a user does it."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nanorocks_ros.errors import NanorocksError
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.pipeline.composition import Pipeline, Wanted
+from nanorocks_ros.records import (
+    CorEstimate,
+    CorStatus,
+    Merge,
+    Notice,
+    PairCollision,
+    Quality,
+    Rebound,
+    SpeedEstimate,
+    Tracks,
+)
+from nanorocks_ros.settings import PipelineSettings, with_values
+from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
+from nanorocks_ros.studies.analysis.bag_images import open_camera
+from nanorocks_ros.studies.analysis.results_json import last_of_each_cycle
+from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
+from nanorocks_ros.studies.film_import.import_film import import_films
+from nanorocks_ros.wire.products import is_measured
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from benchmarks.film_truth import FilmTruth
+    from nanorocks_ros.pipeline.composition import Result
+    from nanorocks_ros.records import ArrayRecord
+
+DECADES = (0.1e-3, 0.3e-3, 1e-3, 3e-3, 10e-3)
+"""Limits of the groups of true speeds, [m/s]."""
+_NS = 1e9
+_SURE = 0.68
+_RADII_FRAMES = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilmResult:
+    """What was measured in a film.
+
+    Parameters
+    ----------
+    refusal : str
+        The line that ended the analysis; empty when nothing did.
+    notices : tuple of str
+    cycles : tuple of CorEstimate
+        Last estimate of each cycle, intervals of 95 %.
+    sure : tuple of CorEstimate
+        The same with intervals of 68 %.
+    speed_ratios : tuple of float
+        Measured over true mean projected speed in each of `DECADES`; NaN without any.
+    flagged_speeds : float, 0 to 1
+        Share of the speeds after the kick with a flag.
+    counts : tuple of float
+        Of each species: beads seen over true beads, mean over frames.
+    radii : tuple of float
+        Of each species: median of the measured radii over the mean true one.
+    sticking : tuple of float, [m/s]
+        Of the last cluster estimate: sticking speed, lower and upper limit.
+    """
+
+    refusal: str = ''
+    notices: tuple[str, ...] = ()
+    cycles: tuple[CorEstimate, ...] = ()
+    sure: tuple[CorEstimate, ...] = ()
+    speed_ratios: tuple[float, ...] = ()
+    flagged_speeds: float = 0.0
+    counts: tuple[float, ...] = ()
+    radii: tuple[float, ...] = ()
+    sticking: tuple[float, ...] = ()
+
+    @property
+    def final(self) -> CorEstimate | None:
+        """The final estimate of the only cycle; None when there is none."""
+        if len(self.cycles) != 1 or self.cycles[0].status is not CorStatus.FINAL:
+            return None
+        return self.cycles[0]
+
+
+# Flags that say nothing against a restitution.
+_HARMLESS = Quality.GRAY_CAMERA | Quality.GLARE | Quality.SATURATED
+
+
+def is_flagged(estimate: CorEstimate) -> bool:
+    """Whether a flag warns of the restitution."""
+    return bool(estimate.quality & ~_HARMLESS)
+
+
+def measure(film: FilmTruth) -> FilmResult:
+    """Import a film into a temporary bag and push it through the pipeline."""
+    cv2.setNumThreads(1)
+    settings = settings_for(film)
+    with tempfile.TemporaryDirectory() as scratch:
+        bag = Path(scratch) / 'bag'
+        try:
+            import_films([film.video], bag, ImportSettings(threads=1), lambda _: None)
+            return _Reading(film, settings).of(bag)
+        except NanorocksError as error:
+            return FilmResult(refusal=str(error))
+
+
+def settings_for(film: FilmTruth) -> PipelineSettings:
+    """What a user tells of the film: tray and scale, and where the floor is."""
+    values: dict[str, object] = {
+        'trays': [film.tray],
+        'preprocess.pixels_per_metre': film.scale,
+    }
+    if film.region:
+        values['preprocess.regions_px'] = [round(side) for side in film.region]
+    return with_values(PipelineSettings(), values, 'benchmark')
+
+
+class _Reading:
+    """Reads one bag and gathers what `FilmResult` holds."""
+
+    def __init__(self, film: FilmTruth, settings: PipelineSettings) -> None:
+        self._film, self._settings = film, settings
+        self._tracks: list[Tracks] = []
+        self._records: list[ArrayRecord] = []
+        self._sticking: tuple[float, ...] = ()
+
+    def of(self, bag: Path) -> FilmResult:
+        source, epoch_ns, view = open_camera(bag, self._settings)
+        pipeline = Pipeline(self._settings, source.where, view)
+        wanted = {self._film.tray: Wanted(tracks=True)}
+        notices = []
+        for frame in source.frames():
+            if isinstance(frame, Exception):
+                notices.append(str(frame))
+                continue
+            self._keep(pipeline.follow(pipeline.preprocessor.push(frame), wanted), notices)
+        self._keep(pipeline.flush(), notices)
+        speeds = [record for record in self._records if isinstance(record, SpeedEstimate)]
+        estimates = [record for record in self._records if isinstance(record, CorEstimate)]
+        return FilmResult(
+            notices=tuple(notices),
+            cycles=tuple(last_of_each_cycle(estimates)),
+            sure=self._narrower(),
+            speed_ratios=self._speed_ratios(speeds, epoch_ns),
+            flagged_speeds=self._flagged(speeds, epoch_ns),
+            counts=self._counts(),
+            radii=self._radii(epoch_ns),
+        )
+
+    def _keep(self, records: Iterable[Result], notices: list[str]) -> None:
+        for record in records:
+            if isinstance(record, Tracks):
+                self._tracks.append(record)
+            elif isinstance(record, Notice):
+                notices.append(record.text)
+            elif is_measured(record):
+                self._records.append(record)
+
+    def _narrower(self) -> tuple[CorEstimate, ...]:
+        """The estimates with intervals of 68 % from the same speeds and contacts."""
+        values = {'cooling.probability': _SURE, 'cooling.update_interval': 60.0}
+        settings = with_values(self._settings, values, 'benchmark')
+        tray = load_trays(settings.trays_file)[self._film.tray]
+        estimator = RestitutionEstimator(settings, tray)
+        estimates: list[CorEstimate] = []
+        for record in self._records:
+            if isinstance(record, SpeedEstimate | Rebound | PairCollision | Merge):
+                estimates += estimator.push(record)
+        return tuple(last_of_each_cycle([*estimates, *estimator.flush()]))
+
+    def _speed_ratios(self, speeds: list[SpeedEstimate], epoch_ns: int) -> tuple[float, ...]:
+        film = self._film
+        sums = np.zeros((len(DECADES) - 1, 2))
+        for speed in speeds:
+            middle = (speed.stamp_ns - epoch_ns) / _NS
+            if middle - 0.5 * speed.window <= film.shake:
+                continue
+            first = round((middle - 0.5 * speed.window) * film.frame_rate)
+            last = round((middle + 0.5 * speed.window) * film.frame_rate)
+            true = film.mean_projected_speed[max(first, 0) : last + 1]
+            value = speed.mean_projected_speed.value
+            if not true.size or not np.isfinite(value):
+                continue
+            group = int(np.searchsorted(DECADES, true.mean())) - 1
+            if 0 <= group < len(sums):
+                sums[group] += value, true.mean()
+        with np.errstate(invalid='ignore', divide='ignore'):
+            return tuple((sums[:, 0] / sums[:, 1]).tolist())
+
+    def _flagged(self, speeds: list[SpeedEstimate], epoch_ns: int) -> float:
+        start_ns = epoch_ns + round(self._film.shake * _NS)
+        later = [speed for speed in speeds if speed.stamp_ns > start_ns]
+        flagged = [speed for speed in later if speed.quality & ~_HARMLESS]
+        return len(flagged) / len(later) if later else 0.0
+
+    def _counts(self) -> tuple[float, ...]:
+        if not self._tracks:
+            return ()
+        true = np.bincount(self._film.species)
+        seen = [
+            np.bincount(tracks.species[tracks.seen], minlength=true.size)
+            for tracks in self._tracks
+        ]
+        return tuple((np.mean(seen, axis=0) / true).tolist())
+
+    def _radii(self, epoch_ns: int) -> tuple[float, ...]:
+        """Median over beads of the measured over the true radius, by species."""
+        film = self._film
+        ratios: list[list[float]] = [[] for _ in np.bincount(film.species)]
+        for tracks in self._tracks[:: max(len(self._tracks) // _RADII_FRAMES, 1)]:
+            number = round((tracks.stamp_ns - epoch_ns) / _NS * film.frame_rate)
+            if not (0 <= number < len(film.positions) and tracks.seen.any()):
+                continue
+            bead = cKDTree(film.positions[number]).query(tracks.positions[tracks.seen])[1]
+            radii = tracks.radii[tracks.seen] / film.radii[bead]
+            kinds = tracks.species[tracks.seen]
+            for kind, ratio, true_kind in zip(kinds, radii, film.species[bead], strict=True):
+                if kind == true_kind:
+                    ratios[kind].append(float(ratio))
+        return tuple(float(np.median(values)) if values else float('nan') for values in ratios)

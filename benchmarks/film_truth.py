@@ -1,0 +1,120 @@
+"""Films in video files with the truth beside them: drawn ones, and those made by other code."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+DEFAULT_SCALE = 13.5
+"""Scale of films that state none, [px/mm]."""
+_PER_METRE = 1000.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilmTruth:
+    """A film of one tray and its truth.
+
+    Parameters
+    ----------
+    video : Path
+    tray : int
+    beads, walls : float
+        Restitutions; NaN where one number does not describe them.
+    sticking : float, [m/s]
+        Beads stick below this normal speed; 0: never.
+    ideal : bool
+        Whether beads are smooth spheres of constant restitution in vacuum.
+    frame_rate : float, [1/s]
+    shake : float, [s]
+        Time of the kick.
+    scale : float, [px/m]
+    region : tuple of 4 floats or empty, [px]
+        Left, top, width and height of the floor; empty: in the middle of the picture.
+    positions, velocities : ndarray (frames, beads, 2), [m], [m/s]
+        From the corner of the floor, and relative to it.
+    radii : ndarray (beads,), [m]
+    species : ndarray of int, (beads,)
+    merges : ndarray (merges,), [s]
+        Times since the kick.
+    """
+
+    video: Path
+    tray: int
+    beads: float
+    walls: float
+    sticking: float
+    ideal: bool
+    frame_rate: float
+    shake: float
+    scale: float
+    region: tuple[float, ...]
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    species: NDArray[np.int64]
+    merges: NDArray[np.float64]
+
+    @cached_property
+    def mean_projected_speed(self) -> NDArray[np.float64]:
+        """Mean speed in the image plane in each frame, (frames,), [m/s]."""
+        speeds = np.hypot(*np.moveaxis(self.velocities, -1, 0))
+        mean: NDArray[np.float64] = speeds.mean(axis=1)
+        return mean
+
+
+def read_truth(video: Path) -> FilmTruth:
+    """Read the truth that lies beside a video as ``.npz``.
+
+    Raises
+    ------
+    OSError
+        Where it cannot be read.
+    """
+    with np.load(video.with_suffix('.npz')) as archive:
+        arrays = dict(archive)
+    asked, scale, region = _asked(arrays)
+    rate = float(arrays['fps'])
+    displacement = arrays['D'].astype(np.float64)
+    swing = rate * np.gradient(displacement, axis=0)
+    spread = any(asked.get(name) for name in ('va', 'vb'))
+    friction = any(asked.get(name) for name in ('mu', 'muw'))
+    return FilmTruth(
+        video=video,
+        tray=int(arrays['tray']),
+        beads=float('nan') if spread else float(asked['eps']),
+        walls=float(asked['epsw']),
+        sticking=float(asked.get('vstick', 0.0)),
+        ideal=not (spread or friction),
+        frame_rate=rate,
+        shake=float(arrays['pre']),
+        scale=scale,
+        region=region,
+        positions=arrays['P'][..., :2].astype(np.float64) - displacement[:, np.newaxis],
+        velocities=arrays['V'][..., :2].astype(np.float64) - swing[:, np.newaxis],
+        radii=arrays['rad'].astype(np.float64),
+        species=arrays['sp'].astype(np.int64),
+        merges=np.asarray(arrays['merges'], dtype=np.float64).reshape(-1, 3)[:, 0],
+    )
+
+
+def _asked(
+    arrays: dict[str, NDArray[np.generic]],
+) -> tuple[dict[str, float], float, tuple[float, ...]]:
+    """What engine and renderer were asked for, scale [px/m], and region of the floor [px]."""
+    if 'settings' not in arrays:
+        asked, drawn = (json.loads(str(arrays[name])) for name in ('sim', 'px'))
+        return asked, _PER_METRE * float(drawn.get('s', DEFAULT_SCALE)), ()
+    simulation = json.loads(str(arrays['settings']))['simulation']
+    names = {'restitution': 'eps', 'wall_restitution': 'epsw', 'sticking_speed': 'vstick'}
+    asked = {short: float(simulation[name]) for name, short in names.items()}
+    region = tuple(float(side) for side in np.asarray(arrays['region'], dtype=np.float64))
+    return asked, float(np.asarray(arrays['scale'], dtype=np.float64)), region

@@ -1,0 +1,287 @@
+"""Films of drawn cameras, drawn trays and other code: restitutions, speeds and counts in them.
+
+Drawn films: one tray in a video file, with light, lens, sensor, codec, scale and frame rate drawn
+(``--effects drawn``), and beads, walls, height, diameter, count and start drawn from the priors.
+The pipeline is told the tray's nominal values, the scale and where the floor is. Films by other
+code are read from the folder ``NANOROCKS_FOREIGN``, by default ``../shared/data/foreign``: videos
+with their truth in ``.npz`` files.
+
+Films and results are kept (`filmed_cycles.folder`), results under a key of the source code: an
+interrupted run goes on where it was. ``NANOROCKS_FILM_COUNT`` is the number of films a tray,
+50 by default.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import pickle
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks.drawn import varied
+from benchmarks.film_measurement import DECADES, FilmResult, is_flagged, measure
+from benchmarks.film_truth import FilmTruth, read_truth
+from benchmarks.filmed_cycles import DRAWN_PAIRS, folder
+from nanorocks_ros.cli.progress import Progress
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.jobs.tasks import Workers, run_tasks
+from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.records import CorStatus, Quality
+from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_values
+from nanorocks_ros.studies.synthetic.drawn_film import write_drawn_film
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.records import Interval
+
+FOREIGN = 'NANOROCKS_FOREIGN'
+"""Environment variable with the folder of films made by other code."""
+COUNT = 'NANOROCKS_FILM_COUNT'
+"""Environment variable with the number of drawn films of each tray."""
+
+_TRAYS = (1, 3, 5, 7)
+_FILMS = 50
+_SHAKE = 1.0
+_SECONDS = 26.0
+# Mean speeds after the kick, drawn with uniform logarithm, [m/s].
+_SPEEDS = (6e-3, 14e-3)
+_HALF_WIDTHS = 3.0
+# Part of the cameras that jitter or sway.
+_MOVING = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Read:
+    """A film and what was measured in it."""
+
+    film: FilmTruth
+    result: FilmResult
+
+
+def report() -> None:
+    """Make missing films, measure in all, and print the tables."""
+    drawn = {
+        f'tray_{tray}_{number}': (tray, number)
+        for number in range(int(os.environ.get(COUNT, _FILMS)))
+        for tray in _TRAYS
+    }
+    missing = {key: film for key, film in drawn.items() if not _video(*film)}
+    with Progress('drawing films') as progress:
+        run_tasks(_draw, missing, Workers(), progress.count)
+    print_drawn(_measured([video for film in drawn.values() if (video := _video(*film))]))
+    default = Path(__file__).resolve().parents[2] / 'shared' / 'data' / 'foreign'
+    foreign = sorted(Path(os.environ.get(FOREIGN, default)).glob('*.mp4'))
+    if foreign:
+        print_foreign(_measured(foreign))
+    else:
+        print(f'\nNo films by other code: set {FOREIGN} to a folder that holds some.')
+
+
+def _stem(tray: int, number: int) -> Path:
+    return folder() / 'drawn_cameras' / f'tray_{tray}_{number}'
+
+
+def _video(tray: int, number: int) -> Path | None:
+    """The film, if it exists with its truth."""
+    stem = _stem(tray, number)
+    videos = [stem.with_suffix(suffix) for suffix in ('.mp4', '.avi')]
+    there = [video for video in videos if video.exists()]
+    return there[0] if there and stem.with_suffix('.npz').exists() else None
+
+
+def _draw(film: tuple[int, int]) -> None:
+    """Draw the truth of a tray, and film it with a drawn camera."""
+    number_of_tray, number = film
+    prior = PriorSettings()
+    random = np.random.default_rng([number, number_of_tray])
+    beads = random.uniform(*DRAWN_PAIRS)
+    walls = random.uniform(prior.min_wall_restitution, prior.max_wall_restitution)
+    tray, values = varied(load_trays()[number_of_tray], walls, prior, random)
+    values |= {
+        'restitution': beads,
+        'wall_restitution': walls,
+        'mean_speed': math.exp(random.uniform(*np.log(_SPEEDS))),
+        'first_shake': _SHAKE,
+        'seed': 5000 + number,
+        'tray': number_of_tray,
+    }
+    simulation = with_values(SimulationSettings(), values, 'benchmark')
+    stem = _stem(number_of_tray, number)
+    stem.parent.mkdir(parents=True, exist_ok=True)
+    seed = 10 * number + number_of_tray
+    write_drawn_film(stem, tray, simulation, _SECONDS, seed, moving=_MOVING)
+
+
+def _measured(videos: list[Path]) -> list[_Read]:
+    """What is measured in each film; results of an earlier run of the same code are used."""
+    missing = {video.stem: video for video in videos if not _result_file(video).exists()}
+    with Progress('measuring in films') as progress:
+        run_tasks(_measure, missing, Workers(), progress.count)
+    return [
+        _Read(film=read_truth(video), result=pickle.loads(_result_file(video).read_bytes()))
+        for video in videos
+    ]
+
+
+def _measure(video: Path) -> None:
+    path = _result_file(video)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(path, pickle.dumps(measure(read_truth(video))))
+
+
+def _result_file(video: Path) -> Path:
+    return folder() / f'measured_{_code_key()}' / f'{video.stem}.pickle'
+
+
+@cache
+def _code_key() -> str:
+    """Key of the code that measures."""
+    here = Path(__file__).resolve().parent
+    files = sorted((here.parent / 'nanorocks_ros').rglob('*.py'))
+    files += [here / 'film_measurement.py', here / 'film_truth.py']
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def print_drawn(read: list[_Read]) -> None:
+    """Print what is measured in drawn films, tray by tray."""
+    print('\nDrawn films: restitutions of the unflagged final estimates\n')
+    print(
+        '| tray | films | one cycle | final, unflagged | beads: bias | sd | covered 68 % | 95 % '
+        '| half | walls: bias | covered 95 % | far off, unflagged |'
+    )
+    print('| --- ' * 12 + '|')
+    trays = sorted({read_film.film.tray for read_film in read})
+    for tray in trays:
+        print(
+            _restitution_row(
+                tray, [read_film for read_film in read if read_film.film.tray == tray]
+            )
+        )
+    print('\nDrawn films: measured over true; speeds by true mean projected speed in mm/s\n')
+    groups = ' | '.join(f'{1e3 * low:g} to {1e3 * high:g}' for low, high in pairwise(DECADES))
+    print(f'| tray | {groups} | speeds flagged | beads counted, by species | radii, by species |')
+    print('| --- ' * (4 + len(DECADES) - 1) + '|')
+    for tray in trays:
+        print(
+            _speed_row(
+                tray, [read_film.result for read_film in read if read_film.film.tray == tray]
+            )
+        )
+
+
+def _restitution_row(tray: int, films: list[_Read]) -> str:
+    final = [
+        read_film
+        for read_film in films
+        if read_film.result.final and not is_flagged(read_film.result.final)
+    ]
+    single = sum(len(read_film.result.cycles) == 1 for read_film in films)
+    row = f'| {tray} | {len(films)} | {single} '
+    row += f'| {len(final)} '
+    if not final:
+        return row + '| ' * 8 + '|'
+    beads, walls = (
+        np.array([getattr(read_film.film, name) for read_film in final])
+        for name in ('beads', 'walls')
+    )
+    wide = np.array([_limits(read_film.result.cycles[0].restitution) for read_film in final])
+    narrow = np.array([_limits(read_film.result.sure[0].restitution) for read_film in final])
+    of_walls = np.array(
+        [_limits(read_film.result.cycles[0].wall_restitution) for read_film in final]
+    )
+    error, half = wide[:, 0] - beads, 0.5 * (wide[:, 2] - wide[:, 1])
+    far = int(np.sum(np.abs(error) > _HALF_WIDTHS * half))
+    standard_error = error.std(ddof=1) / math.sqrt(error.size) if error.size > 1 else math.nan
+    row += f'| {error.mean():+.4f} ± {standard_error:.4f} | {error.std():.3f} '
+    row += f'| {_covered(narrow, beads)} | {_covered(wide, beads)} | {half.mean():.3f} '
+    bias_of_walls = np.nanmean(of_walls[:, 0] - walls)
+    return row + f'| {bias_of_walls:+.4f} | {_covered(of_walls, walls)} | {far} |'
+
+
+def _limits(interval: Interval) -> tuple[float, float, float]:
+    return interval.value, interval.lower, interval.upper
+
+
+def _covered(limits: NDArray[np.float64], truth: NDArray[np.float64]) -> str:
+    return f'{np.mean((limits[:, 1] <= truth) & (truth <= limits[:, 2])):.2f}'
+
+
+def _speed_row(tray: int, results: list[FilmResult]) -> str:
+    row = f'| {tray} '
+    for ratios in _by_column('speed_ratios', results):
+        known = np.array(ratios)[np.isfinite(ratios)]
+        row += f'| {np.median(known):.3f}, {_spread(known)} ' if known.size else '| '
+    flagged = np.mean([result.flagged_speeds for result in results])
+    row += f'| {flagged:.2f} '
+    for name in ('counts', 'radii'):
+        columns = _by_column(name, results)
+        texts = [f'{np.nanmedian(kind):.3f}, {_spread(np.array(kind))}' for kind in columns]
+        row += f'| {"; ".join(texts)} '
+    return row + '|'
+
+
+def _by_column(name: str, results: list[FilmResult]) -> list[tuple[float, ...]]:
+    """The values of a tuple of numbers, first those of its first element."""
+    rows = [getattr(result, name) for result in results if getattr(result, name)]
+    return list(zip(*rows, strict=True))
+
+
+def _spread(values: NDArray[np.float64]) -> str:
+    """Range that holds nine of ten values."""
+    low, high = np.nanquantile(values, (0.05, 0.95))
+    return f'{low:.3f} to {high:.3f}'
+
+
+def print_foreign(read: list[_Read]) -> None:
+    """Print what is measured in read_film film made by other code."""
+    print('\nFilms by other code\n')
+    print(
+        '| film | truth: beads, walls | cycles | beads | walls | flags | speeds | counted '
+        '| radii | verdict |'
+    )
+    print('| --- ' * 10 + '|')
+    for read_film in read:
+        print(_foreign_row(read_film.film, read_film.result))
+
+
+def _foreign_row(film: FilmTruth, result: FilmResult) -> str:
+    beads = f'{film.beads:g}' if math.isfinite(film.beads) else 'depends on speed'
+    row = f'| {film.video.stem} | {beads}, {film.walls:g} '
+    if result.refusal:
+        return row + f'| | refused: {result.refusal} ' + '| ' * 5 + '| flagged |'
+    cycle = result.cycles[0] if result.cycles else None
+    row += f'| {len(result.cycles)} '
+    if cycle is None:
+        row += '| no estimate | | '
+    else:
+        for interval in (cycle.restitution, cycle.wall_restitution):
+            row += f'| {interval.value:.3f} [{interval.lower:.3f}, {interval.upper:.3f}] '
+        words = [cycle.status.name.lower(), *Quality(cycle.quality).names()]
+        row += f'| {", ".join(words)} '
+    row += f'| {", ".join(f"{ratio:.3f}" for ratio in result.speed_ratios)} '
+    row += f'| {", ".join(f"{count:.3f}" for count in result.counts)} '
+    row += f'| {", ".join(f"{radius:.4f}" for radius in result.radii)} '
+    return row + f'| {_verdict(film, result)} |'
+
+
+def _verdict(film: FilmTruth, result: FilmResult) -> str:
+    """Whether the restitution is right, flagged, or wrong without a word."""
+    if len(result.cycles) != 1:
+        return f'WRONG: {len(result.cycles)} cycles'
+    cycle = result.cycles[0]
+    if cycle.status is not CorStatus.FINAL or is_flagged(cycle):
+        return 'flagged'
+    if not math.isfinite(film.beads):
+        return 'WRONG: one restitution, unflagged'
+    return 'right' if cycle.restitution.lower <= film.beads <= cycle.restitution.upper else 'WRONG'
