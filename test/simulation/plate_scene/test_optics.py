@@ -261,6 +261,7 @@ def test_what_cannot_be_drawn_is_refused():
         ({'trays': (1, 3)}, 'close_up: of the trays'),
         ({'pixels_per_metre': 25000.0}, 'tray 1: 375 x 375 px'),
         ({'camera_height': 0.004}, 'camera_height: 0.004 m is within'),
+        ({'camera_height': 0.2, 'close_up': False}, 'whole plate is drawn without perspective'),
         ({'camera_jitter_px': 6.0}, 'camera_jitter_px: 6 px'),
     ):
         with pytest.raises(ConfigurationError, match=message):
