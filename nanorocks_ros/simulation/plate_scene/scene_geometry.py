@@ -184,9 +184,7 @@ class SceneGeometry:
         return Region(int(low[0]), int(low[1]), int(width), int(height))
 
 
-def _check_height(
-    scene: SceneSettings, dimensions: Iterable[tuple[float, float, float]]
-) -> None:
+def _check_height(scene: SceneSettings, dimensions: Iterable[tuple[float, float, float]]) -> None:
     height = scene.camera_height
     if height > 0.0 and not scene.close_up:
         raise ConfigurationError(
