@@ -292,6 +292,24 @@ def measured_shift(still, moved, part):
     return tuple(shift)
 
 
+def test_an_open_shutter_changes_pictures_and_not_the_truth():
+    gas = replace(NEAR_SIMULATION, first_shake=0.1, mean_speed=0.02, frame_rate=25.0)
+    scene = replace(NEAR, swing=0.0002)
+    films = [
+        SceneFilm(gas, replace(scene, exposure=part), {1: TRAYS[1]}).moments(8)
+        for part in (0.0, 0.9)
+    ]
+    for number, (sharp, blurred) in enumerate(zip(*films, strict=True)):
+        for sharp_truth, truth in zip(sharp.beads, blurred.beads, strict=True):
+            assert truth.cycle == sharp_truth.cycle
+            assert truth.positions == pytest.approx(sharp_truth.positions, abs=1e-12)
+            assert truth.velocities == pytest.approx(sharp_truth.velocities, abs=1e-12)
+        assert blurred.trays[0].mean_speed == pytest.approx(sharp.trays[0].mean_speed, abs=1e-12)
+        same = np.array_equal(sharp.frame.image, blurred.frame.image)
+        # The shutter of frame 2 (80 ms) is open from 62 to 98 ms, before the shaking event.
+        assert same == (number <= 2)
+
+
 def test_what_cannot_be_drawn_is_refused():
     for changed, message in (
         ({'fisheye': 0.3}, 'close_up: through a fisheye lens'),
