@@ -20,6 +20,7 @@ ALL = (
     'recordings',
     'preprocess',
     'scene',
+    'drawn_cameras',
     'tracking',
     'plate_cost',
     'recorder',

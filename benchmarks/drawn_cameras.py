@@ -1,21 +1,35 @@
-"""Picture of drawn cameras over some trays: ``python -m benchmarks.drawn_cameras OUT.png``."""
+"""Cameras near to one tray: what a frame costs, and a picture of some that are drawn.
+
+``python -m benchmarks drawn_cameras`` prints the cost; ``python -m benchmarks.drawn_cameras OUT.png``
+writes the picture.
+"""
 
 from __future__ import annotations
 
 import sys
+import time
+from dataclasses import replace
 
 import cv2
 import numpy as np
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.settings import SimulationSettings
+from nanorocks_ros.settings import SceneSettings, SimulationSettings
 from nanorocks_ros.simulation.plate_scene.drawn_camera import drawn_camera
-from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
+from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm, without_effects
 
 # Tray and seed of the camera; two of each row share its width.
 _DRAWN = ((1, 2), (1, 11), (3, 12), (3, 16), (7, 18), (5, 17))
 _WIDTH = 280
 _SECONDS = 0.5
+# Changes of a scene whose cost is printed.
+_CASES: dict[str, dict[str, float]] = {
+    'without motion blur': {'exposure': 0.0},
+    'all effects, tray and camera at rest': {},
+    'and the tray swings': {'swing': 0.0002},
+    'and the camera sways': {'camera_sway_px': 2.0},
+}
+_FRAMES = 100
 _PAPER = 255
 _WHITE = (_PAPER, _PAPER, _PAPER)
 
@@ -33,7 +47,34 @@ def picture(tray: int, seed: int) -> np.ndarray:
     return cv2.resize(image, (_WIDTH, height), interpolation=how)
 
 
-def main(path: str) -> None:
+def report() -> None:
+    """Print what a frame of 400 x 300 px costs, with an exposure of half the frame interval."""
+    cv2.setNumThreads(1)
+    gas = SimulationSettings(width_px=400, height_px=300, first_shake=0.1, mean_speed=0.01)
+    blurred = replace(
+        without_effects(SceneSettings()),
+        trays=(1,),
+        close_up=True,
+        pixels_per_metre=13500.0,
+        defocus_px=0.7,
+        noise=3.0,
+        shadows=0.3,
+        rim_width=0.001,
+        bayer='rggb',
+        camera_height=0.2,
+        exposure=0.5,
+    )
+    print('| tray 1 from near | ms a frame |\n| --- | --- |')
+    for name, changed in _CASES.items():
+        film = SceneFilm(gas, replace(blurred, **changed))
+        film.at(_FRAMES, 0)
+        start = time.process_time()
+        for number in range(_FRAMES + 1, 2 * _FRAMES + 1):
+            film.at(number, 0)
+        print(f'| {name} | {1e3 * (time.process_time() - start) / _FRAMES:.1f} |')
+
+
+def write_picture(path: str) -> None:
     """Write the picture."""
     pictures = [picture(tray, seed) for tray, seed in _DRAWN]
     columns = []
@@ -55,4 +96,7 @@ def main(path: str) -> None:
 
 
 if __name__ == '__main__':
-    main(sys.argv[1])
+    if len(sys.argv) > 1:
+        write_picture(sys.argv[1])
+    else:
+        report()
