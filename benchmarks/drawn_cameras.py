@@ -1,7 +1,7 @@
 """Cameras near to one tray: what a frame costs, and a picture of some that are drawn.
 
-``python -m benchmarks drawn_cameras`` prints the cost; ``python -m benchmarks.drawn_cameras OUT.png``
-writes the picture.
+``python -m benchmarks drawn_cameras`` prints the cost; the picture of the documentation is made
+by ``python -m benchmarks.drawn_cameras OUT.png``.
 """
 
 from __future__ import annotations
