@@ -21,6 +21,7 @@ ALL = (
     'preprocess',
     'scale',
     'scene',
+    'drawn_cameras',
     'tracking',
     'plate_cost',
     'recorder',

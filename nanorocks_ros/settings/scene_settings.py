@@ -124,8 +124,8 @@ class SceneSettings:
     )
     camera_height: float = setting(
         0.0,
-        'distance of the camera from the floor: beads that are higher look larger and further '
-        'out, walls show their inner sides; 0: infinitely far away',
+        'close_up: distance of the camera from the floor; beads that are higher look larger and '
+        'further out, walls show their inner sides; 0: infinitely far away',
         'm',
         low=0.0,
         high=10.0,

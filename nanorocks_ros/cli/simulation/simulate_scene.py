@@ -113,7 +113,6 @@ def _recorder(
     from nanorocks_ros.studies.synthetic.film_compression import check_codec
     from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
 
-    check_quality(options.quality)
     trays = load_trays(options.trays_file)
     defaults, simulation = SceneFilmSettings(), SimulationSettings()
     if options.effects == 'drawn':
@@ -125,6 +124,7 @@ def _recorder(
     check_settings(settings)
     check_scene(filmed.scene)
     check_codec(filmed.compression)
+    check_quality(options.quality)
     return SceneRecorder(settings, filmed.scene, options.duration, trays), filmed, settings
 
 

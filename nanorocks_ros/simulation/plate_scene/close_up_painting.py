@@ -133,7 +133,8 @@ def _over(outside: Field, inside: Field, share: Field) -> Field:
 
 def _covered(grid: _Grid, box: _Box) -> Field:
     """Share of each pixel that a rectangle covers, seen with the width of a pixel."""
-    return _between(grid.x, box.left, box.right) * _between(grid.y, box.top, box.bottom)
+    across, down = _between(grid.x, box.left, box.right), _between(grid.y, box.top, box.bottom)
+    return np.asarray(across * down)
 
 
 def _between(place: Field, low: float, high: float) -> Field:
@@ -150,7 +151,7 @@ def _faces(grid: _Grid, opening: _Box, light: Field) -> Field:
         opening.left - x, opening.top - y, x - opening.right, y - opening.bottom
     )
     side = np.argmax(np.stack(depths), axis=0)
-    return np.asarray(light)[side][..., np.newaxis]
+    return np.asarray(np.asarray(light)[side][..., np.newaxis])
 
 
 def _surface(

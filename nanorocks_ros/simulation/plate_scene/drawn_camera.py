@@ -168,11 +168,13 @@ def drawn_camera(
     _check(ranges)
     draw = _Draws(seed, ranges)
     scene = _scene(draw, tray, moving)
+    width, height = _even_sides(draw.uniform('margin_px'), tray, scene)
     filmed = replace(
         simulation,
         tray=tray.number,
         frame_rate=draw.frame_rate(),
-        **_size(draw.uniform('margin_px'), tray, scene),
+        width_px=width,
+        height_px=height,
     )
     compression = CompressionSettings(
         codec=draw.any_of('codec', _CODECS), crf=round(draw.uniform('crf'))
@@ -223,17 +225,15 @@ def _scene(draw: _Draws, tray: Tray, moving: float) -> SceneSettings:
     )
 
 
-def _size(margin: float, tray: Tray, scene: SceneSettings) -> dict[str, int]:
-    """Even sides of a picture of the tray, its rim and a margin."""
-    rim, depth = scene.rim_width, tray.dimensions[2]
+def _even_sides(margin: float, tray: Tray, scene: SceneSettings) -> tuple[int, int]:
+    """Width and height, [px], of a picture of the tray, its rim and a margin."""
     height = scene.camera_height
-    magnification = height / (height - depth) if height > 0.0 else 1.0
-    sides = (
-        (side * magnification + 2.0 * rim) * scene.pixels_per_metre + 2.0 * margin
+    magnification = height / (height - tray.dimensions[2]) if height > 0.0 else 1.0
+    across, down = (
+        (side * magnification + 2.0 * scene.rim_width) * scene.pixels_per_metre + 2.0 * margin
         for side in tray.dimensions[:2]
     )
-    width, height_px = (2 * math.ceil(0.5 * side) for side in sides)
-    return {'width_px': width, 'height_px': height_px}
+    return 2 * math.ceil(0.5 * across), 2 * math.ceil(0.5 * down)
 
 
 def _check(ranges: CameraRanges) -> None:

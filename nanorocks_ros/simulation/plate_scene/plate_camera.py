@@ -167,8 +167,7 @@ class SceneCamera:
         """
         canvas = self._mean_canvas(instants, turned)
         if self._glare is not None:
-            x, y, _, _ = self._glare.region
-            add_light(canvas, self._glare.light, x, y)
+            _add_glare(canvas, self._glare, instants[len(instants) // 2].plate_shift)
         rows, columns = self.geometry.shape
         picture = np.empty((rows, columns, 3), dtype=np.uint8)
         expose(
@@ -201,3 +200,14 @@ class SceneCamera:
         canvas = self._plate.displaced(instant.plate, instant.plate_shift)
         self._painter.paint(canvas, instant.positions, instant.plate, turned, instant.shift)
         return canvas
+
+
+def _add_glare(canvas: NDArray[np.uint16], glare: Glare, shift: tuple[float, float]) -> None:
+    """Add the light of the LEDs, which moves with the picture by whole pixels."""
+    rows, columns = canvas.shape[1:]
+    left, top = glare.region.x + round(shift[0]), glare.region.y + round(shift[1])
+    right, bottom = left + glare.region.width, top + glare.region.height
+    first, last = (max(-top, 0), max(-left, 0)), (max(bottom - rows, 0), max(right - columns, 0))
+    height, width = glare.light.shape[1:]
+    seen = glare.light[:, first[0] : height - last[0], first[1] : width - last[1]]
+    add_light(canvas, np.ascontiguousarray(seen), left + first[1], top + first[0])

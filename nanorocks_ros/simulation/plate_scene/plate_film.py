@@ -196,7 +196,8 @@ class SceneFilm:
         opened = self._scene.exposure / self._simulation.frame_rate
         if opened == 0.0:
             return 0.0, 1
-        if self._shaken_within(time - 0.5 * opened, time + 0.5 * opened):
+        # The speeds of the frame before say nothing when there was an event since.
+        if self._shaken_within(time - 1.0 / self._simulation.frame_rate, time + 0.5 * opened):
             return opened, MOST
         return opened, instants_for(self._fastest * self._scene.pixels_per_metre * opened)
 

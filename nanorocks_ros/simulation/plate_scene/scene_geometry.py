@@ -15,7 +15,7 @@ from nanorocks_ros.experiment.lens import Camera
 from nanorocks_ros.experiment.plate import PLATE, Region, regions_on_plate
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from numpy.typing import NDArray
 
@@ -92,12 +92,7 @@ class SceneGeometry:
         self.height = float(scene.camera_height) * self.scale
         """Of the camera over the floor, [px]; 0: infinitely far away."""
         self._dimensions = {number: tray.dimensions for number, tray in trays.items()}
-        if 0.0 < scene.camera_height <= 2.0 * max(sides[2] for sides in self._dimensions.values()):
-            raise ConfigurationError(
-                'camera_height',
-                f'{scene.camera_height:g} m is within or close to the trays',
-                'give 0 or at least 0.05 m',
-            )
+        _check_height(scene, self._dimensions.values())
         self.straight = scene.fisheye == 0.0 and scene.close_up
         if scene.close_up:
             self.regions, self._corners = _close_up(scene, trays, self.shape)
@@ -187,6 +182,20 @@ class SceneGeometry:
         high = np.minimum(np.ceil(outline.max(axis=0)), self.shape[::-1]).astype(int)
         width, height = np.maximum(high - low, 0)
         return Region(int(low[0]), int(low[1]), int(width), int(height))
+
+
+def _check_height(scene: SceneSettings, dimensions: Iterable[tuple[float, float, float]]) -> None:
+    height = scene.camera_height
+    if height > 0.0 and not scene.close_up:
+        raise ConfigurationError(
+            'camera_height',
+            f'{height:g} m, but the whole plate is drawn without perspective',
+            'set scene.camera_height to 0, or scene.close_up with one tray',
+        )
+    if 0.0 < height <= 2.0 * max(sides[2] for sides in dimensions):
+        raise ConfigurationError(
+            'camera_height', f'{height:g} m is within or close to the tray', 'give 0.05 m or more'
+        )
 
 
 def _close_up(

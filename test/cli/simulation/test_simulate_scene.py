@@ -52,6 +52,24 @@ def test_the_written_files_are_printed(capsys, tmp_path):
     assert out.splitlines()[-1].split(maxsplit=1) == ['written', path]
 
 
+def test_a_drawn_camera_films_one_tray_from_near(capsys, tmp_path):
+    path = str(tmp_path / 'near.avi')
+    flags = ('--scene', '--effects', 'drawn', '--scene-trays', '1', '--duration', '0.1')
+    code, out, err = simulate(
+        capsys, *flags, '--seed', '4', '--scene-exposure', '0', '--video', path, '--json'
+    )
+    assert (code, err) == (0, [])
+    settings = json.loads(out)['settings']
+    assert settings['scene']['close_up']
+    assert settings['scene']['exposure'] == 0.0
+    video = cv2.VideoCapture(path)
+    assert video.read()[1].shape == (
+        settings['simulation']['height_px'],
+        settings['simulation']['width_px'],
+        3,
+    )
+
+
 def test_single_effects_can_be_added_to_none(capsys, tmp_path):
     pictures = []
     for name, flags in (('none', ()), ('noise', ('--scene-noise', '4'))):
@@ -85,6 +103,8 @@ def test_single_effects_can_be_added_to_none(capsys, tmp_path):
         (['--scene', '--bag', 'b', '--scene-trays', '1', '9'], 2, 'scene.trays: 9 is outside'),
         (['--scene', '--bag', 'b', '--scene-trays', '2', '2'], 2, 'is empty or has duplicates'),
         (['--scene', '--bag', 'b', '--compression-codec', 'av1'], 2, 'is none of jpeg, jpeg_rate'),
+        (['--scene', '--effects', 'drawn', '--bag', 'b'], 2, 'not over 8; add --scene-trays 1'),
+        (['--effects', 'drawn', '--bag', 'b'], 2, 'add --scene --scene-trays 1'),
         (['--scene', '--picture', 'scene.pdf'], 2, 'scene.pdf ends in none of .png'),
         (
             ['--scene', '--bag', 'b', '--width-px', '300'],

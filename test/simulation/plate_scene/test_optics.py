@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import NEAR, NEAR_SIMULATION, TRAYS, near_camera
+from scenes import NEAR, NEAR_SIMULATION, PLAIN, TRAYS, empty_camera, near_camera
 from scipy.ndimage import map_coordinates
 from scipy.optimize import least_squares
 
@@ -240,6 +240,43 @@ def test_the_camera_moves_beads_tray_and_surroundings_alike():
         assert measured_shift(still, moved, part) == pytest.approx(shift, abs=0.05)
 
 
+def test_the_whole_plate_has_the_lamp_the_rim_and_the_motion_of_the_camera():
+    plain = replace(PLAIN, defocus_px=1.0)
+    still, shift = Instant({}, (0.0, 0.0)), (1.37, -2.61)
+    camera = empty_camera(plain)
+    first = camera.exposed([still], 0).astype(float)
+    moved = camera.exposed([still._replace(shift=shift, plate_shift=shift)], 0).astype(float)
+    x, y, width, height = camera.geometry.regions[1]
+    part = np.s_[y - 10 : y + height + 10, x - 10 : x + width + 10]
+    assert measured_shift(first, moved, part) == pytest.approx(shift, abs=0.05)
+    away = empty_camera(replace(plain, lamp_azimuth=plain.lamp_azimuth + math.pi))
+    middle = slice(y + 20, y + height - 20)
+    chamfers = [(middle, slice(x - 3, x - 1)), (middle, slice(x + width + 1, x + width + 3))]
+    turned = away.exposed([still], 0).astype(float)
+    lit = [[picture[chamfer].mean() for chamfer in chamfers] for picture in (first, turned)]
+    assert lit[0][0] < lit[0][1] - 20.0
+    assert lit[1][0] > lit[1][1] + 20.0
+    rim = empty_camera(replace(plain, rim_width=0.001, rim_shade=0.3)).exposed([still], 0)
+    assert rim[middle, x - 7 : x - 2].mean() < 0.5 * first[middle, x - 7 : x - 4].mean()
+    swung = [Instant({}, (step * 1e-4, 0.0)) for step in (-1.0, 0.0, 1.0)]
+    blurred = camera.exposed(swung, 0).astype(float)
+    edge = np.s_[y + 20 : y + height - 20, x + width - 6 : x + width + 6]
+    sharpness = [np.abs(np.diff(picture[edge], axis=1)).max() for picture in (first, blurred)]
+    assert sharpness[1] < 0.9 * sharpness[0]
+
+
+def test_glare_moves_with_the_camera():
+    glaring = replace(PLAIN, glare=1.0)
+    camera = empty_camera(glaring)
+    still = Instant({}, (0.0, 0.0))
+    first, moved = (
+        camera.exposed([still._replace(shift=shift, plate_shift=shift)], 0)[..., 1]
+        for shift in ((0.0, 0.0), (3.0, -2.0))
+    )
+    cores = [np.argwhere(picture > 250).mean(axis=0) for picture in (first, moved)]
+    assert cores[1] - cores[0] == pytest.approx((-2.0, 3.0), abs=0.05)
+
+
 def measured_shift(still, moved, part):
     """Shift of a part of a picture, by least squares over its gradient in small steps."""
     shift = np.array([1.0, -3.0])
@@ -255,12 +292,31 @@ def measured_shift(still, moved, part):
     return tuple(shift)
 
 
+def test_an_open_shutter_changes_pictures_and_not_the_truth():
+    gas = replace(NEAR_SIMULATION, first_shake=0.1, mean_speed=0.02, frame_rate=25.0)
+    scene = replace(NEAR, swing=0.0002)
+    films = [
+        SceneFilm(gas, replace(scene, exposure=part), {1: TRAYS[1]}).moments(8)
+        for part in (0.0, 0.9)
+    ]
+    for number, (sharp, blurred) in enumerate(zip(*films, strict=True)):
+        for sharp_truth, truth in zip(sharp.beads, blurred.beads, strict=True):
+            assert truth.cycle == sharp_truth.cycle
+            assert truth.positions == pytest.approx(sharp_truth.positions, abs=1e-12)
+            assert truth.velocities == pytest.approx(sharp_truth.velocities, abs=1e-12)
+        assert blurred.trays[0].mean_speed == pytest.approx(sharp.trays[0].mean_speed, abs=1e-12)
+        same = np.array_equal(sharp.frame.image, blurred.frame.image)
+        # The shutter of frame 2 (80 ms) is open from 62 to 98 ms, before the shaking event.
+        assert same == (number <= 2)
+
+
 def test_what_cannot_be_drawn_is_refused():
     for changed, message in (
         ({'fisheye': 0.3}, 'close_up: through a fisheye lens'),
         ({'trays': (1, 3)}, 'close_up: of the trays'),
         ({'pixels_per_metre': 25000.0}, 'tray 1: 375 x 375 px'),
         ({'camera_height': 0.004}, 'camera_height: 0.004 m is within'),
+        ({'camera_height': 0.2, 'close_up': False}, 'whole plate is drawn without perspective'),
         ({'camera_jitter_px': 6.0}, 'camera_jitter_px: 6 px'),
     ):
         with pytest.raises(ConfigurationError, match=message):

@@ -151,10 +151,11 @@ def test_stamps_are_those_of_the_frame_rate():
 
 def test_no_effects_means_all_strengths_zero_but_shading():
     bare = without_effects(SceneSettings(shading=0.5))
-    off = {row.name for row in rows(bare) if row.default == 0.0 and row.name != 'swing_knocks'}
+    off = {row.name for row in rows(bare) if row.default == 0.0 and row.default is not False}
     assert off == {
         'fisheye', 'defocus_px', 'noise', 'vignetting', 'gradient', 'flicker', 'shadows', 'chalk',
-        'glare', 'ovality', 'irregularity', 'turning', 'swing',
+        'glare', 'ovality', 'irregularity', 'turning', 'swing', 'floor_texture', 'rim_width',
+        'camera_height', 'exposure', 'camera_jitter_px', 'camera_sway_px',
     }  # fmt: skip
     assert bare.shading == 0.5
 

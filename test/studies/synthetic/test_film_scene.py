@@ -116,9 +116,10 @@ def test_a_picture_is_the_last_frame_as_it_is(tmp_path):
     np.testing.assert_array_equal(cv2.imread(str(tmp_path / 'scene.png')), expected)
 
 
-def test_h264_keeps_the_frames_in_order_and_loses_detail():
+@pytest.mark.parametrize('codec', ['h264', 'h264_crf'])
+def test_h264_keeps_the_frames_in_order_and_loses_detail(codec):
     pytest.importorskip('av')
-    compression = CompressionSettings(codec='h264', rate=40e6)
+    compression = CompressionSettings(codec=codec, rate=40e6, crf=24.0)
     moments = list(film().moments(20))
     made = list(compressed(iter(moments), compression, quality=95, frame_rate=30.0))
     assert [moment.frame.stamp_ns for moment, _ in made] == [
