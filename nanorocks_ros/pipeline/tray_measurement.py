@@ -82,7 +82,6 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
     def _process(self, record: TrayImage) -> tuple[TrayRecord, ...]:
         self._cycles.push(record)
         image = self._cycles.counted(record)
-        self._oscillation.push(image)
         self._area_speed.emit_mask = self.emit_mask
         pictures: list[MotionMask | Tracks] = []
         speeds: list[SpeedEstimate] = []
@@ -99,6 +98,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
                 events += self._contacts_in(tracks)
                 events += self._bodies.push(tracks)
                 speeds += self._track_speed.push(tracks)
+        self._oscillation.push(image, camera_moves=self._tracker.camera_moves)
         speeds += self._structure_speeds(image)
         return (*pictures, *self._selected(speeds), *self._reliable(events))
 
