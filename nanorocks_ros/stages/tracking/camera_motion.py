@@ -3,7 +3,11 @@
 The walls show how the tray moves in the picture, but not whether tray or camera moves. Beads in
 free flight do: they fly straight in space. Where the tray swings, their paths bend in the frame of
 the tray by the opposite of its motion in the picture; where the camera moves, they are straight in
-the frame of the tray.
+the frame of the tray. Beads that touch may stick and turn: only their
+centre of mass flies straight.
+
+Where fewer than four bodies fly, motion that changes direction from frame to frame is that of the
+camera: a tray on springs swings smoothly.
 """
 
 from __future__ import annotations
@@ -11,6 +15,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
+from enum import Enum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,8 +27,10 @@ if TYPE_CHECKING:
 
 # Times between the three positions that give a bend, [s]: for motion of 1 to 10 Hz and of less.
 _LAGS = (0.1, 0.3)
-# Fewest beads with three positions: fewer have no reliable median.
-_FEWEST_BEADS = 4
+# Fewest bodies with three positions: fewer have no reliable median.
+_FEWEST_BODIES = 4
+# Beads this much further from each other than their radii touch: a share of that, and [px].
+_GAP_SHARE, _GAP_PX = 0.04, 0.5
 # Error of a median of normal variates over that of their mean, and their standard deviation over
 # the median of their absolute values.
 _MEDIAN_ERROR = 1.2533
@@ -33,12 +40,20 @@ _LEAST_ERROR = 0.05
 # Least bend of the motion of the picture that is evidence, in errors of a registered bend.
 _SIGNIFICANT = 4.0
 _BEND_ERROR = math.sqrt(6.0)
+# Largest ratio of the two times between three moments.
+_EVEN = 1.25
 # Largest log likelihood ratio of a frame: no single frame decides.
 _LARGEST_RATIO = 4.0
 # Log likelihood ratio that decides, and its largest value, so that a change is noticed.
 _DECISIVE, _LARGEST_EVIDENCE = 6.0, 12.0
 # Evidence and misfit are forgotten with this time, [s].
 _MEMORY = 1.0
+# Displacements whose roughness is measured, and the least roughness of a camera that jitters:
+# medians of fourth over second differences, (2 sin(pi f / rate))^2 for a frequency f. The limit is
+# that of a fourth of the frame rate; white jitter has 3.4.
+_ROUGH_FRAMES, _ROUGH = 16, 2.0
+# A motion that nothing explains for so long is called uncertain, [s].
+_UNDECIDED = 1.0
 # Largest mean square of the common bend that the motion leaves, in units of its variance: 4 for a
 # variate of 2 standard errors. A single frame counts as at most this square.
 _LARGEST_MISFIT, _MISFIT_BOUND = 4.0, 25.0
@@ -71,8 +86,17 @@ class _Moment:
 
     time: float
     positions: NDArray[np.float64]
+    radii: NDArray[np.float64]
     before: NDArray[np.int64]
     displacement: NDArray[np.float64]
+
+
+class _Fate(Enum):
+    """What three moments say: the picture is still, it moves, or beads say what moves."""
+
+    STILL = 0
+    UNKNOWN = 1
+    WEIGHED = 2
 
 
 class CameraMotion:
@@ -82,12 +106,15 @@ class CameraMotion:
         self._moments: deque[_Moment] = deque()
         self._evidence = 0.0
         self._misfit = 1.0
+        self._undecided = 0.0
+        self._decided = False
         self.camera_moves = False
 
     def push(
         self,
         time: float,
         positions: NDArray[np.float64],
+        radii: NDArray[np.float64],
         displacement: NDArray[np.float64],
         error: float,
     ) -> TrayMotion:
@@ -98,82 +125,97 @@ class CameraMotion:
         time : float, [s]
         positions : ndarray (n, 2), [px]
             Of the beads in the frame of the tray, in any order.
+        radii : ndarray (n,), [px]
         displacement : ndarray (2,), [px]
             Of the tray in the picture.
         error : float, [px]
             Of a component of the displacement.
         """
         last = self._moments[-1] if self._moments else None
-        rows = np.empty(len(positions), dtype=np.int64)
-        if last is None:
-            rows[:] = -1
-        else:
+        rows = np.full(len(positions), -1)
+        step = 0.0
+        if last is not None:
             _nearest_rows(positions, last.positions, rows)
-        self._moments.append(_Moment(time, positions, rows, displacement))
+            step = time - last.time
+        self._moments.append(_Moment(time, positions, radii, rows, displacement))
         while time - self._moments[0].time > 2.0 * _LAGS[-1] + _MEMORY:
             self._moments.popleft()
-        step = time - last.time if last is not None else 0.0
-        fading = math.exp(-step / _MEMORY)
-        self._evidence *= fading
-        for lag in _LAGS:
-            self._weigh(lag, step, error)
+        self._evidence *= math.exp(-step / _MEMORY)
+        fates = [self._weigh(lag, step, error) for lag in _LAGS]
+        if not any(fate is _Fate.WEIGHED for fate in fates) and self._rough(error):
+            self._evidence += 1.0
         changed = self._decide()
+        moves = any(fate is not _Fate.STILL for fate in fates)
+        self._undecided = self._undecided + step if moves and not self._decided else 0.0
         return TrayMotion(
             np.zeros(2) if self.camera_moves else displacement,
             self.camera_moves,
             changed,
-            self._misfit > _LARGEST_MISFIT,
+            self._misfit > _LARGEST_MISFIT or self._undecided > _UNDECIDED,
         )
 
     def _decide(self) -> bool:
         before = self.camera_moves
         if abs(self._evidence) > _DECISIVE:
-            self.camera_moves = self._evidence > 0.0
+            self.camera_moves, self._decided = self._evidence > 0.0, True
         self._evidence = min(max(self._evidence, -_LARGEST_EVIDENCE), _LARGEST_EVIDENCE)
         if self.camera_moves != before:
             self._misfit = 1.0
         return self.camera_moves != before
 
-    def _weigh(self, lag: float, step: float, error: float) -> None:
+    def _weigh(self, lag: float, step: float, error: float) -> _Fate:
         """Add the evidence of three moments, as far as the picture moves."""
         frames = max(1, round(lag / step)) if step > 0.0 else 0
         if not frames or len(self._moments) <= 2 * frames:
-            return
+            return _Fate.STILL
         later, middle, earlier = (self._moments[-1 - k * frames] for k in range(3))
         between = middle.time - earlier.time
         ratio = (later.time - middle.time) / between if between > 0.0 else math.inf
         # Where frames are missing the bend would be that of another lag.
-        if not 0.8 < ratio < 1.25:
-            return
+        if not 1.0 / _EVEN < ratio < _EVEN:
+            return _Fate.STILL
+        share = min(1.0, step / _MEMORY)
         moved = _bend(later.displacement, middle.displacement, earlier.displacement, ratio)
-        if math.hypot(moved[0], moved[1]) < _SIGNIFICANT * _BEND_ERROR * error:
-            self._misfit += (1.0 - self._misfit) * step / _MEMORY
-            return
-        bends = self._bends(frames, ratio)
-        if len(bends) < _FEWEST_BEADS:
-            return
+        still = math.hypot(moved[0], moved[1]) < _SIGNIFICANT * _BEND_ERROR * error
+        bends = np.empty((0, 2)) if still else self._bends(frames, ratio)
+        if len(bends) < _FEWEST_BODIES:
+            self._misfit += (1.0 - self._misfit) * share
+            return _Fate.STILL if still else _Fate.UNKNOWN
         common = np.median(bends, axis=0)
         deviation = _DEVIATION * np.median(np.abs(bends - common), axis=0)
         noise = np.hypot(_MEDIAN_ERROR * deviation / math.sqrt(len(bends)), _LEAST_ERROR)
         of_tray = float(np.sum(((common + moved) / noise) ** 2))
         of_camera = float(np.sum((common / noise) ** 2))
+        likelihood = min(max(0.5 * (of_tray - of_camera), -_LARGEST_RATIO), _LARGEST_RATIO)
         # Successive bends share the motion within a lag.
-        ratio_here = min(max(0.5 * (of_tray - of_camera), -_LARGEST_RATIO), _LARGEST_RATIO)
-        self._evidence += ratio_here / frames
+        self._evidence += likelihood / frames
         square = min(0.5 * (of_camera if self.camera_moves else of_tray), _MISFIT_BOUND)
-        self._misfit += (square - self._misfit) * min(1.0, step / _MEMORY)
+        self._misfit += (square - self._misfit) * share
+        return _Fate.WEIGHED
+
+    def _rough(self, error: float) -> bool:
+        """Whether the picture moves as no tray on springs does."""
+        if len(self._moments) < _ROUGH_FRAMES:
+            return False
+        recent = [self._moments[k].displacement for k in range(-_ROUGH_FRAMES, 0)]
+        second, fourth = (np.abs(np.diff(recent, n, axis=0)) for n in (2, 4))
+        usual = float(np.median(second))
+        moves = usual > _SIGNIFICANT * _BEND_ERROR * error / _DEVIATION
+        return moves and float(np.median(fourth)) > _ROUGH * usual
 
     def _bends(self, frames: int, ratio: float) -> NDArray[np.float64]:
-        """Bends of the paths of all beads that are in all frames from the first on, (n, 2)."""
-        rows = [np.arange(len(self._moments[-1].positions))]
+        """Bends of the paths of all bodies that are in all frames from the first on, (n, 2)."""
+        last = self._moments[-1]
+        rows = [np.arange(len(last.positions))]
         for k in range(2 * frames):
-            before = self._moments[-1 - k].before
-            rows.append(np.where(rows[-1] >= 0, before[rows[-1]], -1))
+            # A row more for beads that have none: index -1.
+            before = np.append(self._moments[-1 - k].before, -1)
+            rows.append(before[rows[-1]])
         seen = rows[-1] >= 0
         later, middle, earlier = (
             self._moments[-1 - k * frames].positions[rows[k * frames][seen]] for k in range(3)
         )
-        return _bend(later, middle, earlier, ratio)
+        return _body_means(_bend(later, middle, earlier, ratio), later, last.radii[seen])
 
 
 def _bend(
@@ -212,3 +254,35 @@ def _nearest_rows(
             taken[j], nearest[j] = k, best
         else:
             rows[k] = -1
+
+
+@compiled
+def _body_means(
+    bends: NDArray[np.float64], positions: NDArray[np.float64], radii: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Mean bend of each group of beads that touch, weighted by their volumes, (bodies, 2)."""
+    n = radii.size
+    bodies = np.arange(n)
+    for k in range(n):
+        for j in range(k):
+            reach = (1.0 + _GAP_SHARE) * (radii[k] + radii[j]) + _GAP_PX
+            dx = positions[k, 0] - positions[j, 0]
+            dy = positions[k, 1] - positions[j, 1]
+            if dx * dx + dy * dy < reach * reach and bodies[j] != bodies[k]:
+                merged, kept = bodies[k], bodies[j]
+                for m in range(n):
+                    if bodies[m] == merged:
+                        bodies[m] = kept
+    sums, weights = np.zeros((n, 2)), np.zeros(n)
+    for k in range(n):
+        volume = radii[k] ** 3
+        weights[bodies[k]] += volume
+        sums[bodies[k], 0] += volume * bends[k, 0]
+        sums[bodies[k], 1] += volume * bends[k, 1]
+    count = 0
+    means = np.empty((n, 2))
+    for k in range(n):
+        if weights[k] > 0.0:
+            means[count] = sums[k] / weights[k]
+            count += 1
+    return means[:count]

@@ -96,8 +96,9 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
         expected = np.zeros(2) if self._camera.camera_moves else moved
         hints = [linker.hints(time, expected) for linker in self._linkers]
         detected = self._detector.detect(record.color, hints)
-        beads = np.concatenate([detections.positions for detections in detected])
-        motion = self._camera.push(time, beads, moved, registration)
+        places = np.concatenate([detections.positions for detections in detected])
+        radii = np.concatenate([detections.radii for detections in detected])
+        motion = self._camera.push(time, places, radii, moved, registration)
         if motion.changed:
             self._linkers = [
                 self._linker_of(species, record.gray.shape) for species in self._tray.species

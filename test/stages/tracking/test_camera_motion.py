@@ -12,6 +12,8 @@ FRAMES = 240
 # Error of registration and of the place of a bead, [px].
 REGISTRATION, PLACES = 0.02, 0.05
 TIMES = np.arange(FRAMES) / FRAME_RATE
+# Small, so that few touch.
+RADIUS = 4.0
 
 # [px]
 SWING = 2.7 * np.exp(-0.16 * TIMES)[:, None] * np.sin(9.42 * TIMES)[:, None] * [0.8, 0.6]
@@ -40,7 +42,11 @@ def motions(tray, camera, beads=15, speed=30.0, seed=1):
         path = (start + velocity * time) % 400.0
         places = np.minimum(path, 400.0 - path) - moved + rng.normal(0.0, PLACES, (beads, 2))
         in_picture = moved + shaken + rng.normal(0.0, REGISTRATION, 2)
-        said.append(judge.push(time, rng.permutation(places), in_picture, REGISTRATION))
+        said.append(
+            judge.push(
+                time, rng.permutation(places), np.full(beads, RADIUS), in_picture, REGISTRATION
+            )
+        )
     return said
 
 
@@ -93,9 +99,24 @@ def test_the_tray_is_believed_again_when_the_camera_stops():
     assert not any(motion.camera_moves for motion in settled(said))
 
 
-def test_too_few_beads_decide_nothing():
+def test_too_few_beads_leave_jitter_to_the_camera():
     said = motions(REST, jitter(), beads=3)
-    assert not any(motion.camera_moves for motion in said)
+    assert all(motion.camera_moves for motion in settled(said))
+
+
+def test_smooth_motion_with_too_few_beads_is_called_uncertain():
+    said = settled(motions(SWING, REST, beads=3))
+    assert all(motion.uncertain and not motion.camera_moves for motion in said)
+
+
+def test_beads_that_touch_count_as_one_body():
+    rng = np.random.default_rng(4)
+    offsets = RADIUS * np.stack([2.0 * np.arange(15), np.zeros(15)], axis=-1)
+    judge = CameraMotion()
+    for time, moved in zip(TIMES, SWAY, strict=True):
+        places = 100.0 + offsets + rng.normal(0.0, PLACES, (15, 2))
+        motion = judge.push(time, places, np.full(15, RADIUS), moved, REGISTRATION)
+    assert motion.uncertain
 
 
 def test_motion_across_gaps_decides_nothing():
@@ -103,5 +124,8 @@ def test_motion_across_gaps_decides_nothing():
     rng = np.random.default_rng(2)
     places = rng.uniform(0.0, 200.0, (15, 2))
     times = np.cumsum(np.tile([1.0, 9.0], 60)) / FRAME_RATE
-    said = [judge.push(time, places, rng.normal(0.0, 2.0, 2), REGISTRATION) for time in times]
+    said = [
+        judge.push(time, places, np.full(15, RADIUS), rng.normal(0.0, 2.0, 2), REGISTRATION)
+        for time in times
+    ]
     assert not any(motion.camera_moves or motion.uncertain for motion in said)
