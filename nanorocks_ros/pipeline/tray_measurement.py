@@ -10,7 +10,9 @@ from nanorocks_ros.records import (
     BodyEstimate,
     Merge,
     MotionMask,
+    Notice,
     PairCollision,
+    Quality,
     Rebound,
     SpeedEstimate,
     Tracks,
@@ -34,7 +36,15 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
 
 Event = Rebound | PairCollision | BodyEstimate | Merge
-TrayRecord = SpeedEstimate | MotionMask | Tracks | Event
+TrayRecord = SpeedEstimate | MotionMask | Tracks | Event | Notice
+
+_CAMERA_MOVES = (
+    'the camera moves, not the tray; its motion is removed, and the tray is taken to be at rest'
+)
+_UNCERTAIN = (
+    'the motion of camera and tray cannot be told apart for some time; speeds there carry '
+    'stabilisation_lost, and rebounds miss the speed of the wall; mount the camera firmly'
+)
 
 
 class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
@@ -69,6 +79,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
     def _restart(self, stamp_ns: int | None = None) -> None:
         del stamp_ns
         settings, tray = self._settings, self._tray
+        self._noticed: set[str] = set()
         self._cycles = CycleFollower(settings.speed.shake_ratio, settings.speed.min_cycle_duration)
         self._oscillation = TrayOscillation()
         self._tracker = Tracker(settings, tray)
@@ -83,7 +94,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         self._cycles.push(record)
         image = self._cycles.counted(record)
         self._area_speed.emit_mask = self.emit_mask
-        pictures: list[MotionMask | Tracks] = []
+        pictures: list[MotionMask | Tracks | Notice] = []
         speeds: list[SpeedEstimate] = []
         events: list[Event] = []
         for measured in self._area_speed.push(image):
@@ -95,9 +106,12 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
             speeds += self._track_speed.push(image)
             for tracks in self._tracker.push(image):
                 pictures += [tracks] if self.emit_tracks else []
+                pictures += self._camera_notices(image, tracks)
                 events += self._contacts_in(tracks)
                 events += self._bodies.push(tracks)
                 speeds += self._track_speed.push(tracks)
+        else:
+            self._tracker.watch(image)
         self._oscillation.push(image, camera_moves=self._tracker.camera_moves)
         speeds += self._structure_speeds(image)
         return (*pictures, *self._selected(speeds), *self._reliable(events))
@@ -109,6 +123,17 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         contacts = sorted(self._contacts.flush(), key=attrgetter('stamp_ns'))
         events = [*self._in_cycle(contacts), *self._bodies.flush()]
         return (*self._selected(speeds), *self._reliable(events))
+
+    def _camera_notices(self, image: TrayImage, tracks: Tracks) -> list[Notice]:
+        """What to say of a camera that moves, once."""
+        doubt = Quality.STABILISATION_LOST & tracks.quality & ~image.quality
+        texts = {_CAMERA_MOVES: self._tracker.camera_moves, _UNCERTAIN: bool(doubt)}
+        new = [text for text, holds in texts.items() if holds and text not in self._noticed]
+        self._noticed.update(new)
+        return [
+            Notice(stamp_ns=image.stamp_ns, text=f'tray {self._tray.number}: {text}')
+            for text in new
+        ]
 
     def _structure_speeds(self, image: TrayImage) -> tuple[SpeedEstimate, ...]:
         if self._selector.uses_structure:

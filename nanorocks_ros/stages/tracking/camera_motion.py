@@ -3,8 +3,8 @@
 The walls show how the tray moves in the picture, but not whether tray or camera moves. Beads in
 free flight do: they fly straight in space. Where the tray swings, their paths bend in the frame of
 the tray by the opposite of its motion in the picture; where the camera moves, they are straight in
-the frame of the tray. Beads that touch may stick and turn: only their
-centre of mass flies straight.
+the frame of the tray. Beads that touch may stick and turn: only their centre of mass flies
+straight.
 
 Where fewer than four bodies fly, motion that changes direction from frame to frame is that of the
 camera: a tray on springs swings smoothly.
@@ -152,6 +152,15 @@ class CameraMotion:
             self.camera_moves,
             changed,
             self._misfit > _LARGEST_MISFIT or self._undecided > _UNDECIDED,
+        )
+
+    def of_lost_tray(self) -> TrayMotion:
+        """Motion in a frame in which the tray was not registered: it counts as at rest.
+
+        Uncertain where the camera moves: then the beads move with it.
+        """
+        return TrayMotion(
+            np.zeros(2), self.camera_moves, changed=False, uncertain=self.camera_moves
         )
 
     def _decide(self) -> bool:

@@ -82,23 +82,24 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
     def _process(self, record: TrayImage) -> tuple[Tracks, ...]:
         """Detect and link the beads of an image."""
         if record.color is None:
+            self.watch(record)
             return ()
-        if self._first_ns is None:
-            self._first_ns = record.stamp_ns
+        time = self._time(record)
         if not self._linkers:
             self._linkers = [
                 self._linker_of(species, record.gray.shape) for species in self._tray.species
             ]
-        time = (record.stamp_ns - self._first_ns) / _NS
         # Beads fly straight in space, not in the frame of a swinging tray.
-        moved = self._scale * np.array([_zero_if_nan(value) for value in record.displacement])
         registration = _zero_if_nan(record.displacement_error) * self._scale
-        expected = np.zeros(2) if self._camera.camera_moves else moved
+        rest = self._camera.camera_moves or math.isnan(record.displacement[0])
+        expected = np.zeros(2) if rest else self._scale * np.array(record.displacement)
         hints = [linker.hints(time, expected) for linker in self._linkers]
         detected = self._detector.detect(record.color, hints)
-        places = np.concatenate([detections.positions for detections in detected])
-        radii = np.concatenate([detections.radii for detections in detected])
-        motion = self._camera.push(time, places, radii, moved, registration)
+        motion = self._motion(
+            record,
+            np.concatenate([detections.positions for detections in detected]),
+            np.concatenate([detections.radii for detections in detected]),
+        )
         if motion.changed:
             self._linkers = [
                 self._linker_of(species, record.gray.shape) for species in self._tray.species
@@ -111,6 +112,26 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
             )
             self._next_id += linker.push(time, shifted, shift, self._next_id)
         return (self._tracks(record, time, motion),)
+
+    def watch(self, image: TrayImage) -> None:
+        """Follow the motion of the picture alone, where beads are not tracked."""
+        self._motion(image, np.empty((0, 2)), np.empty(0))
+
+    def _time(self, image: TrayImage) -> float:
+        """Time since the first image, [s]."""
+        if self._first_ns is None:
+            self._first_ns = image.stamp_ns
+        return (image.stamp_ns - self._first_ns) / _NS
+
+    def _motion(
+        self, image: TrayImage, places: NDArray[np.float64], radii: NDArray[np.float64]
+    ) -> TrayMotion:
+        """Motion of the tray in space, from its motion in the picture and the beads, [px]."""
+        if math.isnan(image.displacement[0]):
+            return self._camera.of_lost_tray()
+        moved = self._scale * np.array(image.displacement)
+        error = self._scale * image.displacement_error
+        return self._camera.push(self._time(image), places, radii, moved, error)
 
     def _linker_of(self, species: Species, shape: tuple[int, ...]) -> Linker:
         return Linker(
