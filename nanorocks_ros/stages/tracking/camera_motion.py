@@ -6,7 +6,7 @@ the tray by the opposite of its motion in the picture; where the camera moves, t
 the frame of the tray. Beads that touch may stick and turn: only their centre of mass flies
 straight.
 
-Where fewer than four bodies fly, motion that changes direction from frame to frame is that of the
+Where fewer than two bodies fly, motion that changes direction from frame to frame is that of the
 camera: a tray on springs swings smoothly.
 """
 
@@ -27,15 +27,17 @@ if TYPE_CHECKING:
 
 # Times between the three positions that give a bend, [s]: for motion of 1 to 10 Hz and of less.
 _LAGS = (0.1, 0.3)
-# Fewest bodies with three positions: fewer have no reliable median.
-_FEWEST_BODIES = 4
+# A single body may just have collided; two that agree have not.
+_FEWEST_BODIES = 2
+# The scatter of n bodies is uncertain by itself: its error is larger by 1 + this / (n - 1).
+_FEW_BODIES = 2.0
 # Beads this much further from each other than their radii touch: a share of that, and [px].
 _GAP_SHARE, _GAP_PX = 0.04, 0.5
 # Error of a median of normal variates over that of their mean, and their standard deviation over
 # the median of their absolute values.
 _MEDIAN_ERROR = 1.2533
 _DEVIATION = 1.4826
-# Least error of the common bend, [px]: registration and detection have errors that beads share.
+# Least error of the common bend, [px]: detection has errors that beads share.
 _LEAST_ERROR = 0.05
 # Least bend of the motion of the picture that is evidence, in errors of a registered bend.
 _SIGNIFICANT = 4.0
@@ -54,9 +56,10 @@ _MEMORY = 1.0
 _ROUGH_FRAMES, _ROUGH = 16, 2.0
 # A motion that nothing explains for so long is called uncertain, [s].
 _UNDECIDED = 1.0
-# Largest mean square of the common bend that the motion leaves, in units of its variance: 4 for a
-# variate of 2 standard errors. A single frame counts as at most this square.
-_LARGEST_MISFIT, _MISFIT_BOUND = 4.0, 25.0
+# Largest mean square of the common bend that the motion leaves, in units of its variance: within
+# the memory some ten values are independent, whose mean is beyond 2.5 in 0.5 % of all cases. A
+# single frame counts as at most this square.
+_LARGEST_MISFIT, _MISFIT_BOUND = 2.5, 25.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,9 +193,9 @@ class CameraMotion:
         if len(bends) < _FEWEST_BODIES:
             self._misfit += (1.0 - self._misfit) * share
             return _Fate.STILL if still else _Fate.UNKNOWN
-        common = np.median(bends, axis=0)
-        deviation = _DEVIATION * np.median(np.abs(bends - common), axis=0)
-        noise = np.hypot(_MEDIAN_ERROR * deviation / math.sqrt(len(bends)), _LEAST_ERROR)
+        common, noise = _common_bend(bends)
+        # A shift of the tray that was registered wrongly seems to be one of all beads.
+        noise = np.hypot(noise, _BEND_ERROR * error)
         of_tray = float(np.sum(((common + moved) / noise) ** 2))
         of_camera = float(np.sum((common / noise) ** 2))
         likelihood = min(max(0.5 * (of_tray - of_camera), -_LARGEST_RATIO), _LARGEST_RATIO)
@@ -235,6 +238,15 @@ def _bend(
 ) -> NDArray[np.float64]:
     """Distance of the later position from where straight motion would have led."""
     return later - middle - ratio * (middle - earlier)
+
+
+def _common_bend(bends: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Median of the bends, and its error."""
+    common = np.median(bends, axis=0)
+    deviation = _DEVIATION * np.median(np.abs(bends - common), axis=0)
+    count = len(bends)
+    error = _MEDIAN_ERROR * deviation / math.sqrt(count) * (1.0 + _FEW_BODIES / (count - 1))
+    return common, np.hypot(error, _LEAST_ERROR)
 
 
 @compiled

@@ -100,12 +100,12 @@ def test_the_tray_is_believed_again_when_the_camera_stops():
 
 
 def test_too_few_beads_leave_jitter_to_the_camera():
-    said = motions(REST, jitter(), beads=3)
+    said = motions(REST, jitter(), beads=1)
     assert all(motion.camera_moves for motion in settled(said))
 
 
 def test_smooth_motion_with_too_few_beads_is_called_uncertain():
-    said = settled(motions(SWING, REST, beads=3))
+    said = settled(motions(SWING, REST, beads=1))
     assert all(motion.uncertain and not motion.camera_moves for motion in said)
 
 
