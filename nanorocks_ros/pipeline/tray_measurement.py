@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 Event = Rebound | PairCollision | BodyEstimate | Merge
 TrayRecord = SpeedEstimate | MotionMask | Tracks | Event | Notice
 
+_LONG_DOUBT_NS = 1_000_000_000
 _CAMERA_MOVES = (
     'the camera moves, not the tray; its motion is removed, and the tray is taken to be at rest'
 )
@@ -80,6 +81,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         del stamp_ns
         settings, tray = self._settings, self._tray
         self._noticed: set[str] = set()
+        self._certain_ns: int | None = None
         self._cycles = CycleFollower(settings.speed.shake_ratio, settings.speed.min_cycle_duration)
         self._oscillation = TrayOscillation()
         self._tracker = Tracker(settings, tray)
@@ -112,8 +114,9 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
                 speeds += self._track_speed.push(tracks)
         else:
             self._tracker.watch(image)
-        self._oscillation.push(image, camera_moves=self._tracker.camera_moves)
-        speeds += self._structure_speeds(image)
+        in_space = self._in_space(image)
+        self._oscillation.push(in_space)
+        speeds += self._structure_speeds(in_space)
         return (*pictures, *self._selected(speeds), *self._reliable(events))
 
     def flush(self) -> tuple[TrayRecord, ...]:
@@ -124,10 +127,20 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         events = [*self._in_cycle(contacts), *self._bodies.flush()]
         return (*self._selected(speeds), *self._reliable(events))
 
+    def _in_space(self, image: TrayImage) -> TrayImage:
+        """The image with the motion of its tray in space: none where the camera moves."""
+        if not self._tracker.camera_moves:
+            return image
+        return replace(image, displacement=(0.0, 0.0), velocity=(0.0, 0.0))
+
     def _camera_notices(self, image: TrayImage, tracks: Tracks) -> list[Notice]:
         """What to say of a camera that moves, once."""
-        doubt = Quality.STABILISATION_LOST & tracks.quality & ~image.quality
-        texts = {_CAMERA_MOVES: self._tracker.camera_moves, _UNCERTAIN: bool(doubt)}
+        uncertain = Quality.STABILISATION_LOST in tracks.quality & ~image.quality
+        if self._certain_ns is None or not uncertain:
+            self._certain_ns = image.stamp_ns
+        # A decision takes some tenths of a second.
+        doubt = image.stamp_ns - self._certain_ns >= _LONG_DOUBT_NS
+        texts = {_CAMERA_MOVES: self._tracker.camera_moves, _UNCERTAIN: doubt}
         new = [text for text, holds in texts.items() if holds and text not in self._noticed]
         self._noticed.update(new)
         return [

@@ -188,8 +188,13 @@ class Preprocessor:
         )
 
     def _plate_speed(self) -> tuple[float, float]:
-        """Speed of the plate and its error, [m/s]; NaN when no tray was registered."""
-        known = [crop for crop in self._crops if math.isfinite(crop.velocity_error)]
+        """Speed of the plate and its error, [m/s]; NaN when no tray was registered.
+
+        Also NaN where the picture jitters: that is the camera.
+        """
+        known = [
+            crop for crop in self._crops if crop.swings and math.isfinite(crop.velocity_error)
+        ]
         if not known:
             return math.nan, math.nan
         across, down = (median([crop.velocity[axis] for crop in known]) for axis in (0, 1))

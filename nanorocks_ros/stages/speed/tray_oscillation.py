@@ -24,16 +24,9 @@ class TrayOscillation:
     def __init__(self) -> None:
         self._squares: deque[tuple[int, float, float]] = deque()
 
-    def push(self, image: TrayImage, *, camera_moves: bool = False) -> None:
-        """Take the next image; one whose tray could not be registered is left out.
-
-        Parameters
-        ----------
-        image : TrayImage
-        camera_moves : bool
-            Whether the motion in the picture is that of the camera: then the tray is at rest.
-        """
-        across, down = (0.0, 0.0) if camera_moves else image.velocity
+    def push(self, image: TrayImage) -> None:
+        """Take the next image; one whose tray could not be registered is left out."""
+        across, down = image.velocity
         square, noise = across**2 + down**2, 2.0 * image.velocity_error**2
         if not math.isfinite(square + noise):
             return

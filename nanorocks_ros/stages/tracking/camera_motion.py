@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.stages.preprocess.stabilise import JitterMeter
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,10 +51,6 @@ _LARGEST_RATIO = 4.0
 _DECISIVE, _LARGEST_EVIDENCE = 6.0, 12.0
 # Evidence and misfit are forgotten with this time, [s].
 _MEMORY = 1.0
-# Displacements whose roughness is measured, and the least roughness of a camera that jitters:
-# medians of fourth over second differences, (2 sin(pi f / rate))^2 for a frequency f. The limit is
-# that of a fourth of the frame rate; white jitter has 3.4.
-_ROUGH_FRAMES, _ROUGH = 16, 2.0
 # A motion that nothing explains for so long is called uncertain, [s].
 _UNDECIDED = 1.0
 # Largest mean square of the common bend that the motion leaves, in units of its variance: within
@@ -107,6 +104,7 @@ class CameraMotion:
 
     def __init__(self) -> None:
         self._moments: deque[_Moment] = deque()
+        self._jitter = JitterMeter()
         self._evidence = 0.0
         self._misfit = 1.0
         self._undecided = 0.0
@@ -145,7 +143,8 @@ class CameraMotion:
             self._moments.popleft()
         self._evidence *= math.exp(-step / _MEMORY)
         fates = [self._weigh(lag, step, error) for lag in _LAGS]
-        if not any(fate is _Fate.WEIGHED for fate in fates) and self._rough(error):
+        self._jitter.push(time, float(displacement[0]), float(displacement[1]), error)
+        if not any(fate is _Fate.WEIGHED for fate in fates) and self._jitter.jitters:
             self._evidence += 1.0
         changed = self._decide()
         moves = any(fate is not _Fate.STILL for fate in fates)
@@ -204,16 +203,6 @@ class CameraMotion:
         square = min(0.5 * (of_camera if self.camera_moves else of_tray), _MISFIT_BOUND)
         self._misfit += (square - self._misfit) * share
         return _Fate.WEIGHED
-
-    def _rough(self, error: float) -> bool:
-        """Whether the picture moves as no tray on springs does."""
-        if len(self._moments) < _ROUGH_FRAMES:
-            return False
-        recent = [self._moments[k].displacement for k in range(-_ROUGH_FRAMES, 0)]
-        second, fourth = (np.abs(np.diff(recent, n, axis=0)) for n in (2, 4))
-        usual = float(np.median(second))
-        moves = usual > _SIGNIFICANT * _BEND_ERROR * error / _DEVIATION
-        return moves and float(np.median(fourth)) > _ROUGH * usual
 
     def _bends(self, frames: int, ratio: float) -> NDArray[np.float64]:
         """Bends of the paths of all bodies that are in all frames from the first on, (n, 2)."""
