@@ -19,6 +19,7 @@ ALL = (
     'dashboard',
     'recordings',
     'preprocess',
+    'moving_camera',
     'scene',
     'tracking',
     'plate_cost',

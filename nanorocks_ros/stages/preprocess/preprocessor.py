@@ -193,7 +193,7 @@ class Preprocessor:
         Also NaN where the picture jitters: that is the camera.
         """
         known = [
-            crop for crop in self._crops if crop.swings and math.isfinite(crop.velocity_error)
+            crop for crop in self._crops if math.isfinite(crop.velocity_error) and not crop.jitters
         ]
         if not known:
             return math.nan, math.nan

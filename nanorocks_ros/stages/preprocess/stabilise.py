@@ -93,14 +93,13 @@ class JitterMeter:
 
     Attributes
     ----------
-    ready : bool
-        Whether there were enough pictures.
     jitters : bool
+        False while there are too few pictures.
     """
 
     def __init__(self) -> None:
         self._recent: deque[tuple[float, float, float]] = deque(maxlen=_ROUGH_FRAMES)
-        self.ready = self.jitters = False
+        self.jitters = False
 
     def push(self, time: float, x: float, y: float, error: float) -> None:
         """Take the displacement in the next picture; one that is not finite starts afresh.
@@ -113,11 +112,11 @@ class JitterMeter:
         """
         if not math.isfinite(x + y + error):
             self._recent.clear()
-            self.ready = self.jitters = False
+            self.jitters = False
             return
         self._recent.append((time, x, y))
-        self.ready = len(self._recent) == _ROUGH_FRAMES
-        self.jitters = self.ready and _jitters(np.array(self._recent), error)
+        full = len(self._recent) == _ROUGH_FRAMES
+        self.jitters = full and _jitters(np.array(self._recent), error)
 
 
 @compiled

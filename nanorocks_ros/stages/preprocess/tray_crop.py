@@ -103,9 +103,9 @@ class TrayCrop:
         return float(self._nodes[:-1, :-1, 1].max()) + 1.0
 
     @property
-    def swings(self) -> bool:
-        """Whether the motion in the last frames may be that of a tray on springs."""
-        return self._jitter.ready and not self._jitter.jitters
+    def jitters(self) -> bool:
+        """Whether the motion in the last frames is no swing of a tray on springs."""
+        return self._jitter.jitters
 
     @property
     def displacement(self) -> tuple[float, float]:
