@@ -20,6 +20,7 @@ ALL = (
     'recordings',
     'preprocess',
     'scale',
+    'moving_camera',
     'scene',
     'drawn_cameras',
     'tracking',

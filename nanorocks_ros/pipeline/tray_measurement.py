@@ -39,6 +39,15 @@ if TYPE_CHECKING:
 Event = Rebound | PairCollision | BodyEstimate | Merge
 TrayRecord = SpeedEstimate | MotionMask | Tracks | Event | Notice
 
+_LONG_DOUBT_NS = 1_000_000_000
+_CAMERA_MOVES = (
+    'the camera moves, not the tray; its motion is removed, and the tray is taken to be at rest'
+)
+_UNCERTAIN = (
+    'the motion of camera and tray cannot be told apart for some time; speeds there carry '
+    'stabilisation_lost, and rebounds miss the speed of the wall; mount the camera firmly'
+)
+
 
 class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
     """Measures one tray: tracks, contacts and bodies, and the speed by every method needed.
@@ -73,6 +82,8 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
     def _restart(self, stamp_ns: int | None = None) -> None:
         del stamp_ns
         settings, tray = self._settings, self._tray
+        self._noticed: set[str] = set()
+        self._certain_ns: int | None = None
         self._cycles = CycleFollower(settings.speed.shake_ratio, settings.speed.min_cycle_duration)
         self._oscillation = TrayOscillation()
         self._tracker = Tracker(settings, tray)
@@ -87,7 +98,6 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
     def _process(self, record: TrayImage) -> tuple[TrayRecord, ...]:
         self._cycles.push(record)
         image = self._cycles.counted(record)
-        self._oscillation.push(image)
         self._area_speed.emit_mask = self.emit_mask
         pictures: list[MotionMask | Tracks] = []
         speeds: list[SpeedEstimate] = []
@@ -102,12 +112,17 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
             speeds += self._track_speed.push(image)
             for tracks in self._tracker.push(image):
                 pictures += [tracks] if self.emit_tracks else []
+                notices += self._camera_notices(image, tracks)
                 contacts = self._contacts_in(tracks)
                 notices += self._scale_notices(tracks, contacts)
                 events += contacts
                 events += self._bodies.push(tracks)
                 speeds += self._track_speed.push(tracks)
-        speeds += self._structure_speeds(image)
+        else:
+            self._tracker.watch(image)
+        in_space = self._in_space(image)
+        self._oscillation.push(in_space)
+        speeds += self._structure_speeds(in_space)
         return (*notices, *pictures, *self._selected(speeds), *self._reliable(events))
 
     def flush(self) -> tuple[TrayRecord, ...]:
@@ -130,6 +145,27 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
             if isinstance(contact, PairCollision):
                 self._scale.push(contact)
         return [] if tracks is None else list(self._scale.push(tracks))
+
+    def _in_space(self, image: TrayImage) -> TrayImage:
+        """The image with the motion of its tray in space: none where the camera moves."""
+        if not self._tracker.camera_moves:
+            return image
+        return replace(image, displacement=(0.0, 0.0), velocity=(0.0, 0.0))
+
+    def _camera_notices(self, image: TrayImage, tracks: Tracks) -> list[Notice]:
+        """What to say of a camera that moves, once."""
+        uncertain = Quality.STABILISATION_LOST in tracks.quality & ~image.quality
+        if self._certain_ns is None or not uncertain:
+            self._certain_ns = image.stamp_ns
+        # A decision takes some tenths of a second.
+        doubt = image.stamp_ns - self._certain_ns >= _LONG_DOUBT_NS
+        texts = {_CAMERA_MOVES: self._tracker.camera_moves, _UNCERTAIN: doubt}
+        new = [text for text, holds in texts.items() if holds and text not in self._noticed]
+        self._noticed.update(new)
+        return [
+            Notice(stamp_ns=image.stamp_ns, text=f'tray {self._tray.number}: {text}')
+            for text in new
+        ]
 
     def _structure_speeds(self, image: TrayImage) -> tuple[SpeedEstimate, ...]:
         if self._selector.uses_structure:

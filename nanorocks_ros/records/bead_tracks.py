@@ -29,7 +29,8 @@ class Tracks:
     species : ndarray of int32, (n,)
         Index into the species of the tray.
     displacement : ndarray (2,), [m]
-        Of the tray in the picture, from where it was at first; 0 where nobody measured it.
+        Of the tray in space, from where it was at first; 0 where nobody measured it, and where
+        the camera moves, not the tray.
     positions : ndarray (n, 2), [m]
         Of the centres, from the corner of the floor where it is now; along columns and rows.
     position_errors : ndarray (n,), [m]

@@ -147,7 +147,7 @@ def register(
     start : tuple of 2 floats, [px]
     result : ndarray, (5,)
         Written: displacement (2) [px], its standard error, and the standard deviations of the
-        remaining differences and of the reference [gray levels].
+        remaining differences and of what the reference explains [gray levels].
     values : ndarray, (n,)
         Written: the samples at that displacement, corrected for the light.
 
@@ -200,7 +200,8 @@ def register(
     substitute(normal, sides)
     result[2] = spread * math.sqrt(0.5 * (sides[0, 0] + sides[1, 1])) + 0.5 * change
     result[3] = spread
-    result[4] = math.sqrt(total / n)
+    # At a wrong displacement the light seems to have lost its contrast: the gain is small.
+    result[4] = max(gain, 0.0) * math.sqrt(total / n)
     return True
 
 

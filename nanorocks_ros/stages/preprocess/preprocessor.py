@@ -191,8 +191,13 @@ class Preprocessor:
         )
 
     def _plate_speed(self) -> tuple[float, float]:
-        """Speed of the plate and its error, [m/s]; NaN when no tray was registered."""
-        known = [crop for crop in self._crops if math.isfinite(crop.velocity_error)]
+        """Speed of the plate and its error, [m/s]; NaN when no tray was registered.
+
+        Also NaN where the picture jitters: that is the camera.
+        """
+        known = [
+            crop for crop in self._crops if math.isfinite(crop.velocity_error) and not crop.jitters
+        ]
         if not known:
             return math.nan, math.nan
         across, down = (median([crop.velocity[axis] for crop in known]) for axis in (0, 1))

@@ -6,6 +6,7 @@ Tested by ``test/stages/preprocess/test_preprocessor.py``.
 from __future__ import annotations
 
 import math
+from dataclasses import astuple
 from typing import TYPE_CHECKING
 
 import cv2
@@ -19,7 +20,7 @@ from nanorocks_ros.stages.preprocess.rectify import (
     resample_gray,
 )
 from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter
-from nanorocks_ros.stages.preprocess.stabilise import Shift, TrayRegistration
+from nanorocks_ros.stages.preprocess.stabilise import JitterMeter, Shift, TrayRegistration
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -92,6 +93,7 @@ class TrayCrop:
         self.velocity = (UNKNOWN, UNKNOWN)
         self.velocity_error = UNKNOWN
         self.pending = Quality(0)
+        self._jitter = JitterMeter()
         self._last: Shift | None = None
         self._last_ns = 0
 
@@ -99,6 +101,11 @@ class TrayCrop:
     def lowest_row(self) -> float:
         """The lowest row of the frame that the crop needs, [px]."""
         return float(self._nodes[:-1, :-1, 1].max()) + 1.0
+
+    @property
+    def jitters(self) -> bool:
+        """Whether the motion in the last frames is no swing of a tray on springs."""
+        return self._jitter.jitters
 
     @property
     def displacement(self) -> tuple[float, float]:
@@ -146,6 +153,8 @@ class TrayCrop:
                 self.pending |= Quality.STABILISATION_LOST
                 self.shift = plate
                 self._registration.set_shift(plate)
+        moved = (UNKNOWN,) * 3 if self.shift is None else astuple(self.shift)
+        self._jitter.push(stamp_ns / NS, *moved)
         last, last_ns = self._last, self._last_ns
         self._last, self._last_ns = self.shift, stamp_ns
         self.velocity, self.velocity_error = (UNKNOWN, UNKNOWN), UNKNOWN

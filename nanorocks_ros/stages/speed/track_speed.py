@@ -87,6 +87,8 @@ class TrackSpeed:
         if isinstance(record, TrayImage):
             self._begin_image(record)
             return ()
+        # The tracker knows whether tray and camera can be told apart.
+        self._flags |= record.quality & Quality.STABILISATION_LOST
         self._recent.push(record, record.stamp_ns - _LONGEST_WINDOW_NS)
         self.reliability.push(record)
         if self._next_ns is not None and record.stamp_ns < self._next_ns:

@@ -10,6 +10,7 @@ import numpy as np
 
 from nanorocks_ros.records import Quality, Tracks, TrayImage
 from nanorocks_ros.stages.stage import RestartingStage
+from nanorocks_ros.stages.tracking.camera_motion import CameraMotion
 from nanorocks_ros.stages.tracking.detection.bead_detector import BeadDetector
 from nanorocks_ros.stages.tracking.linking.track_linker import Linker
 from nanorocks_ros.stages.tracking.linking.track_snapshot import (
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.materials import Material
     from nanorocks_ros.experiment.trays import Species, Tray
     from nanorocks_ros.settings import PipelineSettings
+    from nanorocks_ros.stages.tracking.camera_motion import TrayMotion
 
 _NS = 1e9
 # Visible share of a species below which speeds and counts are unreliable.
@@ -57,14 +59,20 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
         """Forget the tracks and the background: the next image is the first one."""
         del stamp_ns
         self._detector = BeadDetector(self._settings, self._tray, self._scale)
+        self._camera = CameraMotion()
         self._linkers: list[Linker] = []
-        self._first_ns = 0
+        self._first_ns: int | None = None
         self._next_id = 0
 
     @property
     def darkness(self) -> NDArray[np.uint8] | None:
         """Darkness map of the last image: 0 background, 255 black; None before the first image."""
         return self._detector.darkness
+
+    @property
+    def camera_moves(self) -> bool:
+        """Whether the motion of the picture is that of the camera, not of the tray."""
+        return self._camera.camera_moves
 
     @property
     def crowded(self) -> bool:
@@ -74,26 +82,56 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
     def _process(self, record: TrayImage) -> tuple[Tracks, ...]:
         """Detect and link the beads of an image."""
         if record.color is None:
+            self.watch(record)
             return ()
+        time = self._time(record)
         if not self._linkers:
-            self._first_ns = record.stamp_ns
             self._linkers = [
                 self._linker_of(species, record.gray.shape) for species in self._tray.species
             ]
-        time = (record.stamp_ns - self._first_ns) / _NS
-        # Beads fly straight in the camera frame, not in the frame of a swinging tray.
-        displacement = np.array([_zero_if_nan(value) for value in record.displacement])
-        shift = displacement * self._scale
+        # Beads fly straight in space, not in the frame of a swinging tray.
         registration = _zero_if_nan(record.displacement_error) * self._scale
-        hints = [linker.hints(time, shift) for linker in self._linkers]
+        rest = self._camera.camera_moves or math.isnan(record.displacement[0])
+        expected = np.zeros(2) if rest else self._scale * np.array(record.displacement)
+        hints = [linker.hints(time, expected) for linker in self._linkers]
         detected = self._detector.detect(record.color, hints)
+        motion = self._motion(
+            record,
+            np.concatenate([detections.positions for detections in detected]),
+            np.concatenate([detections.radii for detections in detected]),
+        )
+        if motion.changed:
+            self._linkers = [
+                self._linker_of(species, record.gray.shape) for species in self._tray.species
+            ]
+        shift = motion.displacement
         for linker, detections in zip(self._linkers, detected, strict=True):
             errors = np.hypot(detections.position_errors, registration)
             shifted = replace(
                 detections, positions=detections.positions + shift, position_errors=errors
             )
             self._next_id += linker.push(time, shifted, shift, self._next_id)
-        return (self._tracks(record, time, displacement),)
+        return (self._tracks(record, time, motion),)
+
+    def watch(self, image: TrayImage) -> None:
+        """Follow the motion of the picture alone, where beads are not tracked."""
+        self._motion(image, np.empty((0, 2)), np.empty(0))
+
+    def _time(self, image: TrayImage) -> float:
+        """Time since the first image, [s]."""
+        if self._first_ns is None:
+            self._first_ns = image.stamp_ns
+        return (image.stamp_ns - self._first_ns) / _NS
+
+    def _motion(
+        self, image: TrayImage, places: NDArray[np.float64], radii: NDArray[np.float64]
+    ) -> TrayMotion:
+        """Motion of the tray in space, from its motion in the picture and the beads, [px]."""
+        if math.isnan(image.displacement[0]):
+            return self._camera.of_lost_tray()
+        moved = self._scale * np.array(image.displacement)
+        error = self._scale * image.displacement_error
+        return self._camera.push(self._time(image), places, radii, moved, error)
 
     def _linker_of(self, species: Species, shape: tuple[int, ...]) -> Linker:
         return Linker(
@@ -110,8 +148,10 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
             return material.chalk_position_error_px
         return _CROWDED_PX if self._detector.crowded else material.position_error_px
 
-    def _tracks(self, image: TrayImage, time: float, displacement: NDArray[np.float64]) -> Tracks:
-        shift = displacement * self._scale
+    def _tracks(self, image: TrayImage, time: float, motion: TrayMotion) -> Tracks:
+        shift = motion.displacement
+        displacement = shift / self._scale
+        doubt = Quality.STABILISATION_LOST if motion.uncertain else Quality(0)
         snapshot = allocate_snapshot(sum(len(linker) for linker in self._linkers))
         end = 0
         for k, linker in enumerate(self._linkers):
@@ -132,7 +172,7 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
             radius_errors=beads.radius_errors,
             seen=beads.seen,
             expected=self._expected,
-            quality=image.quality | self._quality_of(beads.species, beads.seen),
+            quality=image.quality | doubt | self._quality_of(beads.species, beads.seen),
             cycle=image.cycle or 0,
         )
 

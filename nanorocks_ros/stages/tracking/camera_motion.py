@@ -1,0 +1,298 @@
+"""Whether the picture of a tray moves because the tray does, or because the camera does.
+
+The walls show how the tray moves in the picture, but not whether tray or camera moves. Beads in
+free flight do: they fly straight in space. Where the tray swings, their paths bend in the frame of
+the tray by the opposite of its motion in the picture; where the camera moves, they are straight in
+the frame of the tray. Beads that touch may stick and turn: only their centre of mass flies
+straight.
+
+Where fewer than two bodies fly, motion that changes direction from frame to frame is that of the
+camera: a tray on springs swings smoothly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.stages.preprocess.stabilise import JitterMeter
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# Times between the three positions that give a bend, [s]: for motion of 1 to 10 Hz and of less.
+_LAGS = (0.1, 0.3)
+# A single body may just have collided; two that agree have not.
+_FEWEST_BODIES = 2
+# The scatter of n bodies is uncertain by itself: its error is larger by 1 + this / (n - 1).
+_FEW_BODIES = 2.0
+# Beads this much further from each other than their radii touch: a share of that, and [px].
+_GAP_SHARE, _GAP_PX = 0.04, 0.5
+# Error of a median of normal variates over that of their mean, and their standard deviation over
+# the median of their absolute values.
+_MEDIAN_ERROR = 1.2533
+_DEVIATION = 1.4826
+# Least error of the common bend, [px]: detection has errors that beads share.
+_LEAST_ERROR = 0.05
+# Least bend of the motion of the picture that is evidence, in errors of a registered bend.
+_SIGNIFICANT = 4.0
+_BEND_ERROR = math.sqrt(6.0)
+# Largest ratio of the two times between three moments.
+_EVEN = 1.25
+# Largest log likelihood ratio of a frame: no single frame decides.
+_LARGEST_RATIO = 4.0
+# Log likelihood ratio that decides, and its largest value, so that a change is noticed.
+_DECISIVE, _LARGEST_EVIDENCE = 6.0, 12.0
+# Evidence and misfit are forgotten with this time, [s].
+_MEMORY = 1.0
+# A motion that nothing explains for so long is called uncertain, [s].
+_UNDECIDED = 1.0
+# Largest mean square of the common bend that the motion leaves, in units of its variance: within
+# the memory some ten values are independent, whose mean is beyond 2.5 in 0.5 % of all cases. A
+# single frame counts as at most this square.
+_LARGEST_MISFIT, _MISFIT_BOUND = 2.5, 25.0
+
+
+@dataclass(frozen=True, slots=True)
+class TrayMotion:
+    """Motion of a tray in space.
+
+    Parameters
+    ----------
+    displacement : ndarray (2,), [px]
+    camera_moves : bool
+        Whether the motion of the picture is that of the camera.
+    changed : bool
+        Whether this was decided anew with this frame: positions in space before it do not count.
+    uncertain : bool
+        Whether the beads contradict what is assumed, as where tray and camera both move.
+    """
+
+    displacement: NDArray[np.float64]
+    camera_moves: bool
+    changed: bool
+    uncertain: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Moment:
+    """Beads of a frame in the frame of the tray, and the row of each in the frame before."""
+
+    time: float
+    positions: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    before: NDArray[np.int64]
+    displacement: NDArray[np.float64]
+
+
+class _Fate(Enum):
+    """What three moments say: the picture is still, it moves, or beads say what moves."""
+
+    STILL = 0
+    UNKNOWN = 1
+    WEIGHED = 2
+
+
+class CameraMotion:
+    """Decides from frame to frame whether the tray or the camera moves; at first the tray."""
+
+    def __init__(self) -> None:
+        self._moments: deque[_Moment] = deque()
+        self._jitter = JitterMeter()
+        self._evidence = 0.0
+        self._misfit = 1.0
+        self._undecided = 0.0
+        self._decided = False
+        self.camera_moves = False
+
+    def push(
+        self,
+        time: float,
+        positions: NDArray[np.float64],
+        radii: NDArray[np.float64],
+        displacement: NDArray[np.float64],
+        error: float,
+    ) -> TrayMotion:
+        """Motion of the tray in space up to the next frame.
+
+        Parameters
+        ----------
+        time : float, [s]
+        positions : ndarray (n, 2), [px]
+            Of the beads in the frame of the tray, in any order.
+        radii : ndarray (n,), [px]
+        displacement : ndarray (2,), [px]
+            Of the tray in the picture.
+        error : float, [px]
+            Of a component of the displacement.
+        """
+        last = self._moments[-1] if self._moments else None
+        rows = np.full(len(positions), -1)
+        step = 0.0
+        if last is not None:
+            _nearest_rows(positions, last.positions, rows)
+            step = time - last.time
+        self._moments.append(_Moment(time, positions, radii, rows, displacement))
+        while time - self._moments[0].time > 2.0 * _LAGS[-1] + _MEMORY:
+            self._moments.popleft()
+        self._evidence *= math.exp(-step / _MEMORY)
+        fates = [self._weigh(lag, step, error) for lag in _LAGS]
+        self._jitter.push(time, float(displacement[0]), float(displacement[1]), error)
+        if not any(fate is _Fate.WEIGHED for fate in fates) and self._jitter.jitters:
+            self._evidence += 1.0
+        changed = self._decide()
+        moves = any(fate is not _Fate.STILL for fate in fates)
+        self._undecided = self._undecided + step if moves and not self._decided else 0.0
+        return TrayMotion(
+            np.zeros(2) if self.camera_moves else displacement,
+            self.camera_moves,
+            changed,
+            self._misfit > _LARGEST_MISFIT or self._undecided > _UNDECIDED,
+        )
+
+    def of_lost_tray(self) -> TrayMotion:
+        """Motion in a frame in which the tray was not registered: it counts as at rest.
+
+        Uncertain where the camera moves: then the beads move with it.
+        """
+        return TrayMotion(
+            np.zeros(2), self.camera_moves, changed=False, uncertain=self.camera_moves
+        )
+
+    def _decide(self) -> bool:
+        before = self.camera_moves
+        if abs(self._evidence) > _DECISIVE:
+            self.camera_moves, self._decided = self._evidence > 0.0, True
+        self._evidence = min(max(self._evidence, -_LARGEST_EVIDENCE), _LARGEST_EVIDENCE)
+        if self.camera_moves != before:
+            self._misfit = 1.0
+        return self.camera_moves != before
+
+    def _weigh(self, lag: float, step: float, error: float) -> _Fate:
+        """Add the evidence of three moments, as far as the picture moves."""
+        frames = max(1, round(lag / step)) if step > 0.0 else 0
+        if not frames or len(self._moments) <= 2 * frames:
+            return _Fate.STILL
+        later, middle, earlier = (self._moments[-1 - k * frames] for k in range(3))
+        between = middle.time - earlier.time
+        ratio = (later.time - middle.time) / between if between > 0.0 else math.inf
+        # Where frames are missing the bend would be that of another lag.
+        if not 1.0 / _EVEN < ratio < _EVEN:
+            return _Fate.STILL
+        share = min(1.0, step / _MEMORY)
+        moved = _bend(later.displacement, middle.displacement, earlier.displacement, ratio)
+        still = math.hypot(moved[0], moved[1]) < _SIGNIFICANT * _BEND_ERROR * error
+        bends = np.empty((0, 2)) if still else self._bends(frames, ratio)
+        if len(bends) < _FEWEST_BODIES:
+            self._misfit += (1.0 - self._misfit) * share
+            return _Fate.STILL if still else _Fate.UNKNOWN
+        common, noise = _common_bend(bends)
+        # A shift of the tray that was registered wrongly seems to be one of all beads.
+        noise = np.hypot(noise, _BEND_ERROR * error)
+        of_tray = float(np.sum(((common + moved) / noise) ** 2))
+        of_camera = float(np.sum((common / noise) ** 2))
+        likelihood = min(max(0.5 * (of_tray - of_camera), -_LARGEST_RATIO), _LARGEST_RATIO)
+        # Successive bends share the motion within a lag.
+        self._evidence += likelihood / frames
+        square = min(0.5 * (of_camera if self.camera_moves else of_tray), _MISFIT_BOUND)
+        self._misfit += (square - self._misfit) * share
+        return _Fate.WEIGHED
+
+    def _bends(self, frames: int, ratio: float) -> NDArray[np.float64]:
+        """Bends of the paths of all bodies that are in all frames from the first on, (n, 2)."""
+        last = self._moments[-1]
+        rows = [np.arange(len(last.positions))]
+        for k in range(2 * frames):
+            # A row more for beads that have none: index -1.
+            before = np.append(self._moments[-1 - k].before, -1)
+            rows.append(before[rows[-1]])
+        seen = rows[-1] >= 0
+        later, middle, earlier = (
+            self._moments[-1 - k * frames].positions[rows[k * frames][seen]] for k in range(3)
+        )
+        return _body_means(_bend(later, middle, earlier, ratio), later, last.radii[seen])
+
+
+def _bend(
+    later: NDArray[np.float64],
+    middle: NDArray[np.float64],
+    earlier: NDArray[np.float64],
+    ratio: float,
+) -> NDArray[np.float64]:
+    """Distance of the later position from where straight motion would have led."""
+    return later - middle - ratio * (middle - earlier)
+
+
+def _common_bend(bends: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Median of the bends, and its error."""
+    common = np.median(bends, axis=0)
+    deviation = _DEVIATION * np.median(np.abs(bends - common), axis=0)
+    count = len(bends)
+    error = _MEDIAN_ERROR * deviation / math.sqrt(count) * (1.0 + _FEW_BODIES / (count - 1))
+    return common, np.hypot(error, _LEAST_ERROR)
+
+
+@compiled
+def _nearest_rows(
+    positions: NDArray[np.float64], before: NDArray[np.float64], rows: NDArray[np.int64]
+) -> None:
+    """Row of each bead in the frame before: that nearest to it, if it is also nearest to that.
+
+    -1 for a bead that has none.
+    """
+    taken = np.full(before.shape[0], -1, np.int64)
+    nearest = np.full(before.shape[0], np.inf)
+    for k in range(positions.shape[0]):
+        rows[k] = -1
+        best = np.inf
+        for j in range(before.shape[0]):
+            dx = positions[k, 0] - before[j, 0]
+            dy = positions[k, 1] - before[j, 1]
+            square = dx * dx + dy * dy
+            if square < best:
+                best, rows[k] = square, j
+        j = rows[k]
+        if j >= 0 and best < nearest[j]:
+            if taken[j] >= 0:
+                rows[taken[j]] = -1
+            taken[j], nearest[j] = k, best
+        else:
+            rows[k] = -1
+
+
+@compiled
+def _body_means(
+    bends: NDArray[np.float64], positions: NDArray[np.float64], radii: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Mean bend of each group of beads that touch, weighted by their volumes, (bodies, 2)."""
+    n = radii.size
+    bodies = np.arange(n)
+    for k in range(n):
+        for j in range(k):
+            reach = (1.0 + _GAP_SHARE) * (radii[k] + radii[j]) + _GAP_PX
+            dx = positions[k, 0] - positions[j, 0]
+            dy = positions[k, 1] - positions[j, 1]
+            if dx * dx + dy * dy < reach * reach and bodies[j] != bodies[k]:
+                merged, kept = bodies[k], bodies[j]
+                for m in range(n):
+                    if bodies[m] == merged:
+                        bodies[m] = kept
+    sums, weights = np.zeros((n, 2)), np.zeros(n)
+    for k in range(n):
+        volume = radii[k] ** 3
+        weights[bodies[k]] += volume
+        sums[bodies[k], 0] += volume * bends[k, 0]
+        sums[bodies[k], 1] += volume * bends[k, 1]
+    count = 0
+    means = np.empty((n, 2))
+    for k in range(n):
+        if weights[k] > 0.0:
+            means[count] = sums[k] / weights[k]
+            count += 1
+    return means[:count]
