@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.records import CorRelation, CorStatus, Quality
-from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
@@ -67,18 +66,15 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Analyse one bag or many, print and write the results, and return the exit code."""
     from nanorocks_ros.cli.analyse_batch import is_batch, run_many
-    from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.outputs.parquet import check_parquet
 
-    settings = settings_from(options, PipelineSettings(), options.parameters)
     # Checked before hours of work.
     check_parquet(Path(f'tables.{options.format}'))
-    if is_batch(options):
-        return run_many(options, settings)
-    return _run_one(options, settings)
+    return run_many(options) if is_batch(options) else _run_one(options)
 
 
-def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
+def _run_one(options: argparse.Namespace) -> int:
+    from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.analysis.offline_analysis import analyse
     from nanorocks_ros.studies.analysis.results_folder import check_results_folder, write_results
@@ -88,6 +84,7 @@ def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
     # `.` and `..` have no name of a folder.
     resolved = source if source.name not in ('', '..') else source.resolve()
     folder = Path(options.output or f'{resolved}_results')
+    settings, notices, _ = bag_settings(options, source)
     scratch = _scratch_folder() if options.no_output else check_results_folder(folder)
     with Progress('analysing') as progress:
         analysis = analyse(
@@ -97,6 +94,7 @@ def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
             progress=progress.count,
             scratch=scratch,
         )
+    analysis.notices[:0] = notices
     error: NanorocksError | None = analysis.error
     written = ''
     if not options.no_output:

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.json_values import json_values
-from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
@@ -42,12 +41,12 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure cluster sizes, write and print them, and return the exit code."""
-    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.cli.flags import told_bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.autocorrelations import cycle_clusters, write_clusters
 
-    settings = settings_from(options, PipelineSettings(), options.parameters)
+    settings = told_bag_settings(options, options.bag)
     names = {'--output': options.output, '--table': options.table}
     files = {flag: Path(name) for flag, name in names.items() if name}
     kinds = {'--output': ('.png', '.pdf', '.svg'), '--table': ('.csv',)}

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.json_values import json_values
-from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
@@ -46,12 +45,12 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Track, print and write, and return the exit code."""
-    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.cli.flags import told_bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.analysis.bag_tracks import track_bag
     from nanorocks_ros.studies.calibration.manual_tracks import read_manual_tracks
 
-    settings = settings_from(options, PipelineSettings(), options.parameters)
+    settings = told_bag_settings(options, options.bag)
     _check_outputs(options)
     manual = read_manual_tracks(options.compare) if options.compare else None
     with Progress('tracking') as progress:

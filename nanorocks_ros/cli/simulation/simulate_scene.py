@@ -115,7 +115,10 @@ def _recorder(
     check_scene(filmed.scene)
     check_codec(filmed.compression)
     trays = load_trays(options.trays_file)
-    return SceneRecorder(settings, filmed.scene, options.duration, trays), filmed, settings
+    recorder = SceneRecorder(
+        settings, filmed.scene, options.duration, trays, options.trays_file or ''
+    )
+    return recorder, filmed, settings
 
 
 def _print(

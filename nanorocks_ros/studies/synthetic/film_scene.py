@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 
 from nanorocks_ros import __version__
+from nanorocks_ros.experiment.recorded_experiment import experiment_metadata
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
@@ -55,6 +56,8 @@ class SceneRecorder:
     duration : float, [s], > 0
     trays : mapping of int to Tray, optional
         All cells of the plate; by default those of the flight.
+    trays_file : str
+        File that describes them, kept in a bag; empty: those of the flight.
 
     Raises
     ------
@@ -68,8 +71,10 @@ class SceneRecorder:
         scene: SceneSettings,
         duration: float,
         trays: Mapping[int, Tray] | None = None,
+        trays_file: str = '',
     ) -> None:
         check_duration(duration)
+        self._trays_file = trays_file
         self._simulation, self._scene, self._trays = simulation, scene, trays
         self.duration = duration
         self.frames = max(1, round(duration * simulation.frame_rate))
@@ -161,6 +166,14 @@ class SceneRecorder:
             **simulated,
             **{row.name: str(row.default) for row in rows(self._scene, 'scene.')},
             **{row.name: str(row.default) for row in rows(compression, 'compression.')},
+            **experiment_metadata(
+                {
+                    'trays': sorted(self._scene.trays),
+                    'trays_file': self._trays_file,
+                    'preprocess.layout': 'plate',
+                    'preprocess.pixels_per_metre': self._scene.pixels_per_metre,
+                }
+            ),
         }
 
 
