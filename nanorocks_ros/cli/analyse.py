@@ -13,12 +13,11 @@ from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import NanorocksError
-from nanorocks_ros.records import CorRelation, CorStatus, Quality
+from nanorocks_ros.records import CorRelation
 
 if TYPE_CHECKING:
     import argparse
 
-    from nanorocks_ros.records import CorEstimate
     from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
 
 _EPILOG = """\
@@ -59,6 +58,13 @@ def add_parser(commands: Any) -> None:
         help='format of the tables (many bags: of the tables of all cycles); default csv',
     )
     parser.add_argument('--no-output', action='store_true', help='write no files')
+    parser.add_argument(
+        '--include-inconsistent',
+        dest='cooling.include_inconsistent',
+        action='store_const',
+        const='true',
+        help='count cycles flagged inconsistent in the means of all cycles',
+    )
     add_options(parser)
     parser.set_defaults(run=run)
 
@@ -130,53 +136,43 @@ def _print(analysis: Analysis) -> None:
     print(f'{analysis.frames} frames{lost}, {analysis.seconds:.1f} s')
     for number, results in analysis.trays.items():
         print(f'tray {number}: {len(results.speeds)} speeds')
-        _print_cycles(results)
+        for line in _tray_lines(results, include_inconsistent=analysis.include_inconsistent):
+            print(f'  {line}')
 
 
-def _print_cycles(results: TrayResults) -> None:
-    from nanorocks_ros.studies.analysis.results_json import last_of_each_cycle
+def _tray_lines(results: TrayResults, *, include_inconsistent: bool) -> list[str]:
+    from nanorocks_ros.studies.analysis.cycle_words import (
+        cycle_lines,
+        is_left_out,
+        tray_reason,
+        used_speeds,
+    )
+    from nanorocks_ros.studies.analysis.results_json import (
+        end_of_cycle,
+        ends_of_cycles,
+        last_of_each_cycle,
+    )
 
+    reason = tray_reason(results)
+    if reason is not None:
+        return [f'no COR: {reason.text}; {reason.remedy}']
     cycles = last_of_each_cycle(results.cors)
-    if not cycles:
-        print('  no COR: no shaking event was followed by a decay')
-    for estimate in cycles:
-        print(f'  cycle {estimate.cycle}: {_cor_text(estimate)}')
-        for name, speed, time in zip(
-            ('first', 'second'),
-            estimate.species_initial_speeds,
-            estimate.species_haff_times,
-            strict=False,
-        ):
-            if math.isfinite(time.value):
-                print(
-                    f'    {name} species: v0 {speed.value * 1e3:.2f} mm/s, tau {time.value:.2f} s'
-                )
-    last = cycles[-1] if cycles else None
-    if last is not None and len(cycles) > 1 and math.isfinite(last.mean_restitution.value):
-        mean = last.mean_restitution
-        print(f'  all cycles: COR {mean.value:.4f} +- {mean.error:.4f}')
-    if cycles and results.truth:
+    used, ends = used_speeds(results.speeds, cycles), ends_of_cycles(results.clusters)
+    lines: list[str] = []
+    left_out = 0
+    for cor in cycles:
+        is_out = is_left_out(cor, include_inconsistent=include_inconsistent)
+        left_out += is_out
+        lines += cycle_lines(cor, end_of_cycle(ends, cor), used[cor.cycle], left_out=is_out)
+    mean = cycles[-1].mean_restitution
+    if len(cycles) > 1 and math.isfinite(mean.value):
+        without = f', without {left_out} flagged inconsistent' if left_out else ''
+        lines.append(f'all cycles: COR {mean.value:.4f} +- {mean.error:.4f}{without}')
+    if results.truth:
         truth = results.truth[-1]
-        print(f'  truth:   COR {truth.restitution:g}, walls {truth.wall_restitution:g}')
-    if cycles and cycles[-1].relation is CorRelation.PAPER:
-        print("  relation 'paper': its interval is statistical only, see docs/method/physics.md")
-
-
-def _cor_text(cor: CorEstimate) -> str:
-    if cor.status in (CorStatus.NO_DECAY, CorStatus.UNDETERMINED):
-        reason = 'the decay does not determine it'
-        if cor.quality & Quality.WRONG_SCALE:
-            reason = 'the trays are not at the positions in the settings'
-        return f'COR unknown ({cor.status.name.lower()}: {reason})'
-    beads, wall = cor.restitution, cor.wall_restitution
-    walls = (
-        f', walls {wall.value:.3f} [{wall.lower:.3f}, {wall.upper:.3f}], '
-        f'paper says {cor.paper_restitution:.3f}'
-        if cor.relation is CorRelation.LIBRARY
-        else ''
-    )
-    return (
-        f'COR {beads.value:.4f} [{beads.lower:.4f}, {beads.upper:.4f}] '
-        f'({cor.relation.name.lower()}, {cor.status.name.lower()}), '
-        f'v0 {cor.initial_speed.value * 1e3:.2f} mm/s, tau {cor.haff_time.value:.2f} s{walls}'
-    )
+        lines.append(f'truth:   COR {truth.restitution:g}, walls {truth.wall_restitution:g}')
+    if cycles[-1].relation is CorRelation.PAPER:
+        lines.append(
+            "relation 'paper': its interval is statistical only, see docs/method/physics.md"
+        )
+    return lines

@@ -179,6 +179,11 @@ def _tray_lines(tray: TrayMeans) -> list[str]:
         walls = f', walls {text("wall_restitution")}' if values['wall_restitution'] else ''
         count = values['cycles_read']
         lines.append(f'{counted(count, "cycle")} together: COR {text("restitution")}{walls}')
+    if tray.left_out:
+        lines.append(
+            f'{counted(tray.left_out, "cycle")} flagged inconsistent left out of the '
+            'restitutions; pass --include-inconsistent to count'
+        )
     for name, label, factor, unit in (
         ('cycle_restitution', 'COR of a cycle', 1.0, ''),
         ('paper_restitution', "COR by the paper's closed form", 1.0, ''),

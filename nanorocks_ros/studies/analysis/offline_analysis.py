@@ -144,6 +144,8 @@ class Analysis:
         Frames that could not be used.
     metadata : dict of str to str
         Provenance that the recording holds.
+    include_inconsistent : bool
+        Whether cycles flagged inconsistent are counted in the means.
     """
 
     epoch_ns: int
@@ -154,6 +156,7 @@ class Analysis:
     error: FrameError | None = None
     refused: int = 0
     metadata: dict[str, str] = field(default_factory=dict)
+    include_inconsistent: bool = False
 
     @property
     def frames(self) -> int:
@@ -222,6 +225,7 @@ def analyse(
         trays=_empty(settings.trays, truth, scratch),
         complete=bag.reader.complete,
         metadata=bag.reader.metadata,
+        include_inconsistent=settings.cooling.include_inconsistent,
     )
     frames = PreprocessedFrames(bag, pipeline.preprocessor)
     for shot in frames.shots(progress):
