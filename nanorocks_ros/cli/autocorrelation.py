@@ -46,11 +46,11 @@ def run(options: argparse.Namespace) -> int:
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.autocorrelations import cycle_clusters, write_clusters
 
-    settings = told_bag_settings(options, options.bag)
     names = {'--output': options.output, '--table': options.table}
     files = {flag: Path(name) for flag, name in names.items() if name}
     kinds = {'--output': ('.png', '.pdf', '.svg'), '--table': ('.csv',)}
     check_outputs(files, kinds, force=options.force)
+    settings = told_bag_settings(options, options.bag)
     try:
         with Progress('measuring') as progress:
             clusters = cycle_clusters(

@@ -50,12 +50,12 @@ def run(options: argparse.Namespace) -> int:
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.preprocessing_steps import steps_of_bag
 
-    settings = told_bag_settings(options, options.bag)
     _check_time(options)
     if options.output:
         check_outputs(
             {'--output': Path(options.output)}, {'--output': ('.png',)}, force=options.force
         )
+    settings = told_bag_settings(options, options.bag)
     try:
         with Progress('looking') as progress:
             steps = steps_of_bag(

@@ -46,10 +46,10 @@ def run(options: argparse.Namespace) -> int:
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.speed_comparison import compare_speeds
 
-    settings = told_bag_settings(options, options.bag)
     names = {'--output': options.output, '--table': options.table}
     files = {flag: Path(name) for flag, name in names.items() if name}
     check_outputs(files, {'--output': ('.png',), '--table': ('.csv',)}, force=options.force)
+    settings = told_bag_settings(options, options.bag)
     try:
         with Progress('measuring') as progress:
             speeds = compare_speeds(

@@ -50,9 +50,9 @@ def run(options: argparse.Namespace) -> int:
     from nanorocks_ros.studies.analysis.bag_tracks import track_bag
     from nanorocks_ros.studies.calibration.manual_tracks import read_manual_tracks
 
-    settings = told_bag_settings(options, options.bag)
     _check_outputs(options)
     manual = read_manual_tracks(options.compare) if options.compare else None
+    settings = told_bag_settings(options, options.bag)
     with Progress('tracking') as progress:
         bag = track_bag(
             Path(options.bag), settings, image_topic=options.image_topic, progress=progress.count
