@@ -32,6 +32,7 @@ from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResult
 from nanorocks_ros.studies.analysis.results_json import as_json
 
 NS = 1_000_000_000
+NOTHING_WRONG = Quality(0)
 FINAL = CorEstimate(
     stamp_ns=20 * NS,
     tray=1,
@@ -67,7 +68,7 @@ def text_of(cor, clusters=None, *, left_out=False):
     return '\n'.join(cycle_lines(cor, clusters, UsedSpeeds(), left_out=left_out))
 
 
-def speed(time, *, start=1.0, quality=Quality(0), tray_speed=0.0):
+def speed(time, *, start=1.0, quality=NOTHING_WRONG, tray_speed=0.0):
     return SpeedEstimate(
         stamp_ns=round(time * NS),
         tray=1,
