@@ -100,7 +100,7 @@ def _run_one(options: argparse.Namespace) -> int:
             progress=progress.count,
             scratch=scratch,
         )
-    analysis.notices[:0] = notices
+    analysis.notices += notices
     error: NanorocksError | None = analysis.error
     written = ''
     if not options.no_output:

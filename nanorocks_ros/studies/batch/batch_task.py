@@ -203,7 +203,7 @@ def _analysed(task: BagTask) -> BagOutcome:
         progress=_noting(task.note),
         scratch=task.folder.parent,
     )
-    analysis.notices[:0] = notices
+    analysis.notices += notices
     if file_states(task.path) != files:
         raise RecordingError(
             str(task.path), 'changed while it was analysed', 'analyse it again when it is complete'
