@@ -136,11 +136,11 @@ def _print(analysis: Analysis) -> None:
     print(f'{analysis.frames} frames{lost}, {analysis.seconds:.1f} s')
     for number, results in analysis.trays.items():
         print(f'tray {number}: {len(results.speeds)} speeds')
-        for line in _tray_lines(results, include_inconsistent=analysis.include_inconsistent):
+        for line in _tray_lines(analysis, results):
             print(f'  {line}')
 
 
-def _tray_lines(results: TrayResults, *, include_inconsistent: bool) -> list[str]:
+def _tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
     from nanorocks_ros.studies.analysis.cycle_words import (
         cycle_lines,
         is_left_out,
@@ -157,11 +157,12 @@ def _tray_lines(results: TrayResults, *, include_inconsistent: bool) -> list[str
     if reason is not None:
         return [f'no COR: {reason.text}; {reason.remedy}']
     cycles = last_of_each_cycle(results.cors)
-    used, ends = used_speeds(results.speeds, cycles), ends_of_cycles(results.clusters)
+    used = used_speeds(results.speeds, cycles, analysis.lowest_walls)
+    ends = ends_of_cycles(results.clusters)
     lines: list[str] = []
     left_out = 0
     for cor in cycles:
-        is_out = is_left_out(cor, include_inconsistent=include_inconsistent)
+        is_out = is_left_out(cor, include_inconsistent=analysis.include_inconsistent)
         left_out += is_out
         lines += cycle_lines(cor, end_of_cycle(ends, cor), used[cor.cycle], left_out=is_out)
     mean = cycles[-1].mean_restitution

@@ -21,10 +21,17 @@ from nanorocks_ros.records.quality_flags import (
 
 if TYPE_CHECKING:
     from nanorocks_ros.records.restitution_estimates import CorEstimate
-    from nanorocks_ros.records.values import Interval, Measured
+    from nanorocks_ros.records.values import Interval, Measured, MeasuredInterval
 
 LARGEST_FIT_ERROR = 0.5
 """Relative standard error above which an initial speed or a Haff time means nothing."""
+
+
+# Standard errors of the tracks within which an interval of the autocorrelation must begin.
+_DISAGREEMENT = 2.0
+# Part of the distance from the edge of a prior to the upper limit, in which the lower limit is
+# at the edge.
+_AT_EDGE = 0.04
 
 
 class Words(NamedTuple):
@@ -116,6 +123,53 @@ def flags_in_words(quality: Quality) -> list[FlagWords]:
             known = FLAGS.get(flag, Words(name.replace('_', ' '), 'see docs/method/speed.md'))
             words.append(FlagWords(name, *known))
     return words
+
+
+def size_flag(autocorrelation: MeasuredInterval, tracks: Measured) -> FlagWords | None:
+    """A flag where autocorrelation and tracks disagree on the beads of a cluster; None else.
+
+    Parameters
+    ----------
+    autocorrelation : MeasuredInterval, [beads]
+    tracks : Measured, [beads]
+        Weight-averaged size of bodies.
+    """
+    reach = _DISAGREEMENT * tracks.error
+    if not tracks.known or (
+        not autocorrelation.lower > tracks.value + reach
+        and not autocorrelation.upper < tracks.value - reach
+    ):
+        return None
+    limits = f'[{autocorrelation.lower:.1f}, {autocorrelation.upper:.1f}]'
+    return FlagWords(
+        'cluster_size',
+        f'the autocorrelation says {autocorrelation.value:.1f} beads a cluster {limits}, the '
+        f'tracks {tracks.value:.1f}',
+        'use the tracks (bodies, weighted_size); for this camera calibrate the autocorrelation '
+        'with `nanorocks cluster-curve`',
+    )
+
+
+def wall_flag(walls: Interval, lowest: float) -> FlagWords | None:
+    """A flag where the walls are at the lower end of their prior; None else.
+
+    Parameters
+    ----------
+    walls : Interval
+        Restitution of the walls.
+    lowest : float
+        Lower end of the flat prior.
+    """
+    # A likelihood that falls from the edge on, flat, half-normal or exponential, puts the lower
+    # quantile of 0.025 at 0.03, 0.014, 0.007 of the upper one; with its peak inside, it is more.
+    if not walls.lower - lowest < _AT_EDGE * (walls.upper - lowest):
+        return None
+    return FlagWords(
+        'wall_limit',
+        f'the walls are at the lowest restitution that is allowed, {lowest:g}; those of the '
+        'beads make up for it',
+        'lower --prior-min-wall-restitution if such walls are possible',
+    )
 
 
 def reason_of(cor: CorEstimate) -> Words | None:

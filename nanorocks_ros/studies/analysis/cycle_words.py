@@ -13,11 +13,14 @@ from nanorocks_ros.records.result_words import (
     NO_SHAKING,
     NO_SPEEDS,
     RELATIONS,
+    FlagWords,
     Words,
     fitted,
     flags_in_words,
     reason_of,
+    size_flag,
     sticking_in_words,
+    wall_flag,
 )
 from nanorocks_ros.wire.array_layouts import NS
 
@@ -39,18 +42,21 @@ class UsedSpeeds:
     methods : Counter of SpeedMethod
     flags : Counter of str
         Speeds with each flag, by name.
+    lowest_walls : float
+        Lower end of the prior of their restitution.
     """
 
     methods: Counter[SpeedMethod] = field(default_factory=Counter)
     flags: Counter[str] = field(default_factory=Counter)
+    lowest_walls: float = 0.0
 
 
 def used_speeds(
-    speeds: Iterable[SpeedEstimate], cycles: Iterable[CorEstimate]
+    speeds: Iterable[SpeedEstimate], cycles: Iterable[CorEstimate], lowest_walls: float = 0.0
 ) -> dict[int, UsedSpeeds]:
     """The speeds in the window of each cycle, by its number; the speeds are read once."""
     windows = {cor.cycle: (cor.window_start, cor.window_end) for cor in cycles}
-    used = {cycle: UsedSpeeds() for cycle in windows}
+    used = {cycle: UsedSpeeds(lowest_walls=lowest_walls) for cycle in windows}
     for speed in speeds:
         if speed.cycle not in windows or speed.cycle_start_ns is None:
             continue
@@ -80,13 +86,25 @@ def cycle_as_json(
     return {
         'flags': [
             {**flag._asdict(), 'speeds': used.flags.get(flag.name)}
-            for flag in flags_in_words(cor.quality)
+            for flag in _flags(cor, clusters, used)
         ],
         'reason': None if reason is None else reason._asdict(),
         'contacts': {'rebounds': cor.rebounds, 'collisions': cor.collisions},
         'methods': {method.name.lower(): number for method, number in used.methods.items()},
         'sticking': _sticking(clusters),
     }
+
+
+def _flags(
+    cor: CorEstimate, clusters: ClusterEstimate | None, used: UsedSpeeds
+) -> list[FlagWords]:
+    """Flags of the estimate, and what only its values and those of the clusters tell."""
+    others = [
+        None if clusters is None else size_flag(clusters.cluster_size, clusters.weighted_size)
+    ]
+    if reason_of(cor) is None:
+        others.append(wall_flag(cor.wall_restitution, used.lowest_walls))
+    return [*flags_in_words(cor.quality), *(flag for flag in others if flag is not None)]
 
 
 def tray_reason(results: TrayResults) -> Words | None:
@@ -130,7 +148,7 @@ def cycle_lines(
     if clusters is not None:
         lines.append(f'  sticking: {_sticking(clusters)}')
         lines += _clusters_lines(clusters)
-    for flag in flags_in_words(cor.quality):
+    for flag in _flags(cor, clusters, used):
         number = used.flags.get(flag.name)
         part = f' ({number} of {cor.samples} speeds)' if number else ''
         name = flag.name.replace('_', ' ')

@@ -146,6 +146,8 @@ class Analysis:
         Provenance that the recording holds.
     include_inconsistent : bool
         Whether cycles flagged inconsistent are counted in the means.
+    lowest_walls : float
+        Lower end of the prior of the restitution of the walls.
     """
 
     epoch_ns: int
@@ -157,6 +159,7 @@ class Analysis:
     refused: int = 0
     metadata: dict[str, str] = field(default_factory=dict)
     include_inconsistent: bool = False
+    lowest_walls: float = 0.0
 
     @property
     def frames(self) -> int:
@@ -226,6 +229,7 @@ def analyse(
         complete=bag.reader.complete,
         metadata=bag.reader.metadata,
         include_inconsistent=settings.cooling.include_inconsistent,
+        lowest_walls=settings.prior.min_wall_restitution,
     )
     frames = PreprocessedFrames(bag, pipeline.preprocessor)
     for shot in frames.shots(progress):

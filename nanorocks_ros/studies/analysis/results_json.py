@@ -108,7 +108,7 @@ def _tray_as_json(analysis: Analysis, results: TrayResults, *, series: bool) -> 
         if speed.stamp_ns in wanted
     }
     ends = ends_of_cycles(results.clusters)
-    used = used_speeds(results.speeds, cycles)
+    used = used_speeds(results.speeds, cycles, analysis.lowest_walls)
     reason = tray_reason(results)
     return {
         **(_series_as_json(results, epoch_ns) if series else {}),

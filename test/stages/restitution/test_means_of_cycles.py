@@ -56,7 +56,7 @@ def rebounds(cycle, wall, n=60):
 
 
 def final_estimates(*, include):
-    """Two cycles that agree, and between them one that cools more slowly than its rebounds allow."""
+    """Two cycles that agree; between them one that cools more slowly than rebounds allow."""
     settings = with_values(PipelineSettings(), {'cooling.include_inconsistent': include}, 'test')
     stage = RestitutionEstimator(settings, load_trays()[1])
     finals = []

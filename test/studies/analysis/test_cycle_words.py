@@ -14,6 +14,7 @@ from nanorocks_ros.records import (
     CorStatus,
     Interval,
     Measured,
+    MeasuredInterval,
     Quality,
     SpeedEstimate,
     SpeedMethod,
@@ -192,6 +193,32 @@ def test_flags_are_counted_in_the_speeds_of_the_window():
     text = '\n'.join(cycle_lines(cor, None, used, left_out=False))
     assert 'flag uncertain (91 of 180 speeds)' in text
     assert 'by tracking' in text
+
+
+def test_clusters_by_the_autocorrelation_that_the_tracks_contradict_are_flagged():
+    size = MeasuredInterval(2.4, 0.9, 1.8, 3.7)
+    contradicted = replace(CLUSTERS, cluster_size=size, weighted_size=Measured(1.0, 0.0))
+    assert 'the autocorrelation says 2.4 beads a cluster [1.8, 3.7], the tracks 1.0' in text_of(
+        FINAL, contradicted
+    )
+    agreed = replace(contradicted, weighted_size=Measured(2.1, 0.2))
+    assert 'autocorrelation' not in text_of(FINAL, agreed)
+    assert 'autocorrelation' not in text_of(FINAL, replace(agreed, weighted_size=Measured()))
+
+
+@pytest.mark.parametrize(
+    ('walls', 'flagged'),
+    [
+        (Interval(0.8006, 0.8000, 0.8034), True),
+        (Interval(0.83, 0.8012, 0.88), True),
+        (Interval(0.85, 0.82, 0.88), False),
+        (Interval(0.97, 0.96, 0.98), False),
+    ],
+)
+def test_walls_at_the_edge_of_what_is_allowed_are_flagged(walls, flagged):
+    cor = replace(FINAL, wall_restitution=walls)
+    flags = cycle_as_json(cor, None, UsedSpeeds(lowest_walls=0.8))['flags']
+    assert [flag['name'] for flag in flags] == ['wall_limit'] * flagged
 
 
 def test_the_json_says_the_same_as_the_terminal():
