@@ -7,6 +7,7 @@ import shutil
 
 import cv2
 import pytest
+import yaml
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.experiment.trays import load_trays
@@ -155,3 +156,33 @@ def test_a_batch_analyses_each_bag_by_what_it_says(tray_3, own_tray, tmp_path, c
     batch = json.loads(out)
     assert [list(bag['trays']) for bag in batch['bags']] in ([['3'], ['2']], [['2'], ['3']])
     assert sorted(batch['trays']) == ['2', '3']
+
+
+def test_a_tray_with_other_beads_is_left_out_of_the_means_of_a_batch(own_tray, tmp_path, capsys):
+    path = tmp_path / 'mine.yaml'
+    path.write_text(OWN_TRAY.replace('count: 12', 'count: 9'))
+    other = tmp_path / 'other'
+    simulate = ('simulate', '--trays-file', path, '--bag', other, *SHORT, *SMALL)
+    assert run(capsys, *simulate)[0] == 0
+    code, out, error = run(
+        capsys, 'analyse', own_tray, other, '-o', tmp_path / 'results', '--json', '--workers', '1',
+        '--cooling-relation', 'paper',
+    )  # fmt: skip
+    assert code == 0, error
+    assert len(json.loads(out)['bags']) == 2
+    assert error.count('its tray 2 holds other beads') == 1
+
+
+@pytest.mark.parametrize('key', ['trays', 'trays_file'])
+def test_hostile_metadata_ends_a_command_in_one_line(key, tray_3, tmp_path, capsys):
+    bag = tmp_path / 'bag'
+    shutil.copytree(tray_3, bag)
+    path = bag / 'metadata.yaml'
+    document = yaml.safe_load(path.read_text())
+    content = document['rosbag2_bagfile_information']['custom_data']
+    content[f'experiment.{key}'] = [['x'] * 100_000] * 10
+    path.write_text(yaml.safe_dump(document))
+    code, _, error = run(capsys, 'track', bag)
+    assert code == 1
+    assert error.count('\n') == 1
+    assert f'experiment.{key}' in error

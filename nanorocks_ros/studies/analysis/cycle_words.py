@@ -129,8 +129,7 @@ def tray_reason(results: TrayResults) -> Words | None:
     return Words(
         f'a shaking event was seen {start:.1f} s before the end, but no time at which the tray '
         f'was calm{moves}',
-        'fix the camera to the tray, or film longer; to use the speeds all the same, raise '
-        '--cooling-max-tray-to-bead-speed',
+        'fix the camera, so that it does not shake, or film until the tray is at rest',
     )
 
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nanorocks_ros.errors import FitError, RecordingError
 from nanorocks_ros.experiment.calibration_file import calibrated
-from nanorocks_ros.experiment.recorded_experiment import recorded_settings
 from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
 from nanorocks_ros.numerics.sample_mean import mean_of
@@ -29,6 +28,7 @@ from nanorocks_ros.records.result_words import fitted
 from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleSummary
 from nanorocks_ros.studies.analysis.long_term import Campaign, campaign_of
 from nanorocks_ros.studies.analysis.results_folder import EVIDENCE
+from nanorocks_ros.studies.batch.batch_trays import of_these_trays, settings_by_tray
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -142,8 +142,8 @@ def combined(
         Called with the steps done and the steps there are.
     """
     notices: list[str] = []
-    of_results = _settings_by_tray(results, settings)
-    results = [_of_these_trays(result, settings, of_results, notices) for result in results]
+    of_results = settings_by_tray(results, settings)
+    results = [of_these_trays(result, settings, of_results, notices) for result in results]
     column, unit = _measure(results)
     rows = [row for result in results for row in _rows(result, column)]
     evidence, sticking = _added_up(results, notices, progress)
@@ -173,43 +173,6 @@ def combined(
         size_unit=unit,
         notices=notices,
     )
-
-
-def _settings_by_tray(
-    results: Sequence[BagResults], settings: PipelineSettings
-) -> dict[int, PipelineSettings]:
-    """Of each tray, the settings by which its first recording was analysed."""
-    if not results:
-        return dict.fromkeys(settings.trays, settings)
-    by_tray: dict[int, PipelineSettings] = {}
-    for result in results:
-        own_settings = _settings_of(result, settings)
-        for number in own_settings.trays:
-            by_tray.setdefault(number, own_settings)
-    return by_tray
-
-
-def _settings_of(result: BagResults, settings: PipelineSettings) -> PipelineSettings:
-    experiment = result.summary.get('experiment', {})
-    return recorded_settings(settings, (), experiment, result.name).settings
-
-
-def _of_these_trays(
-    result: BagResults,
-    settings: PipelineSettings,
-    of_results: Mapping[int, PipelineSettings],
-    notices: list[str],
-) -> BagResults:
-    """The results without trays that hold other beads than in the recordings before."""
-    kept = dict(result.summary['trays'])
-    for number, tray in trays_of(_settings_of(result, settings)).items():
-        if trays_of(of_results[number])[number] != tray:
-            kept.pop(str(number), None)
-            notices.append(
-                f'{result.name}: its tray {number} holds other beads or has other sides than in '
-                'the recordings before, and is left out of the means; analyse it by itself'
-            )
-    return replace(result, summary={**result.summary, 'trays': kept})
 
 
 def _measure(results: Sequence[BagResults]) -> tuple[str, str]:
