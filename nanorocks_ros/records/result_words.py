@@ -145,8 +145,9 @@ def size_flag(autocorrelation: MeasuredInterval, tracks: Measured) -> FlagWords 
         'cluster_size',
         f'the autocorrelation says {autocorrelation.value:.1f} beads a cluster {limits}, the '
         f'tracks {tracks.value:.1f}',
-        'use the tracks (bodies, weighted_size); for this camera calibrate the autocorrelation '
-        'with `nanorocks cluster-curve`',
+        'look at the end of the cycle with `nanorocks look BAG --at SECONDS -o steps.png`: if '
+        'beads lie together, the tracks miss that they stick; if not, calibrate the '
+        'autocorrelation for this camera with `nanorocks cluster-curve`',
     )
 
 

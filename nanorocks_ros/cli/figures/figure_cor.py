@@ -148,7 +148,7 @@ def _settings(options: argparse.Namespace, bag: Path) -> PipelineSettings:
         options.trays = [str(options.tray)]
     settings, notices, trays_known = bag_settings(options, bag)
     if not trays_known or len(settings.trays) != 1:
-        problem = 'is required, since the bag does not say which single tray it shows'
+        problem = 'is required with a bag that does not say which single tray it shows'
         raise ConfigurationError('--tray', problem, 'name the tray')
     for notice in notices:
         print(f'nanorocks: {notice}', file=sys.stderr)
