@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -118,14 +117,6 @@ def bag_settings(options: argparse.Namespace, bag: str | Path) -> RecordedSettin
     settings = settings_from(options, PipelineSettings(), options.parameters)
     told = told_settings(options, options.parameters)
     return recorded_settings(settings, told, read_metadata(bag), str(bag))
-
-
-def told_bag_settings(options: argparse.Namespace, bag: str | Path) -> PipelineSettings:
-    """As `bag_settings`; prints the notices."""
-    settings, notices, _ = bag_settings(options, bag)
-    for notice in notices:
-        print(f'nanorocks: {notice}', file=sys.stderr)
-    return settings
 
 
 def _given(options: argparse.Namespace, settings: Any) -> dict[str, Any]:

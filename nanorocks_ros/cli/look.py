@@ -45,7 +45,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Process the bag up to the frame, print and draw it, and return the exit code."""
-    from nanorocks_ros.cli.flags import told_bag_settings
+    from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.preprocessing_steps import steps_of_bag
@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
         check_outputs(
             {'--output': Path(options.output)}, {'--output': ('.png',)}, force=options.force
         )
-    settings = told_bag_settings(options, options.bag)
+    settings, assumed, _ = bag_settings(options, options.bag)
     try:
         with Progress('looking') as progress:
             steps = steps_of_bag(
@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
-    for notice in steps.notices:
+    for notice in (*assumed, *steps.notices):
         print(f'nanorocks: {notice}', file=sys.stderr)
     if options.json:
         print(json.dumps(_as_json(steps), allow_nan=False))

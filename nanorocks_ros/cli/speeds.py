@@ -41,7 +41,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure speeds, print and write them, and return the exit code."""
-    from nanorocks_ros.cli.flags import told_bag_settings
+    from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.speed_comparison import compare_speeds
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     names = {'--output': options.output, '--table': options.table}
     files = {flag: Path(name) for flag, name in names.items() if name}
     check_outputs(files, {'--output': ('.png',), '--table': ('.csv',)}, force=options.force)
-    settings = told_bag_settings(options, options.bag)
+    settings, assumed, _ = bag_settings(options, options.bag)
     try:
         with Progress('measuring') as progress:
             speeds = compare_speeds(
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
-    for notice in speeds.notices:
+    for notice in (*assumed, *speeds.notices):
         print(f'nanorocks: {notice}', file=sys.stderr)
     cycle = _cycle(speeds, options.cycle)
     if options.json:
