@@ -46,7 +46,7 @@ const COR_STATES = {
   undetermined: 'the decay tells too little yet',
 };
 
-export const corState = (cor) => cor.reason ?? COR_STATES[cor.status] ?? String(cor.status);
+export const corState = (cor) => COR_STATES[cor.status] ?? String(cor.status);
 
 /** Whether an estimate is one, and not only what is probable before anything is known. */
 export const saysSomething = (cor) => !!cor && known(cor.restitution) && ['cooling', 'final'].includes(cor.status);
@@ -55,8 +55,9 @@ export const saysSomething = (cor) => !!cor && known(cor.restitution) && ['cooli
 export const flags = ({ speed: now, cor }) =>
   [...new Set([...(now?.quality ?? []), ...(cor?.quality ?? [])])].map((one) => one.replaceAll('_', ' '));
 
-/** What these flags mean and what to do, a line for each. */
-export const flagTexts = ({ speed: now, cor }) => [...new Set([...(now?.flags ?? []), ...(cor?.flags ?? [])])].join('\n');
+/** What these flags mean and what to do, and why a restitution is not known; a line for each. */
+export const flagTexts = ({ speed: now, cor }) =>
+  [...new Set([...(now?.flags ?? []), ...(cor?.flags ?? []), ...(cor?.reason ? [cor.reason] : [])])].join('\n');
 
 /** The value of a sticking speed, and what is to be said of it. */
 export function sticking(cluster) {
