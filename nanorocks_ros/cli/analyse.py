@@ -13,13 +13,11 @@ from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import NanorocksError
-from nanorocks_ros.records import CorRelation, CorStatus, Quality
-from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.records import CorRelation
 
 if TYPE_CHECKING:
     import argparse
 
-    from nanorocks_ros.records import CorEstimate
     from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
 
 _EPILOG = """\
@@ -60,6 +58,13 @@ def add_parser(commands: Any) -> None:
         help='format of the tables (many bags: of the tables of all cycles); default csv',
     )
     parser.add_argument('--no-output', action='store_true', help='write no files')
+    parser.add_argument(
+        '--include-inconsistent',
+        dest='cooling.include_inconsistent',
+        action='store_const',
+        const='true',
+        help='count cycles flagged inconsistent in the means of all cycles',
+    )
     add_options(parser)
     parser.set_defaults(run=run)
 
@@ -67,18 +72,15 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Analyse one bag or many, print and write the results, and return the exit code."""
     from nanorocks_ros.cli.analyse_batch import is_batch, run_many
-    from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.outputs.parquet import check_parquet
 
-    settings = settings_from(options, PipelineSettings(), options.parameters)
     # Checked before hours of work.
     check_parquet(Path(f'tables.{options.format}'))
-    if is_batch(options):
-        return run_many(options, settings)
-    return _run_one(options, settings)
+    return run_many(options) if is_batch(options) else _run_one(options)
 
 
-def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
+def _run_one(options: argparse.Namespace) -> int:
+    from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.analysis.offline_analysis import analyse
     from nanorocks_ros.studies.analysis.results_folder import check_results_folder, write_results
@@ -88,6 +90,7 @@ def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
     # `.` and `..` have no name of a folder.
     resolved = source if source.name not in ('', '..') else source.resolve()
     folder = Path(options.output or f'{resolved}_results')
+    settings, notices, _ = bag_settings(options, source)
     scratch = _scratch_folder() if options.no_output else check_results_folder(folder)
     with Progress('analysing') as progress:
         analysis = analyse(
@@ -97,6 +100,7 @@ def _run_one(options: argparse.Namespace, settings: PipelineSettings) -> int:
             progress=progress.count,
             scratch=scratch,
         )
+    analysis.notices += notices
     error: NanorocksError | None = analysis.error
     written = ''
     if not options.no_output:
@@ -132,53 +136,44 @@ def _print(analysis: Analysis) -> None:
     print(f'{analysis.frames} frames{lost}, {analysis.seconds:.1f} s')
     for number, results in analysis.trays.items():
         print(f'tray {number}: {len(results.speeds)} speeds')
-        _print_cycles(results)
+        for line in _tray_lines(analysis, results):
+            print(f'  {line}')
 
 
-def _print_cycles(results: TrayResults) -> None:
-    from nanorocks_ros.studies.analysis.results_json import last_of_each_cycle
+def _tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
+    from nanorocks_ros.studies.analysis.cycle_words import (
+        cycle_lines,
+        is_left_out,
+        tray_reason,
+        used_speeds,
+    )
+    from nanorocks_ros.studies.analysis.results_json import (
+        end_of_cycle,
+        ends_of_cycles,
+        last_of_each_cycle,
+    )
 
+    reason = tray_reason(results)
+    if reason is not None:
+        return [f'no COR: {reason.text}; {reason.remedy}']
     cycles = last_of_each_cycle(results.cors)
-    if not cycles:
-        print('  no COR: no shaking event was followed by a decay')
-    for estimate in cycles:
-        print(f'  cycle {estimate.cycle}: {_cor_text(estimate)}')
-        for name, speed, time in zip(
-            ('first', 'second'),
-            estimate.species_initial_speeds,
-            estimate.species_haff_times,
-            strict=False,
-        ):
-            if math.isfinite(time.value):
-                print(
-                    f'    {name} species: v0 {speed.value * 1e3:.2f} mm/s, tau {time.value:.2f} s'
-                )
-    last = cycles[-1] if cycles else None
-    if last is not None and len(cycles) > 1 and math.isfinite(last.mean_restitution.value):
-        mean = last.mean_restitution
-        print(f'  all cycles: COR {mean.value:.4f} +- {mean.error:.4f}')
-    if cycles and results.truth:
+    used = used_speeds(results.speeds, cycles, analysis.lowest_walls)
+    ends = ends_of_cycles(results.clusters)
+    lines: list[str] = []
+    left_out = 0
+    for cor in cycles:
+        is_out = is_left_out(cor, include_inconsistent=analysis.include_inconsistent)
+        left_out += is_out
+        lines += cycle_lines(cor, end_of_cycle(ends, cor), used[cor.cycle], left_out=is_out)
+    mean = cycles[-1].mean_restitution
+    if len(cycles) > 1 and math.isfinite(mean.value):
+        without = f', without {left_out} flagged inconsistent' if left_out else ''
+        lines.append(f'all cycles: COR {mean.value:.4f} +- {mean.error:.4f}{without}')
+    if results.truth:
         truth = results.truth[-1]
-        print(f'  truth:   COR {truth.restitution:g}, walls {truth.wall_restitution:g}')
-    if cycles and cycles[-1].relation is CorRelation.PAPER:
-        print("  relation 'paper': its interval is statistical only, see docs/method/physics.md")
-
-
-def _cor_text(cor: CorEstimate) -> str:
-    if cor.status in (CorStatus.NO_DECAY, CorStatus.UNDETERMINED):
-        reason = 'the decay does not determine it'
-        if cor.quality & Quality.WRONG_SCALE:
-            reason = 'the trays are not at the positions in the settings'
-        return f'COR unknown ({cor.status.name.lower()}: {reason})'
-    beads, wall = cor.restitution, cor.wall_restitution
-    walls = (
-        f', walls {wall.value:.3f} [{wall.lower:.3f}, {wall.upper:.3f}], '
-        f'paper says {cor.paper_restitution:.3f}'
-        if cor.relation is CorRelation.LIBRARY
-        else ''
-    )
-    return (
-        f'COR {beads.value:.4f} [{beads.lower:.4f}, {beads.upper:.4f}] '
-        f'({cor.relation.name.lower()}, {cor.status.name.lower()}), '
-        f'v0 {cor.initial_speed.value * 1e3:.2f} mm/s, tau {cor.haff_time.value:.2f} s{walls}'
-    )
+        lines.append(f'truth:   COR {truth.restitution:g}, walls {truth.wall_restitution:g}')
+    if cycles[-1].relation is CorRelation.PAPER:
+        lines.append(
+            "relation 'paper': its interval is statistical only, see docs/method/physics.md"
+        )
+    return lines

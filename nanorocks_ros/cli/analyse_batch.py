@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.safe_text import counted, printable
+from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
 
-    from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.batch.batch_analysis import Batch
     from nanorocks_ros.studies.batch.batch_store import BatchStore
     from nanorocks_ros.studies.batch.batch_task import BagOutcome
@@ -50,14 +50,16 @@ def is_batch(options: argparse.Namespace) -> bool:
     return is_pattern(options.bags[0]) or is_collection(Path(options.bags[0]))
 
 
-def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
+def run_many(options: argparse.Namespace) -> int:
     """Analyse all recordings, combine and report them, and return the exit code."""
+    from nanorocks_ros.cli.flags import settings_from, told_settings
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.recordings.bag.find_bags import find_bags
     from nanorocks_ros.studies.batch.batch_analysis import BatchPlan, run_batch
     from nanorocks_ros.studies.batch.batch_files import write_batch
     from nanorocks_ros.studies.batch.campaign_means import combined
 
+    settings = settings_from(options, PipelineSettings(), options.parameters)
     if options.no_output or not options.output:
         raise ConfigurationError('--output', 'is required for many recordings', 'pass -o RESULTS')
     workers = Workers(processes=options.workers, scheduler=options.scheduler)
@@ -78,7 +80,11 @@ def run_many(options: argparse.Namespace, settings: PipelineSettings) -> int:
             else next(iter(search.missing.values()))
         )
     plan = BatchPlan(
-        bags=search, folder=folder, settings=settings, image_topic=options.image_topic
+        bags=search,
+        folder=folder,
+        settings=settings,
+        image_topic=options.image_topic,
+        told=told_settings(options, options.parameters),
     )
     with _BatchProgress() as progress:
         batch = run_batch(plan, workers, progress)
@@ -173,6 +179,11 @@ def _tray_lines(tray: TrayMeans) -> list[str]:
         walls = f', walls {text("wall_restitution")}' if values['wall_restitution'] else ''
         count = values['cycles_read']
         lines.append(f'{counted(count, "cycle")} together: COR {text("restitution")}{walls}')
+    if tray.left_out:
+        lines.append(
+            f'{counted(tray.left_out, "cycle")} flagged inconsistent left out of the '
+            'restitutions; pass --include-inconsistent to count'
+        )
     for name, label, factor, unit in (
         ('cycle_restitution', 'COR of a cycle', 1.0, ''),
         ('paper_restitution', "COR by the paper's closed form", 1.0, ''),

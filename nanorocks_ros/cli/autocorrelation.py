@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.json_values import json_values
-from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
@@ -42,16 +41,16 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure cluster sizes, write and print them, and return the exit code."""
-    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.autocorrelations import cycle_clusters, write_clusters
 
-    settings = settings_from(options, PipelineSettings(), options.parameters)
     names = {'--output': options.output, '--table': options.table}
     files = {flag: Path(name) for flag, name in names.items() if name}
     kinds = {'--output': ('.png', '.pdf', '.svg'), '--table': ('.csv',)}
     check_outputs(files, kinds, force=options.force)
+    settings, assumed, _ = bag_settings(options, options.bag)
     try:
         with Progress('measuring') as progress:
             clusters = cycle_clusters(
@@ -63,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
-    for notice in clusters.notices:
+    for notice in (*assumed, *clusters.notices):
         print(f'nanorocks: {notice}', file=sys.stderr)
     if '--table' in files:
         write_clusters(files['--table'], clusters)

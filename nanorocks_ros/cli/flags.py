@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import yaml
 
@@ -17,6 +17,9 @@ from nanorocks_ros.settings import (
     with_current_names,
     with_values,
 )
+
+if TYPE_CHECKING:
+    from nanorocks_ros.experiment.recorded_experiment import RecordedSettings
 
 SettingsType = TypeVar('SettingsType')
 _LOGGER = logging.getLogger(__name__)
@@ -87,13 +90,43 @@ def settings_from(
     """
     if parameters:
         settings = _replaced(settings, _from_file(Path(parameters)), parameters)
-    given = {
+    return _replaced(settings, _given(options, settings), 'command line')
+
+
+def told_settings(options: argparse.Namespace, parameters: str | None = None) -> frozenset[str]:
+    """Names of the settings of the pipeline that the user told, by a flag or in the file."""
+    settings = PipelineSettings()
+    values = _from_file(Path(parameters)) if parameters else {}
+    names, _ = with_current_names(settings, {**values, **_given(options, settings)}, '')
+    return frozenset(names)
+
+
+def bag_settings(options: argparse.Namespace, bag: str | Path) -> RecordedSettings:
+    """Settings of the pipeline for a bag: what is told, else what the bag says, else defaults.
+
+    Raises
+    ------
+    ConfigurationError
+        As `settings_from`.
+    RecordingError
+        When the bag cannot be read, or what it says of itself cannot be used.
+    """
+    from nanorocks_ros.experiment.recorded_experiment import recorded_settings
+    from nanorocks_ros.recordings.bag.bag_folder import read_metadata
+
+    settings = settings_from(options, PipelineSettings(), options.parameters)
+    told = told_settings(options, options.parameters)
+    return recorded_settings(settings, told, read_metadata(bag), str(bag))
+
+
+def _given(options: argparse.Namespace, settings: Any) -> dict[str, Any]:
+    """Values of the flags that were given."""
+    return {
         name: _parsed(row, getattr(options, name))
         for row in rows(settings)
         for name in (row.name, row.deprecated)
         if getattr(options, name, None) is not None
     }
-    return _replaced(settings, given, 'command line')
 
 
 def _replaced(settings: SettingsType, values: dict[str, Any], where: str) -> SettingsType:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.json_values import finite_or_none
-from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
@@ -46,17 +45,17 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Process the bag up to the frame, print and draw it, and return the exit code."""
-    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.preprocessing_steps import steps_of_bag
 
-    settings = settings_from(options, PipelineSettings(), options.parameters)
     _check_time(options)
     if options.output:
         check_outputs(
             {'--output': Path(options.output)}, {'--output': ('.png',)}, force=options.force
         )
+    settings, assumed, _ = bag_settings(options, options.bag)
     try:
         with Progress('looking') as progress:
             steps = steps_of_bag(
@@ -69,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
-    for notice in steps.notices:
+    for notice in (*assumed, *steps.notices):
         print(f'nanorocks: {notice}', file=sys.stderr)
     if options.json:
         print(json.dumps(_as_json(steps), allow_nan=False))

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.json_values import json_values
-from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
@@ -42,15 +41,15 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure speeds, print and write them, and return the exit code."""
-    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.speed_comparison import compare_speeds
 
-    settings = settings_from(options, PipelineSettings(), options.parameters)
     names = {'--output': options.output, '--table': options.table}
     files = {flag: Path(name) for flag, name in names.items() if name}
     check_outputs(files, {'--output': ('.png',), '--table': ('.csv',)}, force=options.force)
+    settings, assumed, _ = bag_settings(options, options.bag)
     try:
         with Progress('measuring') as progress:
             speeds = compare_speeds(
@@ -61,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
-    for notice in speeds.notices:
+    for notice in (*assumed, *speeds.notices):
         print(f'nanorocks: {notice}', file=sys.stderr)
     cycle = _cycle(speeds, options.cycle)
     if options.json:

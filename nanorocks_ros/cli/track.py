@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.json_values import json_values
-from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
@@ -46,19 +45,19 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Track, print and write, and return the exit code."""
-    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.analysis.bag_tracks import track_bag
     from nanorocks_ros.studies.calibration.manual_tracks import read_manual_tracks
 
-    settings = settings_from(options, PipelineSettings(), options.parameters)
     _check_outputs(options)
     manual = read_manual_tracks(options.compare) if options.compare else None
+    settings, assumed, _ = bag_settings(options, options.bag)
     with Progress('tracking') as progress:
         bag = track_bag(
             Path(options.bag), settings, image_topic=options.image_topic, progress=progress.count
         )
-    for notice in bag.notices:
+    for notice in (*assumed, *bag.notices):
         print(f'nanorocks: {notice}', file=sys.stderr)
     compared = {} if manual is None else _comparisons(bag, manual, options.first_frame)
     if options.json:

@@ -18,8 +18,10 @@ from nanorocks_ros.records import (
     CorEstimate,
     CorStatus,
     GroundTruth,
+    Quality,
     SpeedEstimate,
 )
+from nanorocks_ros.records.result_words import flags_in_words, reason_of
 from nanorocks_ros.wire.array_layouts import NS
 from nanorocks_ros.wire.flat_records import flat_names, flat_value
 from nanorocks_ros.wire.products import CURVES
@@ -242,6 +244,8 @@ def as_fields(record: ArrayRecord) -> dict[str, Any]:
         if name in _NOT_SHOWN:
             continue
         value = flat_value(record, name)
+        if isinstance(value, Quality):
+            elements['flags'] = [f'{flag.text}; {flag.remedy}' for flag in flags_in_words(value)]
         if isinstance(value, IntFlag):
             value = value.names() if hasattr(value, 'names') else int(value)
         elif isinstance(value, IntEnum):
@@ -249,6 +253,8 @@ def as_fields(record: ArrayRecord) -> dict[str, Any]:
         elif isinstance(value, float):
             value = _number(value)
         elements[name] = value
+    if isinstance(record, CorEstimate) and (reason := reason_of(record)) is not None:
+        elements['reason'] = reason.text
     return elements
 
 

@@ -29,7 +29,12 @@ from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.calibration import Calibration, CameraInfo, rectified_view
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.experiment.view import IDENTITY
-from nanorocks_ros.experiment.yaml_lines import YamlLines, parse_yaml, read_text
+from nanorocks_ros.experiment.yaml_lines import (
+    YamlLines,
+    file_content,
+    parse_yaml,
+    shown_name,
+)
 
 if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
@@ -38,13 +43,19 @@ if TYPE_CHECKING:
 def load_calibration(path: str | Path) -> Calibration:
     """Read a calibration file.
 
+    Parameters
+    ----------
+    path : str or Path
+        Of the file; or, with a line break in it, its content, as a recording keeps it.
+
     Raises
     ------
     ConfigurationError
         When it cannot be read or an entry cannot be used; names the line.
     """
-    text = read_text(Path(path), 'a calibration file')
-    return _File(str(path)).calibration(parse_yaml(str(path), text))
+    name = shown_name(path, 'calibration')
+    text = file_content(path, 'a calibration file')
+    return _File(name).calibration(parse_yaml(name, text))
 
 
 class _File(YamlLines):
@@ -160,7 +171,7 @@ def calibrated(settings: PipelineSettings) -> PipelineSettings:
     missing = [str(tray) for tray in settings.trays if tray not in calibration.regions]
     if missing:
         raise ConfigurationError(
-            path,
+            shown_name(path, 'calibration'),
             f'holds no region of tray {", ".join(missing)}',
             'calibrate with these trays, or leave them out of `trays`',
         )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass, replace
 from importlib import resources
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import yaml
@@ -18,10 +17,16 @@ from nanorocks_ros.experiment.materials import (
     known_materials,
     paste_remedy,
 )
-from nanorocks_ros.experiment.yaml_lines import YamlLines, parse_yaml, read_text
+from nanorocks_ros.experiment.yaml_lines import (
+    YamlLines,
+    file_content,
+    parse_yaml,
+    shown_name,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
 MILLIMETRE = 1e-3
 GRAM = 1e-3
@@ -131,6 +136,11 @@ class Tray:
 def load_trays(path: str | Path | None = None) -> dict[int, Tray]:
     """The trays of a YAML file, by number; by default those that were flown.
 
+    Parameters
+    ----------
+    path : str or Path, optional
+        Of the file; or, with a line break in it, its content, as a recording keeps it.
+
     Raises
     ------
     ConfigurationError
@@ -140,8 +150,8 @@ def load_trays(path: str | Path | None = None) -> dict[int, Tray]:
         name = 'trays.yaml'
         text = resources.files(__package__).joinpath(name).read_text(encoding='utf-8')
     else:
-        name = str(path)
-        text = read_text(Path(path), 'a readable YAML file of trays')
+        name = shown_name(path, 'trays file')
+        text = file_content(path, 'a readable YAML file of trays')
     return _TrayFile(name).trays(parse_yaml(name, text))
 
 

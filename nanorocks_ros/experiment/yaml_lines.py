@@ -30,6 +30,10 @@ def parse_yaml(name: str, text: str) -> yaml.Node | None:
     """
     try:
         return yaml.compose(text, Loader=yaml.SafeLoader)
+    except RecursionError as error:
+        raise ConfigurationError(
+            name, 'not YAML: nested too deeply', 'write it without such nesting'
+        ) from error
     except yaml.YAMLError as error:
         mark = getattr(error, 'problem_mark', None)
         line = mark.line + 1 if mark else 1
@@ -37,6 +41,34 @@ def parse_yaml(name: str, text: str) -> yaml.Node | None:
         raise ConfigurationError(
             f'{name}:{line}', f'not YAML: {reason}', 'correct this line'
         ) from error
+
+
+def is_content(source: str | Path) -> bool:
+    """Whether a setting is the content of a file, as a recording keeps it, and not its path."""
+    return isinstance(source, str) and '\n' in source
+
+
+def shown_name(source: str | Path, kind: str) -> str:
+    """Name of a file in errors: its path, or what it is when a recording keeps its content."""
+    return f'{kind} in the recording' if is_content(source) else str(source)
+
+
+def file_content(source: str | Path, expected: str) -> str:
+    """The content of a file, by its path or by itself.
+
+    Parameters
+    ----------
+    source : str or Path
+        A path; or, with a line break in it, the content.
+    expected : str
+        Kind of file that is expected, for the error.
+
+    Raises
+    ------
+    ConfigurationError
+        When it cannot be read.
+    """
+    return str(source) if is_content(source) else read_text(Path(source), expected)
 
 
 def read_text(path: Path, expected: str) -> str:

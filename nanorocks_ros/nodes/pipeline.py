@@ -15,6 +15,7 @@ from nanorocks_ros.nodes.sources.bag_source import (
     open_bag_frames,
     recorded_moments,
     refuse_unused_parameters,
+    settings_of_bag,
 )
 from nanorocks_ros.nodes.sources.camera_subscription import CameraSubscription
 from nanorocks_ros.nodes.sources.play_range import PlayRange
@@ -74,10 +75,14 @@ class PipelineNode(NanorocksNode):
     def __init__(self) -> None:
         super().__init__('pipeline')
         declare = self.parameters.declare
-        self._settings = declare(st.PipelineSettings(), read_only=False)
         self._source = declare(st.SourceSettings()).source
-        self._simulation = declare(st.SimulationSettings(), prefix='simulation.')
         self._bag_settings = declare(st.BagSettings())
+        self._defaults = st.PipelineSettings()
+        if self._source == 'bag':
+            # What is told to the node replaces what the bag says.
+            self._defaults = settings_of_bag(self, self._bag_settings)
+        self._settings = declare(self._defaults, read_only=False)
+        self._simulation = declare(st.SimulationSettings(), prefix='simulation.')
         self._pacing = declare(st.PacingSettings())
         camera = declare(st.CameraSettings())
         record = declare(st.RecordSettings())
@@ -115,7 +120,7 @@ class PipelineNode(NanorocksNode):
         for worker in self._workers:
             worker.ready()
         self._adopt(self._settings, self._build(self._settings))
-        self.parameters.react_to_changes(st.PipelineSettings(), self._build, self._adopt)
+        self.parameters.react_to_changes(self._defaults, self._build, self._adopt)
 
     def _offer_topics(self) -> None:
         self.outputs.offer((topics.EPOCH,))

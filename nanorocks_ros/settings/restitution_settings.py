@@ -71,6 +71,11 @@ class CoolingSettings:
     collisions: bool = setting(
         True, 'use collisions of two beads, found in the tracks, besides the decay'
     )
+    include_inconsistent: bool = setting(
+        False,
+        'count cycles flagged inconsistent, whose decay and contacts contradict each other, in '
+        'the means of all cycles',
+    )
     update_interval: float = setting(
         0.5, 'time between two live estimates', 's', low=0.0, high=60.0
     )

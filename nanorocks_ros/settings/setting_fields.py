@@ -89,9 +89,10 @@ def rows(settings: Any, prefix: str = '') -> Iterator[SettingRow]:
 def _number_problem(value: float, bounds: Bounds) -> str | None:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return f'{value!r} is not a number'
-    if not math.isfinite(value):
+    # Integers of Python may be too large for a float.
+    if isinstance(value, float) and not math.isfinite(value):
         return f'{value!r} is not finite'
-    if bounds.whole and not float(value).is_integer():
+    if bounds.whole and isinstance(value, float) and not value.is_integer():
         return f'{value!r} is not a whole number'
     if not bounds.low <= value <= bounds.high:
         return f'{value!r} is outside [{bounds.low:g}, {bounds.high:g}]'

@@ -246,7 +246,16 @@ def test_what_is_not_known_is_null_and_states_are_words(board):
     assert news['latest']['cor']['wall_restitution'] is None
     assert news['latest']['cor']['status'] == 'cooling'
     assert news['latest']['speed']['quality'] == ['glare']
+    (words,) = news['latest']['speed']['flags']
+    assert words.startswith('reflections hide')
+    assert 'reason' not in news['latest']['cor']
     assert news['description'] == '15 acrylic 2 mm'
+
+
+def test_an_undetermined_restitution_says_why(board):
+    board.take(replace(cor(2.0), status=CorStatus.NO_DECAY), 0.0)
+    latest = board.news(Cursor(), 0.0)['trays']['1']['latest']['cor']
+    assert latest['reason'] == 'the speeds do not fall'
 
 
 def test_a_tray_is_shown_before_anything_is_measured(board):

@@ -133,6 +133,7 @@ def test_what_is_wrong_or_not_told_is_said_in_words(look, serve, results):
     server.take(replace(results.cors[-1], quality=Quality.INCONSISTENT | Quality.LOW_CONTRAST))
     text_is(page, '#state', 'over, low contrast, inconsistent')
     text_is(page, '.card', 'low contrast')
+    assert 'contradict each other' in page.locator('#state').get_attribute('title')
     server.take(replace(results.cors[-1], status=CorStatus.UNDETERMINED))
     text_is(page, '#cor', 'the decay tells too little yet')
     server.diagnose([('/n', 0, 'working', [('frames waiting for the trays', '29')])])

@@ -15,13 +15,25 @@ pytest.importorskip('rclpy')
 
 from sensor_msgs.msg import CompressedImage, Image
 
+from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.nodes.base.ros_messages import compressed_message, qos_of, stamp_of
+from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.messages.image_messages import encode_jpeg
 from nanorocks_ros.records import ClusterEstimate
+from nanorocks_ros.settings import SimulationSettings, with_values
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
+from nanorocks_ros.studies.synthetic.film_bag import film_into_bag
 from nanorocks_ros.wire import topics
 
 from .result_arrays import SAMPLE, ResultArrays, assert_same_numbers
+
+OWN_TRAY = """\
+trays:
+  3:
+    dimensions_mm: [48, 15, 3.5]
+    species:
+      - {material: acrylic, diameter_mm: 2, count: 21}
+"""
 
 
 @pytest.mark.parametrize('workers', [0, 1])
@@ -115,3 +127,59 @@ def test_the_pipeline_takes_a_camera_topic_and_sets_the_epoch_itself(graph):
     times = [message.data[0] for message in arrays.messages[ClusterEstimate]]
     assert times == pytest.approx([0.2 * k for k in range(10)], abs=0.04)
     assert graph.interrupt(process).code == 0
+
+
+def test_a_played_bag_says_its_tray_and_so_does_the_recording_of_it(graph, tmp_path):
+    bag, record = tmp_path / 'tray_3', tmp_path / 'recorded'
+    trays_file = tmp_path / 'mine.yaml'
+    trays_file.write_text(OWN_TRAY)
+    settings = with_values(
+        SimulationSettings(),
+        {
+            'tray': 3,
+            'frame_rate': 10.0,
+            'pixels_per_metre': 9000.0,
+            'width_px': 480,
+            'height_px': 176,
+        },
+        'test',
+    )
+    film_into_bag(
+        bag,
+        settings,
+        duration=1.0,
+        quality=90,
+        progress=lambda *_: None,
+        tray=load_trays(trays_file)[3],
+        trays_file=str(trays_file),
+    )
+    trays_file.unlink()
+    # A topic of tray 3 has a publisher only where the node knows the tray.
+    process = graph.start(
+        'pipeline',
+        'source:=bag',
+        f'bag:={bag}',
+        'rate:=0.0',
+        f'record:={record}',
+        'workers:=0',
+        'cooling.relation:=paper',
+    )
+    finished = graph.wait(process)
+    assert finished.code == 0, finished.output
+    assert 'is assumed' not in finished.output
+    metadata = open_bag(record).metadata
+    assert metadata['experiment.trays'] == '3'
+    assert metadata['experiment.pixels_per_metre'] == '9000.0'
+    assert metadata['experiment.trays_file'] == OWN_TRAY
+    assert load_trays(metadata['experiment.trays_file'])[3].count == 21
+    assert topics.SPEED.absolute(3) in open_bag(record).topics
+
+
+def test_what_is_told_to_the_pipeline_replaces_what_the_bag_says(graph):
+    process = graph.start(
+        'pipeline', 'source:=bag', f'bag:={SAMPLE}', 'rate:=0.0', 'duration:=0.5',
+        'preprocess.pixels_per_metre:=13400.0', 'workers:=0',
+    )  # fmt: skip
+    finished = graph.wait(process)
+    assert finished.code == 0, finished.output
+    assert finished.output.count('preprocess.pixels_per_metre 13400.0 is told and used') == 1

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.json_values import finite_or_none
-from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
     import argparse
 
+    from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.calibration.area_calibration import AreaCalibration
     from nanorocks_ros.studies.calibration.area_fit import AreaFit
 
@@ -51,12 +51,12 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fit, print and write, and return the exit code."""
-    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.calibration.area_calibration import calibrate_area
     from nanorocks_ros.studies.calibration.manual_tracks import read_manual_tracks
 
-    settings = settings_from(options, PipelineSettings(), options.parameters)
+    settings, assumed, _ = bag_settings(options, options.bag)
     _check_outputs(options, settings)
     manual = read_manual_tracks(options.tracks)
     try:
@@ -71,7 +71,11 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
-    for notice in (*calibration.notices, *(str(error) for error in calibration.refused.values())):
+    for notice in (
+        *assumed,
+        *calibration.notices,
+        *(str(error) for error in calibration.refused.values()),
+    ):
         print(f'nanorocks: {notice}', file=sys.stderr)
     if options.json:
         print(json.dumps(_as_json(calibration), allow_nan=False))

@@ -12,6 +12,7 @@ from nanorocks_ros.errors import ConfigurationError
 if TYPE_CHECKING:
     import argparse
 
+    from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.figures.cor_figures import CorData, Search
 
 _TEXT = 'the decay, the search over simulated runs, and restitution against speed (7, 12, 13)'
@@ -40,9 +41,7 @@ def add_parser(kinds: Any) -> None:
     )
     parser.add_argument('source', help='folder of results of `nanorocks analyse`, or a bag')
     parser.add_argument('-o', '--output', required=True, help='folder for the figures')
-    parser.add_argument(
-        '--tray', type=int, help='number of the tray; required with a bag or several trays'
-    )
+    parser.add_argument('--tray', type=int, help='number of the tray; required with several trays')
     parser.add_argument(
         '--runs', type=int, default=20, help='runs at each point of the search; default 20'
     )
@@ -91,10 +90,9 @@ def run(options: argparse.Namespace) -> int:
     folder = Path(options.output)
     source = Path(options.source)
     if _is_bag(source):
-        if options.tray is None:
-            raise ConfigurationError('--tray', 'is required with a bag', 'name the tray')
+        settings = _settings(options, source)
         prepare_folder(folder)
-        source = _analyse_bag(options, source, folder / 'results')
+        source = _analyse_bag(settings, source, folder / 'results')
     data = _data(options, source)
     prepare_folder(folder)
     bars: dict[str, RunProgress] = {}
@@ -142,16 +140,28 @@ def _is_bag(path: Path) -> bool:
     )
 
 
-def _analyse_bag(options: argparse.Namespace, bag: Path, folder: Path) -> Path:
+def _settings(options: argparse.Namespace, bag: Path) -> PipelineSettings:
+    """Settings for a bag that shows one tray, or of which one is named."""
+    from nanorocks_ros.cli.flags import bag_settings
+
+    if options.tray is not None:
+        options.trays = [str(options.tray)]
+    settings, notices, trays_known = bag_settings(options, bag)
+    if not trays_known or len(settings.trays) != 1:
+        problem = 'is required with a bag that does not say which single tray it shows'
+        raise ConfigurationError('--tray', problem, 'name the tray')
+    for notice in notices:
+        print(f'nanorocks: {notice}', file=sys.stderr)
+    options.tray = settings.trays[0]
+    return settings
+
+
+def _analyse_bag(settings: PipelineSettings, bag: Path, folder: Path) -> Path:
     """Analyse a bag into a folder beside the figures."""
-    from nanorocks_ros.cli.flags import settings_from
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.settings import PipelineSettings, with_values
     from nanorocks_ros.studies.analysis.offline_analysis import analyse
     from nanorocks_ros.studies.analysis.results_folder import check_results_folder, write_results
 
-    settings = settings_from(options, PipelineSettings(), options.parameters)
-    settings = with_values(settings, {'trays': [options.tray]}, '--tray')
     scratch = check_results_folder(folder)
     with Progress('analysing') as progress:
         analysis = analyse(bag, settings, progress=progress.count, scratch=scratch)
@@ -163,6 +173,7 @@ def _analyse_bag(options: argparse.Namespace, bag: Path, folder: Path) -> Path:
 
 def _data(options: argparse.Namespace, source: Path) -> CorData:
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+    from nanorocks_ros.studies.analysis.results_folder import trays_file_of
     from nanorocks_ros.studies.decays.cooling_curves import (
         read_cycles,
         species_cycles,
@@ -174,7 +185,7 @@ def _data(options: argparse.Namespace, source: Path) -> CorData:
     table, number = speed_table(source, options.tray)
     if number is None:
         raise ConfigurationError('--tray', 'cannot be read from the file name', 'name the tray')
-    tray = tray_by_number(load_trays(), number)
+    tray = tray_by_number(load_trays(trays_file_of(table.parent)), number)
     cycles = read_cycles(table)
     window = cooling_window(table)
     default_span = (window.first, window.last) if window else (_FIRST, _LAST)

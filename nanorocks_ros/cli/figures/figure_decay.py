@@ -49,7 +49,7 @@ def add_parser(kinds: Any) -> None:
         parser.add_argument(
             '--last', type=float, help='[s] end of the fit; default 20, or as analysed'
         )
-        parser.add_argument('--trays', default='', help='YAML file of trays; default: as flown')
+        parser.add_argument('--trays', default='', help='YAML file of trays; default: as analysed')
         parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
         parser.add_argument('--force', action='store_true', help='replace a picture that exists')
         parser.set_defaults(run=run)
@@ -59,6 +59,7 @@ def run(options: argparse.Namespace) -> int:
     """Read, draw and print, and return the exit code."""
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.outputs.atomic_files import check_outputs
+    from nanorocks_ros.studies.analysis.results_folder import trays_file_of
     from nanorocks_ros.studies.decays.cooling_curves import read_cycles, speed_table
 
     path = Path(options.output)
@@ -66,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     table, number = speed_table(Path(options.speeds), options.tray)
     if number is None:
         raise ConfigurationError('--tray', 'cannot be read from the file name', 'name the tray')
-    tray = tray_by_number(load_trays(options.trays), number)
+    tray = tray_by_number(load_trays(options.trays or trays_file_of(table.parent)), number)
     cycles = read_cycles(table)
     values = _draw_figure(options, table, tray, cycles)
     if options.json:

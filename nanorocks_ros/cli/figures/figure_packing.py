@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
         from nanorocks_ros.studies.analysis.result_tables import trays_of
 
         numbers = numbers or trays_of(Path(options.results), 'cluster')
-    all_trays = load_trays()
+    all_trays = load_trays(_trays_file(options.results))
     trays = {number: tray_by_number(all_trays, number) for number in numbers}
     curves = (_simulate_curves if options.simulate else _read_curves)(options, trays)
 
@@ -92,6 +92,13 @@ def run(options: argparse.Namespace) -> int:
         _print(tray_values)
     print(f'nanorocks: {len(trays)} tray{"s" * (len(trays) > 1)} in {path}', file=sys.stderr)
     return 0
+
+
+def _trays_file(results: str | None) -> str:
+    """The trays file that the results were made with."""
+    from nanorocks_ros.studies.analysis.results_folder import trays_file_of
+
+    return trays_file_of(Path(results)) if results else ''
 
 
 def _numbers(text: str | None) -> tuple[int, ...]:

@@ -12,7 +12,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.flags import flag_of, settings_from
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.settings import PipelineSettings, rows
 
 if TYPE_CHECKING:
     from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
@@ -20,6 +22,14 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.film_import.import_result import ImportResult
 
 NS = 1_000_000_000
+# Flags of this command for settings of the pipeline; their names in `analyse` do as well.
+_EXPERIMENT = {
+    'trays': '--trays',
+    'trays_file': '--trays-file',
+    'preprocess.layout': '--layout',
+    'preprocess.pixels_per_metre': '--pixels-per-metre',
+    'preprocess.regions_px': '--regions-px',
+}
 # Number of skipped files that are named in the notice.
 _NAMED = 3
 
@@ -51,6 +61,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         '--calibration', metavar='YAML', help='calibration file, for the camera_info in the bag'
     )
+    _add_experiment(parser.add_argument_group('what the film shows, kept in the bag'))
     parser.add_argument(
         '--quality',
         type=int,
@@ -58,6 +69,20 @@ def add_parser(commands: Any) -> None:
         help='JPEG quality of frames that are not JPEG already, 1 to 100; default 95',
     )
     parser.set_defaults(run=run)
+
+
+def _add_experiment(group: Any) -> None:
+    """Flags of `nanorocks analyse`, which then needs them no more."""
+    by_name = {row.name: row for row in rows(PipelineSettings())}
+    for name, own_flag in _EXPERIMENT.items():
+        row = by_name[name]
+        group.add_argument(
+            *dict.fromkeys((own_flag, flag_of(name))),
+            dest=name,
+            metavar='V',
+            nargs='+' if isinstance(row.default, tuple) else None,
+            help=f'{row.doc}{f" [{row.unit}]" if row.unit else ""}; default: not stated',
+        )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -86,13 +111,42 @@ def _settings(options: argparse.Namespace) -> ImportSettings:
             '--rate', f'{options.rate!r} is not a number', 'give one like 30 or 30000/1001'
         ) from error
     name = options.calibration
+    experiment = _experiment(options)
     return ImportSettings(
         quality=options.quality,
         start_ns=start_ns,
         rate=rate,
         calibration=load_calibration(name) if name else None,
         calibration_name=name or '',
+        experiment=experiment,
     )
+
+
+def _experiment(options: argparse.Namespace) -> dict[str, str]:
+    """What the bag is to say of its trays, checked."""
+    from nanorocks_ros.experiment.recorded_experiment import experiment_metadata
+    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+
+    told = {name for name in _EXPERIMENT if getattr(options, name) is not None}
+    settings = settings_from(options, PipelineSettings())
+    values: dict[str, Any] = {row.name: row.default for row in rows(settings) if row.name in told}
+    if options.calibration:
+        values['preprocess.calibration'] = options.calibration
+        for name in told - {'trays', 'trays_file'}:
+            raise ConfigurationError(
+                _EXPERIMENT[name], 'is part of the --calibration', 'leave out one of them'
+            )
+    trays = load_trays(settings.trays_file)
+    for number in values.get('trays', ()):
+        tray_by_number(trays, number)
+    regions = values.get('preprocess.regions_px', ())
+    if regions and len(regions) != 4 * len(values.get('trays', ())):
+        raise ConfigurationError(
+            '--regions-px',
+            f'{len(regions)} numbers for {len(values.get("trays", ()))} trays',
+            'give x, y, width, height for each of --trays',
+        )
+    return experiment_metadata(values)
 
 
 def _run_single(

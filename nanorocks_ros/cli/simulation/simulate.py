@@ -191,6 +191,7 @@ def _plan(options: argparse.Namespace, files: SimulatedFiles) -> SimulationPlan:
     return SimulationPlan(
         settings=settings,
         tray=tray_by_number(trays, settings.tray),
+        trays_file=options.trays_file or '',
         duration=options.duration,
         samples=samples,
         runs=options.runs,

@@ -125,7 +125,10 @@ def _recorder(
     check_scene(filmed.scene)
     check_codec(filmed.compression)
     check_quality(options.quality)
-    return SceneRecorder(settings, filmed.scene, options.duration, trays), filmed, settings
+    recorder = SceneRecorder(
+        settings, filmed.scene, options.duration, trays, options.trays_file or ''
+    )
+    return recorder, filmed, settings
 
 
 def _drawn(

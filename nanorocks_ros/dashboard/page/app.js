@@ -91,6 +91,7 @@ function drawTray(tray) {
   at('about').textContent = tray.description;
   at('state').dataset.state = flagged && state === 'ok' ? 'warning' : state;
   at('state').textContent = text + flagged;
+  at('state').title = words.flagTexts(tray.latest);
   at('canvas').setAttribute('aria-label', `Picture of tray ${chosen}${pressed('tracks') ? ' with its tracks' : ''}`);
   document.title = `Tray ${chosen}, NanoRocks`;
   drawNumbers(tray);

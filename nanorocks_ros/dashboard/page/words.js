@@ -55,6 +55,10 @@ export const saysSomething = (cor) => !!cor && known(cor.restitution) && ['cooli
 export const flags = ({ speed: now, cor }) =>
   [...new Set([...(now?.quality ?? []), ...(cor?.quality ?? [])])].map((one) => one.replaceAll('_', ' '));
 
+/** What these flags mean and what to do, and why a restitution is not known; a line for each. */
+export const flagTexts = ({ speed: now, cor }) =>
+  [...new Set([...(now?.flags ?? []), ...(cor?.flags ?? []), ...(cor?.reason ? [cor.reason] : [])])].join('\n');
+
 /** The value of a sticking speed, and what is to be said of it. */
 export function sticking(cluster) {
   const between = interval(cluster.sticking_speed_lower, cluster.sticking_speed_upper, speed);

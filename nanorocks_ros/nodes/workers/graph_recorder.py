@@ -10,6 +10,7 @@ from sensor_msgs.msg import CompressedImage
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import NanorocksError
+from nanorocks_ros.experiment.recorded_experiment import metadata_of_settings
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.reader import BagMessage
 from nanorocks_ros.recordings.bag.recorder import Recorder
@@ -18,7 +19,7 @@ from nanorocks_ros.recordings.messages.message_builders import (
     compressed_image_message,
     time_message,
 )
-from nanorocks_ros.settings import rows
+from nanorocks_ros.settings import PipelineSettings, rows
 from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:
@@ -154,7 +155,13 @@ def provenance(source: str, *settings: Any) -> dict[str, str]:
     settings : dataclasses of settings
     """
     values = {row.name: str(row.default) for group in settings for row in rows(group)}
-    return {'nanorocks_ros': __version__, 'source': source, **values}
+    said = {k: v for group in settings for k, v in _experiment(group).items()}
+    return {'nanorocks_ros': __version__, 'source': source, **values, **said}
+
+
+def _experiment(settings: Any) -> dict[str, str]:
+    """What the recording is to say of its trays."""
+    return metadata_of_settings(settings) if isinstance(settings, PipelineSettings) else {}
 
 
 def _serialized(message: Any) -> bytes:

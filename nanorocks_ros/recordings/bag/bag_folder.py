@@ -93,6 +93,20 @@ def open_contents(path: Path, *, salvaging: bool = False) -> BagContents:
         ) from error
 
 
+def read_metadata(path: str | Path) -> dict[str, str]:
+    """Provenance of a recording, without its messages where ``metadata.yaml`` is there.
+
+    Raises
+    ------
+    RecordingError
+        If nothing exists at the path, or it is not a recording.
+    """
+    path = Path(path)
+    if path.is_dir() and (information := _information(path, [])):
+        return _provenance(information)
+    return open_contents(path).metadata
+
+
 def _open_file(path: Path, salvaging: bool) -> StorageFile:
     with path.open('rb') as stream:
         start = stream.read(16)

@@ -26,6 +26,7 @@ from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 from nanorocks_ros.stages.preprocess.shake_detection import NS
 from nanorocks_ros.stages.restitution.cycle_restitution import UNDETERMINED, CycleRestitution
 from nanorocks_ros.stages.restitution.restitution_methods import (
+    LARGEST_TENSION,
     Decay,
     DecayLibraryMethod,
     PaperMethod,
@@ -44,8 +45,6 @@ if TYPE_CHECKING:
 _STAMP_ROUNDING_NS = 1_000_000
 # The first speed may come that much later for other reasons than a tray that oscillates.
 _LATE_NS = 500_000_000
-# Standard deviations by which decay, rebounds and collisions may disagree without a flag.
-_TENSE = 3.0
 
 
 Input = SpeedEstimate | Rebound | PairCollision | Merge
@@ -235,7 +234,7 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
         if status is CorStatus.FINAL:
             few = self._settings.min_samples
             initial_speeds, haff_times = species_decays(self._tray, decay.time, self._samples, few)
-        if result.tension > _TENSE:
+        if result.tension > LARGEST_TENSION:
             quality |= Quality.INCONSISTENT
         return (
             CorEstimate(

@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 # Largest standard deviation of a restitution that is given: a uniform one from 0 to 1 has 0.29.
 _LARGEST_DEVIATION = 0.2
+LARGEST_TENSION = 3.0
+"""Standard deviations by which decay, rebounds and collisions may disagree without a flag."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,6 +173,7 @@ class DecayLibraryMethod:
         check_walls(self._walls)
         half = 0.5 * settings.cooling.probability
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
+        self._include_inconsistent = settings.cooling.include_inconsistent
         self.evidence: CycleLikelihoods | None = None
         self._means_so_far = UNKNOWN_MEASURED, UNKNOWN_MEASURED
 
@@ -210,7 +213,8 @@ class DecayLibraryMethod:
                 wall_restitution=wall_restitution,
                 correlation=_correlation(posterior),
             )
-        mean, wall_mean = self._means(likelihood, contacts, final=final)
+        counts = self._include_inconsistent or not posterior.tension > LARGEST_TENSION
+        mean, wall_mean = self._means(likelihood, contacts, final=final and counts)
         return replace(result, mean_restitution=mean, mean_wall_restitution=wall_mean)
 
     def _posterior(self, integrated: NDArray[np.float64], contacts: ContactTerms) -> Posterior:
@@ -225,7 +229,7 @@ class DecayLibraryMethod:
     def _means(
         self, likelihood: DecayLikelihood, contacts: ContactTerms, *, final: bool
     ) -> tuple[Measured, Measured]:
-        """Mean restitutions of beads and of walls, of all finished cycles and a final one."""
+        """Mean restitutions of beads and of walls, of all finished cycles and one that counts."""
         if not final:
             return self._means_so_far
         own = CycleLikelihoods(cycles=1, decay=likelihood, contacts=contacts)

@@ -144,6 +144,10 @@ class Analysis:
         Frames that could not be used.
     metadata : dict of str to str
         Provenance that the recording holds.
+    include_inconsistent : bool
+        Whether cycles flagged inconsistent are counted in the means.
+    lowest_walls : float
+        Lower end of the prior of the restitution of the walls.
     """
 
     epoch_ns: int
@@ -154,6 +158,8 @@ class Analysis:
     error: FrameError | None = None
     refused: int = 0
     metadata: dict[str, str] = field(default_factory=dict)
+    include_inconsistent: bool = False
+    lowest_walls: float = 0.0
 
     @property
     def frames(self) -> int:
@@ -222,6 +228,8 @@ def analyse(
         trays=_empty(settings.trays, truth, scratch),
         complete=bag.reader.complete,
         metadata=bag.reader.metadata,
+        include_inconsistent=settings.cooling.include_inconsistent,
+        lowest_walls=settings.prior.min_wall_restitution,
     )
     frames = PreprocessedFrames(bag, pipeline.preprocessor)
     for shot in frames.shots(progress):

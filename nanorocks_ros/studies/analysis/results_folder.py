@@ -16,8 +16,10 @@ import numpy as np
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError, UnwritableError
+from nanorocks_ros.experiment.recorded_experiment import experiment_key, metadata_of_settings
 from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.outputs.parquet import Column, write_parquet
+from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
@@ -64,6 +66,14 @@ def check_results_folder(folder: Path) -> Path:
             str(folder), 'exists and holds no results of ours', 'pass another --output'
         )
     return next(parent for parent in folder.absolute().parents if parent.is_dir())
+
+
+def trays_file_of(folder: Path) -> str:
+    """Content of the trays file of some results; empty where the trays flew, or it is unknown."""
+    try:
+        return read_metadata(folder / BAG_NAME).get(experiment_key('trays_file'), '')
+    except RecordingError:
+        return ''
 
 
 def write_results(
@@ -172,6 +182,7 @@ def _provenance(source: Path, settings: PipelineSettings) -> dict[str, str]:
         'nanorocks_ros': __version__,
         'source': source.name,
         **{row.name: str(row.default) for row in rows(settings)},
+        **metadata_of_settings(settings),
     }
 
 

@@ -9,11 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.records import ClusterEstimate, CorEstimate, CorStatus
+from nanorocks_ros.studies.analysis.cycle_words import (
+    cycle_as_json,
+    is_left_out,
+    tray_reason,
+    used_speeds,
+)
 from nanorocks_ros.wire.array_layouts import NS, layout
 from nanorocks_ros.wire.flat_records import flat_value
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from nanorocks_ros.records import ArrayRecord
     from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
@@ -101,17 +107,27 @@ def _tray_as_json(analysis: Analysis, results: TrayResults, *, series: bool) -> 
         for speed in results.speeds
         if speed.stamp_ns in wanted
     }
-    clusters = _ends_of_cycles(results.clusters)
+    ends = ends_of_cycles(results.clusters)
+    used = used_speeds(results.speeds, cycles, analysis.lowest_walls)
+    reason = tray_reason(results)
     return {
         **(_series_as_json(results, epoch_ns) if series else {}),
         'cycles': [
-            _cycle_as_json(
-                estimate,
-                ((starts[estimate.stamp_ns] or 0) - epoch_ns) / NS,
-                _end_of_cycle(clusters.get(estimate.cycle, []), estimate),
-            )
+            {
+                **_cycle_as_json(
+                    estimate,
+                    ((starts[estimate.stamp_ns] or 0) - epoch_ns) / NS,
+                    clusters := end_of_cycle(ends, estimate),
+                ),
+                **cycle_as_json(estimate, clusters, used[estimate.cycle]),
+            }
             for estimate in cycles
         ],
+        'cycles_left_out': sum(
+            is_left_out(estimate, include_inconsistent=analysis.include_inconsistent)
+            for estimate in cycles
+        ),
+        'reason': None if reason is None else reason._asdict(),
         'truth': _truth_as_json(analysis, results, series=series),
     }
 
@@ -128,7 +144,7 @@ def _series_as_json(results: TrayResults, epoch_ns: int) -> dict[str, Any]:
     }
 
 
-def _ends_of_cycles(
+def ends_of_cycles(
     clusters: Iterable[ClusterEstimate],
 ) -> dict[int, list[tuple[int, ClusterEstimate]]]:
     """Of each cycle, and every time it was played: stamp of the first estimate, and the last."""
@@ -142,10 +158,11 @@ def _ends_of_cycles(
     return ends
 
 
-def _end_of_cycle(
-    parts: Sequence[tuple[int, ClusterEstimate]], cor: CorEstimate
+def end_of_cycle(
+    ends: Mapping[int, Sequence[tuple[int, ClusterEstimate]]], cor: CorEstimate
 ) -> ClusterEstimate | None:
     """The last estimate of the cycle, in the same pass of a recording that was played twice."""
+    parts = ends.get(cor.cycle, ())
     near = [last for first, last in parts if first <= cor.stamp_ns <= last.stamp_ns]
     return near[-1] if near else parts[-1][1] if parts else None
 

@@ -47,12 +47,16 @@ class BatchPlan:
         For results.
     settings : PipelineSettings
     image_topic : str
+    told : frozenset of str or None
+        Names of the settings that hold for all recordings; what a recording says of its trays
+        replaces the others. None: all of them hold.
     """
 
     bags: FoundBags
     folder: Path
     settings: PipelineSettings
     image_topic: str = ''
+    told: frozenset[str] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,10 +177,11 @@ def run_batch(plan: BatchPlan, workers: Workers, watcher: Watcher) -> Batch:
     KeyboardInterrupt
         Ctrl-C; its text says what is kept.
     """
-    # Checked once, before hours of work.
-    Pipeline(plan.settings, 'settings')
+    # Checked once, before hours of work, unless each recording says which trays it shows.
+    if plan.told is None or 'trays' in plan.told or 'trays_file' not in plan.told:
+        Pipeline(plan.settings, 'settings')
     workers.check()
-    with BatchStore(plan.folder, plan.settings, plan.image_topic) as store:
+    with BatchStore(plan.folder, plan.settings, plan.image_topic, plan.told) as store:
         tasks = store.add(plan.bags.bags)
         for text in store.notices:
             watcher.notice(text)

@@ -70,6 +70,8 @@ class BatchStore:
         New, empty, or that of an earlier batch.
     settings : PipelineSettings
     image_topic : str
+    told : frozenset of str or None
+        As in `BagTask`.
 
     Attributes
     ----------
@@ -81,11 +83,17 @@ class BatchStore:
         When the folder holds something else, is in use, or cannot be written.
     """
 
-    def __init__(self, folder: Path, settings: PipelineSettings, image_topic: str) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        settings: PipelineSettings,
+        image_topic: str,
+        told: frozenset[str] | None = None,
+    ) -> None:
         self.folder = folder.absolute()
         self.notices: list[str] = []
-        self._settings, self._image_topic = settings, image_topic
-        self._question = _question(settings, image_topic)
+        self._settings, self._image_topic, self._told = settings, image_topic, told
+        self._question = _question(settings, image_topic, told)
         self.entries: dict[Path, Entry] = {}
         self._by_task: dict[str, Entry] = {}
         self._check_place()
@@ -165,6 +173,7 @@ class BatchStore:
                 question=self._question,
                 note=self.folder / _NOTES / name,
                 earlier=() if before else self._gone(path),
+                told=self._told,
             )
             self._by_task[name] = entry
         return tasks
@@ -255,7 +264,7 @@ class BatchStore:
         return entries
 
 
-def _question(settings: PipelineSettings, image_topic: str) -> str:
+def _question(settings: PipelineSettings, image_topic: str, told: frozenset[str] | None) -> str:
     """A hash of all that the results depend on besides the recording."""
     digest = hashlib.blake2b(digest_size=16)
     for row in rows(settings):
@@ -264,7 +273,8 @@ def _question(settings: PipelineSettings, image_topic: str) -> str:
             # The content of a file may change under the same name.
             with suppress(OSError):
                 digest.update(Path(row.default).read_bytes())
-    digest.update(f'{__version__} {image_topic}'.encode(errors='surrogateescape'))
+    names = None if told is None else sorted(told)
+    digest.update(f'{__version__} {image_topic} {names}'.encode(errors='surrogateescape'))
     return digest.hexdigest()
 
 

@@ -16,10 +16,16 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.errors import NanorocksError, RecordingError, UnwritableError
+from nanorocks_ros.experiment.recorded_experiment import (
+    RecordedSettings,
+    metadata_of_settings,
+    recorded_settings,
+)
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.outputs.npz_archive import Arrays, write_archive
 from nanorocks_ros.outputs.safe_text import printable
+from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 from nanorocks_ros.recordings.bag.fingerprint import FileState, content_hash, file_states
 from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleSummary, cycles_of
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, analyse
@@ -51,6 +57,9 @@ class BagTask:
         For its results.
     settings : PipelineSettings
     image_topic : str
+    told : frozenset of str or None
+        Names of the settings that hold for all recordings; a recording that says what it shows
+        replaces the others. None: all of them hold.
     question : str
         Hash of all else that results depend on.
     note : Path
@@ -66,6 +75,7 @@ class BagTask:
     question: str
     note: Path
     earlier: tuple[Path, ...] = ()
+    told: frozenset[str] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,6 +127,8 @@ class BagSummary(TypedDict):
         As in `BagOutcome`.
     start_ns : int, [ns]
         Stamp of the first frame.
+    experiment : dict of str to str
+        Trays, beads and scale by which it was analysed, as a recording keeps them.
     trays : dict of str to TraySummary
         By number.
     """
@@ -135,6 +147,7 @@ class BagSummary(TypedDict):
     reason: str
     start_ns: int
     metadata: dict[str, str]
+    experiment: dict[str, str]
     trays: dict[str, TraySummary]
 
 
@@ -182,13 +195,15 @@ def _analysed(task: BagTask) -> BagOutcome:
         ):
             other = '' if folder == task.folder else folder.name
             return replace(_outcome(stored, files), folder=other)
+    settings, notices, _ = _settings_of(task)
     analysis = analyse(
         task.path,
-        task.settings,
+        settings,
         image_topic=task.image_topic,
         progress=_noting(task.note),
         scratch=task.folder.parent,
     )
+    analysis.notices += notices
     if file_states(task.path) != files:
         raise RecordingError(
             str(task.path), 'changed while it was analysed', 'analyse it again when it is complete'
@@ -199,6 +214,7 @@ def _analysed(task: BagTask) -> BagOutcome:
         'content': content,
         'film': analysis.metadata.get('source_sha256', ''),
         'question': task.question,
+        'experiment': metadata_of_settings(settings),
         **_summary(analysis),
     }
 
@@ -208,8 +224,15 @@ def _analysed(task: BagTask) -> BagOutcome:
         write_archive(folder / EVIDENCE, _evidence(analysis))
         write_bytes(folder / SUMMARY, json.dumps(summary, allow_nan=False).encode())
 
-    write_results(analysis, task.folder, task.path, task.settings, more=more)
+    write_results(analysis, task.folder, task.path, settings, more=more)
     return replace(_outcome(summary, files), frames=analysis.frames)
+
+
+def _settings_of(task: BagTask) -> RecordedSettings:
+    if task.told is None:
+        return RecordedSettings(task.settings, ())
+    metadata = read_metadata(task.path)
+    return recorded_settings(task.settings, task.told, metadata, str(task.path))
 
 
 def _outcome(summary: BagSummary, files: tuple[FileState, ...]) -> BagOutcome:

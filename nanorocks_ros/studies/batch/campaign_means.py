@@ -17,10 +17,18 @@ from nanorocks_ros.numerics.sample_mean import mean_of
 from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.outputs.npz_archive import read_archive
 from nanorocks_ros.pipeline.composition import TrayStages, trays_of
-from nanorocks_ros.records import UNKNOWN_MEASURED_INTERVAL, MeasuredInterval, Quality
+from nanorocks_ros.records import (
+    UNKNOWN_MEASURED_INTERVAL,
+    CorStatus,
+    Measured,
+    MeasuredInterval,
+    Quality,
+)
+from nanorocks_ros.records.result_words import fitted
 from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleSummary
 from nanorocks_ros.studies.analysis.long_term import Campaign, campaign_of
 from nanorocks_ros.studies.analysis.results_folder import EVIDENCE
+from nanorocks_ros.studies.batch.batch_trays import of_these_trays, settings_by_tray
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -44,8 +52,8 @@ MEANS = {
     'onset': 's',
 }
 # Of these a decay that is too short tells nothing, and its fit anything: they are not part of a
-# mean unless they are known to this part of themselves.
-_FITTED, _WORST_FIT = ('initial_speed', 'haff_time'), 0.5
+# mean unless they are known to a part of themselves.
+_FITTED = 'initial_speed', 'haff_time'
 # Less known than this nothing is: anything from 0 to 1 has a deviation of 0.29.
 _LEAST_KNOWN = 0.2
 
@@ -73,6 +81,8 @@ class TrayMeans:
     sticking : StickingEstimate or None
     means : dict of str to Mean
         Of `MEANS`.
+    left_out : int
+        Cycles that are not counted in the restitutions, since they are flagged inconsistent.
     """
 
     tray: int
@@ -81,6 +91,7 @@ class TrayMeans:
     restitution: MeanRestitution | None
     sticking: StickingEstimate | None
     means: dict[str, Mean]
+    left_out: int = 0
 
 
 class CycleRow(NamedTuple):
@@ -131,14 +142,15 @@ def combined(
         Called with the steps done and the steps there are.
     """
     notices: list[str] = []
+    of_results = settings_by_tray(results, settings)
+    results = [of_these_trays(result, settings, of_results, notices) for result in results]
     column, unit = _measure(results)
     rows = [row for result in results for row in _rows(result, column)]
     evidence, sticking = _added_up(results, notices, progress)
     trays: dict[int, TrayMeans] = {}
-    settings = calibrated(settings)
-    for number, tray in trays_of(settings).items():
+    for number, own_settings in sorted(of_results.items()):
         own = [row for row in rows if row.tray == number]
-        stages = TrayStages(settings, tray)
+        stages = TrayStages(calibrated(own_settings), trays_of(own_settings)[number])
         mean = None
         if number in evidence:
             try:
@@ -151,7 +163,8 @@ def combined(
             cycles=len(own),
             restitution=mean,
             sticking=stages.clusters.together(sticking.get(number, [])),
-            means={name: _mean(own, name) for name in MEANS},
+            means={name: _mean(_counted(own, name, settings), name) for name in MEANS},
+            left_out=len(own) - len(_counted(own, 'cycle_restitution', settings)),
         )
     return Combined(
         trays=trays,
@@ -197,6 +210,20 @@ def _rows(result: BagResults, column: str) -> Iterable[CycleRow]:
             yield CycleRow(result.name, int(number), values)
 
 
+def _counted(
+    rows: Sequence[CycleRow], name: str, settings: PipelineSettings
+) -> Sequence[CycleRow]:
+    """The cycles of a mean: for restitutions without those flagged inconsistent."""
+    if settings.cooling.include_inconsistent or 'restitution' not in name:
+        return rows
+    final = CorStatus.FINAL.name.lower()
+    return [
+        row
+        for row in rows
+        if row.values['status'] != final or not row.values['quality'] & Quality.INCONSISTENT
+    ]
+
+
 def _mean(rows: Sequence[CycleRow], name: str) -> Mean:
     values = [row.values for row in rows]
     if name in _FITTED:
@@ -208,7 +235,7 @@ def _mean(rows: Sequence[CycleRow], name: str) -> Mean:
 
 def _fitted(values: Mapping[str, Any], name: str) -> bool:
     value, error = values.get(name), values.get(f'{name}_error')
-    return value is not None and error is not None and error <= _WORST_FIT * value
+    return value is not None and error is not None and fitted(Measured(value, error))
 
 
 def _added_up(
@@ -294,6 +321,7 @@ def means_as_json(tray: TrayMeans) -> dict[str, Any]:
         **_interval_as_json('restitution', restitution),
         **_interval_as_json('wall_restitution', wall_restitution),
         'cycles_read': mean.cycles if mean else 0,
+        'cycles_left_out': tray.left_out,
         'tension': finite_or_none(mean.tension) if mean else None,
         'rebounds': mean.rebounds if mean else 0,
         'collisions': mean.collisions if mean else 0,

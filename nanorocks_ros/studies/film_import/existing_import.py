@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.experiment.recorded_experiment import EXPERIMENT_SETTINGS, experiment_key
 from nanorocks_ros.recordings.bag.provenance import checksum
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.film.image_folder import images_in
@@ -16,6 +17,7 @@ from nanorocks_ros.studies.film_import.import_film import FRAME_ID
 from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from nanorocks_ros.experiment.calibration import CameraInfo
@@ -84,9 +86,25 @@ def check_same_settings(bag: Path, settings: ImportSettings) -> None:
     # The quality does not matter for JPEGs that were not recompressed.
     if pictures.startswith('JPEG of') and pictures != settings.compression():
         differences.append(f'--quality was {pictures.split()[-1]}, is {settings.quality}')
+    differences += _experiment_differences(metadata, settings)
     if differences:
         problem = f'was imported with other settings ({" and ".join(differences)})'
         raise RecordingError(str(bag), problem, _REMEDY)
+
+
+def _experiment_differences(metadata: Mapping[str, str], settings: ImportSettings) -> list[str]:
+    """What the bag says of its trays otherwise than the settings."""
+    differences = []
+    for name in EXPERIMENT_SETTINGS:
+        key = experiment_key(name)
+        before, now = metadata.get(key, ''), settings.experiment.get(key, '')
+        # The lens of a calibration is compared by its camera_info.
+        if before == now or name == 'preprocess.calibration':
+            continue
+        flag = key.rpartition('.')[2].replace('_', '-')
+        texts = ['another' if '\n' in text else text or _NOT_GIVEN for text in (before, now)]
+        differences.append(f'--{flag} was {texts[0]}, is {texts[1]}')
+    return differences
 
 
 def _lens_in(reader: BagReader) -> CameraInfo | None:

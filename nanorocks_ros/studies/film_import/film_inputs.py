@@ -6,7 +6,7 @@ Tested by ``test/studies/film_import/test_import_times.py``.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
@@ -46,6 +46,8 @@ class ImportSettings:
         Calibration of the camera.
     calibration_name : str
         Name of the calibration file.
+    experiment : dict of str to str
+        What the bag is to say of its trays; see `experiment_metadata`.
     threads : int
         Number of threads for decoding and compression; 0: one per core.
     """
@@ -55,6 +57,7 @@ class ImportSettings:
     rate: Fraction | None = None
     calibration: Calibration | None = None
     calibration_name: str = ''
+    experiment: dict[str, str] = field(default_factory=dict)
     threads: int = 0
 
     def __post_init__(self) -> None:

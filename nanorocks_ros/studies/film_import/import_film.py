@@ -209,6 +209,7 @@ class _Import:
             'pictures': 'as stored' if unchanged else settings.compression(),
             **{f'import.{name}': value for name, value in settings.as_metadata().items() if value},
             **{f'camera.{k}': v for info in infos[:1] for k, v in info.tags.items()},
+            **settings.experiment,
         }
 
     def _set_metadata(self, bag: BagWriter, metadata: dict[str, str]) -> None:

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FrameError, NanorocksError
+from nanorocks_ros.experiment.recorded_experiment import recorded_settings
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.messages.camera_info import info_from_message, view_from_message
 from nanorocks_ros.recordings.messages.image_messages import image_kind
 from nanorocks_ros.recordings.storage import NS
+from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:
@@ -102,7 +104,7 @@ class BagInfo:
     complete : bool
     messages_lost : int
     trays : list of int
-        Trays with results or ground truth.
+        Trays with results or ground truth, and those that the metadata name.
     calibration : CameraInfo or None
     camera : str
         Topic of the camera; empty if there is none.
@@ -156,6 +158,7 @@ def bag_info(path: Path, progress: Callable[[int, int], None]) -> BagInfo:
         trays=sorted({tray for name in reader.topics if (tray := topics.tray_of(name))}),
     )
     total = sum(topic.count for topic in reader.topics.values())
+    _add_recorded_trays(info)
     info.camera = _camera(reader)
     for number, message in enumerate(reader.messages(), start=1):
         report = info.topics.get(message.topic)
@@ -169,6 +172,16 @@ def bag_info(path: Path, progress: Callable[[int, int], None]) -> BagInfo:
     info.messages_lost = max(reader.messages_lost, (reader.expected or 0) - read)
     info.health = _health(info, reader)
     return info
+
+
+def _add_recorded_trays(info: BagInfo) -> None:
+    try:
+        recorded = recorded_settings(PipelineSettings(), (), info.metadata, str(info.path))
+    except NanorocksError as error:
+        info.health.append(Problem(f'{error.where}: {error.what}', error.do))
+        return
+    if recorded.trays_known:
+        info.trays = sorted({*info.trays, *recorded.settings.trays})
 
 
 def _camera(reader: BagReader) -> str:

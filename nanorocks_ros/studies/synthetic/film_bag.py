@@ -11,6 +11,7 @@ import numpy as np
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.recorded_experiment import experiment_metadata
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.jobs.progress import Progress
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
@@ -46,6 +47,7 @@ def film_into_bag(
     quality: int,
     progress: Progress,
     tray: Tray | None = None,
+    trays_file: str = '',
 ) -> dict[str, Any]:
     """Film a simulated tray into a new bag.
 
@@ -61,6 +63,8 @@ def film_into_bag(
         Called with the number of written frames and the number of frames.
     tray : Tray, optional
         By default the flown tray with the number in the settings.
+    trays_file : str
+        File that describes the tray, kept in the bag; empty: it was flown.
 
     Returns
     -------
@@ -88,6 +92,14 @@ def film_into_bag(
     provenance = {
         'nanorocks_ros': __version__,
         **{row.name: str(row.default) for row in rows(settings)},
+        **experiment_metadata(
+            {
+                'trays': [settings.tray],
+                'trays_file': trays_file,
+                'preprocess.layout': 'centred',
+                'preprocess.pixels_per_metre': settings.pixels_per_metre,
+            }
+        ),
     }
     # Before the bag, so that a tray that does not fit leaves no files.
     moments = film(settings, tray, frames, start_stamp_ns=START_NS)

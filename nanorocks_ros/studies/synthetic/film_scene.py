@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 
 from nanorocks_ros import __version__
+from nanorocks_ros.experiment.recorded_experiment import experiment_metadata
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
@@ -56,6 +57,8 @@ class SceneRecorder:
     duration : float, [s], > 0
     trays : mapping of int to Tray, optional
         All cells of the plate; by default those of the flight.
+    trays_file : str
+        File that describes them, kept in a bag; empty: those of the flight.
 
     Raises
     ------
@@ -69,8 +72,10 @@ class SceneRecorder:
         scene: SceneSettings,
         duration: float,
         trays: Mapping[int, Tray] | None = None,
+        trays_file: str = '',
     ) -> None:
         check_duration(duration)
+        self._trays_file = trays_file
         self._simulation, self._scene, self._trays = simulation, scene, trays
         self.duration = duration
         self.frames = max(1, round(duration * simulation.frame_rate))
@@ -142,7 +147,7 @@ class SceneRecorder:
         compressed_moments = compressed(
             moments, compression, quality=quality, frame_rate=self._simulation.frame_rate
         )
-        with BagWriter(path, self._table(), metadata=self._provenance(compression)) as bag:
+        with BagWriter(path, self._table(), metadata=self._provenance(film, compression)) as bag:
             bag.write(topics.EPOCH.absolute(), START_NS, time_message(START_NS))
             info = lens_message(film.camera.geometry.camera, START_NS)
             bag.write(topics.CAMERA_INFO.absolute(), START_NS, info)
@@ -161,7 +166,7 @@ class SceneRecorder:
                 table[topic.absolute(tray)] = offered_topic(topic)
         return table
 
-    def _provenance(self, compression: CompressionSettings) -> dict[str, str]:
+    def _provenance(self, film: SceneFilm, compression: CompressionSettings) -> dict[str, str]:
         simulated = {row.name: str(row.default) for row in rows(self._simulation)}
         # These settings of a single tray do not apply: the scene has its own.
         for name in ('tray', 'noise', 'pixels_per_metre'):
@@ -171,7 +176,22 @@ class SceneRecorder:
             **simulated,
             **{row.name: str(row.default) for row in rows(self._scene, 'scene.')},
             **{row.name: str(row.default) for row in rows(compression, 'compression.')},
+            **experiment_metadata(
+                {
+                    'trays': sorted(self._scene.trays),
+                    'trays_file': self._trays_file,
+                    'preprocess.pixels_per_metre': self._scene.pixels_per_metre,
+                    **self._places(film),
+                }
+            ),
         }
+
+    def _places(self, film: SceneFilm) -> dict[str, Any]:
+        """Settings that say where the trays are in the picture."""
+        if not self._scene.close_up:
+            return {'preprocess.layout': 'plate'}
+        regions = (film.camera.geometry.regions[number] for number in sorted(self._scene.trays))
+        return {'preprocess.regions_px': [side for region in regions for side in region]}
 
 
 def lens_message(camera: Camera, stamp_ns: int) -> object:

@@ -129,6 +129,7 @@ class SimulatedFiles:
             quality=self.quality,
             progress=progress,
             tray=plan.tray,
+            trays_file=plan.trays_file,
         )
 
     def film_video(self, plan: SimulationPlan, progress: Progress) -> dict[str, Any]:

@@ -53,6 +53,8 @@ class SimulationPlan:
         Whether to keep the beads of the first run at `shown_times`.
     events : bool
         Whether to keep every collision.
+    trays_file : str
+        File that describes the tray; empty: it was flown.
 
     Raises
     ------
@@ -68,6 +70,7 @@ class SimulationPlan:
     trajectory: bool = False
     picture: bool = False
     events: bool = False
+    trays_file: str = ''
 
     def __post_init__(self) -> None:
         check_settings(self.settings)

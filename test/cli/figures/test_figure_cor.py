@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sysconfig
@@ -13,6 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import yaml
 from decays import simulated_mixture, simulated_table, write_rows
 
 from nanorocks_ros.cli.main import main
@@ -182,13 +184,22 @@ def test_an_oscillating_tray_is_fitted_from_the_start_of_the_cooling(table, tmp_
 
 def test_a_bag_is_analysed_first(tmp_path, capsys):
     folder = tmp_path / 'figures'
-    assert draw(SAMPLE, folder, '--tray', '1', '--json') == 0
+    # The bag says that it shows tray 1.
+    assert draw(SAMPLE, folder, '--json') == 0
     values = json.loads(capsys.readouterr().out)
     assert values['cycles'] == 1
     assert values['first'] == pytest.approx(1.75, abs=0.2)
     assert all((folder / name).is_file() for name in FIGURES)
     assert (folder / 'results' / 'tray_1_speed.csv').is_file()
-    assert draw(SAMPLE, tmp_path / 'other') == 2
+
+
+def test_of_a_bag_that_does_not_say_its_tray_the_tray_is_required(tmp_path, capsys):
+    foreign = shutil.copytree(SAMPLE, tmp_path / 'foreign')
+    path = foreign / 'metadata.yaml'
+    document = yaml.safe_load(path.read_text())
+    document['rosbag2_bagfile_information']['custom_data'] = {}
+    path.write_text(yaml.safe_dump(document))
+    assert draw(foreign, tmp_path / 'figures') == 2
     assert '--tray: is required with a bag' in capsys.readouterr().err
 
 

@@ -1,0 +1,240 @@
+"""What flags and states mean in words, each with a remedy: the one register of such texts.
+
+The terminal, the JSON of `nanorocks analyse`, reports and the live page take their words from
+here.
+
+Tested by ``test/studies/analysis/test_cycle_words.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from nanorocks_ros.records.quality_flags import (
+    CorRelation,
+    CorStatus,
+    Quality,
+    SpeedMethod,
+    StickingStatus,
+)
+
+if TYPE_CHECKING:
+    from nanorocks_ros.records.restitution_estimates import CorEstimate
+    from nanorocks_ros.records.values import Interval, Measured, MeasuredInterval
+
+LARGEST_FIT_ERROR = 0.5
+"""Relative standard error above which an initial speed or a Haff time means nothing."""
+
+
+# Standard errors of the tracks within which an interval of the autocorrelation must begin.
+_DISAGREEMENT = 2.0
+# Part of the distance from the edge of a prior to the upper limit, in which the lower limit is
+# at the edge.
+_AT_EDGE = 0.04
+
+
+class Words(NamedTuple):
+    """What is the case, and what to do about it."""
+
+    text: str
+    remedy: str
+
+
+class FlagWords(NamedTuple):
+    """A flag by its name, what it means, and what to do about it."""
+
+    name: str
+    text: str
+    remedy: str
+
+
+_LOOK = 'look at the picture with `nanorocks look BAG -o steps.png`'
+FLAGS = {
+    Quality.SATURATED: Words(
+        'more than 1 % of the pixels are at full scale', 'reduce the exposure; speeds still hold'
+    ),
+    Quality.LOW_CONTRAST: Words('dark and bright hardly differ: no beads, or no light', _LOOK),
+    Quality.FEW_BEADS: Words(
+        'the tracks do not show all beads, or are not reliable',
+        f'{_LOOK}; speeds of the structure function still hold',
+    ),
+    Quality.GLARE: Words(
+        'reflections hide more than 1 % of the tray', 'move the lamp, or trust slow beads less'
+    ),
+    Quality.STABILISATION_LOST: Words(
+        'the motion of the tray could not be measured',
+        'below a few mm/s its swing is in the speeds; film the rim of the tray, too',
+    ),
+    Quality.GRAY_CAMERA: Words(
+        'the pictures have no colour: no tracks, species are not separated', 'film in colour'
+    ),
+    Quality.FROZEN: Words(
+        'the picture did not change for a quarter of a second',
+        'check the camera, unless beads rest in a film without noise',
+    ),
+    Quality.HALF_FRAME: Words(
+        'part of a frame was missing', 'the estimate bridges it; check the recording'
+    ),
+    Quality.WRONG_SCALE: Words(
+        'the trays are not where the settings say, or not as large',
+        f'{_LOOK}; set --preprocess-pixels-per-metre or --preprocess-regions-px, or calibrate',
+    ),
+    Quality.UNCERTAIN: Words(
+        'speeds may be wrong by more than 20 %',
+        'use their errors; film at a higher rate, or closer',
+    ),
+    Quality.UNCALIBRATED: Words(
+        'speeds by the binarised area are not calibrated',
+        'run `nanorocks calibrate-area` with manual tracks',
+    ),
+    Quality.INCONSISTENT: Words(
+        'decay, rebounds and collisions contradict each other: something happens that is not '
+        'simulated, such as friction, sticking or drag',
+        'do not use the restitutions of this cycle; compare contacts and decay with '
+        '--cooling-rebounds false and --cooling-collisions false',
+    ),
+}
+"""Meaning and remedy of each flag."""
+
+NO_SHAKING = Words(
+    'no shaking event was seen',
+    'film the shaking and the rest before it; if the film shows it, lower --speed-shake-ratio '
+    'or --preprocess-shake-speed',
+)
+NO_SPEEDS = Words('no speed could be measured', _LOOK)
+METHODS = {
+    SpeedMethod.TRACKING: 'tracking',
+    SpeedMethod.STRUCTURE_FUNCTION: 'structure function',
+    SpeedMethod.BINARISED_AREA: 'binarised area',
+}
+RELATIONS = {
+    CorRelation.LIBRARY: 'simulated decays',
+    CorRelation.PAPER: 'closed form of the paper',
+}
+
+
+def flags_in_words(quality: Quality) -> list[FlagWords]:
+    """Each flag that is set, with its meaning and remedy."""
+    words = []
+    for flag in Quality:
+        if flag in quality and flag.name:
+            name = flag.name.lower()
+            known = FLAGS.get(flag, Words(name.replace('_', ' '), 'see docs/method/speed.md'))
+            words.append(FlagWords(name, *known))
+    return words
+
+
+def size_flag(autocorrelation: MeasuredInterval, tracks: Measured) -> FlagWords | None:
+    """A flag where autocorrelation and tracks disagree on the beads of a cluster; None else.
+
+    Parameters
+    ----------
+    autocorrelation : MeasuredInterval, [beads]
+    tracks : Measured, [beads]
+        Weight-averaged size of bodies.
+    """
+    reach = _DISAGREEMENT * tracks.error
+    if not tracks.known or (
+        not autocorrelation.lower > tracks.value + reach
+        and not autocorrelation.upper < tracks.value - reach
+    ):
+        return None
+    limits = f'[{autocorrelation.lower:.1f}, {autocorrelation.upper:.1f}]'
+    return FlagWords(
+        'cluster_size',
+        f'the autocorrelation says {autocorrelation.value:.1f} beads a cluster {limits}, the '
+        f'tracks {tracks.value:.1f}',
+        'look at the end of the cycle with `nanorocks look BAG --at SECONDS -o steps.png`: if '
+        'beads lie together, the tracks miss that they stick; if not, calibrate the '
+        'autocorrelation for this camera with `nanorocks cluster-curve`',
+    )
+
+
+def wall_flag(walls: Interval, lowest: float) -> FlagWords | None:
+    """A flag where the walls are at the lower end of their prior; None else.
+
+    Parameters
+    ----------
+    walls : Interval
+        Restitution of the walls.
+    lowest : float
+        Lower end of the flat prior.
+    """
+    # A likelihood that falls from the edge on, flat, half-normal or exponential, puts the lower
+    # quantile of 0.025 at 0.03, 0.014, 0.007 of the upper one; with its peak inside, it is more.
+    if not walls.lower - lowest < _AT_EDGE * (walls.upper - lowest):
+        return None
+    return FlagWords(
+        'wall_limit',
+        f'the walls are at the lowest restitution that is allowed, {lowest:g}; those of the '
+        'beads make up for it',
+        'lower --prior-min-wall-restitution if such walls are possible',
+    )
+
+
+def reason_of(cor: CorEstimate) -> Words | None:
+    """Why a cycle has no restitution; None where it has one."""
+    if cor.status in (CorStatus.COOLING, CorStatus.FINAL):
+        return None
+    if cor.quality & Quality.WRONG_SCALE:
+        return FLAGS[Quality.WRONG_SCALE]
+    if cor.status is CorStatus.NO_DECAY:
+        return Words(
+            'the speeds do not fall',
+            'look at them with `nanorocks speeds BAG -o speeds.png`; does the camera move, or '
+            'was the tray shaken again?',
+        )
+    if math.isnan(cor.window_start):
+        return Words(
+            f'too few speeds before the end of the cycle or the first merge: {cor.samples}',
+            'film longer; where beads stick early pass --cooling-until-merge false',
+        )
+    contacts = f'{cor.rebounds} rebounds and {cor.collisions} collisions'
+    if math.isnan(cor.reduced_chi_square):
+        return Words(
+            'the speeds are those of grains, whose bias is not known, and no contact was seen',
+            'film closer, so that grains are tracked and contacts found',
+        )
+    return Words(
+        f'the decay, with {contacts}, allows almost any restitution',
+        'film more cycles, longer after the shaking, and closer or at a higher rate',
+    )
+
+
+def fitted(quantity: Measured) -> bool:
+    """Whether a fitted speed or time means anything: it is known to half of itself."""
+    return quantity.known and 0.0 < quantity.error <= LARGEST_FIT_ERROR * quantity.value
+
+
+def sticking_in_words(status: StickingStatus, speed: Interval, onset: float) -> str:
+    """The sticking speed of a cycle, and when beads began to stick.
+
+    Parameters
+    ----------
+    status : StickingStatus
+    speed : Interval, [m/s]
+    onset : float, [s]
+        First merge, since the shaking event; NaN: none.
+    """
+    began = f', from {onset:.1f} s after the shaking event on' if math.isfinite(onset) else ''
+    match status:
+        case StickingStatus.MEASURED:
+            limits = f'[{_mm(speed.lower)}, {_mm(speed.upper)}]'
+            return f'beads stick below {_mm(speed.value)} mm/s {limits}{began}'
+        case StickingStatus.NO_MERGE:
+            limit = f'; the sticking speed is below {_mm(speed.upper)} mm/s'
+            return 'no merge was seen' + (limit if math.isfinite(speed.upper) else '')
+        case StickingStatus.NO_UPPER_LIMIT:
+            limit = f'; the sticking speed is above {_mm(speed.lower)} mm/s'
+            above = limit if math.isfinite(speed.lower) and speed.lower > 0.0 else ''
+            return f'beads stick{began}{above}; there is no upper limit'
+        case StickingStatus.STUCK_FROM_THE_START:
+            return 'beads stuck together from the start; the sticking speed is not known'
+        case _:
+            return 'not known, since beads were not tracked'
+
+
+def _mm(speed: float) -> str:
+    """A speed in mm/s with the digits that mean something."""
+    return f'{1e3 * speed:.3g}' if math.isfinite(speed) else 'unknown'

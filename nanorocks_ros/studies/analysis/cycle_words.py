@@ -1,0 +1,231 @@
+"""The results of each cycle in words: flags, reasons, contacts, sticking; with remedies."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.records import CorStatus, Quality, SpeedMethod
+from nanorocks_ros.records.result_words import (
+    METHODS,
+    NO_SHAKING,
+    NO_SPEEDS,
+    RELATIONS,
+    FlagWords,
+    Words,
+    fitted,
+    flags_in_words,
+    reason_of,
+    size_flag,
+    sticking_in_words,
+    wall_flag,
+)
+from nanorocks_ros.wire.array_layouts import NS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from nanorocks_ros.records import ClusterEstimate, CorEstimate, Interval, SpeedEstimate
+    from nanorocks_ros.studies.analysis.offline_analysis import TrayResults
+
+_MM = 1e3
+
+
+@dataclass(slots=True)
+class UsedSpeeds:
+    """The speeds of a cooling window: how they were measured, and what was wrong with them.
+
+    Parameters
+    ----------
+    methods : Counter of SpeedMethod
+    flags : Counter of str
+        Speeds with each flag, by name.
+    lowest_walls : float
+        Lower end of the prior of their restitution.
+    """
+
+    methods: Counter[SpeedMethod] = field(default_factory=Counter)
+    flags: Counter[str] = field(default_factory=Counter)
+    lowest_walls: float = 0.0
+
+
+def used_speeds(
+    speeds: Iterable[SpeedEstimate], cycles: Iterable[CorEstimate], lowest_walls: float = 0.0
+) -> dict[int, UsedSpeeds]:
+    """The speeds in the window of each cycle, by its number; the speeds are read once."""
+    windows = {cor.cycle: (cor.window_start, cor.window_end) for cor in cycles}
+    used = {cycle: UsedSpeeds(lowest_walls=lowest_walls) for cycle in windows}
+    for speed in speeds:
+        if speed.cycle not in windows or speed.cycle_start_ns is None:
+            continue
+        first, last = windows[speed.cycle]
+        # Half a millisecond is the rounding of window times on the wire.
+        age = (speed.stamp_ns - speed.cycle_start_ns) / NS
+        if first - 5e-4 <= age <= last + 5e-4:
+            used[speed.cycle].methods[speed.method] += 1
+            used[speed.cycle].flags.update(speed.quality.names())
+    return used
+
+
+def is_left_out(cor: CorEstimate, *, include_inconsistent: bool) -> bool:
+    """Whether a cycle is not counted in the means of all cycles."""
+    return (
+        cor.status is CorStatus.FINAL
+        and bool(cor.quality & Quality.INCONSISTENT)
+        and not include_inconsistent
+    )
+
+
+def cycle_as_json(
+    cor: CorEstimate, clusters: ClusterEstimate | None, used: UsedSpeeds
+) -> dict[str, Any]:
+    """Flags, reason, contacts and sticking of a cycle, in words and numbers."""
+    reason = reason_of(cor)
+    return {
+        'flags': [
+            {**flag._asdict(), 'speeds': used.flags.get(flag.name)}
+            for flag in _flags(cor, clusters, used)
+        ],
+        'reason': None if reason is None else reason._asdict(),
+        'contacts': {'rebounds': cor.rebounds, 'collisions': cor.collisions},
+        'methods': {method.name.lower(): number for method, number in used.methods.items()},
+        'sticking': _sticking(clusters),
+    }
+
+
+def _flags(
+    cor: CorEstimate, clusters: ClusterEstimate | None, used: UsedSpeeds
+) -> list[FlagWords]:
+    """Flags of the estimate, and what only its values and those of the clusters tell."""
+    others = [
+        None if clusters is None else size_flag(clusters.cluster_size, clusters.weighted_size)
+    ]
+    if reason_of(cor) is None:
+        others.append(wall_flag(cor.wall_restitution, used.lowest_walls))
+    return [*flags_in_words(cor.quality), *(flag for flag in others if flag is not None)]
+
+
+def tray_reason(results: TrayResults) -> Words | None:
+    """Why a tray has no cycle with a restitution, determined or not; None where it has one."""
+    if results.cors:
+        return None
+    speeds = results.speeds
+    if not speeds:
+        return NO_SPEEDS
+    last = speeds[-1]
+    if last.cycle_start_ns is None:
+        return NO_SHAKING
+    start = (last.stamp_ns - last.cycle_start_ns) / NS
+    beads = last.mean_projected_speed.value
+    tray = last.tray_speed
+    moves = (
+        f': at the end the tray moves at {_MM * tray:.2g} mm/s in the picture, the beads at '
+        f'{_MM * beads:.2g} mm/s'
+        if math.isfinite(tray) and math.isfinite(beads)
+        else ''
+    )
+    return Words(
+        f'a shaking event was seen {start:.1f} s before the end, but no time at which the tray '
+        f'was calm{moves}',
+        'fix the camera, so that it does not shake, or film until the tray is at rest',
+    )
+
+
+def cycle_lines(
+    cor: CorEstimate, clusters: ClusterEstimate | None, used: UsedSpeeds, *, left_out: bool
+) -> list[str]:
+    """A cycle in lines for the terminal: the restitution first, then what it rests on."""
+    lines = [f'cycle {cor.cycle}: {_cor_text(cor)}']
+    reason = reason_of(cor)
+    if reason is not None:
+        lines.append(f'  reason: {reason.text}; {reason.remedy}')
+    lines += _decay_lines(cor)
+    if cor.samples:
+        lines.append(f'  used: {_used_text(cor, used)}')
+    if clusters is not None:
+        lines.append(f'  sticking: {_sticking(clusters)}')
+        lines += _clusters_lines(clusters)
+    for flag in _flags(cor, clusters, used):
+        number = used.flags.get(flag.name)
+        part = f' ({number} of {cor.samples} speeds)' if number else ''
+        name = flag.name.replace('_', ' ')
+        lines.append(f'  flag {name}{part}: {flag.text}; {flag.remedy}')
+    if left_out:
+        lines.append('  left out of all cycles; pass --include-inconsistent to count it')
+    return lines
+
+
+def _cor_text(cor: CorEstimate) -> str:
+    state = cor.status.name.lower()
+    if reason_of(cor) is not None:
+        return f'COR unknown ({state.replace("_", " ")})'
+    walls = ''
+    if math.isfinite(cor.wall_restitution.value):
+        walls = f', walls {_interval(cor.wall_restitution, 3)}'
+    return (
+        f'COR {_interval(cor.restitution, 4)}{walls} '
+        f'({cor.relation.name.lower()}, {state}: {RELATIONS[cor.relation]})'
+    )
+
+
+def _interval(interval: Interval, digits: int) -> str:
+    value, lower, upper = (
+        f'{number:.{digits}f}' for number in (interval.value, interval.lower, interval.upper)
+    )
+    return f'{value} [{lower}, {upper}]'
+
+
+def _decay_lines(cor: CorEstimate) -> list[str]:
+    """Haff's law of the decay; nothing where the decay does not determine it."""
+    lines = []
+    if fitted(cor.initial_speed) and fitted(cor.haff_time):
+        paper = ''
+        if math.isfinite(cor.paper_restitution):
+            paper = f'; the closed form of the paper makes it {cor.paper_restitution:.3f}'
+        lines.append(
+            f'  decay: v0 {_MM * cor.initial_speed.value:.2f} mm/s, '
+            f'tau {cor.haff_time.value:.2f} s{paper}'
+        )
+    for name, speed, time in zip(
+        ('first', 'second'),
+        cor.species_initial_speeds,
+        cor.species_haff_times,
+        strict=False,
+    ):
+        if fitted(speed) and fitted(time):
+            lines.append(
+                f'  {name} species: v0 {_MM * speed.value:.2f} mm/s, tau {time.value:.2f} s'
+            )
+    return lines
+
+
+def _used_text(cor: CorEstimate, used: UsedSpeeds) -> str:
+    counts = used.methods.most_common()
+    methods = ' and '.join(METHODS[method] for method, _ in counts)
+    by_methods = f' by {methods}' if methods else ''
+    window = ''
+    if math.isfinite(cor.window_start):
+        window = f' from {cor.window_start:.1f} to {cor.window_end:.1f} s after the shaking event'
+    contacts = f', {cor.rebounds} rebounds, {cor.collisions} collisions'
+    tension = ''
+    if cor.rebounds or cor.collisions:
+        tension = f'; they and the decay differ by {cor.tension:.1f} standard deviations'
+    return f'{cor.samples} speeds{by_methods}{window}{contacts}{tension}'
+
+
+def _sticking(clusters: ClusterEstimate | None) -> str | None:
+    if clusters is None:
+        return None
+    return sticking_in_words(clusters.sticking_status, clusters.sticking_speed, clusters.onset)
+
+
+def _clusters_lines(clusters: ClusterEstimate) -> list[str]:
+    size = clusters.combined_size
+    if not (math.isfinite(size.value) and math.isfinite(clusters.bodies.value)):
+        return []
+    return [
+        f'  at the end: {clusters.bodies.value:.0f} bodies, {size.value:.2f} beads in that of a '
+        'bead on average'
+    ]
