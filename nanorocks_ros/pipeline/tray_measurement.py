@@ -18,7 +18,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.stages.bodies.body_counter import BodyCounter
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
-from nanorocks_ros.stages.preprocess.shake_detection import CycleFollower
+from nanorocks_ros.stages.preprocess.shaking_cycles import CycleFollower
 from nanorocks_ros.stages.speed.area_speed import AreaSpeed
 from nanorocks_ros.stages.speed.speed_selector import SpeedSelector
 from nanorocks_ros.stages.speed.structure_speed import StructureSpeed
@@ -70,6 +70,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         del stamp_ns
         settings, tray = self._settings, self._tray
         self._cycles = CycleFollower(settings.speed.shake_ratio, settings.speed.min_cycle_duration)
+        self._cycle: tuple[int, int | None] = (0, None)
         self._oscillation = TrayOscillation()
         self._tracker = Tracker(settings, tray)
         self._contacts = ContactFinder(tray)
@@ -80,8 +81,13 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         self._selector = SpeedSelector(settings.speed, self._track_speed.reliability)
 
     def _process(self, record: TrayImage) -> tuple[TrayRecord, ...]:
-        self._cycles.push(record)
-        image = self._cycles.counted(record)
+        return tuple(
+            result for image in self._cycles.push(record) for result in self._measured(image)
+        )
+
+    def _measured(self, image: TrayImage) -> tuple[TrayRecord, ...]:
+        """Everything that follows from an image whose cycle is known."""
+        self._cycle = image.cycle or 0, image.cycle_start_ns
         self._oscillation.push(image)
         self._area_speed.emit_mask = self.emit_mask
         pictures: list[MotionMask | Tracks] = []
@@ -104,11 +110,12 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
 
     def flush(self) -> tuple[TrayRecord, ...]:
         """Contacts and bodies of the last seconds, and speeds that were still held back."""
+        last = [result for image in self._cycles.flush() for result in self._measured(image)]
         self._track_speed.flush()
         speeds = self._structure_speed.flush() if self._selector.uses_structure else ()
         contacts = sorted(self._contacts.flush(), key=attrgetter('stamp_ns'))
         events = [*self._in_cycle(contacts), *self._bodies.flush()]
-        return (*self._selected(speeds), *self._reliable(events))
+        return (*last, *self._selected(speeds), *self._reliable(events))
 
     def _structure_speeds(self, image: TrayImage) -> tuple[SpeedEstimate, ...]:
         if self._selector.uses_structure:
@@ -126,7 +133,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
 
     def _in_cycle(self, contacts: Iterable[Rebound | PairCollision]) -> list[Event]:
         """The contacts with their cycle: some before a shaking event are known only after it."""
-        cycle, start_ns = self._cycles.cycle, self._cycles.cycle_start_ns
+        cycle, start_ns = self._cycle
         return [
             replace(
                 contact, cycle=cycle - int(start_ns is not None and contact.stamp_ns < start_ns)

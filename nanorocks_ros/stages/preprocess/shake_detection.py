@@ -1,147 +1,178 @@
-"""Sensor noise and shaking events, from the gray images and from the motion of the trays.
+"""Beginnings of lasting motion: of the beads in the images of one tray, and of the plate.
 
-The :class:`ShakeCounter` of the preprocessor counts the shaking events; each tray image carries
-the count. For images without a count a :class:`CycleFollower` finds the same events.
+A shaking event sets all beads in motion between one frame and the next, and they move for seconds.
+A key frame of a codec changes all still texture a little, a lamp that is switched changes all
+levels, a knocked camera blurs a picture: each for a frame or two. So a jump is a candidate, which
+the frames after it confirm or refute.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
 import numpy as np
 
-from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.quantiles import Quantile, median
+from nanorocks_ros.stages.preprocess.difference_noise import (
+    MEMORY_FRAMES,
+    NOISE_QUANTILE,
+    NS,
+    clipped_power,
+    difference_counts,
+    difference_power,
+    total_power,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from numpy.typing import NDArray
 
-    from nanorocks_ros.records import TrayImage
-
-NS = 1_000_000_000
-
-# Half a second of pictures at 30 Hz: longer than a jump takes, shorter than a decay.
-_MEMORY_FRAMES = 15
 _NOISE_FRAMES = 300
-# Frames needed for the smallest noise.
-_FEW_FRAMES = 5
-_NOISE_QUANTILE = 0.2
 # A step in time so many times longer than usual means that frames are missing.
 _GAP = 1.75
-# Beyond 3 sigma a difference counts as motion; what is left of a Gaussian has this variance.
-_CLIP = 3.0
-_CLIPPED_VARIANCE = 0.9733
-# A uint8 difference of variance 2 sigma^2 is never known better than its rounding.
-_ROUNDING_POWER = 1.0 / 6.0
+# Frames after a jump that confirm it. In 0.3 s a bead of 3 mm/s moves by its radius; codecs settle
+# within a few frames; publishers keep 30 images.
+_CONFIRMATION_NS = 3 * NS // 10
+_FEWEST_FRAMES, _MOST_FRAMES = 5, 24
+# At most so many of these frames may lack the motion, as a share.
+_LACKING = 1.0 / 3.0
+# A candidate whose frames do not come is decided after this time.
+_LONGEST_NS = NS
+# Frames before a jump that tell the usual motion.
+_FEW_BEFORE = 3
+# A gas does not stop from one frame to the next: with a motion below this share of the usual, the
+# picture is frozen. A gas that is at rest for longer has cooled.
+_STOPPED = 0.1
+_LONGEST_STOP_NS = 5 * NS
+# Between distant frames, beads differ by more than between neighbours; noise does not. Motion
+# beyond a bead diameter per frame does not either: it is larger than any noise, being this many
+# times the level that most pixels show, or this share of the contrast.
+_GROWTH = 3.0
+_LARGE, _LARGE_SHARE = 10.0, 0.1
 # An oscillating plate stands still twice in every period, which is no rest.
 _SWING_NS = 5 * NS
 # Smallest significant speed of the tray, in standard errors.
 _SIGNIFICANT = 5.0
+# Share of the frames in which an oscillating plate must be fast: it turns twice a period. A knock
+# of the camera lasts for a frame or two.
+_SWING_LACKING = 2.0 / 3.0
 
 
-def difference_power(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> float:
-    """Sum of the squared differences of two gray images, [gray levels^2]."""
-    return float(cv2.norm(later, earlier, cv2.NORM_L2SQR))
+class Onsets(NamedTuple):
+    """Beginnings of motion, each as the stamp of the last frame before it, [ns].
 
-
-@compiled
-def _difference_counts(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """How many pixels differ by 0, 1, ... 255 gray levels."""
-    # Two tables: the same entry twice in a row would wait for itself.
-    counts = np.zeros((2, 256), dtype=np.int64)
-    first, second = later.reshape(-1), earlier.reshape(-1)
-    for k in range(first.size):
-        place = np.uint64(k)
-        difference = np.int32(first[place]) - np.int32(second[place])
-        counts[np.uint64(k & 1), np.uint64(abs(difference))] += 1
-    total: NDArray[np.int64] = counts[0] + counts[1]
-    return total
-
-
-@compiled
-def _total_power(counts: NDArray[np.int64]) -> float:
-    """Sum of the squared differences, [gray levels^2]; exact, for they are whole numbers."""
-    total = 0.0
-    for level in range(256):
-        total += counts[level] * float(level * level)
-    return total
-
-
-@compiled
-def _power_of(counts: NDArray[np.int64]) -> float:
-    pixels = 0.0
-    for level in range(256):
-        pixels += counts[level]
-    power = _total_power(counts) / pixels
-    for _ in range(30):
-        bound = max(1.0, _CLIP * _CLIP * power)
-        kept, kept_power = 0.0, 0.0
-        for level in range(256):
-            if level * level <= bound:
-                kept += counts[level]
-                kept_power += counts[level] * float(level * level)
-        clipped = kept_power / kept / _CLIPPED_VARIANCE
-        if abs(clipped - power) <= 1e-6 * power:
-            break
-        power = clipped
-    return max(power, _ROUNDING_POWER)
-
-
-def noise_power(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> float:
-    """Mean squared difference per pixel that two images of a scene at rest would have.
-
-    Pixels in which something moved are clipped away, iteratively.
-
-    Returns
-    -------
-    float, [gray levels^2]
-        Twice the variance of the sensor noise.
+    Parameters
+    ----------
+    confirmed : tuple of int
+        Those that the last frame confirmed.
+    pending : tuple of int
+        Candidates that later frames will decide.
     """
-    counts = _difference_counts(np.ascontiguousarray(later), np.ascontiguousarray(earlier))
-    return float(_power_of(counts))
+
+    confirmed: tuple[int, ...] = ()
+    pending: tuple[int, ...] = ()
 
 
-class NoiseMeter:
-    """Noise of a series of images: the smallest measured.
+@dataclass(slots=True)
+class _Candidate:
+    """A jump of the motion and what followed.
 
-    Where grains cover much of a picture, fast motion cannot be told from noise: of the grains of
-    tray 7 at 15 mm/s all motion was taken for noise. Grains that are slow or at rest show it.
+    Parameters
+    ----------
+    before_ns : int
+        Stamp of the last frame before the jump.
+    bar : float
+        Motion that counts as lasting.
+    frames : int
+        Frames that decide.
+    gray : ndarray of uint8, optional
+        First image of the motion.
+    motions, noises : list of float
+        Of the frames since.
     """
+
+    before_ns: int
+    bar: float
+    frames: int
+    gray: NDArray[np.uint8] | None = None
+    motions: list[float] = field(default_factory=list)
+    noises: list[float] = field(default_factory=list)
+
+    def lacking(self) -> int:
+        """Frames without the motion so far."""
+        return sum(motion <= self.bar for motion in self.motions)
+
+
+class _Clock:
+    """Steps in time between frames, and how many frames confirm an onset."""
 
     def __init__(self) -> None:
-        # A frame stored twice has no noise: the minimum would be wrong.
-        self._recent = Quantile(_NOISE_QUANTILE, _MEMORY_FRAMES)
-        self._pushed = 0
-        self._smallest = math.inf
-        self._last: NDArray[np.uint8] | None = None
+        self._steps: deque[int] = deque(maxlen=MEMORY_FRAMES)
+        self.last_ns: int | None = None
+        self.previous_ns = 0
 
-    def start_from(self, image: NDArray[np.uint8]) -> None:
-        """Compare the next image with this one."""
-        self._last = image
-
-    def push(self, image: NDArray[np.uint8]) -> float:
-        """Mean squared difference per pixel of two images of a scene at rest."""
-        last, self._last = self._last, image
+    def push(self, stamp_ns: int) -> bool:
+        """Take the next stamp; False when it is the first or frames are missing before it."""
+        last, self.last_ns = self.last_ns, stamp_ns
         if last is None:
-            return 0.0
-        recent = self._recent.push(noise_power(image, last))
-        self._pushed += 1
-        if self._pushed >= _FEW_FRAMES:
-            self._smallest = min(self._smallest, recent)
-        return min(self._smallest, recent)
+            return False
+        self.previous_ns = last
+        step = stamp_ns - last
+        usual = median(self._steps) if self._steps else step
+        self._steps.append(step)
+        return step <= _GAP * usual
+
+    def confirming_frames(self) -> int:
+        """Frames after a jump that confirm it."""
+        frames = round(_CONFIRMATION_NS / max(1.0, median(self._steps)))
+        return min(max(frames, _FEWEST_FRAMES), _MOST_FRAMES)
+
+
+class _Candidates:
+    """The undecided jumps of a motion; `lacking`: share of the frames that may lack it."""
+
+    def __init__(self, lacking: float) -> None:
+        self._lacking = lacking
+        self.undecided: list[_Candidate] = []
+
+    def add(self, candidate: _Candidate) -> None:
+        """Open a candidate, unless it only continues the motion of another."""
+        if not any(other.motions[-1] > other.bar for other in self.undecided if other.motions):
+            self.undecided.append(candidate)
+
+    def push(self, stamp_ns: int, motion: float, noise: float = 0.0) -> list[_Candidate]:
+        """Take the motion of the next frame; the candidates whose motion lasted."""
+        for candidate in self.undecided:
+            candidate.motions.append(motion)
+            candidate.noises.append(noise)
+        lasting, undecided = [], []
+        for candidate in self.undecided:
+            late = stamp_ns - candidate.before_ns > _LONGEST_NS
+            seen = len(candidate.motions)
+            frames = seen if late else candidate.frames
+            if candidate.lacking() > self._lacking * frames:
+                continue
+            if seen >= frames:
+                lasting.append(candidate)
+            else:
+                undecided.append(candidate)
+        self.undecided = undecided
+        return lasting
+
+    def onsets(self, confirmed: tuple[int, ...] = ()) -> Onsets:
+        """The onsets confirmed now, and those that are not decided."""
+        return Onsets(confirmed, tuple(candidate.before_ns for candidate in self.undecided))
 
 
 class MotionMeter:
-    """Noise of the gray images of one tray, and whether their motion just jumped.
+    """Noise of the gray images of one tray, and where lasting motion of its beads begins.
 
-    A shaking event sets every bead in motion between one frame and the next, whereas
-    collisions change the mean squared difference of two images by some ten per cent.
+    The motion is the mean squared difference of successive images without what noise and changes
+    of brightness and contrast explain, in units of the contrast. Collisions change it by some ten
+    per cent, a shaking event by a factor, for many frames.
 
     Parameters
     ----------
@@ -156,40 +187,78 @@ class MotionMeter:
 
     def __init__(self, ratio: float) -> None:
         self._ratio = ratio
-        self._recent: deque[float] = deque(maxlen=_MEMORY_FRAMES)
-        self._noise = Quantile(_NOISE_QUANTILE, _NOISE_FRAMES)
-        self._last: NDArray[np.uint8] | None = None
-        self._last_ns = 0
-        self._steps: deque[int] = deque(maxlen=_MEMORY_FRAMES)
+        self._recent: deque[float] = deque(maxlen=MEMORY_FRAMES)
+        self._noise = Quantile(NOISE_QUANTILE, _NOISE_FRAMES)
+        self._last: tuple[NDArray[np.uint8], float, float] | None = None
+        self._clock = _Clock()
+        self._stopped_ns: int | None = None
+        self._candidates = _Candidates(_LACKING)
         self.noise_power = 0.0
 
-    def push(self, stamp_ns: int, gray: NDArray[np.uint8]) -> bool:
-        """Take the next image; True when the motion jumped since the one before."""
+    def push(self, stamp_ns: int, gray: NDArray[np.uint8]) -> Onsets:
+        """Take the next image.
+
+        Parameters
+        ----------
+        stamp_ns : int
+        gray : ndarray of uint8, (rows, columns)
+        """
         gray = np.ascontiguousarray(gray)
-        last, self._last = self._last, gray
-        step, self._last_ns = stamp_ns - self._last_ns, stamp_ns
-        if last is None:
-            return False
-        usual = median(self._steps) if self._steps else step
-        self._steps.append(step)
+        mean, spread = (float(level[0, 0]) for level in cv2.meanStdDev(gray))
+        last, self._last = self._last, (gray, mean, spread)
         # Beads move further while frames are missing, which is no jump. A jump during the gap is
         # seen with the next image.
-        if step > _GAP * usual:
-            return False
-        counts = _difference_counts(gray, last)
+        if not self._clock.push(stamp_ns) or last is None:
+            return self._candidates.onsets()
+        counts = difference_counts(gray, last[0])
+        noise = clipped_power(counts)
         # Motion adds to the noise, and a frame stored twice has none: neither the mean nor the
         # minimum is right.
-        self.noise_power = self._noise.push(_power_of(counts))
-        quiet = self.noise_power * gray.size
-        motion = _total_power(counts) - quiet
-        # Of 15 frames, not of all: an earlier shaking event may have been stronger.
-        before = max(self._recent, default=None)
-        self._recent.append(motion)
-        return before is not None and motion > self._ratio * max(before, 0.0) + quiet
+        self.noise_power = self._noise.push(noise)
+        power = total_power(counts) / gray.size - (mean - last[1]) ** 2 - (spread - last[2]) ** 2
+        contrast = max(spread * last[2], self.noise_power)
+        motion = max(power - self.noise_power, 0.0) / contrast
+        confirmed = tuple(
+            candidate.before_ns
+            for candidate in self._candidates.push(stamp_ns, motion, noise / contrast)
+            if self._is_motion(candidate, gray, mean, spread)
+        )
+        if len(self._recent) >= _FEW_BEFORE:
+            bar = self._ratio * median(self._recent) + self.noise_power / contrast
+            if motion > bar:
+                frames = self._clock.confirming_frames()
+                self._candidates.add(_Candidate(self._clock.previous_ns, bar, frames, gray))
+        self._remember(stamp_ns, motion, identical=counts[0] == gray.size)
+        return self._candidates.onsets(confirmed)
+
+    def _remember(self, stamp_ns: int, motion: float, *, identical: bool) -> None:
+        """Add the motion to the usual one, unless the picture is frozen."""
+        full = len(self._recent) == MEMORY_FRAMES
+        stopped = full and (identical or motion < _STOPPED * median(self._recent))
+        if not stopped:
+            self._stopped_ns = None
+        elif self._stopped_ns is None:
+            self._stopped_ns = stamp_ns
+        if not stopped or not (identical or stamp_ns - (self._stopped_ns or 0) < _LONGEST_STOP_NS):
+            self._recent.append(motion)
+
+    def _is_motion(
+        self, candidate: _Candidate, gray: NDArray[np.uint8], mean: float, spread: float
+    ) -> bool:
+        """Whether what lasts is motion of beads, not a stronger noise."""
+        assert candidate.gray is not None
+        first_mean, first_spread = (float(v[0, 0]) for v in cv2.meanStdDev(candidate.gray))
+        power = difference_power(gray, candidate.gray) / gray.size
+        power -= (mean - first_mean) ** 2 + (spread - first_spread) ** 2
+        contrast = max(spread * first_spread, self.noise_power)
+        distant = (power - self.noise_power) / contrast
+        motion, noise = median(candidate.motions), median(candidate.noises)
+        large = motion > _LARGE * noise or motion > 2.0 * _LARGE_SHARE * (1.0 - noise)
+        return large or distant > _GROWTH * motion
 
 
 class PlateMeter:
-    """Whether the plate with the trays just began to move.
+    """Where the plate with the trays begins to move.
 
     Parameters
     ----------
@@ -202,104 +271,22 @@ class PlateMeter:
         self._ratio = ratio
         self._least = least_speed
         self._recent: deque[tuple[int, float]] = deque()
+        self._clock = _Clock()
+        self._candidates = _Candidates(_SWING_LACKING)
 
-    def push(self, stamp_ns: int, speed: float, error: float) -> bool:
+    def push(self, stamp_ns: int, speed: float, error: float) -> Onsets:
         """Take the speed of the plate since the frame before, [m/s]; NaN when unknown."""
+        self._clock.push(stamp_ns)
         if not (math.isfinite(speed) and math.isfinite(error)):
-            return False
+            return self._candidates.onsets()
         while self._recent and stamp_ns - self._recent[0][0] > _SWING_NS:
             self._recent.popleft()
-        before = max((speed for _, speed in self._recent), default=None)
+        lasting = self._candidates.push(stamp_ns, speed)
+        if len(self._recent) >= _FEW_BEFORE:
+            before = max(speed for _, speed in self._recent)
+            bar = max(self._least, _SIGNIFICANT * error, self._ratio * before)
+            if speed > bar:
+                frames = self._clock.confirming_frames()
+                self._candidates.add(_Candidate(self._clock.previous_ns, bar, frames))
         self._recent.append((stamp_ns, speed))
-        least = max(self._least, _SIGNIFICANT * error)
-        return before is not None and speed > max(least, self._ratio * before)
-
-
-class ShakeCounter:
-    """Counts the shaking events, by the jumps of the trays and of the plate in each frame.
-
-    All trays are on one plate and are shaken together: an event is a jump of the plate, or of at
-    least half of the trays.
-
-    Parameters
-    ----------
-    shortest_cycle : float, [s]
-
-    Attributes
-    ----------
-    cycle : int
-        Events so far.
-    cycle_start_ns : int or None
-        Stamp of the frame before the last one.
-    """
-
-    def __init__(self, shortest_cycle: float) -> None:
-        self._shortest_ns = round(shortest_cycle * NS)
-        self._last_ns: int | None = None
-        self.cycle = 0
-        self.cycle_start_ns: int | None = None
-
-    def push(self, stamp_ns: int, jumps: Iterable[bool], plate: bool = False) -> bool:
-        """Take the jumps of the next frame; True when the trays were shaken before it."""
-        last, self._last_ns = self._last_ns, stamp_ns
-        if last is None:
-            return False
-        votes = list(jumps)
-        rested = self.cycle_start_ns is None or last - self.cycle_start_ns >= self._shortest_ns
-        shaken = plate or (any(votes) and 2 * sum(votes) >= len(votes))
-        if not (rested and shaken):
-            return False
-        self.cycle += 1
-        self.cycle_start_ns = last
-        return True
-
-
-class CycleFollower:
-    """Cycle and noise of the images of one tray: carried by the images, or found from them.
-
-    Parameters
-    ----------
-    ratio : float
-        Smallest jump of the motion, as a factor.
-    shortest_cycle : float, [s]
-
-    Attributes
-    ----------
-    cycle, cycle_start_ns, noise_power
-        Of the last image, see :class:`nanorocks_ros.records.TrayImage`.
-    """
-
-    def __init__(self, ratio: float, shortest_cycle: float) -> None:
-        self._meter = MotionMeter(ratio)
-        self._counter = ShakeCounter(shortest_cycle)
-        self._first = True
-        self.cycle = 0
-        self.cycle_start_ns: int | None = None
-        self.noise_power = 0.0
-
-    def push(self, image: TrayImage) -> bool:
-        """Take the next image; True when the tray was shaken since the one before."""
-        before, first = self.cycle, self._first
-        self._first = False
-        if image.cycle is None or math.isnan(image.noise_power):
-            jump = self._meter.push(image.stamp_ns, image.gray)
-            self._counter.push(image.stamp_ns, (jump,))
-            self.noise_power = self._meter.noise_power
-            self.cycle, self.cycle_start_ns = self._counter.cycle, self._counter.cycle_start_ns
-        if image.cycle is not None:
-            self.cycle, self.cycle_start_ns = image.cycle, image.cycle_start_ns
-            if not math.isnan(image.noise_power):
-                self.noise_power = image.noise_power
-        # A recording that starts in the middle of a cycle was not shaken at its first image.
-        return self.cycle != before and not first
-
-    def counted(self, image: TrayImage) -> TrayImage:
-        """The last image with its cycle and noise filled in."""
-        if image.cycle is not None and not math.isnan(image.noise_power):
-            return image
-        return replace(
-            image,
-            cycle=self.cycle,
-            cycle_start_ns=self.cycle_start_ns,
-            noise_power=self.noise_power,
-        )
+        return self._candidates.onsets(tuple(candidate.before_ns for candidate in lasting))
