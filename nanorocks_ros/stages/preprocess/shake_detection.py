@@ -23,7 +23,6 @@ from nanorocks_ros.stages.preprocess.difference_noise import (
     NS,
     clipped_power,
     difference_counts,
-    difference_power,
     total_power,
 )
 
@@ -47,11 +46,13 @@ _FEW_BEFORE = 3
 # picture is frozen. A gas that is at rest for longer has cooled.
 _STOPPED = 0.1
 _LONGEST_STOP_NS = 5 * NS
-# Between distant frames, beads differ by more than between neighbours; noise does not. Motion
-# beyond a bead diameter per frame does not either: it is larger than any noise, being this many
-# times the level that most pixels show, or this share of the contrast.
-_GROWTH = 3.0
-_LARGE, _LARGE_SHARE = 10.0, 0.1
+# Squared difference of the first and the last image of a motion, as a share of the variance of the
+# image, in the blocks of 8 pixels where each is largest: a bead that moves by u pixels reaches
+# u^2 / 5.3, hence 1.2 pixels in 0.3 s are motion. What a codec refines reaches some per cent.
+_BLOCK_PX, _LARGEST_BLOCKS = 8, 4
+_MOVED_SHARE = 0.25
+# Contrast below which nothing is seen, as a multiple of the noise.
+_SEEN = 4.0
 # An oscillating plate stands still twice in every period, which is no rest.
 _SWING_NS = 5 * NS
 # Smallest significant speed of the tray, in standard errors.
@@ -90,7 +91,7 @@ class _Candidate:
         Frames that decide.
     gray : ndarray of uint8, optional
         First image of the motion.
-    motions, noises : list of float
+    motions : list of float
         Of the frames since.
     """
 
@@ -99,7 +100,6 @@ class _Candidate:
     frames: int
     gray: NDArray[np.uint8] | None = None
     motions: list[float] = field(default_factory=list)
-    noises: list[float] = field(default_factory=list)
 
     def lacking(self) -> int:
         """Frames without the motion so far."""
@@ -143,11 +143,10 @@ class _Candidates:
         if not any(other.motions[-1] > other.bar for other in self.undecided if other.motions):
             self.undecided.append(candidate)
 
-    def push(self, stamp_ns: int, motion: float, noise: float = 0.0) -> list[_Candidate]:
+    def push(self, stamp_ns: int, motion: float) -> list[_Candidate]:
         """Take the motion of the next frame; the candidates whose motion lasted."""
         for candidate in self.undecided:
             candidate.motions.append(motion)
-            candidate.noises.append(noise)
         lasting, undecided = [], []
         for candidate in self.undecided:
             late = stamp_ns - candidate.before_ns > _LONGEST_NS
@@ -211,17 +210,16 @@ class MotionMeter:
         if not self._clock.push(stamp_ns) or last is None:
             return self._candidates.onsets()
         counts = difference_counts(gray, last[0])
-        noise = clipped_power(counts)
         # Motion adds to the noise, and a frame stored twice has none: neither the mean nor the
         # minimum is right.
-        self.noise_power = self._noise.push(noise)
+        self.noise_power = self._noise.push(clipped_power(counts))
         power = total_power(counts) / gray.size - (mean - last[1]) ** 2 - (spread - last[2]) ** 2
         contrast = max(spread * last[2], self.noise_power)
         motion = max(power - self.noise_power, 0.0) / contrast
         confirmed = tuple(
             candidate.before_ns
-            for candidate in self._candidates.push(stamp_ns, motion, noise / contrast)
-            if self._is_motion(candidate, gray, mean, spread)
+            for candidate in self._candidates.push(stamp_ns, motion)
+            if candidate.gray is not None and _moved(candidate.gray, gray, self.noise_power)
         )
         if len(self._recent) >= _FEW_BEFORE:
             bar = self._ratio * median(self._recent) + self.noise_power / contrast
@@ -242,19 +240,29 @@ class MotionMeter:
         if not stopped or not (identical or stamp_ns - (self._stopped_ns or 0) < _LONGEST_STOP_NS):
             self._recent.append(motion)
 
-    def _is_motion(
-        self, candidate: _Candidate, gray: NDArray[np.uint8], mean: float, spread: float
-    ) -> bool:
-        """Whether what lasts is motion of beads, not a stronger noise."""
-        assert candidate.gray is not None
-        first_mean, first_spread = (float(v[0, 0]) for v in cv2.meanStdDev(candidate.gray))
-        power = difference_power(gray, candidate.gray) / gray.size
-        power -= (mean - first_mean) ** 2 + (spread - first_spread) ** 2
-        contrast = max(spread * first_spread, self.noise_power)
-        distant = (power - self.noise_power) / contrast
-        motion, noise = median(candidate.motions), median(candidate.noises)
-        large = motion > _LARGE * noise or motion > 2.0 * _LARGE_SHARE * (1.0 - noise)
-        return large or distant > _GROWTH * motion
+
+def _moved(first: NDArray[np.uint8], last: NDArray[np.uint8], noise_power: float) -> bool:
+    """Whether something moved from one image to another, be they as bright as they may."""
+    levels = first.astype(np.float32)
+    later = last.astype(np.float32)
+    gain = float(levels.std()) / max(float(later.std()), 1e-6)
+    difference = (later - later.mean()) * gain - (levels - levels.mean())
+    variance = _largest(_blocks(levels * levels) - _blocks(levels) ** 2) - 0.5 * noise_power
+    change = _largest(_blocks(difference * difference)) - noise_power
+    return variance > _SEEN * noise_power and change > _MOVED_SHARE * variance
+
+
+def _blocks(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Means of the blocks of an image."""
+    rows, columns = (max(1, side // _BLOCK_PX) for side in values.shape)
+    means = cv2.resize(values, (columns, rows), interpolation=cv2.INTER_AREA)
+    return means.astype(np.float32, copy=False)
+
+
+def _largest(values: NDArray[np.float32]) -> float:
+    """The last of the few largest values: a single one may be a reflection."""
+    place = max(0, values.size - _LARGEST_BLOCKS)
+    return float(np.partition(values.reshape(-1), place)[place])
 
 
 class PlateMeter:
