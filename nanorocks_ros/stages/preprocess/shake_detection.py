@@ -191,6 +191,7 @@ class MotionMeter:
         self._last: tuple[NDArray[np.uint8], float, float] | None = None
         self._clock = _Clock()
         self._stopped_ns: int | None = None
+        self._seen = True
         self._candidates = _Candidates(_LACKING)
         self.noise_power = 0.0
 
@@ -213,6 +214,12 @@ class MotionMeter:
         # Motion adds to the noise, and a frame stored twice has none: neither the mean nor the
         # minimum is right.
         self.noise_power = self._noise.push(clipped_power(counts))
+        seen, self._seen = self._seen, _is_seen(gray, spread, self.noise_power)
+        if not (seen and self._seen):
+            # In the dark, motion is unknown.
+            self._recent.clear()
+            self._candidates.undecided.clear()
+            return Onsets()
         power = total_power(counts) / gray.size - (mean - last[1]) ** 2 - (spread - last[2]) ** 2
         contrast = max(spread * last[2], self.noise_power)
         motion = max(power - self.noise_power, 0.0) / contrast
@@ -247,9 +254,20 @@ def _moved(first: NDArray[np.uint8], last: NDArray[np.uint8], noise_power: float
     later = last.astype(np.float32)
     gain = float(levels.std()) / max(float(later.std()), 1e-6)
     difference = (later - later.mean()) * gain - (levels - levels.mean())
-    variance = _largest(_blocks(levels * levels) - _blocks(levels) ** 2) - 0.5 * noise_power
     change = _largest(_blocks(difference * difference)) - noise_power
-    return variance > _SEEN * noise_power and change > _MOVED_SHARE * variance
+    return change > _MOVED_SHARE * _block_variance(levels, noise_power)
+
+
+def _is_seen(gray: NDArray[np.uint8], spread: float, noise_power: float) -> bool:
+    """Whether an image shows more than noise; `spread` is its standard deviation."""
+    if spread * spread > (_SEEN + 0.5) * noise_power:
+        return True
+    return _block_variance(gray.astype(np.float32), noise_power) > _SEEN * noise_power
+
+
+def _block_variance(levels: NDArray[np.float32], noise_power: float) -> float:
+    """Largest variance in the blocks of an image, without noise, [gray levels^2]."""
+    return _largest(_blocks(levels * levels) - _blocks(levels) ** 2) - 0.5 * noise_power
 
 
 def _blocks(values: NDArray[np.float32]) -> NDArray[np.float32]:
