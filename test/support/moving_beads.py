@@ -33,15 +33,16 @@ def pictures(positions, *, radius=7.0, noise=1.5, gains=None, floor=90.0, seed=2
     """Gray pictures of dark beads with a highlight on a lighter, textured floor."""
     rng = np.random.default_rng(seed)
     texture = cv2.GaussianBlur(rng.normal(0, 12, (SIDE, SIDE)), (0, 0), 2) + floor
-    y, x = np.mgrid[:SIDE, :SIDE]
     for number, beads in enumerate(positions):
         image = texture.copy()
         for bead_x, bead_y in beads:
-            distance = np.hypot(x - bead_x, y - bead_y)
-            cover = np.clip(radius + 0.5 - distance, 0, 1)
-            image += cover * (35.0 - image)
+            left, top = (max(0, int(place - radius - 2)) for place in (bead_x, bead_y))
+            part = image[top : int(bead_y + radius + 3), left : int(bead_x + radius + 3)]
+            y, x = np.mgrid[top : top + part.shape[0], left : left + part.shape[1]]
+            cover = np.clip(radius + 0.5 - np.hypot(x - bead_x, y - bead_y), 0, 1)
+            part += cover * (35.0 - part)
             light = np.hypot(x - bead_x + 0.3 * radius, y - bead_y + 0.3 * radius)
-            image += np.clip(0.25 * radius + 0.5 - light, 0, 1) * (180.0 - image)
+            part += np.clip(0.25 * radius + 0.5 - light, 0, 1) * (180.0 - part)
         image *= 1.0 if gains is None else gains[number]
         image += rng.normal(0, noise, image.shape)
         yield np.clip(image, 0, 255).astype(np.uint8)

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -25,21 +24,19 @@ from nanorocks_ros.stages.preprocess.difference_noise import (
     difference_counts,
     total_power,
 )
+from nanorocks_ros.stages.preprocess.onset_confirmation import (
+    Candidate,
+    Candidates,
+    FrameClock,
+    Onsets,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _NOISE_FRAMES = 300
-# A step in time so many times longer than usual means that frames are missing.
-_GAP = 1.75
-# Frames after a jump that confirm it. In 0.3 s a bead of 3 mm/s moves by its radius; codecs settle
-# within a few frames; publishers keep 30 images.
-_CONFIRMATION_NS = 3 * NS // 10
-_FEWEST_FRAMES, _MOST_FRAMES = 5, 24
-# At most so many of these frames may lack the motion, as a share.
+# At most so many of the frames that confirm an onset may lack the motion, as a share.
 _LACKING = 1.0 / 3.0
-# A candidate whose frames do not come is decided after this time.
-_LONGEST_NS = NS
 # Frames before a jump that tell the usual motion.
 _FEW_BEFORE = 3
 # A gas does not stop from one frame to the next: with a motion below this share of the usual, the
@@ -62,110 +59,6 @@ _SIGNIFICANT = 5.0
 _SWING_LACKING = 2.0 / 3.0
 
 
-class Onsets(NamedTuple):
-    """Beginnings of motion, each as the stamp of the last frame before it, [ns].
-
-    Parameters
-    ----------
-    confirmed : tuple of int
-        Those that the last frame confirmed.
-    pending : tuple of int
-        Candidates that later frames will decide.
-    """
-
-    confirmed: tuple[int, ...] = ()
-    pending: tuple[int, ...] = ()
-
-
-@dataclass(slots=True)
-class _Candidate:
-    """A jump of the motion and what followed.
-
-    Parameters
-    ----------
-    before_ns : int
-        Stamp of the last frame before the jump.
-    bar : float
-        Motion that counts as lasting.
-    frames : int
-        Frames that decide.
-    gray : ndarray of uint8, optional
-        First image of the motion.
-    motions : list of float
-        Of the frames since.
-    """
-
-    before_ns: int
-    bar: float
-    frames: int
-    gray: NDArray[np.uint8] | None = None
-    motions: list[float] = field(default_factory=list)
-
-    def lacking(self) -> int:
-        """Frames without the motion so far."""
-        return sum(motion <= self.bar for motion in self.motions)
-
-
-class _Clock:
-    """Steps in time between frames, and how many frames confirm an onset."""
-
-    def __init__(self) -> None:
-        self._steps: deque[int] = deque(maxlen=MEMORY_FRAMES)
-        self.last_ns: int | None = None
-        self.previous_ns = 0
-
-    def push(self, stamp_ns: int) -> bool:
-        """Take the next stamp; False when it is the first or frames are missing before it."""
-        last, self.last_ns = self.last_ns, stamp_ns
-        if last is None:
-            return False
-        self.previous_ns = last
-        step = stamp_ns - last
-        usual = median(self._steps) if self._steps else step
-        self._steps.append(step)
-        return step <= _GAP * usual
-
-    def confirming_frames(self) -> int:
-        """Frames after a jump that confirm it."""
-        frames = round(_CONFIRMATION_NS / max(1.0, median(self._steps)))
-        return min(max(frames, _FEWEST_FRAMES), _MOST_FRAMES)
-
-
-class _Candidates:
-    """The undecided jumps of a motion; `lacking`: share of the frames that may lack it."""
-
-    def __init__(self, lacking: float) -> None:
-        self._lacking = lacking
-        self.undecided: list[_Candidate] = []
-
-    def add(self, candidate: _Candidate) -> None:
-        """Open a candidate, unless it only continues the motion of another."""
-        if not any(other.motions[-1] > other.bar for other in self.undecided if other.motions):
-            self.undecided.append(candidate)
-
-    def push(self, stamp_ns: int, motion: float) -> list[_Candidate]:
-        """Take the motion of the next frame; the candidates whose motion lasted."""
-        for candidate in self.undecided:
-            candidate.motions.append(motion)
-        lasting, undecided = [], []
-        for candidate in self.undecided:
-            late = stamp_ns - candidate.before_ns > _LONGEST_NS
-            seen = len(candidate.motions)
-            frames = seen if late else candidate.frames
-            if candidate.lacking() > self._lacking * frames:
-                continue
-            if seen >= frames:
-                lasting.append(candidate)
-            else:
-                undecided.append(candidate)
-        self.undecided = undecided
-        return lasting
-
-    def onsets(self, confirmed: tuple[int, ...] = ()) -> Onsets:
-        """The onsets confirmed now, and those that are not decided."""
-        return Onsets(confirmed, tuple(candidate.before_ns for candidate in self.undecided))
-
-
 class MotionMeter:
     """Noise of the gray images of one tray, and where lasting motion of its beads begins.
 
@@ -186,13 +79,13 @@ class MotionMeter:
 
     def __init__(self, ratio: float) -> None:
         self._ratio = ratio
-        self._recent: deque[float] = deque(maxlen=MEMORY_FRAMES)
+        self._recent: deque[tuple[float, float]] = deque(maxlen=MEMORY_FRAMES)
         self._noise = Quantile(NOISE_QUANTILE, _NOISE_FRAMES)
         self._last: tuple[NDArray[np.uint8], float, float] | None = None
-        self._clock = _Clock()
+        self._clock = FrameClock()
         self._stopped_ns: int | None = None
         self._seen = True
-        self._candidates = _Candidates(_LACKING)
+        self._candidates = Candidates(_LACKING)
         self.noise_power = 0.0
 
     def push(self, stamp_ns: int, gray: NDArray[np.uint8]) -> Onsets:
@@ -223,29 +116,33 @@ class MotionMeter:
         power = total_power(counts) / gray.size - (mean - last[1]) ** 2 - (spread - last[2]) ** 2
         contrast = max(spread * last[2], self.noise_power)
         motion = max(power - self.noise_power, 0.0) / contrast
+        noise = self.noise_power / contrast
         confirmed = tuple(
             candidate.before_ns
             for candidate in self._candidates.push(stamp_ns, motion)
             if candidate.gray is not None and _moved(candidate.gray, gray, self.noise_power)
         )
         if len(self._recent) >= _FEW_BEFORE:
-            bar = self._ratio * median(self._recent) + self.noise_power / contrast
+            # In a picture with less contrast, the motion before was known less well.
+            before, unknown = (median(values) for values in zip(*self._recent, strict=True))
+            bar = self._ratio * before + max(unknown, noise)
             if motion > bar:
                 frames = self._clock.confirming_frames()
-                self._candidates.add(_Candidate(self._clock.previous_ns, bar, frames, gray))
-        self._remember(stamp_ns, motion, identical=counts[0] == gray.size)
+                self._candidates.add(Candidate(self._clock.previous_ns, bar, frames, gray))
+        if not self._is_frozen(stamp_ns, motion, identical=counts[0] == gray.size):
+            self._recent.append((motion, noise))
         return self._candidates.onsets(confirmed)
 
-    def _remember(self, stamp_ns: int, motion: float, *, identical: bool) -> None:
-        """Add the motion to the usual one, unless the picture is frozen."""
+    def _is_frozen(self, stamp_ns: int, motion: float, *, identical: bool) -> bool:
+        """Whether the picture stands still, while the beads need not."""
         full = len(self._recent) == MEMORY_FRAMES
-        stopped = full and (identical or motion < _STOPPED * median(self._recent))
-        if not stopped:
+        usual = median(before for before, _ in self._recent) if full else 0.0
+        if not full or not (identical or motion < _STOPPED * usual):
             self._stopped_ns = None
-        elif self._stopped_ns is None:
+            return False
+        if self._stopped_ns is None:
             self._stopped_ns = stamp_ns
-        if not stopped or not (identical or stamp_ns - (self._stopped_ns or 0) < _LONGEST_STOP_NS):
-            self._recent.append(motion)
+        return identical or stamp_ns - self._stopped_ns < _LONGEST_STOP_NS
 
 
 def _moved(first: NDArray[np.uint8], last: NDArray[np.uint8], noise_power: float) -> bool:
@@ -297,8 +194,8 @@ class PlateMeter:
         self._ratio = ratio
         self._least = least_speed
         self._recent: deque[tuple[int, float]] = deque()
-        self._clock = _Clock()
-        self._candidates = _Candidates(_SWING_LACKING)
+        self._clock = FrameClock()
+        self._candidates = Candidates(_SWING_LACKING)
 
     def push(self, stamp_ns: int, speed: float, error: float) -> Onsets:
         """Take the speed of the plate since the frame before, [m/s]; NaN when unknown."""
@@ -313,6 +210,6 @@ class PlateMeter:
             bar = max(self._least, _SIGNIFICANT * error, self._ratio * before)
             if speed > bar:
                 frames = self._clock.confirming_frames()
-                self._candidates.add(_Candidate(self._clock.previous_ns, bar, frames))
+                self._candidates.add(Candidate(self._clock.previous_ns, bar, frames))
         self._recent.append((stamp_ns, speed))
         return self._candidates.onsets(tuple(candidate.before_ns for candidate in lasting))

@@ -13,7 +13,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.stages.preprocess.difference_noise import NS
-from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter, Onsets
+from nanorocks_ros.stages.preprocess.onset_confirmation import Onsets
+from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from nanorocks_ros.stages.preprocess.shake_detection import Onsets
+from nanorocks_ros.stages.preprocess.onset_confirmation import Onsets
 from nanorocks_ros.stages.preprocess.shaking_cycles import (
     CycleFollower,
     HeldImages,
