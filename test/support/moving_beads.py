@@ -50,10 +50,10 @@ def pictures(positions, *, radius=7.0, noise=1.5, gains=None, floor=90.0, seed=2
 
 def encoded(grays, codec, rate=30, **options):
     """The pictures as a codec gives them back."""
-    file = io.BytesIO()
+    grays, file = list(grays), io.BytesIO()
     with av.open(file, 'w', format='matroska') as container:
         stream = container.add_stream(codec, rate=rate, options=options)
-        stream.width = stream.height = SIDE
+        stream.height, stream.width = grays[0].shape
         stream.pix_fmt = 'yuvj420p' if codec == 'mjpeg' else 'yuv420p'
         for gray in grays:
             frame = av.VideoFrame.from_ndarray(np.repeat(gray[..., None], 3, 2), format='bgr24')
@@ -62,8 +62,7 @@ def encoded(grays, codec, rate=30, **options):
     file.seek(0)
     with av.open(file) as container:
         return [
-            np.ascontiguousarray(frame.to_ndarray(format='bgr24')[..., 1])
-            for frame in container.decode(video=0)
+            frame.to_ndarray(format='bgr24')[..., 1].copy() for frame in container.decode(video=0)
         ]
 
 
