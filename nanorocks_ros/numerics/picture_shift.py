@@ -13,9 +13,6 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# A codec that finds nothing new in a picture changes it by less than this share of what motion
-# does (0.03 at most with x264 and MPEG-4); it then may shift what it had drawn coarsely.
-_SKIPPED = 0.05
 # Shifts explain 0.5 to 0.9 of the difference of distinct frames, and 0.02 of compression noise.
 _SHIFTED = 0.3
 # Beads that move differently lie in different blocks of so many pixels.
@@ -68,17 +65,9 @@ def shifted_share(before: NDArray[np.uint8], now: NDArray[np.uint8]) -> float:
     return float(np.clip(explained, 0.0, dd).sum()) / total
 
 
-def is_same_moment(share: float, ratio: float) -> bool:
-    """Whether two alike pictures are of the same moment, compressed twice.
-
-    Parameters
-    ----------
-    share : float
-        Of their difference, see `shifted_share`.
-    ratio : float
-        Their mean difference, as a share of the usual one.
-    """
-    return ratio <= _SKIPPED or share < _SHIFTED
+def is_shifted(share: float) -> bool:
+    """Whether the difference of two alike pictures is motion, by its `shifted_share`."""
+    return share >= _SHIFTED
 
 
 def _block_means(values: NDArray[np.float32]) -> NDArray[np.float32]:
