@@ -32,8 +32,8 @@ _LONGEST_RUN = 7
 # at most _MAX_PRODUCT. Neighbouring frames must differ by at least _MIN_CHANGE gray levels.
 # With 5 codecs at usual qualities the product reaches 0.13.
 _MAX_RATIO, _MAX_PRODUCT, _MIN_CHANGE = 0.5, 0.15, 6.0
-# A codec that finds nothing new changes a picture by so little (0.009 at most with x264 and MPEG-4)
-# that a shift means nothing: it refines what it had drawn coarsely. When a camera that jitters
+# A codec that finds nothing new changes a picture by so little (0.009 at most with x264 and
+# MPEG-4) that a shift means nothing: it refines what it had drawn coarsely. When a camera that jitters
 # returns to its place, the beads change the picture more (0.02).
 _SKIPPED_PRODUCT = 0.01
 # Stored images are decoded for the comparison only among the first frames, and later only if there
