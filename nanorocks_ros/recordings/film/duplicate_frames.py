@@ -33,8 +33,8 @@ _LONGEST_RUN = 7
 # With 5 codecs at usual qualities the product reaches 0.13.
 _MAX_RATIO, _MAX_PRODUCT, _MIN_CHANGE = 0.5, 0.15, 6.0
 # A codec that finds nothing new changes a picture by so little (0.009 at most with x264 and
-# MPEG-4) that a shift means nothing: it refines what it had drawn coarsely. When a camera that jitters
-# returns to its place, the beads change the picture more (0.02).
+# MPEG-4) that a shift means nothing: it refines what it had drawn coarsely. When a camera that
+# jitters returns to its place, the beads change the picture more (0.02).
 _SKIPPED_PRODUCT = 0.01
 # Stored images are decoded for the comparison only among the first frames, and later only if there
 # were duplicates among those.
