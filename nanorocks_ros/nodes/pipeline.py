@@ -286,8 +286,8 @@ class PipelineNode(NanorocksNode):
 
     def _finish(self) -> None:
         self._background.drain()
-        for record in self._pipeline.flush():
-            self.outputs.publish_result(record, self._epoch.ns)
+        # Images that were held back may be among the last results.
+        self._publish(_Done(self._pipeline.flush(), True))
         if self._recorder is not None:
             self._recorder.close()
         self.finish()

@@ -170,4 +170,5 @@ class Pipeline:
 
     def flush(self) -> tuple[Result, ...]:
         """Everything that is held back when the frames end."""
-        return tuple(estimate for tray in self.trays.values() for estimate in tray.flush())
+        last = self.follow(self.preprocessor.flush())
+        return (*last, *(estimate for tray in self.trays.values() for estimate in tray.flush()))

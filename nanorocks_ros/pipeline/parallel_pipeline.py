@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from typing import TYPE_CHECKING
 
@@ -94,6 +95,15 @@ class SharedPipeline(Pipeline):
         self, records: Sequence[TrayImage | Notice], wanted: Mapping[int, Wanted] | None = None
     ) -> tuple[Result, ...]:
         """See `Pipeline.follow`; raises NanorocksError when a process has ended."""
+        results: list[Result] = []
+        # The records of a tray must follow its image: of each tray one image at a time.
+        for _, of_frame in itertools.groupby(records, lambda record: record.stamp_ns):
+            results += self._follow_frame(tuple(of_frame), wanted)
+        return tuple(results)
+
+    def _follow_frame(
+        self, records: Sequence[TrayImage | Notice], wanted: Mapping[int, Wanted] | None
+    ) -> list[Result]:
         images = [record for record in records if isinstance(record, TrayImage)]
         of_tray = self._run(images, wanted) if images else {}
         results: list[Result] = []
@@ -101,14 +111,15 @@ class SharedPipeline(Pipeline):
             results.append(record)
             if isinstance(record, TrayImage):
                 results += of_tray[record.tray]
-        return tuple(results)
+        return results
 
     def flush(self) -> tuple[Result, ...]:
         """See `Pipeline.flush`."""
+        last = self.follow(self.preprocessor.flush())
         if not self._prepared:
-            return super().flush()
+            return (*last, *super().flush())
         of_tray = self._run((), None, flush=True)
-        return tuple(record for number in self.trays for record in of_tray[number])
+        return (*last, *(record for number in self.trays for record in of_tray[number]))
 
     def _run(
         self,

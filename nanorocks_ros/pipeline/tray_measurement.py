@@ -20,7 +20,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.stages.bodies.body_counter import BodyCounter
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
-from nanorocks_ros.stages.preprocess.shake_detection import CycleFollower
+from nanorocks_ros.stages.preprocess.shaking_cycles import CycleFollower
 from nanorocks_ros.stages.scale.scale_check import ScaleCheck
 from nanorocks_ros.stages.speed.area_speed import AreaSpeed
 from nanorocks_ros.stages.speed.speed_selector import SpeedSelector
@@ -85,6 +85,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         self._noticed: set[str] = set()
         self._certain_ns: int | None = None
         self._cycles = CycleFollower(settings.speed.shake_ratio, settings.speed.min_cycle_duration)
+        self._cycle: tuple[int, int | None] = (0, None)
         self._oscillation = TrayOscillation()
         self._tracker = Tracker(settings, tray)
         self._contacts = ContactFinder(tray)
@@ -96,8 +97,13 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         self._selector = SpeedSelector(settings.speed, self._track_speed.reliability)
 
     def _process(self, record: TrayImage) -> tuple[TrayRecord, ...]:
-        self._cycles.push(record)
-        image = self._cycles.counted(record)
+        return tuple(
+            result for image in self._cycles.push(record) for result in self._measured(image)
+        )
+
+    def _measured(self, image: TrayImage) -> tuple[TrayRecord, ...]:
+        """Everything that follows from an image whose cycle is known."""
+        self._cycle = image.cycle or 0, image.cycle_start_ns
         self._area_speed.emit_mask = self.emit_mask
         pictures: list[MotionMask | Tracks] = []
         speeds: list[SpeedEstimate] = []
@@ -127,12 +133,13 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
 
     def flush(self) -> tuple[TrayRecord, ...]:
         """Contacts and bodies of the last seconds, and speeds that were still held back."""
+        last = [result for image in self._cycles.flush() for result in self._measured(image)]
         self._track_speed.flush()
         speeds = self._structure_speed.flush() if self._selector.uses_structure else ()
         contacts = self._in_cycle(sorted(self._contacts.flush(), key=attrgetter('stamp_ns')))
         notices = [*self._scale_notices(None, contacts), *self._scale.flush()]
         events = [*contacts, *self._bodies.flush()]
-        return (*notices, *self._selected(speeds), *self._reliable(events))
+        return (*last, *notices, *self._selected(speeds), *self._reliable(events))
 
     @property
     def scale_flag(self) -> Quality:
@@ -183,7 +190,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
 
     def _in_cycle(self, contacts: Iterable[Rebound | PairCollision]) -> list[Event]:
         """The contacts with their cycle: some before a shaking event are known only after it."""
-        cycle, start_ns = self._cycles.cycle, self._cycles.cycle_start_ns
+        cycle, start_ns = self._cycle
         return [
             replace(
                 contact, cycle=cycle - int(start_ns is not None and contact.stamp_ns < start_ns)

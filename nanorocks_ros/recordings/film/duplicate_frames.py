@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
 
+from nanorocks_ros.numerics.picture_shift import is_shifted, shifted_share
 from nanorocks_ros.recordings.film.film_source import EncodedImage
 from nanorocks_ros.recordings.storage import NS
 
@@ -31,6 +32,10 @@ _LONGEST_RUN = 7
 # at most _MAX_PRODUCT. Neighbouring frames must differ by at least _MIN_CHANGE gray levels.
 # With 5 codecs at usual qualities the product reaches 0.13.
 _MAX_RATIO, _MAX_PRODUCT, _MIN_CHANGE = 0.5, 0.15, 6.0
+# A codec that finds nothing new changes a picture by so little (0.009 at most with x264 and
+# MPEG-4) that a shift means nothing: it refines what it had drawn coarsely. When a camera that
+# jitters returns to its place, the beads change the picture more (0.02).
+_SKIPPED_PRODUCT = 0.01
 # Stored images are decoded for the comparison only among the first frames, and later only if there
 # were duplicates among those.
 _DECODED_FRAMES = 64
@@ -41,16 +46,23 @@ _TURNING_RATIO = 0.8
 
 
 class _Change(NamedTuple):
-    """Difference of a frame from the previous one: mean and maximum, [gray levels]."""
+    """Difference of a frame from the previous one: mean and maximum, [gray levels].
+
+    `shifted`: share of it that is motion, where it was measured. A camera that shakes returns to
+    the same place now and then, while the beads have moved.
+    """
 
     mean: float
     maximum: float
+    shifted: float = 0.0
 
     def is_small_beside(self, other: _Change) -> bool:
         if other.maximum < _MIN_CHANGE:
             return False
         mean, maximum = self.mean / other.mean, self.maximum / other.maximum
-        return max(mean, maximum) <= _MAX_RATIO and mean * maximum <= _MAX_PRODUCT
+        if max(mean, maximum) > _MAX_RATIO or mean * maximum > _MAX_PRODUCT:
+            return False
+        return mean * maximum <= _SKIPPED_PRODUCT or not is_shifted(self.shifted)
 
 
 _NONE = _Change(0.0, 0.0)
@@ -138,6 +150,8 @@ class DuplicateFilter:
 
     def _judged(self, frame: Stamped[FilmFrame], change: _Change) -> Iterator[Stamped[FilmFrame]]:
         """Hold back frames with a small change until a larger change follows."""
+        if self._before is None or self._is_candidate(change):
+            change = change._replace(shifted=shifted_share(self._grays[-2], self._grays[-1]))
         if self._run:
             if all(small.is_small_beside(change) for _, small in self._run):
                 if self._is_turning_point(change):

@@ -25,7 +25,7 @@ from nanorocks_ros.records import (
 from nanorocks_ros.stages.clusters.correlation_width import ClusterAutocorrelator
 from nanorocks_ros.stages.clusters.sticking_estimator import StickingEstimator
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
-from nanorocks_ros.stages.preprocess.shake_detection import NS
+from nanorocks_ros.stages.preprocess.difference_noise import NS
 from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
@@ -122,6 +122,9 @@ class ClusterEstimator(RestartingStage[Input, Clusters]):
 
     def flush(self) -> tuple[ClusterEstimate, ...]:
         """The estimates of the last two seconds."""
+        for result in self._images.flush():
+            if isinstance(result, ClusterEstimate):
+                self._held.append((result, False))
         held, self._held = self._held, deque()
         return tuple(self._completed(estimate, wrong_scale) for estimate, wrong_scale in held)
 

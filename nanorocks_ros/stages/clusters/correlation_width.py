@@ -27,10 +27,13 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.stages.clusters.background_removal import tray_contrast, tray_levels
-from nanorocks_ros.stages.preprocess.shake_detection import NS, CycleFollower
+from nanorocks_ros.stages.preprocess.difference_noise import NS
+from nanorocks_ros.stages.preprocess.shaking_cycles import CycleFollower
 from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
@@ -138,14 +141,22 @@ class ClusterAutocorrelator(RestartingStage[TrayImage, Correlations]):
         self._next_ns: int | None = None
 
     def _process(self, record: TrayImage) -> tuple[Correlations, ...]:
-        image = record
-        self._cycles.push(image)
+        return self._correlations(self._cycles.push(record))
+
+    def flush(self) -> tuple[Correlations, ...]:
+        """Of the images that were held back until their cycle was known."""
+        return self._correlations(self._cycles.flush())
+
+    def _correlations(self, images: Iterable[TrayImage]) -> tuple[Correlations, ...]:
+        return tuple(record for image in images for record in self._correlation(image))
+
+    def _correlation(self, image: TrayImage) -> tuple[Correlations, ...]:
         if self._next_ns is not None and image.stamp_ns < self._next_ns:
             return ()
         self._next_ns = image.stamp_ns + round(self._settings.clusters.interval * NS)
         records: list[Correlations] = []
         correlation = correlated(image.gray, self._settings.preprocess.pixels_per_metre)
-        records.append(self._estimate(image.stamp_ns, correlation))
+        records.append(self._estimate(image, correlation))
         if self.emit_image:
             picture = Autocorrelation(
                 stamp_ns=image.stamp_ns, tray=image.tray, values=correlation.values
@@ -156,15 +167,15 @@ class ClusterAutocorrelator(RestartingStage[TrayImage, Correlations]):
             self._notice = ''
         return tuple(records)
 
-    def _estimate(self, stamp_ns: int, correlation: Correlated) -> ClusterEstimate:
+    def _estimate(self, image: TrayImage, correlation: Correlated) -> ClusterEstimate:
         region = correlation.region(self._settings.clusters.level)
         width = correlation.width(region.area)
         size = _NO_SIZE if self._curve is None else self._curve.size_of(width)
         area, inner = width.level_area, width.inner_area
         return ClusterEstimate(
-            stamp_ns=stamp_ns,
+            stamp_ns=image.stamp_ns,
             tray=self._tray.number,
-            cycle=self._cycles.cycle,
+            cycle=image.cycle or 0,
             level_area=area,
             correlation_length=math.sqrt(area / math.pi),
             axes_ratio=region.axes_ratio,

@@ -18,7 +18,7 @@ from nanorocks_ros.inference.sticking.sticking_speed import StickingEstimate, st
 from nanorocks_ros.physics.sticking_rates import slow_contacts
 from nanorocks_ros.records import BodyEstimate, Merge, Quality, SpeedEstimate
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
-from nanorocks_ros.stages.preprocess.shake_detection import NS
+from nanorocks_ros.stages.preprocess.difference_noise import NS
 from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.picture_shift import is_shifted, shifted_share
 from nanorocks_ros.numerics.quantiles import Quantile, median
 from nanorocks_ros.records import Notice, Quality
 
@@ -29,12 +31,24 @@ _FROZEN_NOTICE_NS = NS
 # A duplicate that was compressed again differs a little: by less than this share of the usual
 # change from frame to frame, where that is so many gray levels.
 _RECODED, _NOISY = 0.1, 0.5
+# Below this share, a codec found nothing new, and may shift what it had drawn coarsely.
+_SKIPPED = 0.05
 _USUAL = 0.75
 # Smallest number of filled rows, as a share of the height, beyond the usual number.
 _HALF = 0.03
 _FEWEST_ROWS = 12
 _USUAL_FRAMES = 30
 _HISTORY = 5
+# Rows that stay the same hide something where, so many pixels below the first of them, blocks of
+# 16 pixels changed from frame to frame so far: a codec skips what is still, and a bead that leaves
+# these rows is not farther away after one frame. Key frames change still blocks by less than
+# so many gray levels, and only once.
+_BLOCK_PX = 16
+_DEPTH_PX = 32
+_MOVED = 3.0
+_CHANGES = 2
+# Frames after which a part that stays the same is no longer compared with what moved there before.
+_MOST_BROKEN = 15
 # Largest difference of levels between filled rows, due to JPEG.
 _FILLED = 2
 
@@ -77,7 +91,8 @@ class FrameChecks:
         self._changed_frames = 0
         self._changed_ns = 0
         self._ends: deque[int] = deque(maxlen=_USUAL_FRAMES)
-        self._same: deque[int] = deque(maxlen=_USUAL_FRAMES)
+        self._whole: deque[NDArray[np.uint8]] = deque(maxlen=_CHANGES + 1)
+        self._broken = 0
         self._blank = 0
         self._noticed: set[str] = set()
         self._frozen_noticed = False
@@ -142,7 +157,9 @@ class FrameChecks:
         # At first half of all frames may be duplicates.
         usual = self._usual_change if self._changed_frames >= _HISTORY else 0.0
         if usual >= _NOISY and change <= _RECODED * usual:
-            return True
+            share = shifted_share(_one_channel(self._image), _one_channel(frame.image))
+            if change <= _SKIPPED * usual or not is_shifted(share):
+                return True
         self._usual_change = self._changes.push(change)
         self._changed_frames += 1
         return False
@@ -168,17 +185,50 @@ class FrameChecks:
         """The first row of the incomplete part of the frame, or its height."""
         height = frame.image.shape[0]
         image = frame.image.reshape(height, frame.image.shape[1], -1)
+        smallest = max(_FEWEST_ROWS, _HALF * height)
         filled = _filled_rows(image)
-        same = 0
+        # A scene without noise may end in equal rows in every frame.
+        beyond = filled - median(self._ends) if self._ends else 0
+        self._ends.append(filled)
+        cut = filled if beyond >= smallest and self._differs(image, height - filled) else 0
         if self._image is not None and self._image.shape == frame.image.shape:
             same = _rows_the_same(image, self._image.reshape(image.shape))
-        cut, smallest = 0, max(_FEWEST_ROWS, _HALF * height)
-        for count, usual, history in ((filled, self._ends, 1), (same, self._same, _HISTORY)):
-            # A scene without noise may end in equal rows in every frame.
-            if count >= smallest and len(usual) >= history and count - median(usual) >= smallest:
-                cut = max(cut, count)
-            usual.append(count)
+            if same >= max(smallest, cut + 1) and self._hides_motion(height - same + _DEPTH_PX):
+                cut = same
+        self._broken = self._broken + 1 if cut else 0
+        if not 0 < self._broken <= _MOST_BROKEN:
+            self._whole.append(image)
         return int(height - cut)
+
+    def _differs(self, image: NDArray[np.uint8], row: int) -> bool:
+        """Whether the rows from one on differ from those of the last whole frame."""
+        if not self._whole or self._whole[-1].shape != image.shape:
+            return True
+        return _largest_change(image[row:], self._whole[-1][row:]) > _MOVED
+
+    def _hides_motion(self, row: int) -> bool:
+        """Whether something moved from one row on, in each of the last whole frames."""
+        pairs = list(pairwise(self._whole))
+        return (
+            len(pairs) == _CHANGES
+            and row < self._whole[-1].shape[0]
+            and all(
+                before.shape == now.shape and _largest_change(now[row:], before[row:]) > _MOVED
+                for before, now in pairs
+            )
+        )
+
+
+def _one_channel(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The picture itself, or its middle channel."""
+    return image if image.ndim == 2 else image[..., image.shape[2] // 2]
+
+
+def _largest_change(now: NDArray[np.uint8], before: NDArray[np.uint8]) -> float:
+    """Largest mean difference of a block of two pictures, [gray levels]."""
+    difference = cv2.absdiff(_one_channel(now), _one_channel(before))
+    size = [max(1, side // _BLOCK_PX) for side in difference.shape]
+    return float(cv2.resize(difference, size[::-1], interpolation=cv2.INTER_AREA).max())
 
 
 @compiled

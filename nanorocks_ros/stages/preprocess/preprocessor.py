@@ -17,7 +17,8 @@ from nanorocks_ros.records import Frame, Notice, Quality, TrayImage
 from nanorocks_ros.stages.preprocess.frame_checks import FrameChecks
 from nanorocks_ros.stages.preprocess.gray_image_checks import picture_quality
 from nanorocks_ros.stages.preprocess.scale_advice import misfit_remedy
-from nanorocks_ros.stages.preprocess.shake_detection import PlateMeter, ShakeCounter
+from nanorocks_ros.stages.preprocess.shake_detection import PlateMeter
+from nanorocks_ros.stages.preprocess.shaking_cycles import HeldImages, ShakeCounter
 from nanorocks_ros.stages.preprocess.stabilise import shift_of_plate
 from nanorocks_ros.stages.preprocess.tray_crop import TrayCrop
 from nanorocks_ros.stages.preprocess.tray_position_check import position_problem
@@ -98,6 +99,9 @@ class Preprocessor:
     def push(self, frame: Frame) -> tuple[TrayImage | Notice, ...]:
         """The tray images of a frame; notices alone when it cannot be used.
 
+        While the beginning of a cycle is undecided, images are held back; see
+        :mod:`nanorocks_ros.stages.preprocess.shaking_cycles`.
+
         Raises
         ------
         FrameError
@@ -106,6 +110,7 @@ class Preprocessor:
         self._check_frame(frame)
         last, self._last_stamp_ns = self._last_stamp_ns, frame.stamp_ns
         notices: tuple[Notice, ...] = ()
+        held: tuple[TrayImage, ...] = ()
         if last is not None and frame.stamp_ns <= last:
             late = (last - frame.stamp_ns) / NS
             if late < self._settings.late_tolerance:
@@ -113,13 +118,23 @@ class Preprocessor:
                 text = f'{self._camera}: a frame came {late:.3f} s late and was dropped'
                 return (Notice(stamp_ns=frame.stamp_ns, text=text),)
             text = f'{self._camera}: time went back by {late:.3f} s; starting afresh'
+            held = self.flush()
             notices = (Notice(stamp_ns=frame.stamp_ns, text=text),)
             self._start()
         verdict = self._checks.push(frame)
         if not verdict.usable:
-            return (*notices, *verdict.notices)
+            return (*held, *notices, *verdict.notices)
         images = self._tray_images(frame, verdict.rows, verdict.quality)
-        return (*notices, *images, *verdict.notices, *self._check_positions(frame))
+        return (*held, *notices, *images, *verdict.notices, *self._check_positions(frame))
+
+    def flush(self) -> tuple[TrayImage, ...]:
+        """The tray images that are held back, at the end of the recording."""
+        return () if self._shape is None else self._held.flush()
+
+    @property
+    def held_from_ns(self) -> float:
+        """Stamp of the first image that is held back, [ns]; infinite when none is."""
+        return math.inf if self._shape is None else self._held.first_ns
 
     def _start(self) -> None:
         """Forget everything but the regions of the trays."""
@@ -132,6 +147,7 @@ class Preprocessor:
         self._misplaced: frozenset[int] = frozenset()
         self._checks = FrameChecks(self._camera)
         self._counter = ShakeCounter(speed.min_cycle_duration)
+        self._held = HeldImages(self._counter)
         self._plate = PlateMeter(speed.shake_ratio, self._settings.shake_speed)
         self._crops = tuple(
             TrayCrop(
@@ -176,19 +192,20 @@ class Preprocessor:
             whole.append(crop)
         plate = shift_of_plate([crop.shift for crop in whole if crop.shift is not None])
         pictures: list[tuple[TrayCrop, NDArray[np.uint8], NDArray[np.uint8] | None]] = []
-        jumps = []
+        onsets = []
         for crop in whole:
             crop.update_motion(frame.stamp_ns, plate)
             gray, color = crop.crop(image)
-            jumps.append(crop.meter.push(frame.stamp_ns, gray))
+            onsets.append(crop.meter.push(frame.stamp_ns, gray))
             pictures.append((crop, gray, color))
         if pictures:
-            shaken = self._plate.push(frame.stamp_ns, *self._plate_speed())
-            self._counter.push(frame.stamp_ns, jumps, shaken)
-        return tuple(
+            plate_onsets = self._plate.push(frame.stamp_ns, *self._plate_speed())
+            self._counter.push(onsets, plate_onsets)
+        self._held.add(
             self._tray_image(frame.stamp_ns, crop, gray, color, quality)
             for crop, gray, color in pictures
         )
+        return self._held.known()
 
     def _plate_speed(self) -> tuple[float, float]:
         """Speed of the plate and its error, [m/s]; NaN when no tray was registered.
@@ -220,8 +237,6 @@ class Preprocessor:
             tray=crop.tray,
             gray=gray,
             color=color,
-            cycle=self._counter.cycle,
-            cycle_start_ns=self._counter.cycle_start_ns,
             noise_power=crop.meter.noise_power,
             displacement=crop.displacement,
             displacement_error=crop.displacement_error,

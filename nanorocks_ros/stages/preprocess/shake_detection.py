@@ -1,147 +1,70 @@
-"""Sensor noise and shaking events, from the gray images and from the motion of the trays.
+"""Beginnings of lasting motion: of the beads in the images of one tray, and of the plate.
 
-The :class:`ShakeCounter` of the preprocessor counts the shaking events; each tray image carries
-the count. For images without a count a :class:`CycleFollower` finds the same events.
+A shaking event sets all beads in motion between one frame and the next, and they move for seconds.
+A key frame of a codec changes all still texture a little, a lamp that is switched changes all
+levels, a knocked camera blurs a picture: each for a frame or two. So a jump is a candidate, which
+the frames after it confirm or refute.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
-from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.quantiles import Quantile, median
+from nanorocks_ros.stages.preprocess.difference_noise import (
+    MEMORY_FRAMES,
+    NOISE_QUANTILE,
+    NS,
+    clipped_power,
+    difference_counts,
+    total_power,
+)
+from nanorocks_ros.stages.preprocess.onset_confirmation import (
+    Candidate,
+    Candidates,
+    FrameClock,
+    Onsets,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from numpy.typing import NDArray
 
-    from nanorocks_ros.records import TrayImage
-
-NS = 1_000_000_000
-
-# Half a second of pictures at 30 Hz: longer than a jump takes, shorter than a decay.
-_MEMORY_FRAMES = 15
 _NOISE_FRAMES = 300
-# Frames needed for the smallest noise.
-_FEW_FRAMES = 5
-_NOISE_QUANTILE = 0.2
-# A step in time so many times longer than usual means that frames are missing.
-_GAP = 1.75
-# Beyond 3 sigma a difference counts as motion; what is left of a Gaussian has this variance.
-_CLIP = 3.0
-_CLIPPED_VARIANCE = 0.9733
-# A uint8 difference of variance 2 sigma^2 is never known better than its rounding.
-_ROUNDING_POWER = 1.0 / 6.0
+# At most so many of the frames that confirm an onset may lack the motion, as a share.
+_LACKING = 1.0 / 3.0
+# Frames before a jump that tell the usual motion.
+_FEW_BEFORE = 3
+# A gas does not stop from one frame to the next: with a motion below this share of the usual, the
+# picture is frozen. A gas that is at rest for longer has cooled.
+_STOPPED = 0.1
+_LONGEST_STOP_NS = 5 * NS
+# Squared difference of the first and the last image of a motion, as a share of the variance of the
+# image, in the blocks of 8 pixels where each is largest: a bead that moves by u pixels reaches
+# u^2 / 5.3, hence 1.2 pixels in 0.3 s are motion. What a codec refines reaches some per cent.
+_BLOCK_PX, _LARGEST_BLOCKS = 8, 4
+_MOVED_SHARE = 0.25
+# Contrast below which nothing is seen, as a multiple of the noise.
+_SEEN = 4.0
 # An oscillating plate stands still twice in every period, which is no rest.
 _SWING_NS = 5 * NS
 # Smallest significant speed of the tray, in standard errors.
 _SIGNIFICANT = 5.0
-
-
-def difference_power(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> float:
-    """Sum of the squared differences of two gray images, [gray levels^2]."""
-    return float(cv2.norm(later, earlier, cv2.NORM_L2SQR))
-
-
-@compiled
-def _difference_counts(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """How many pixels differ by 0, 1, ... 255 gray levels."""
-    # Two tables: the same entry twice in a row would wait for itself.
-    counts = np.zeros((2, 256), dtype=np.int64)
-    first, second = later.reshape(-1), earlier.reshape(-1)
-    for k in range(first.size):
-        place = np.uint64(k)
-        difference = np.int32(first[place]) - np.int32(second[place])
-        counts[np.uint64(k & 1), np.uint64(abs(difference))] += 1
-    total: NDArray[np.int64] = counts[0] + counts[1]
-    return total
-
-
-@compiled
-def _total_power(counts: NDArray[np.int64]) -> float:
-    """Sum of the squared differences, [gray levels^2]; exact, for they are whole numbers."""
-    total = 0.0
-    for level in range(256):
-        total += counts[level] * float(level * level)
-    return total
-
-
-@compiled
-def _power_of(counts: NDArray[np.int64]) -> float:
-    pixels = 0.0
-    for level in range(256):
-        pixels += counts[level]
-    power = _total_power(counts) / pixels
-    for _ in range(30):
-        bound = max(1.0, _CLIP * _CLIP * power)
-        kept, kept_power = 0.0, 0.0
-        for level in range(256):
-            if level * level <= bound:
-                kept += counts[level]
-                kept_power += counts[level] * float(level * level)
-        clipped = kept_power / kept / _CLIPPED_VARIANCE
-        if abs(clipped - power) <= 1e-6 * power:
-            break
-        power = clipped
-    return max(power, _ROUNDING_POWER)
-
-
-def noise_power(later: NDArray[np.uint8], earlier: NDArray[np.uint8]) -> float:
-    """Mean squared difference per pixel that two images of a scene at rest would have.
-
-    Pixels in which something moved are clipped away, iteratively.
-
-    Returns
-    -------
-    float, [gray levels^2]
-        Twice the variance of the sensor noise.
-    """
-    counts = _difference_counts(np.ascontiguousarray(later), np.ascontiguousarray(earlier))
-    return float(_power_of(counts))
-
-
-class NoiseMeter:
-    """Noise of a series of images: the smallest measured.
-
-    Where grains cover much of a picture, fast motion cannot be told from noise: of the grains of
-    tray 7 at 15 mm/s all motion was taken for noise. Grains that are slow or at rest show it.
-    """
-
-    def __init__(self) -> None:
-        # A frame stored twice has no noise: the minimum would be wrong.
-        self._recent = Quantile(_NOISE_QUANTILE, _MEMORY_FRAMES)
-        self._pushed = 0
-        self._smallest = math.inf
-        self._last: NDArray[np.uint8] | None = None
-
-    def start_from(self, image: NDArray[np.uint8]) -> None:
-        """Compare the next image with this one."""
-        self._last = image
-
-    def push(self, image: NDArray[np.uint8]) -> float:
-        """Mean squared difference per pixel of two images of a scene at rest."""
-        last, self._last = self._last, image
-        if last is None:
-            return 0.0
-        recent = self._recent.push(noise_power(image, last))
-        self._pushed += 1
-        if self._pushed >= _FEW_FRAMES:
-            self._smallest = min(self._smallest, recent)
-        return min(self._smallest, recent)
+# Share of the frames in which an oscillating plate must be fast: it turns twice a period. A knock
+# of the camera lasts for a frame or two.
+_SWING_LACKING = 2.0 / 3.0
 
 
 class MotionMeter:
-    """Noise of the gray images of one tray, and whether their motion just jumped.
+    """Noise of the gray images of one tray, and where lasting motion of its beads begins.
 
-    A shaking event sets every bead in motion between one frame and the next, whereas
-    collisions change the mean squared difference of two images by some ten per cent.
+    The motion is the mean squared difference of successive images without what noise and changes
+    of brightness and contrast explain, in units of the contrast. Collisions change it by some ten
+    per cent, a shaking event by a factor, for many frames.
 
     Parameters
     ----------
@@ -156,40 +79,109 @@ class MotionMeter:
 
     def __init__(self, ratio: float) -> None:
         self._ratio = ratio
-        self._recent: deque[float] = deque(maxlen=_MEMORY_FRAMES)
-        self._noise = Quantile(_NOISE_QUANTILE, _NOISE_FRAMES)
-        self._last: NDArray[np.uint8] | None = None
-        self._last_ns = 0
-        self._steps: deque[int] = deque(maxlen=_MEMORY_FRAMES)
+        self._recent: deque[tuple[float, float]] = deque(maxlen=MEMORY_FRAMES)
+        self._noise = Quantile(NOISE_QUANTILE, _NOISE_FRAMES)
+        self._last: tuple[NDArray[np.uint8], float, float] | None = None
+        self._clock = FrameClock()
+        self._stopped_ns: int | None = None
+        self._seen = True
+        self._candidates = Candidates(_LACKING)
         self.noise_power = 0.0
 
-    def push(self, stamp_ns: int, gray: NDArray[np.uint8]) -> bool:
-        """Take the next image; True when the motion jumped since the one before."""
+    def push(self, stamp_ns: int, gray: NDArray[np.uint8]) -> Onsets:
+        """Take the next image.
+
+        Parameters
+        ----------
+        stamp_ns : int
+        gray : ndarray of uint8, (rows, columns)
+        """
         gray = np.ascontiguousarray(gray)
-        last, self._last = self._last, gray
-        step, self._last_ns = stamp_ns - self._last_ns, stamp_ns
-        if last is None:
-            return False
-        usual = median(self._steps) if self._steps else step
-        self._steps.append(step)
+        mean, spread = (float(level[0, 0]) for level in cv2.meanStdDev(gray))
+        last, self._last = self._last, (gray, mean, spread)
         # Beads move further while frames are missing, which is no jump. A jump during the gap is
         # seen with the next image.
-        if step > _GAP * usual:
-            return False
-        counts = _difference_counts(gray, last)
+        if not self._clock.push(stamp_ns) or last is None:
+            return self._candidates.onsets()
+        counts = difference_counts(gray, last[0])
         # Motion adds to the noise, and a frame stored twice has none: neither the mean nor the
         # minimum is right.
-        self.noise_power = self._noise.push(_power_of(counts))
-        quiet = self.noise_power * gray.size
-        motion = _total_power(counts) - quiet
-        # Of 15 frames, not of all: an earlier shaking event may have been stronger.
-        before = max(self._recent, default=None)
-        self._recent.append(motion)
-        return before is not None and motion > self._ratio * max(before, 0.0) + quiet
+        self.noise_power = self._noise.push(clipped_power(counts))
+        seen, self._seen = self._seen, _is_seen(gray, spread, self.noise_power)
+        if not (seen and self._seen):
+            # In the dark, motion is unknown.
+            self._recent.clear()
+            self._candidates.undecided.clear()
+            return Onsets()
+        power = total_power(counts) / gray.size - (mean - last[1]) ** 2 - (spread - last[2]) ** 2
+        contrast = max(spread * last[2], self.noise_power)
+        motion = max(power - self.noise_power, 0.0) / contrast
+        noise = self.noise_power / contrast
+        confirmed = tuple(
+            candidate.before_ns
+            for candidate in self._candidates.push(stamp_ns, motion)
+            if candidate.gray is not None and _moved(candidate.gray, gray, self.noise_power)
+        )
+        if len(self._recent) >= _FEW_BEFORE:
+            # In a picture with less contrast, the motion before was known less well.
+            before, unknown = (median(values) for values in zip(*self._recent, strict=True))
+            bar = self._ratio * before + max(unknown, noise)
+            if motion > bar:
+                frames = self._clock.confirming_frames()
+                self._candidates.add(Candidate(self._clock.previous_ns, bar, frames, gray))
+        if not self._is_frozen(stamp_ns, motion, identical=counts[0] == gray.size):
+            self._recent.append((motion, noise))
+        return self._candidates.onsets(confirmed)
+
+    def _is_frozen(self, stamp_ns: int, motion: float, *, identical: bool) -> bool:
+        """Whether the picture stands still, while the beads need not."""
+        full = len(self._recent) == MEMORY_FRAMES
+        usual = median(before for before, _ in self._recent) if full else 0.0
+        if not full or not (identical or motion < _STOPPED * usual):
+            self._stopped_ns = None
+            return False
+        if self._stopped_ns is None:
+            self._stopped_ns = stamp_ns
+        return identical or stamp_ns - self._stopped_ns < _LONGEST_STOP_NS
+
+
+def _moved(first: NDArray[np.uint8], last: NDArray[np.uint8], noise_power: float) -> bool:
+    """Whether something moved from one image to another, be they as bright as they may."""
+    levels = first.astype(np.float32)
+    later = last.astype(np.float32)
+    gain = float(levels.std()) / max(float(later.std()), 1e-6)
+    difference = (later - later.mean()) * gain - (levels - levels.mean())
+    change = _largest(_blocks(difference * difference)) - noise_power
+    return change > _MOVED_SHARE * _block_variance(levels, noise_power)
+
+
+def _is_seen(gray: NDArray[np.uint8], spread: float, noise_power: float) -> bool:
+    """Whether an image shows more than noise; `spread` is its standard deviation."""
+    if spread * spread > (_SEEN + 0.5) * noise_power:
+        return True
+    return _block_variance(gray.astype(np.float32), noise_power) > _SEEN * noise_power
+
+
+def _block_variance(levels: NDArray[np.float32], noise_power: float) -> float:
+    """Largest variance in the blocks of an image, without noise, [gray levels^2]."""
+    return _largest(_blocks(levels * levels) - _blocks(levels) ** 2) - 0.5 * noise_power
+
+
+def _blocks(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Means of the blocks of an image."""
+    rows, columns = (max(1, side // _BLOCK_PX) for side in values.shape)
+    means = cv2.resize(values, (columns, rows), interpolation=cv2.INTER_AREA)
+    return means.astype(np.float32, copy=False)
+
+
+def _largest(values: NDArray[np.float32]) -> float:
+    """The last of the few largest values: a single one may be a reflection."""
+    place = max(0, values.size - _LARGEST_BLOCKS)
+    return float(np.partition(values.reshape(-1), place)[place])
 
 
 class PlateMeter:
-    """Whether the plate with the trays just began to move.
+    """Where the plate with the trays begins to move.
 
     Parameters
     ----------
@@ -202,104 +194,22 @@ class PlateMeter:
         self._ratio = ratio
         self._least = least_speed
         self._recent: deque[tuple[int, float]] = deque()
+        self._clock = FrameClock()
+        self._candidates = Candidates(_SWING_LACKING)
 
-    def push(self, stamp_ns: int, speed: float, error: float) -> bool:
+    def push(self, stamp_ns: int, speed: float, error: float) -> Onsets:
         """Take the speed of the plate since the frame before, [m/s]; NaN when unknown."""
+        self._clock.push(stamp_ns)
         if not (math.isfinite(speed) and math.isfinite(error)):
-            return False
+            return self._candidates.onsets()
         while self._recent and stamp_ns - self._recent[0][0] > _SWING_NS:
             self._recent.popleft()
-        before = max((speed for _, speed in self._recent), default=None)
+        lasting = self._candidates.push(stamp_ns, speed)
+        if len(self._recent) >= _FEW_BEFORE:
+            before = max(speed for _, speed in self._recent)
+            bar = max(self._least, _SIGNIFICANT * error, self._ratio * before)
+            if speed > bar:
+                frames = self._clock.confirming_frames()
+                self._candidates.add(Candidate(self._clock.previous_ns, bar, frames))
         self._recent.append((stamp_ns, speed))
-        least = max(self._least, _SIGNIFICANT * error)
-        return before is not None and speed > max(least, self._ratio * before)
-
-
-class ShakeCounter:
-    """Counts the shaking events, by the jumps of the trays and of the plate in each frame.
-
-    All trays are on one plate and are shaken together: an event is a jump of the plate, or of at
-    least half of the trays.
-
-    Parameters
-    ----------
-    shortest_cycle : float, [s]
-
-    Attributes
-    ----------
-    cycle : int
-        Events so far.
-    cycle_start_ns : int or None
-        Stamp of the frame before the last one.
-    """
-
-    def __init__(self, shortest_cycle: float) -> None:
-        self._shortest_ns = round(shortest_cycle * NS)
-        self._last_ns: int | None = None
-        self.cycle = 0
-        self.cycle_start_ns: int | None = None
-
-    def push(self, stamp_ns: int, jumps: Iterable[bool], plate: bool = False) -> bool:
-        """Take the jumps of the next frame; True when the trays were shaken before it."""
-        last, self._last_ns = self._last_ns, stamp_ns
-        if last is None:
-            return False
-        votes = list(jumps)
-        rested = self.cycle_start_ns is None or last - self.cycle_start_ns >= self._shortest_ns
-        shaken = plate or (any(votes) and 2 * sum(votes) >= len(votes))
-        if not (rested and shaken):
-            return False
-        self.cycle += 1
-        self.cycle_start_ns = last
-        return True
-
-
-class CycleFollower:
-    """Cycle and noise of the images of one tray: carried by the images, or found from them.
-
-    Parameters
-    ----------
-    ratio : float
-        Smallest jump of the motion, as a factor.
-    shortest_cycle : float, [s]
-
-    Attributes
-    ----------
-    cycle, cycle_start_ns, noise_power
-        Of the last image, see :class:`nanorocks_ros.records.TrayImage`.
-    """
-
-    def __init__(self, ratio: float, shortest_cycle: float) -> None:
-        self._meter = MotionMeter(ratio)
-        self._counter = ShakeCounter(shortest_cycle)
-        self._first = True
-        self.cycle = 0
-        self.cycle_start_ns: int | None = None
-        self.noise_power = 0.0
-
-    def push(self, image: TrayImage) -> bool:
-        """Take the next image; True when the tray was shaken since the one before."""
-        before, first = self.cycle, self._first
-        self._first = False
-        if image.cycle is None or math.isnan(image.noise_power):
-            jump = self._meter.push(image.stamp_ns, image.gray)
-            self._counter.push(image.stamp_ns, (jump,))
-            self.noise_power = self._meter.noise_power
-            self.cycle, self.cycle_start_ns = self._counter.cycle, self._counter.cycle_start_ns
-        if image.cycle is not None:
-            self.cycle, self.cycle_start_ns = image.cycle, image.cycle_start_ns
-            if not math.isnan(image.noise_power):
-                self.noise_power = image.noise_power
-        # A recording that starts in the middle of a cycle was not shaken at its first image.
-        return self.cycle != before and not first
-
-    def counted(self, image: TrayImage) -> TrayImage:
-        """The last image with its cycle and noise filled in."""
-        if image.cycle is not None and not math.isnan(image.noise_power):
-            return image
-        return replace(
-            image,
-            cycle=self.cycle,
-            cycle_start_ns=self.cycle_start_ns,
-            noise_power=self.noise_power,
-        )
+        return self._candidates.onsets(tuple(candidate.before_ns for candidate in lasting))

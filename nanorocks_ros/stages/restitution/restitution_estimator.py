@@ -23,7 +23,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.stages.contacts.cycle_contacts import CycleContacts
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
-from nanorocks_ros.stages.preprocess.shake_detection import NS
+from nanorocks_ros.stages.preprocess.difference_noise import NS
 from nanorocks_ros.stages.restitution.cycle_restitution import UNDETERMINED, CycleRestitution
 from nanorocks_ros.stages.restitution.restitution_methods import (
     LARGEST_TENSION,

@@ -19,7 +19,7 @@ from nanorocks_ros.records import (
     SpeedMethod,
     TrayImage,
 )
-from nanorocks_ros.stages.preprocess.shake_detection import NS
+from nanorocks_ros.stages.preprocess.difference_noise import NS
 from nanorocks_ros.stages.speed.motion_mask import MotionMasker
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.stages.preprocess.shake_detection import NS
+from nanorocks_ros.stages.preprocess.difference_noise import NS
 from nanorocks_ros.stages.speed.structure_function import Sample, StructureFunction
 
 if TYPE_CHECKING:

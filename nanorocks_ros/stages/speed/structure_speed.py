@@ -9,7 +9,7 @@ import math
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import Measured, Quality, SpeedEstimate, SpeedMethod, TrayImage
-from nanorocks_ros.stages.preprocess.shake_detection import NS, NoiseMeter
+from nanorocks_ros.stages.preprocess.difference_noise import NS, NoiseMeter
 from nanorocks_ros.stages.speed.species_images import SpeciesImages
 from nanorocks_ros.stages.speed.species_speeds import PictureSpeed, SpeciesSpeeds
 

@@ -18,7 +18,7 @@ from nanorocks_ros.records import (
     Tracks,
     TrayImage,
 )
-from nanorocks_ros.stages.preprocess.shake_detection import NS
+from nanorocks_ros.stages.preprocess.difference_noise import NS
 from nanorocks_ros.stages.speed.track_reliability import TrackReliability
 from nanorocks_ros.stages.tracking.mean_speed import (
     NOISE_FRAMES,

@@ -5,6 +5,8 @@ Tested by ``test/studies/inspection/test_preprocessing_steps.py``.
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.errors import FrameError, RecordingError
@@ -15,7 +17,7 @@ from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
     from nanorocks_ros.experiment.view import View
@@ -59,6 +61,14 @@ class Shot(NamedTuple):
     def images(self) -> tuple[TrayImage, ...]:
         """Images of the trays that can be used; may be empty."""
         return tuple(record for record in self.records if isinstance(record, TrayImage))
+
+
+class _WaitingFrame(NamedTuple):
+    """A frame, and the records of it so far; see `Shot`."""
+
+    number: int
+    frame: Frame
+    records: list[TrayImage | Notice]
 
 
 def open_camera(path: str | Path, settings: PipelineSettings, image_topic: str = '') -> BagCamera:
@@ -107,6 +117,7 @@ class PreprocessedFrames:
         self.frames = 0
         self.refused = 0
         self.error: FrameError | None = None
+        self._waiting: deque[_WaitingFrame] = deque()
 
     @property
     def lens_notices(self) -> list[str]:
@@ -134,12 +145,16 @@ class PreprocessedFrames:
         any_images = False
         for number, frame in enumerate(self._bag.frames()):
             self.frames = number + 1
-            shot = self._shot(number, frame)
-            if shot is not None:
+            self._take(number, frame)
+            for shot in self._complete(self._stage.held_from_ns):
                 any_images = any_images or bool(shot.images)
                 yield shot
             if progress is not None:
                 progress(number + 1, self._bag.count)
+        self._hand_out(self._stage.flush())
+        for shot in self._complete(math.inf):
+            any_images = any_images or bool(shot.images)
+            yield shot
         if not any_images:
             raise self.error or FrameError(
                 self._bag.where,
@@ -147,16 +162,34 @@ class PreprocessedFrames:
                 'record it again',
             )
 
-    def _shot(self, number: int, frame: Frame | FrameError) -> Shot | None:
-        """The preprocessed frame; None when it is refused."""
+    def _take(self, number: int, frame: Frame | FrameError) -> None:
+        """Preprocess the next frame, unless it is refused."""
         try:
             if isinstance(frame, FrameError):
                 raise frame
-            return Shot(number, frame, self._stage.push(frame))
+            records = self._stage.push(frame)
         except FrameError as error:
             self.refused += 1
             self.error = self.error or error
-            return None
+            return
+        self._waiting.append(_WaitingFrame(number, frame, []))
+        self._hand_out(records)
+
+    def _hand_out(self, records: Sequence[TrayImage | Notice]) -> None:
+        """Give each image to its frame, and each notice to the last frame."""
+        for record in records:
+            own = [
+                waiting
+                for waiting in self._waiting
+                if isinstance(record, TrayImage) and waiting.frame.stamp_ns == record.stamp_ns
+            ]
+            (own or self._waiting)[-1].records.append(record)
+
+    def _complete(self, held_from_ns: float) -> Iterator[Shot]:
+        """The frames whose images the preprocessor does not hold back any more."""
+        while self._waiting and self._waiting[0].frame.stamp_ns < held_from_ns:
+            number, frame, records = self._waiting.popleft()
+            yield Shot(number, frame, tuple(records))
 
 
 class BagImages:

@@ -16,7 +16,6 @@ from nanorocks_ros.stages.preprocess.rectify import (
     resample_color,
     resample_gray,
 )
-from nanorocks_ros.stages.preprocess.shake_detection import CycleFollower
 from nanorocks_ros.stages.speed.motion_mask import MotionMasker
 from nanorocks_ros.stages.tracking.tracker import Tracker
 from nanorocks_ros.studies.analysis.bag_images import BagImages
@@ -177,14 +176,16 @@ class _TrayStages:
     """The stages that process the images of one tray."""
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
-        self._shakes = CycleFollower(settings.speed.shake_ratio, settings.speed.min_cycle_duration)
+        self._cycle: int | None = None
+        self._noise_power = 0.0
         self._masker = MotionMasker(settings.speed)
         self._tracker = Tracker(settings, tray)
         self.tracks: Tracks | None = None
 
     def push(self, image: TrayImage) -> None:
-        if self._shakes.push(image):
+        if self._cycle not in (None, image.cycle):
             self._masker.clear()
+        self._cycle, self._noise_power = image.cycle, image.noise_power
         self._masker.push(image.stamp_ns, image.gray)
         self.tracks = next(iter(self._tracker.push(image)), None)
 
@@ -198,7 +199,7 @@ class _TrayStages:
 
     @property
     def mask(self) -> NDArray[np.uint8] | None:
-        return self._masker.mask(self._shakes.noise_power) if self._masker.full else None
+        return self._masker.mask(self._noise_power) if self._masker.full else None
 
 
 def _steps(shot: Shot, images: BagImages, stages: dict[int, _TrayStages]) -> dict[int, TraySteps]:

@@ -12,6 +12,7 @@ import pytest
 from nanorocks_ros.recordings.film.duplicate_frames import DuplicateFilter
 from nanorocks_ros.recordings.film.film_source import EncodedImage, FilmFrame
 from nanorocks_ros.recordings.film.timestamp_repair import Stamped
+from test.support.moving_beads import encoded, pictures, places
 
 STEP_NS = 40_000_000
 SCENE = cv2.GaussianBlur(
@@ -77,6 +78,49 @@ def test_duplicates_of_swinging_scenes_are_dropped():
     positions = swinging(60, 9)
     kept = moments_kept(duplicated(positions), sensor=1.0)
     assert len(kept) == len(set(kept)) >= 52
+
+
+class Still:
+    """A frame whose gray levels are known."""
+
+    def __init__(self, image):
+        self.image = image
+
+    def gray(self):
+        return self.image
+
+
+def test_a_camera_that_jitters_loses_no_frame():
+    """Now and then it returns to where it was; meanwhile the beads have moved."""
+    rng = np.random.default_rng(3)
+    times = np.arange(300) / 30
+    frames = []
+    for k, gray in enumerate(pictures(places(times, [25.0] * 300))):
+        across, down = rng.normal(0, 2, 2)
+        shift = np.float32([[1, 0, across], [0, 1, down]])
+        moved = cv2.warpAffine(gray, shift, gray.shape[::-1], borderMode=cv2.BORDER_REFLECT)
+        frames.append(Stamped(k * STEP_NS, FilmFrame(None, Still(moved), 0.0)))
+    assert len(list(DuplicateFilter().filter(frames))) == 300
+
+
+@pytest.mark.parametrize(
+    ('codec', 'options'),
+    [
+        ('libx264', {'crf': '18'}),
+        ('libx264', {'crf': '28'}),
+        ('mpeg4', {'qmin': '5', 'qmax': '5'}),
+    ],
+)
+def test_frames_that_a_codec_stored_twice_are_dropped(codec, options):
+    times = np.arange(40) / 30
+    grays = [gray for gray in pictures(places(times, [60.0] * 40)) for _ in range(2)]
+    frames = [
+        Stamped(k * STEP_NS, FilmFrame(None, Still(gray), 0.0))
+        for k, gray in enumerate(encoded(grays, codec, **options))
+    ]
+    kept = [frame.stamp_ns // STEP_NS // 2 for frame in DuplicateFilter().filter(frames)]
+    assert sorted(set(kept)) == list(range(40))
+    assert len(kept) <= 42
 
 
 def test_frames_that_are_no_longer_compared_stay_in_order():

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
 from nanorocks_ros.records import Frame, Quality
 from nanorocks_ros.stages.preprocess.frame_checks import FrameChecks
+from test.support.moving_beads import encoded, pictures, places
 
 NS = 1_000_000_000
 STEP = NS // 30
@@ -124,6 +126,53 @@ def test_a_scene_that_always_ends_in_an_even_floor_is_whole():
     _, verdicts, texts = judged([frame(k, even(k)) for k in range(20)])
     assert all(verdict.rows == 240 for verdict in verdicts)
     assert texts == []
+
+
+def beads(speeds, codec='libx264', **options):
+    """Frames of beads as a codec gives them back; the lowest rows stay still."""
+    times = np.arange(len(speeds)) / 30
+    grays = [
+        np.concatenate([gray, np.full((48, gray.shape[1]), 90, np.uint8)])
+        for gray in pictures(places(times, speeds))
+    ]
+    decoded = encoded(grays, codec, **options)
+    return [frame(k, gray, encoding='mono8') for k, gray in enumerate(decoded)]
+
+
+@pytest.mark.parametrize('crf', ['18', '28'])
+@pytest.mark.parametrize('speed', [0.0, 4.0, 60.0])
+def test_rows_that_a_codec_skips_are_whole_and_no_frame_is_a_duplicate(crf, speed):
+    frames = beads([speed] * 90, crf=crf, g='40')
+    _, verdicts, texts = judged(frames)
+    assert [k for k, verdict in enumerate(verdicts) if verdict.rows < 208] == []
+    assert not [text for text in texts if 'breaks off' in text]
+    if speed:
+        assert all(verdict.usable for verdict in verdicts)
+
+
+@pytest.mark.parametrize('codec', ['libx264', 'mjpeg'])
+def test_rows_of_the_frame_before_are_found_where_they_hide_beads(codec):
+    frames = beads([60.0] * 40, codec)
+    for k in (12, 25):
+        upper, lower = frames[k].image[:64], frames[k - 1].image[64:]
+        frames[k] = frame(k, np.concatenate([upper, lower]), encoding='mono8')
+    _, verdicts, _ = judged(frames)
+    assert [k for k, verdict in enumerate(verdicts) if verdict.rows < 208] == [12, 25]
+    assert verdicts[12].rows <= 64
+
+
+def test_a_camera_that_jitters_stores_no_frame_twice():
+    rng = np.random.default_rng(4)
+    times = np.arange(120) / 30
+    still = list(pictures(places(times, [20.0] * 120), noise=0.7))
+    frames = []
+    for k, gray in enumerate(still):
+        across, down = (0.0, 0.0) if k in (60, 61, 90, 91) else rng.normal(0, 3, 2)
+        shift = np.float32([[1, 0, across], [0, 1, down]])
+        moved = cv2.warpAffine(gray, shift, gray.shape[::-1], borderMode=cv2.BORDER_REFLECT)
+        frames.append(frame(k, moved, encoding='mono8'))
+    _, verdicts, _ = judged(frames)
+    assert all(verdict.usable for verdict in verdicts)
 
 
 def test_gray_pictures_are_flagged_whether_they_are_called_gray_or_not():

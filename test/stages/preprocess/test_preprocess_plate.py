@@ -29,7 +29,7 @@ def preprocessor(view=None, **values):
 
 
 def pushed(stage, frames):
-    records = [item for frame in frames for item in stage.push(frame)]
+    records = [*(item for frame in frames for item in stage.push(frame)), *stage.flush()]
     images = [record for record in records if isinstance(record, TrayImage)]
     return images, [record.text for record in records if isinstance(record, Notice)]
 

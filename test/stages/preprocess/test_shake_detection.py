@@ -1,22 +1,17 @@
-"""Shaking events from the beads and from the plate, numbered once for all."""
+"""Lasting motion of the beads and of the plate: where it begins."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from nanorocks_ros.records import TrayImage
-from nanorocks_ros.stages.preprocess.shake_detection import (
-    CycleFollower,
-    MotionMeter,
-    PlateMeter,
-    ShakeCounter,
-    noise_power,
-)
+from nanorocks_ros.stages.preprocess.difference_noise import noise_power
+from nanorocks_ros.stages.preprocess.onset_confirmation import Onsets
+from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter, PlateMeter
+from test.support.moving_beads import encoded, pictures, places
 
 NS = 1_000_000_000
 STEP = NS // 30
@@ -34,7 +29,8 @@ def swing(seconds, amplitude=2e-4, frequency=1.5, damping=0.16, shakes=(1.0,)):
 
 def jumps(speeds, error=2e-5):
     meter = PlateMeter(2.0, 5e-4)
-    return [k for k, speed in enumerate(speeds) if meter.push(k * STEP, float(speed), error)]
+    onsets = [meter.push(k * STEP, float(speed), error) for k, speed in enumerate(speeds)]
+    return [before_ns // STEP + 1 for onset in onsets for before_ns in onset.confirmed]
 
 
 @pytest.mark.parametrize('frequency', [0.4, 1.5, 6.0])
@@ -56,58 +52,7 @@ def test_noise_of_the_registration_is_no_shaking():
 
 
 def test_a_plate_that_is_not_seen_says_nothing():
-    assert not PlateMeter(2.0, 1e-3).push(0, math.nan, math.nan)
-
-
-def test_events_are_counted_once_when_half_of_the_trays_jump():
-    counter = ShakeCounter(5.0)
-    votes = {10: (True, False, False), 20: (True, True, False), 40: (True, True, True)}
-    shaken = [counter.push(k * STEP, votes.get(k, (False,) * 3)) for k in range(60)]
-    assert [k for k, jump in enumerate(shaken) if jump] == [20]
-    assert counter.cycle == 1
-    assert counter.cycle_start_ns == 19 * STEP
-
-
-def test_the_plate_alone_is_enough_and_nobody_is_none():
-    counter = ShakeCounter(0.0)
-    assert not counter.push(0, (False,), plate=True)
-    assert counter.push(STEP, (False, False), plate=True)
-    assert not counter.push(2 * STEP, ())
-
-
-def images(count=80, shake=40):
-    rng = np.random.default_rng(5)
-    still = rng.integers(90, 140, (60, 60)).astype(float)
-    images = []
-    for k in range(count):
-        gray = still + rng.normal(0, 2, still.shape)
-        if k >= shake:
-            gray = np.roll(gray, 3 * k, axis=1)
-        images.append(TrayImage(stamp_ns=k * STEP, tray=1, gray=gray.astype(np.uint8)))
-    return images
-
-
-def test_who_is_told_the_cycle_knows_what_the_images_say():
-    alone, told = CycleFollower(2.0, 5.0), CycleFollower(2.0, 5.0)
-    for image in images():
-        shaken = alone.push(image)
-        counted = replace(
-            image,
-            cycle=alone.cycle,
-            cycle_start_ns=alone.cycle_start_ns,
-            noise_power=alone.noise_power,
-        )
-        assert told.push(counted) == shaken
-        assert (told.cycle, told.cycle_start_ns) == (alone.cycle, alone.cycle_start_ns)
-        assert told.noise_power == alone.noise_power
-    assert told.cycle == 1
-
-
-def test_a_recording_joined_in_the_middle_of_a_cycle_is_not_shaken_then():
-    follower = CycleFollower(2.0, 5.0)
-    (first, *_) = images(2)
-    assert not follower.push(replace(first, cycle=7, cycle_start_ns=0, noise_power=8.0))
-    assert follower.cycle == 7
+    assert PlateMeter(2.0, 1e-3).push(0, math.nan, math.nan) == Onsets()
 
 
 def test_the_noise_is_the_lower_quantile_of_what_was_measured():
@@ -125,25 +70,109 @@ def test_the_noise_is_the_lower_quantile_of_what_was_measured():
             assert meter.noise_power == pytest.approx(expected, rel=1e-12)
 
 
-def moving(times, speed=30.0):
-    """Images of a striped pattern that moves evenly, [px/s], at given times."""
-    rng = np.random.default_rng(8)
-    x = np.arange(80)
-    for k, time in enumerate(times):
-        stripes = 120 + 60 * np.sin(2 * np.pi * (x - speed * time) / 40)
-        gray = np.tile(stripes, (60, 1)) + rng.normal(0, 2, (60, 80))
-        yield TrayImage(stamp_ns=round(time * NS), tray=1, gray=gray.astype(np.uint8)), k
+def test_a_knock_of_the_camera_does_not_shake_the_plate():
+    speeds = np.full(200, 2e-5)
+    speeds[[100, 101]] = 0.02
+    assert jumps(speeds) == []
 
 
-def test_frames_that_are_missing_are_no_shaking_event():
-    times = [k / 30 for k in range(90) if not 40 <= k < 47 and k not in (60, 70, 71)]
-    follower = CycleFollower(2.0, 0.0)
-    assert not any(follower.push(image) for image, _ in moving(times))
+def onset_frames(grays, times):
+    """Frames in which lasting motion begins."""
+    meter = MotionMeter(2.0)
+    stamps = [round(time * NS) for time in times]
+    onsets = [meter.push(stamp, gray) for stamp, gray in zip(stamps, grays, strict=True)]
+    return [stamps.index(before_ns) + 1 for onset in onsets for before_ns in onset.confirmed]
+
+
+SECOND = np.arange(60) / 30
+
+
+def filmed(speeds, times=SECOND, **look):
+    return list(pictures(places(times, np.broadcast_to(speeds, times.shape)), **look))
+
+
+@pytest.mark.parametrize(
+    ('before', 'after'), [(0.0, 135.0), (1.35, 135.0), (0.0, 40.0), (13.0, 40.0)]
+)
+@pytest.mark.parametrize('codec', ['none', 'x264'])
+def test_beads_that_are_shaken_are_found_to_the_frame(before, after, codec):
+    grays = filmed(np.where(SECOND <= 1.0, before, after))
+    if codec == 'x264':
+        grays = encoded(grays, 'libx264', crf='23')
+    assert onset_frames(grays, SECOND) == [31]
+
+
+@pytest.mark.parametrize('rate', [15, 60, 120])
+def test_the_rate_of_the_frames_does_not_matter(rate):
+    times = np.arange(round(1.6 * rate)) / rate
+    grays = filmed(np.where(times <= 1.0, 0.0, 100.0), times)
+    assert onset_frames(grays, times) == [rate + 1]
+
+
+def test_grains_as_small_as_two_pixels_are_found():
+    beads = places(SECOND, np.where(SECOND <= 1.0, 1.0, 100.0), count=300)
+    assert onset_frames(list(pictures(beads, radius=1.5)), SECOND) == [31]
+
+
+@pytest.mark.parametrize('speed', [0.0, 25.0])
+@pytest.mark.parametrize(
+    'gains',
+    [
+        np.where(SECOND < 1.0, 1.0, 0.1),
+        np.where(SECOND < 1.0, 0.1, 1.0),
+        np.where(SECOND < 1.0, 1.0, 1.8),
+        1.0 + 0.1 * (SECOND > 1.0) * np.sin(20.0 * SECOND),
+    ],
+    ids=['lamp off', 'lamp on', 'exposure', 'flicker'],
+)
+def test_light_that_changes_is_no_motion(speed, gains):
+    assert onset_frames(filmed(speed, gains=gains), SECOND) == []
+
+
+@pytest.mark.parametrize(
+    ('codec', 'options'),
+    [
+        ('libx264', {'crf': '18', 'g': '12'}),
+        ('libx264', {'crf': '28', 'g': '25'}),
+        ('mpeg4', {'qmin': '6', 'qmax': '6', 'g': '12'}),
+    ],
+)
+@pytest.mark.parametrize('speed', [0.0, 4.0, 60.0])
+def test_key_frames_are_no_motion(codec, options, speed):
+    assert onset_frames(encoded(filmed(speed), codec, **options), SECOND) == []
+
+
+def test_noise_that_rises_is_no_motion():
+    quiet, loud = filmed(0.0, noise=1.5), filmed(0.0, noise=5.0)
+    assert onset_frames([*quiet[:30], *loud[30:]], SECOND) == []
+
+
+def test_a_picture_that_froze_and_goes_on_is_no_shaking_event():
+    grays = filmed(25.0)
+    frozen = [*grays[:20], *[grays[20]] * 20, *grays[40:]]
+    assert onset_frames(frozen, SECOND) == []
+    assert onset_frames(encoded(frozen, 'libx264', crf='28'), SECOND) == []
+
+
+@pytest.mark.parametrize('stays', [False, True])
+def test_a_knock_of_the_camera_moves_no_beads(stays):
+    grays = filmed(25.0)
+    moved = [np.roll(gray, 5, axis=1) for gray in grays]
+    end = 60 if stays else 31
+    assert onset_frames([*grays[:30], *moved[30:end], *grays[end:]], SECOND) == []
+
+
+def test_a_recording_that_begins_in_motion_was_not_shaken():
+    assert onset_frames(filmed(100.0 / (1.0 + SECOND)), SECOND) == []
+
+
+def test_frames_that_are_missing_are_no_motion():
+    kept = [k for k in range(60) if not 25 <= k < 32 and k not in (45, 50, 51)]
+    grays = filmed(25.0)
+    assert onset_frames([grays[k] for k in kept], SECOND[kept]) == []
 
 
 def test_a_shake_while_frames_are_missing_is_seen_with_the_next():
-    before = [image for image, _ in moving([k / 30 for k in range(40)], speed=4.0)]
-    after = [image for image, _ in moving([k / 30 for k in range(48, 70)], speed=40.0)]
-    follower = CycleFollower(2.0, 0.0)
-    shaken = [image.stamp_ns for image in (*before, *after) if follower.push(image)]
-    assert shaken == [after[1].stamp_ns]
+    kept = [k for k in range(60) if not 28 <= k < 35]
+    grays = filmed(np.where(SECOND <= 1.0, 4.0, 100.0))
+    assert onset_frames([grays[k] for k in kept], SECOND[kept]) == [kept.index(35) + 1]
