@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
 
 # A relative velocity u, Gaussian in two components, stays within a box of full width 2 x over a
-# time T when |u_i| T < 2 x: 16 x^2 / (2 pi W^2), W being the path sigma T of a component.
-_BOX = 8.0 / math.pi
+# time T when |u_i| T < 2 x, so that u T lies in an area of 16 x^2.
+_BOX_AREA = 16.0
 # Slow pairs are more frequent than a Gaussian says: inelastic neighbours move alike, and mixtures
 # and starts with even speeds are peaked. Together with the next number it is not below what gases
 # without sticking show, restitutions 0.5 to 0.95 (`python -m benchmarks sticking`).
@@ -62,10 +62,45 @@ def chance_probability(path: ArrayLike, tolerance: ArrayLike, rate: float) -> ND
     -------
     ndarray, 0 to 1
     """
+    return _chance(path, _BOX_AREA * np.square(tolerance), rate)
+
+
+def turning_chance_probability(
+    path: ArrayLike, nearest: ArrayLike, farthest: ArrayLike, rate: float
+) -> NDArray[np.float64]:
+    """Probability that an encounter of two free beads looks like a body of two that turns.
+
+    Free beads move past each other on a straight line. Such a line stays between the distances
+    a and b for 2 (b^2 - a^2)^(1/2) at most, and only if it has the direction of the tangent
+    within (b - a): the displacement lies in an area of about 4 (b - a) (b^2 - a^2)^(1/2), for
+    a = 0 in that of the disc.
+
+    Parameters
+    ----------
+    path : array_like, [m]
+        As in `chance_probability`.
+    nearest, farthest : array_like, [m]
+        Range of their distance in the image.
+    rate : float, [1/m]
+        From `encounter_rate`.
+
+    Returns
+    -------
+    ndarray, 0 to 1
+    """
+    a, b = np.asarray(nearest, dtype=np.float64), np.asarray(farthest, dtype=np.float64)
+    return _chance(path, 4.0 * (b - a) * np.sqrt(b**2 - a**2), rate)
+
+
+def _chance(path: ArrayLike, area: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
+    """Probability that the displacement of free beads lies in an area, and nothing hit them.
+
+    The displacement is Gaussian with the path W as the standard deviation of each component; its
+    density at 0 is 1 / (2 pi W^2).
+    """
     path_length = np.asarray(path, dtype=np.float64)
-    ratio = np.asarray(tolerance, dtype=np.float64) / np.maximum(path_length, 1e-12)
-    slow = np.minimum(1.0, _PEAKED * _BOX * ratio**2)
-    return np.asarray(slow * np.exp(-_DISTURBED * rate * path_length))
+    slow = _PEAKED * area / (2.0 * math.pi * np.maximum(path_length, 1e-12) ** 2)
+    return np.asarray(np.minimum(1.0, slow) * np.exp(-_DISTURBED * rate * path_length))
 
 
 def expected_encounters(tray: Tray) -> float:
