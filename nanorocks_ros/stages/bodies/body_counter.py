@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.inference.sticking.chance_proximity import (
+    CollisionRate,
     encounter_rate,
     max_chance_probability,
 )
@@ -69,7 +70,7 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
         self._equal_sizes = np.array(
             [kind.diameter_low == kind.diameter_high for kind in tray.species]
         )
-        self._bond_finder = BondFinder(self._encounter_rate)
+        self._bond_finder = BondFinder(self._encounter_rate, CollisionRate(tray))
         self.reset()
 
     def _restart(self, stamp_ns: int | None = None) -> None:

@@ -36,7 +36,10 @@ DISTANCE, NEAREST, FARTHEST, TURNING_PATH, MET, LAST_TOUCHING = range(14, 20)
 """Columns of a pair that may turn: its smoothed distance, the range of it, the path of free beads
 and the time since the beads met, and the last time at which they touched in the image."""
 
-_COLUMNS = 20
+SMALLER_RADIUS, DEFLECTED = 20, 21
+"""Columns for the collisions of a pair; see `CollisionRate`."""
+
+_COLUMNS = 22
 
 
 class PairTable(NamedTuple):
@@ -258,6 +261,10 @@ def _start_pair(
     distance = math.sqrt(row[SMOOTHED] * row[SMOOTHED] + row[SMOOTHED + 1] * row[SMOOTHED + 1])
     row[DISTANCE] = row[NEAREST] = row[FARTHEST] = distance
     row[TURNING_PATH], row[MET], row[LAST_TOUCHING] = 0.0, time, time
+    row[SMALLER_RADIUS] = min(beads.radii[i], beads.radii[j])
+    low = min(beads.variances[i], beads.variances[j])
+    high = max(beads.variances[i], beads.variances[j])
+    row[DEFLECTED] = 1.0 + (low / high if high > 0.0 else 0.0)
     row[TOLERANCE] = _TOLERANCE_SIGMAS * _combined_error(beads.errors, i, j)
     row[SPEED] = math.sqrt(beads.variances[i] + beads.variances[j])
     row[LAST] = time

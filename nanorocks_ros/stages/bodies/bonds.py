@@ -12,6 +12,7 @@ from nanorocks_ros.inference.sticking.chance_proximity import (
 )
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.stages.bodies.bond_kernels import (
+    DEFLECTED,
     FARTHEST,
     HIGH,
     LAST,
@@ -21,6 +22,7 @@ from nanorocks_ros.stages.bodies.bond_kernels import (
     NEAREST,
     OFFSET,
     PATH,
+    SMALLER_RADIUS,
     SMOOTHED,
     START,
     TOLERANCE,
@@ -33,6 +35,8 @@ from nanorocks_ros.stages.bodies.bond_kernels import (
 from nanorocks_ros.stages.bodies.touching_pairs import SHIFT, SeenBeads
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
 # Smallest range of a separation, in tolerances: what position noise alone makes.
@@ -69,10 +73,17 @@ class BondFinder:
     ----------
     rate : float, [1/m]
         Encounters of a bead per path length, from `encounter_rate`.
+    collision_rate : callable
+        Collisions of pairs per path: a `CollisionRate`.
     """
 
-    def __init__(self, rate: float) -> None:
+    def __init__(
+        self,
+        rate: float,
+        collision_rate: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
+    ) -> None:
         self._rate = rate
+        self._collision_rate = collision_rate
         self.clear()
 
     def clear(self) -> None:
@@ -132,7 +143,10 @@ class BondFinder:
         least = 2.0 * _MIN_RANGE * rows[:, TOLERANCE]
         farthest = np.maximum(rows[:, FARTHEST], rows[:, NEAREST] + least)
         return turning_chance_probability(
-            rows[:, TURNING_PATH], rows[:, NEAREST], farthest, self._rate
+            rows[:, TURNING_PATH],
+            rows[:, NEAREST],
+            farthest,
+            self._collision_rate(rows[:, SMALLER_RADIUS], rows[:, DEFLECTED]),
         )
 
     def _new_bonds(self, time: float, max_chance: float) -> list[Bond]:
