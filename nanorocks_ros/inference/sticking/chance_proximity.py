@@ -109,7 +109,7 @@ class CollisionRate:
             Beads of a pair whose collisions change its relative velocity: a heavy bead is hardly
             deflected.
         """
-        return deflected * np.interp(radii, self._radii, self._rates)
+        return np.asarray(deflected * np.interp(radii, self._radii, self._rates))
 
 
 def _mean_width(radii: NDArray[np.float64], radius: float, height: float) -> NDArray[np.float64]:
@@ -159,7 +159,7 @@ def _chance(path: ArrayLike, area: NDArray[np.float64], rate: ArrayLike) -> NDAr
     """
     path_length = np.asarray(path, dtype=np.float64)
     slow = _PEAKED * area / (2.0 * math.pi * np.maximum(path_length, 1e-12) ** 2)
-    return np.asarray(np.minimum(1.0, slow) * np.exp(-rate * path_length))
+    return np.asarray(np.minimum(1.0, slow) * np.exp(-np.asarray(rate) * path_length))
 
 
 def expected_encounters(tray: Tray) -> float:
