@@ -39,7 +39,8 @@ class CycleContacts:
         used = {Rebound: settings.rebounds, PairCollision: settings.collisions}
         self._used = tuple(kind for kind, enabled in used.items() if enabled)
         self._waiting: deque[Rebound | PairCollision] = deque(maxlen=_MAX_WAITING)
-        self.next_cycle()
+        self._counted: list[Rebound | PairCollision] = []
+        self.terms = ContactTerms.of(())
 
     def push(self, contact: Rebound | PairCollision) -> None:
         """Add a contact; it may come before or after the speeds of that time."""
@@ -70,7 +71,7 @@ class CycleContacts:
 
     def next_cycle(self) -> None:
         """Clear the sums; late contacts of the cycle before are too early to be summed."""
-        self._counted: list[Rebound | PairCollision] = []
+        self._counted = []
         self.terms = ContactTerms.of(())
 
     def restart(self, stamp_ns: int) -> None:
