@@ -446,7 +446,7 @@ def test_the_window_ends_with_the_first_merge():
 
 def test_contacts_since_a_merge_that_is_known_late_are_not_used():
     rng = np.random.default_rng(5)
-    before, since = list(rebounds(rng, 20, 1.0, 11.0)), list(rebounds(rng, 30, 12.0, 15.0))
+    before, since = list(rebounds(rng, 20, 2.0, 11.0)), list(rebounds(rng, 30, 12.0, 15.0))
     late = merge(12.05, known=6.0)
     finals = [
         all_estimates(fitter(), as_known([*simulated_cycle(), *contacts, late]))[-1]
