@@ -40,6 +40,7 @@ ALL = (
     'contacts',
     'sticking',
     'sticking_films',
+    'turning_bodies',
     'packing',
     'rotation',
     'engine',

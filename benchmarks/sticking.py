@@ -196,7 +196,7 @@ def _report_sizes(courses: dict[tuple[int, float], list[Course]]) -> None:
         print(f'| {number}, {1e3 * speed:g} mm/s | {size_row(cycles)} |', flush=True)
 
 
-def _cycle(course: Course, beads: int, merges: list[Merge]) -> StickingCycle:
+def threshold_cycle(course: Course, beads: int, merges: list[Merge]) -> StickingCycle:
     stamps = np.rint(course.times[1:] * _NS).astype(np.int64)
     return sticking_cycle(beads, merges, stamps, course.speeds[1:], 0)
 
@@ -213,9 +213,9 @@ def threshold_row(number: int, speed: float, cycles: list[Course], measure: str)
     """Cells of the table of sticking speeds."""
     tray = load_trays()[number]
     contacts = slow_contacts(tray)
-    measured = [_cycle(cycle, tray.count, cycle.merges) for cycle in cycles]
+    measured = [threshold_cycle(cycle, tray.count, cycle.merges) for cycle in cycles]
     true = [
-        _cycle(cycle, tray.count, true_merges(cycle.times, cycle.bodies, tray.count))
+        threshold_cycle(cycle, tray.count, true_merges(cycle.times, cycle.bodies, tray.count))
         for cycle in cycles
     ]
     estimates = [

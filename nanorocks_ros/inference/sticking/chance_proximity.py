@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
 
 # A relative velocity u, Gaussian in two components, stays within a box of full width 2 x over a
-# time T when |u_i| T < 2 x: 16 x^2 / (2 pi W^2), W being the path sigma T of a component.
-_BOX = 8.0 / math.pi
+# time T when |u_i| T < 2 x, so that u T lies in an area of 16 x^2.
+_BOX_AREA = 16.0
 # Slow pairs are more frequent than a Gaussian says: inelastic neighbours move alike, and mixtures
 # and starts with even speeds are peaked. Together with the next number it is not below what gases
 # without sticking show, restitutions 0.5 to 0.95 (`python -m benchmarks sticking`).
@@ -29,6 +29,13 @@ _PEAKED = 7.0
 # Collisions that part two neighbours, with each other and with others, per encounter of a bead
 # and relative path: 2 in simulated trays 3, 1 in trays 5.
 _DISTURBED = 1.3
+# Collisions that part two neighbours whose distance may vary, per collision of either bead; others
+# leave them beside each other: 0.85 in gases of free beads in tray 3.
+_PARTING = 0.75
+# Heights of the centres of two beads, for mean widths: nodes of a midpoint rule.
+_HEIGHTS = (np.arange(32) + 0.5) / 32
+# Radii at which collision rates are worked out.
+_RADII = 16
 # Way of a bead between two shaking events, [m]: 58 s after a shake at 10 mm/s it was 0.03 to 0.12.
 _CYCLE = 0.1
 
@@ -62,10 +69,97 @@ def chance_probability(path: ArrayLike, tolerance: ArrayLike, rate: float) -> ND
     -------
     ndarray, 0 to 1
     """
+    return _chance(path, _BOX_AREA * np.square(tolerance), _DISTURBED * rate)
+
+
+class CollisionRate:
+    """Collisions of two neighbours with other beads, per path of their relative motion.
+
+    In the plane: a bead meets those whose height lets them touch.
+
+    Parameters
+    ----------
+    tray : Tray
+    """
+
+    def __init__(self, tray: Tray) -> None:
+        species = [kind for kind in tray.species if kind.count]
+        sizes = [
+            0.5 * size for kind in species for size in (kind.diameter_low, kind.diameter_high)
+        ]
+        self._radii = np.linspace(min(sizes), max(sizes), _RADII)
+        room = math.prod(side - tray.diameter for side in tray.dimensions[:2])
+        height, others = tray.dimensions[2], max(1.0 - 1.0 / tray.count, 0.0)
+        widths = [
+            kind.count * _mean_width(self._radii, 0.5 * kind.diameter, height) for kind in species
+        ]
+        # The mean relative speed in the plane is (pi/2)^(1/2) times a component.
+        self._rates = math.sqrt(0.5 * math.pi) * others * np.sum(widths, axis=0) / room
+
+    def __call__(
+        self, radii: NDArray[np.float64], deflected: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Collisions per path, [1/m].
+
+        Parameters
+        ----------
+        radii : ndarray (n,), [m]
+            Of the smaller bead of each pair.
+        deflected : ndarray (n,), 1 to 2
+            Beads of a pair whose collisions change its relative velocity: a heavy bead is hardly
+            deflected.
+        """
+        return np.asarray(deflected * np.interp(radii, self._radii, self._rates))
+
+
+def _mean_width(radii: NDArray[np.float64], radius: float, height: float) -> NDArray[np.float64]:
+    """Mean width within which beads of some radii, (n,), hit one of another radius, [m]."""
+    own = (
+        radii[:, None, None]
+        + np.maximum(height - 2.0 * radii, 0.0)[:, None, None] * (_HEIGHTS[:, None])
+    )
+    other = radius + max(height - 2.0 * radius, 0.0) * _HEIGHTS
+    squares = (radii[:, None, None] + radius) ** 2 - (own - other) ** 2
+    return np.asarray(2.0 * np.sqrt(np.maximum(squares, 0.0)).mean(axis=(1, 2)))
+
+
+def turning_chance_probability(
+    path: ArrayLike, nearest: ArrayLike, farthest: ArrayLike, collision_rate: ArrayLike
+) -> NDArray[np.float64]:
+    """Probability that an encounter of two free beads looks like a body of two that turns.
+
+    Free beads move past each other on a straight line. Such a line stays between the distances
+    a and b for 2 (b^2 - a^2)^(1/2) at most, and only if it has the direction of the tangent
+    within (b - a): the displacement lies in an area of about 4 (b - a) (b^2 - a^2)^(1/2), for
+    a = 0 in that of the disc.
+
+    Parameters
+    ----------
+    path : array_like, [m]
+        As in `chance_probability`.
+    nearest, farthest : array_like, [m]
+        Range of their distance in the image.
+    collision_rate : array_like, [1/m]
+        From `CollisionRate`.
+
+    Returns
+    -------
+    ndarray, 0 to 1
+    """
+    a, b = np.asarray(nearest, dtype=np.float64), np.asarray(farthest, dtype=np.float64)
+    area = 4.0 * (b - a) * np.sqrt(b**2 - a**2)
+    return _chance(path, area, _PARTING * np.asarray(collision_rate, dtype=np.float64))
+
+
+def _chance(path: ArrayLike, area: NDArray[np.float64], rate: ArrayLike) -> NDArray[np.float64]:
+    """Probability that the displacement of free beads lies in an area, and nothing parts them.
+
+    The displacement is Gaussian with the path W as the standard deviation of each component; its
+    density at 0 is 1 / (2 pi W^2). They are parted at a rate per path.
+    """
     path_length = np.asarray(path, dtype=np.float64)
-    ratio = np.asarray(tolerance, dtype=np.float64) / np.maximum(path_length, 1e-12)
-    slow = np.minimum(1.0, _PEAKED * _BOX * ratio**2)
-    return np.asarray(slow * np.exp(-_DISTURBED * rate * path_length))
+    slow = _PEAKED * area / (2.0 * math.pi * np.maximum(path_length, 1e-12) ** 2)
+    return np.asarray(np.minimum(1.0, slow) * np.exp(-np.asarray(rate) * path_length))
 
 
 def expected_encounters(tray: Tray) -> float:

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from functools import reduce
 from operator import add
+from statistics import NormalDist
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -126,6 +127,11 @@ def _posterior(
         status, low, median, high = StickingStatus.NO_MERGE, 0.0, math.nan, limit
     elif likelihood[-1] > likelihood.max() - _UNLIMITED:
         # All colliding bodies stuck: any higher speed fits as well.
+        # The flat prior up to the highest speed would raise the quantile: the likelihood alone
+        # gives the lower limit, half the square of a normal deviate below its maximum.
+        drop = 0.5 * NormalDist().inv_cdf(probability) ** 2
+        likely = grid[likelihood >= likelihood.max() - drop]
+        least = min(least, float(likely[0]))
         status, low, median = StickingStatus.NO_UPPER_LIMIT, least, math.nan
         high = float(grid[-1])
     else:

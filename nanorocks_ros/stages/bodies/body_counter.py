@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nanorocks_ros.inference.sticking.chance_proximity import (
-    chance_probability,
+    CollisionRate,
     encounter_rate,
     max_chance_probability,
 )
@@ -71,7 +70,7 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
         self._equal_sizes = np.array(
             [kind.diameter_low == kind.diameter_high for kind in tray.species]
         )
-        self._bond_finder = BondFinder(partial(chance_probability, rate=self._encounter_rate))
+        self._bond_finder = BondFinder(self._encounter_rate, CollisionRate(tray))
         self.reset()
 
     def _restart(self, stamp_ns: int | None = None) -> None:

@@ -22,6 +22,8 @@ _JUMP_TIME, _JUMP_DISTANCE = 0.3, 2.5
 _SMOOTHING_TIMES = np.array([0.1, 2.0])
 # A pair of which one bead is hidden is kept for this time, [s].
 _MAX_HIDDEN_TIME = 1.5
+# A pair may look apart for this time, [s]: a misplaced outline in two or three images.
+_MAX_APART_TIME = 0.1
 # A bonded pair of which one bead is hidden is kept for this time, [s].
 _MAX_HIDDEN_BOND_TIME = 60.0
 SMOOTHED, LOW, HIGH, OFFSET = 0, 2, 4, 6
@@ -30,7 +32,14 @@ SMOOTHED, LOW, HIGH, OFFSET = 0, 2, 4, 6
 TOLERANCE, SPEED, PATH, START, LAST, LAST_TOGETHER = range(8, 14)
 """Further columns of `PairTable.values`."""
 
-_COLUMNS = 14
+DISTANCE, NEAREST, FARTHEST, TURNING_PATH, MET, LAST_TOUCHING = range(14, 20)
+"""Columns of a pair that may turn: its smoothed distance, the range of it, the path of free beads
+and the time since the beads met, and the last time at which they touched in the image."""
+
+SMALLER_RADIUS, DEFLECTED = 20, 21
+"""Columns for the collisions of a pair; see `CollisionRate`."""
+
+_COLUMNS = 22
 
 
 class PairTable(NamedTuple):
@@ -93,12 +102,13 @@ def _update_pairs(
             pair += 1
             count += 1
             continue
-        both_seen = _update_pair(table, row, time, beads, weights[row])
         touches = pair < keys.size and keys[pair] == table.keys[row]
+        both_seen = _update_pair(table, row, time, beads, weights[row], touches)
         pair += touches
         elapsed = time - table.values[row, LAST]
-        hidden = not both_seen and elapsed < _MAX_HIDDEN_TIME
-        if touches or hidden or (table.bonded[row] and elapsed < _MAX_HIDDEN_BOND_TIME):
+        waits = elapsed < _MAX_HIDDEN_TIME if not both_seen else False
+        waits |= time - table.values[row, LAST_TOUCHING] < _MAX_APART_TIME
+        if touches or waits or (table.bonded[row] and elapsed < _MAX_HIDDEN_BOND_TIME):
             new.keys[count], new.bonded[count] = table.keys[row], table.bonded[row]
             new.values[count] = table.values[row]
             count += 1
@@ -120,7 +130,12 @@ def _combined_error(errors: NDArray[np.float64], i: int, j: int) -> float:
 
 @compiled
 def _update_pair(
-    table: PairTable, k: int, time: float, beads: SeenBeads, weights: NDArray[np.float64]
+    table: PairTable,
+    k: int,
+    time: float,
+    beads: SeenBeads,
+    weights: NDArray[np.float64],
+    touches: bool,
 ) -> bool:
     """Update a pair with the next frame; whether both beads are seen in it."""
     i = _row_of(beads.ids, table.keys[k] >> SHIFT)
@@ -135,6 +150,10 @@ def _update_pair(
     row[SPEED] = max(row[SPEED], free_speed)
     row[PATH] += row[SPEED] * step
     row[LAST] = time
+    row[TURNING_PATH] += free_speed * step
+    _update_distance(row, beads, i, j, weights[0])
+    if touches:
+        row[LAST_TOUCHING] = time
     out_of_range = False
     for c in range(2):
         separation = beads.positions[j, c] - beads.positions[i, c]
@@ -152,7 +171,25 @@ def _update_pair(
         for c in range(2):
             separation = beads.positions[j, c] - beads.positions[i, c]
             row[OFFSET + c] += (separation - row[OFFSET + c]) * weights[1]
+    elif touches and table.bonded[k]:
+        # The body turns.
+        row[LAST_TOGETHER] = row[START] = time
+        for c in range(2):
+            separation = beads.positions[j, c] - beads.positions[i, c]
+            row[SMOOTHED + c] = row[LOW + c] = row[HIGH + c] = row[OFFSET + c] = separation
     return True
+
+
+@compiled
+def _update_distance(
+    row: NDArray[np.float64], beads: SeenBeads, i: int, j: int, weight: float
+) -> None:
+    """Update the smoothed distance of a pair and its range."""
+    x = beads.positions[j, 0] - beads.positions[i, 0]
+    y = beads.positions[j, 1] - beads.positions[i, 1]
+    row[DISTANCE] += (math.sqrt(x * x + y * y) - row[DISTANCE]) * weight
+    row[NEAREST] = min(row[NEAREST], row[DISTANCE])
+    row[FARTHEST] = max(row[FARTHEST], row[DISTANCE])
 
 
 @compiled
@@ -221,6 +258,13 @@ def _start_pair(
     for c in range(2):
         row[SMOOTHED + c] = beads.positions[j, c] - beads.positions[i, c]
     restart_pair(row, time)
+    distance = math.sqrt(row[SMOOTHED] * row[SMOOTHED] + row[SMOOTHED + 1] * row[SMOOTHED + 1])
+    row[DISTANCE] = row[NEAREST] = row[FARTHEST] = distance
+    row[TURNING_PATH], row[MET], row[LAST_TOUCHING] = 0.0, time, time
+    row[SMALLER_RADIUS] = min(beads.radii[i], beads.radii[j])
+    low = min(beads.variances[i], beads.variances[j])
+    high = max(beads.variances[i], beads.variances[j])
+    row[DEFLECTED] = 1.0 + (low / high if high > 0.0 else 0.0)
     row[TOLERANCE] = _TOLERANCE_SIGMAS * _combined_error(beads.errors, i, j)
     row[SPEED] = math.sqrt(beads.variances[i] + beads.variances[j])
     row[LAST] = time

@@ -6,16 +6,27 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from nanorocks_ros.inference.sticking.chance_proximity import (
+    chance_probability,
+    turning_chance_probability,
+)
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.stages.bodies.bond_kernels import (
+    DEFLECTED,
+    FARTHEST,
     HIGH,
     LAST,
     LAST_TOGETHER,
     LOW,
+    MET,
+    NEAREST,
     OFFSET,
     PATH,
+    SMALLER_RADIUS,
+    SMOOTHED,
     START,
     TOLERANCE,
+    TURNING_PATH,
     PairTable,
     add_bonds,
     restart_pair,
@@ -60,15 +71,19 @@ class BondFinder:
 
     Parameters
     ----------
-    chance : callable
-        Probability that two free beads stay within ranges (n,) over paths (n,).
+    rate : float, [1/m]
+        Encounters of a bead per path length, from `encounter_rate`.
+    collision_rate : callable
+        Collisions of pairs per path: a `CollisionRate`.
     """
 
     def __init__(
         self,
-        chance: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
+        rate: float,
+        collision_rate: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
     ) -> None:
-        self._chance = chance
+        self._rate = rate
+        self._collision_rate = collision_rate
         self.clear()
 
     def clear(self) -> None:
@@ -115,8 +130,24 @@ class BondFinder:
         return np.column_stack([keys >> SHIFT, keys & ((1 << SHIFT) - 1)]), chances[is_unlikely]
 
     def _chances(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.minimum(self._fixed_chances(rows), self._turning_chances(rows))
+
+    def _fixed_chances(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Probabilities that free beads keep their separation."""
         ranges = 0.5 * (rows[:, HIGH : HIGH + 2] - rows[:, LOW : LOW + 2]).max(axis=1)
-        return self._chance(rows[:, PATH], np.maximum(ranges, _MIN_RANGE * rows[:, TOLERANCE]))
+        ranges = np.maximum(ranges, _MIN_RANGE * rows[:, TOLERANCE])
+        return chance_probability(rows[:, PATH], ranges, self._rate)
+
+    def _turning_chances(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Probabilities that free beads keep their distance within the range that was seen."""
+        least = 2.0 * _MIN_RANGE * rows[:, TOLERANCE]
+        farthest = np.maximum(rows[:, FARTHEST], rows[:, NEAREST] + least)
+        return turning_chance_probability(
+            rows[:, TURNING_PATH],
+            rows[:, NEAREST],
+            farthest,
+            self._collision_rate(rows[:, SMALLER_RADIUS], rows[:, DEFLECTED]),
+        )
 
     def _new_bonds(self, time: float, max_chance: float) -> list[Bond]:
         keys, values, bonded = self._table
@@ -124,14 +155,21 @@ class BondFinder:
         rows = _unbonded_since(values, bonded, time, _MIN_AGE)
         if not rows.size:
             return []
-        rows = rows[self._chances(values[rows]) < max_chance]
+        chances = self._fixed_chances(values[rows])
+        is_fixed = (chances < max_chance) & (time - values[rows, START] >= _MIN_AGE)
+        is_bond = is_fixed | (self._turning_chances(values[rows]) < max_chance)
         bonds = []
-        for k in rows.tolist():
+        for k, fixed in zip(rows[is_bond].tolist(), is_fixed[is_bond].tolist(), strict=True):
             row = values[k]
             bonded[k], row[LAST_TOGETHER] = True, time
-            row[OFFSET : OFFSET + 2] = 0.5 * (row[LOW : LOW + 2] + row[HIGH : HIGH + 2])
+            row[OFFSET : OFFSET + 2] = (
+                0.5 * (row[LOW : LOW + 2] + row[HIGH : HIGH + 2])
+                if fixed
+                else row[SMOOTHED : SMOOTHED + 2]
+            )
             offset = (float(row[OFFSET]), float(row[OFFSET + 1]))
-            bonds.append(Bond(_ids_of(keys[k]), float(row[START]), offset, float(row[TOLERANCE])))
+            start = float(row[START] if fixed else row[MET])
+            bonds.append(Bond(_ids_of(keys[k]), start, offset, float(row[TOLERANCE])))
         return bonds
 
     def _broken_bonds(self, time: float) -> list[tuple[int, int]]:
@@ -150,10 +188,10 @@ class BondFinder:
 def _unbonded_since(
     values: NDArray[np.float64], bonded: NDArray[np.bool_], time: float, min_age: float
 ) -> NDArray[np.int64]:
-    """Rows of pairs that are no bonds and at least `min_age` old, [s]."""
+    """Rows of pairs that are no bonds and met at least `min_age` ago, [s]."""
     rows, count = np.empty(bonded.size, dtype=np.int64), 0
     for k in range(bonded.size):
-        if not bonded[k] and time - values[k, START] >= min_age:
+        if not bonded[k] and time - values[k, MET] >= min_age:
             rows[count] = k
             count += 1
     return rows[:count]

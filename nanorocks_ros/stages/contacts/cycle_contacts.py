@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # Between two cooling windows contacts come in that no fit uses.
 _MAX_WAITING = 5000
+# Error of the time of a merge, [ns]: the contact that made the body may be dated before it.
+_MERGE_ERROR_NS = 100_000_000
 
 
 class CycleContacts:
@@ -37,6 +39,7 @@ class CycleContacts:
         used = {Rebound: settings.rebounds, PairCollision: settings.collisions}
         self._used = tuple(kind for kind, enabled in used.items() if enabled)
         self._waiting: deque[Rebound | PairCollision] = deque(maxlen=_MAX_WAITING)
+        self._counted: list[Rebound | PairCollision] = []
         self.terms = ContactTerms.of(())
 
     def push(self, contact: Rebound | PairCollision) -> None:
@@ -51,10 +54,24 @@ class CycleContacts:
         self._keep(lambda stamp_ns: stamp_ns > latest)
         within = [contact for contact in ripe if contact.stamp_ns >= first_ns]
         if within:
+            self._counted += within
             self.terms += ContactTerms.of(within)
+
+    def end_at_merge(self, merge_ns: int) -> None:
+        """Take out the contacts since a merge, which is known seconds later.
+
+        Bodies rebound with the mass of all their beads, and where one turns its beads change
+        their velocity without a contact.
+        """
+        kept = [
+            contact for contact in self._counted if contact.stamp_ns < merge_ns - _MERGE_ERROR_NS
+        ]
+        if len(kept) < len(self._counted):
+            self._counted, self.terms = kept, ContactTerms.of(kept)
 
     def next_cycle(self) -> None:
         """Clear the sums; late contacts of the cycle before are too early to be summed."""
+        self._counted = []
         self.terms = ContactTerms.of(())
 
     def restart(self, stamp_ns: int) -> None:

@@ -121,6 +121,7 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
             self._samples = [
                 sample for sample in self._samples if sample.stamp_ns < merge.stamp_ns
             ]
+            self._contacts.end_at_merge(merge.stamp_ns)
             self._merged = True
         return self._end_cycle()
 

@@ -457,6 +457,21 @@ def test_the_window_ends_with_the_first_merge():
     assert later.window_end == pytest.approx(20.0, abs=0.11)
 
 
+def test_contacts_since_a_merge_that_is_known_late_are_not_used():
+    rng = np.random.default_rng(5)
+    before, since = list(rebounds(rng, 20, 2.0, 11.0)), list(rebounds(rng, 30, 12.0, 15.0))
+    late = merge(12.05, known=6.0)
+    finals = [
+        all_estimates(fitter(), as_known([*simulated_cycle(), *contacts, late]))[-1]
+        for contacts in (before, [*before, *since])
+    ]
+    assert finals[0].status is CorStatus.FINAL
+    assert [final.rebounds for final in finals] == [20, 20]
+    # Sums in another order differ by rounding.
+    walls = [final.wall_restitution.value for final in finals]
+    assert walls[1] == pytest.approx(walls[0], abs=1e-9)
+
+
 def test_a_gas_whose_beads_stick_at_once_tells_nothing():
     for time in (0.5, 2.0):
         (only,) = all_estimates(fitter(), as_known([*simulated_cycle(), merge(time, known=0.4)]))

@@ -1,0 +1,127 @@
+"""Bodies that turn: false alarms, first merges and sticking speeds, against the truth.
+
+Tracks of `turning_gas`, 40 s after a kick to 10 mm/s; no camera.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+from benchmarks.sticking import Course, course, threshold_cycle
+from benchmarks.turning_gas import RATE, Gas, pictures
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.sticking.sticking_speed import StickingEstimate, sticking_estimate
+from nanorocks_ros.jobs.tasks import Workers, run_tasks
+from nanorocks_ros.physics.sticking_rates import slow_contacts
+from nanorocks_ros.records import StickingStatus
+
+_TRAYS = (1, 3)
+_SECONDS = 40.0
+_CONTROLS = 100
+_CONTROL_TRUTHS = (0.5, 0.9)
+_CYCLES = 30
+_STICKING = (1e-3, 3e-3, 10e-3)
+# The issue asks for these: sticking speed, and first merge, [s].
+_FACTOR, _ONSET = 1.3, 0.5
+
+
+def turning(number: int, gas: Gas, seed: int, seconds: float = _SECONDS) -> Course:
+    """One cycle of a tray, counted."""
+    tray = load_trays()[number]
+    frames = pictures(tray, gas, seed, round(seconds * RATE))
+    return course(
+        tray,
+        (
+            (frame.tracks, frame.bodies, np.hypot(*frame.tracks.velocities.T).mean())
+            for frame in frames
+        ),
+    )
+
+
+def _estimate(cycles: list[Course], number: int) -> StickingEstimate:
+    tray = load_trays()[number]
+    return sticking_estimate(
+        [threshold_cycle(cycle, tray.count, cycle.merges) for cycle in cycles],
+        slow_contacts(tray),
+        tray.count,
+    )
+
+
+def _row(number: int, speed: float, cycles: list[Course]) -> str:
+    late = np.array([cycle.first - cycle.first_true for cycle in cycles])
+    late = late[np.isfinite(late)]
+    merges = np.array([sum(merge.joins for merge in cycle.merges) for cycle in cycles])
+    true = np.array([cycle.bodies[0] - cycle.bodies[-1] for cycle in cycles])
+    estimates = [_estimate([cycle], number) for cycle in cycles]
+    ratios = np.array([estimate.sticking_speed for estimate in estimates]) / speed
+    known = ratios[np.isfinite(ratios)]
+    within = np.mean(np.abs(np.log(known)) < np.log(_FACTOR)) if known.size else np.nan
+    holds = sum(estimate.lower <= speed <= estimate.upper for estimate in estimates)
+    wrong_limits = sum(
+        estimate.upper < speed
+        for estimate in estimates
+        if estimate.status is StickingStatus.NO_MERGE
+    )
+    both = _estimate(cycles, number)
+    cells = (
+        f'{number}, {1e3 * speed:g} mm/s',
+        f'{len(cycles)}',
+        f'{merges.sum()} of {true.sum():.0f}',
+        f'{np.mean(late):+.2f}, {np.abs(late).max(initial=0.0):.2f}, '
+        f'{np.count_nonzero(np.abs(late) <= _ONSET)}/{len(cycles)}',
+        f'{np.mean(known):.2f} ({np.std(known):.2f}) of {known.size}, {within:.0%}',
+        f'{holds}/{len(cycles)}',
+        f'{wrong_limits}',
+        f'{both.sticking_speed / speed:.2f} [{both.lower / speed:.2f}, {both.upper / speed:.2f}]',
+    )
+    return f'| {" | ".join(cells)} |'
+
+
+def _sticking(task: tuple[int, float, int]) -> Course:
+    number, speed, seed = task
+    return turning(number, Gas(0.89, sticking=speed), seed)
+
+
+def _false_alarm(task: tuple[int, float, int]) -> bool:
+    number, eps, seed = task
+    return bool(turning(number, Gas(eps), seed).merges)
+
+
+def _report_controls(trays: tuple[int, ...], runs: int) -> None:
+    print('| tray | restitution | cycles without sticking | with a merge |\n' + '| --- ' * 4 + '|')
+    for number in trays:
+        for eps in _CONTROL_TRUTHS:
+            tasks = {f'{number} {eps} {seed}': (number, eps, seed) for seed in range(runs)}
+            alarms = run_tasks(_false_alarm, tasks, Workers())
+            print(f'| {number} | {eps} | {runs} | {sum(alarms)} |', flush=True)
+
+
+def report(trays: tuple[int, ...] = _TRAYS, share: float = 1.0) -> None:
+    """Print the tables.
+
+    Parameters
+    ----------
+    trays : tuple of int
+    share : float
+        Of the number of cycles.
+    """
+    _report_controls(trays, round(share * _CONTROLS))
+    print(
+        '\n| tray, sticking speed | cycles | merges found | first merge found later by: mean, '
+        f'largest [s], within {_ONSET} s | speed / truth, one cycle: mean (sd), within a factor '
+        f'of {_FACTOR} | 95 % hold | upper limits below the truth | all cycles [95 %] |\n'
+        + '| --- ' * 8
+        + '|'
+    )
+    for number in trays:
+        for speed in _STICKING:
+            runs = round(share * _CYCLES)
+            tasks = {f'{number} {speed} {seed}': (number, speed, seed) for seed in range(runs)}
+            cycles = run_tasks(_sticking, tasks, Workers())
+            print(_row(number, speed, cycles), flush=True)
+
+
+if __name__ == '__main__':
+    report(tuple(int(number) for number in sys.argv[2:]) or _TRAYS, float(sys.argv[1]))
