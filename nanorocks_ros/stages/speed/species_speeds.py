@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.settings import SpeedSettings
+    from nanorocks_ros.stages.speed.crowded_paths import CrowdedGrains
 
 # Samples held back at most while the beads do not move enough to be known.
 _MAX_HELD = 3000
@@ -64,6 +65,8 @@ class SpeciesSpeeds:
         Beads of each species.
     factors : sequence of (float, float)
         Factor for the speed of each species, and its error.
+    crowd : CrowdedGrains, optional
+        Of grains that hide and hit each other.
     """
 
     def __init__(
@@ -72,11 +75,14 @@ class SpeciesSpeeds:
         diameters_px: Sequence[float],
         counts: Sequence[int],
         factors: Sequence[tuple[float, float]],
+        crowd: CrowdedGrains | None = None,
     ) -> None:
         self._counts = tuple(counts)
         self._factors = tuple(factors)
         self._parts = [
-            StructureFunction(settings, diameter, count, centred=len(self._counts) > 1)
+            StructureFunction(
+                settings, diameter, count, centred=len(self._counts) > 1, crowd=crowd
+            )
             for diameter, count in zip(diameters_px, counts, strict=True)
         ]
         self._held: list[tuple[Sample, ...]] = []

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import fft, special
 
+from nanorocks_ros.physics.crowded_grains import picture_correlation, shared_outline
 from nanorocks_ros.physics.moving_area import RAYLEIGH_NODES
 
 if TYPE_CHECKING:
@@ -94,9 +95,12 @@ class StructureCalibration:
         Mean bead diameter; beads further apart than this in two images share nothing.
     beads : int
         Number of beads, for the error of a mean over so many displacements.
+    layers : float, >= 0
+        Number of grains above one another, where they hide each other; 0 where they do not.
     """
 
-    def __init__(self, diameter_px: float, beads: int) -> None:
+    def __init__(self, diameter_px: float, beads: int, layers: float = 0.0) -> None:
+        self._layers = layers
         self._longest = max(2.0, float(np.ceil(diameter_px)))
         self._beads = beads
         self._at = _bessel(self._longest)[0]
@@ -142,13 +146,27 @@ class StructureCalibration:
     def _tabulate(self) -> None:
         mean = np.maximum.accumulate(self._sum / self.pairs)
         at = np.interp(self._grid[:, np.newaxis] * RAYLEIGH_NODES, self._at, mean)
-        self._power = at.mean(axis=1)
+        self._power = at.mean(axis=1) if self._layers == 0.0 else self._hidden_power(mean)
         slope = np.gradient(self._power, self._grid)
         residual = at - slope[:, np.newaxis] * self._grid[:, np.newaxis] * RAYLEIGH_NODES
         steep = slope > 1e-3 * slope.max()
         self._scatter = np.divide(
             residual.std(axis=1), slope * np.sqrt(self._beads), where=steep, out=self._grid.copy()
         )
+
+    def _hidden_power(self, response: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Squared difference of grains that hide each other, on the grid.
+
+        Together, as in the response, they uncover less than when each moves by itself.
+        """
+        plateau = float(response[-1])
+        if plateau <= 0.0:
+            return np.zeros_like(self._grid)
+        correlation = np.clip(1.0 - response / plateau, 0.0, 1.0)
+        shared = shared_outline(correlation, self._layers)
+        displaced = self._grid[:, np.newaxis] * RAYLEIGH_NODES
+        mean_share = np.interp(displaced, self._at, shared).mean(axis=1)
+        return plateau * (1.0 - picture_correlation(mean_share, self._layers))
 
     @property
     def plateau(self) -> float:

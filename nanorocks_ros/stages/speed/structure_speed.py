@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import Measured, Quality, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.stages.preprocess.shake_detection import NS, NoiseMeter
+from nanorocks_ros.stages.speed.crowded_paths import CrowdedGrains
 from nanorocks_ros.stages.speed.species_images import SpeciesImages
 from nanorocks_ros.stages.speed.species_speeds import PictureSpeed, SpeciesSpeeds
 
@@ -40,12 +41,15 @@ class StructureSpeed:
     ----------
     settings : PipelineSettings
     tray : Tray
+    crowded : bool
+        Whether a species has too many grains to be tracked.
     """
 
-    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+    def __init__(self, settings: PipelineSettings, tray: Tray, *, crowded: bool = False) -> None:
         self._settings = settings.speed
         self._scale = settings.preprocess.pixels_per_metre
         self._tray = tray
+        self._crowd = CrowdedGrains.of_tray(tray, self._scale) if crowded else None
         self.reset()
 
     def reset(self, stamp_ns: int | None = None) -> None:
@@ -144,7 +148,7 @@ class StructureSpeed:
         self._separated = separated
         self._waited = 0
         self._noise = [NoiseMeter() for _ in diameters]
-        self._speeds = SpeciesSpeeds(self._settings, diameters, counts, factors)
+        self._speeds = SpeciesSpeeds(self._settings, diameters, counts, factors, self._crowd)
         return True
 
     def _estimates(self, speeds: tuple[PictureSpeed, ...]) -> tuple[SpeedEstimate, ...]:
