@@ -85,19 +85,22 @@ def picture_correlation(shared: NDArray[np.float64], layers: float) -> NDArray[n
     return np.asarray(np.expm1(layers * shared) / math.expm1(layers))
 
 
-def path_of_displacement(displacement: float, persistence: float) -> float:
+def path_of_displacement(
+    displacement: NDArray[np.float64] | float, persistence: float
+) -> NDArray[np.float64]:
     """Path of grains whose velocities die away exponentially along it, by their displacement.
 
     Parameters
     ----------
-    displacement, persistence : float, any length
+    displacement : ndarray or float, any length
+    persistence : float, the same length
 
     Returns
     -------
-    float
+    ndarray
         The displacement is sqrt(2 (x - 1 + exp(-x))) persistence lengths for a path of x.
     """
-    return float(persistence * np.interp(displacement / persistence, _REACHED, _PATHS))
+    return np.asarray(persistence * np.interp(displacement / persistence, _REACHED, _PATHS))
 
 
 def displacement_of_path(path: float, persistence: float) -> float:

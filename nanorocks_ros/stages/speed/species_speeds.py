@@ -10,6 +10,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.stages.preprocess.shake_detection import NS
+from nanorocks_ros.stages.speed.crowded_structure_function import (
+    CrowdedGrains,
+    CrowdedStructureFunction,
+)
 from nanorocks_ros.stages.speed.structure_function import Sample, StructureFunction
 
 if TYPE_CHECKING:
@@ -19,7 +23,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.settings import SpeedSettings
-    from nanorocks_ros.stages.speed.crowded_paths import CrowdedGrains
 
 # Samples held back at most while the beads do not move enough to be known.
 _MAX_HELD = 3000
@@ -80,9 +83,9 @@ class SpeciesSpeeds:
         self._counts = tuple(counts)
         self._factors = tuple(factors)
         self._parts = [
-            StructureFunction(
-                settings, diameter, count, centred=len(self._counts) > 1, crowd=crowd
-            )
+            StructureFunction(settings, diameter, count, centred=len(self._counts) > 1)
+            if crowd is None
+            else CrowdedStructureFunction(settings, diameter, count, crowd)
             for diameter, count in zip(diameters_px, counts, strict=True)
         ]
         self._held: list[tuple[Sample, ...]] = []

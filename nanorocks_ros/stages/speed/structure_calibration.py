@@ -29,6 +29,12 @@ _STEP_PX = 0.25
 _WAVENUMBERS = 600
 # Where the response no longer grows, relative errors grow by so much at most.
 _FLAT = 100.0
+# Quadrature over the displacements of grains between two pictures that are not quite unrelated:
+# every so many of the Rayleigh nodes, and directions in half a turn; and rounds of its solution.
+_EVERY_NODE = 8
+_ANGLES = (np.arange(12) + 0.5) * (np.pi / 12)
+_COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
+_ITERATIONS = 3
 
 
 @cache
@@ -127,11 +133,14 @@ class StructureCalibration:
             Mean squared difference per pixel of a scene at rest.
         path_px : float, [px]
             Mean displacement between the two: some beads have hardly moved, and are made
-            up for.
+            up for. Of grains that hide each other it may be a diameter.
         """
         difference = later.astype(np.float32) - earlier.astype(np.float32)
         response = displacement_response(difference, noise_power, self._longest)[1]
-        response /= self._moved_share(response, path_px)
+        if self._layers > 0.0:
+            response = self._unrelated(response, path_px)
+        else:
+            response /= self._moved_share(response, path_px)
         self._sum += response
         self._squares += response**2
         self.pairs += 1
@@ -142,6 +151,28 @@ class StructureCalibration:
             return 1.0
         moved = np.interp(path_px * RAYLEIGH_NODES, self._at, response)
         return float(max(moved.mean() / response[-1], 0.1))
+
+    def _unrelated(
+        self, response: NDArray[np.float64], displacement_px: float
+    ) -> NDArray[np.float64]:
+        """Response of unrelated pictures, from that of two which still have grains in common.
+
+        The difference of two pictures has the autocovariance 2 C(d) - 2 X(d), with X the
+        covariance of one with the other: of the same grains, displaced.
+        """
+        if not np.isfinite(displacement_px) or response[-1] <= 0.0:
+            return response
+        moved = displacement_px * RAYLEIGH_NODES[_EVERY_NODE // 2 :: _EVERY_NODE, np.newaxis]
+        apart = np.hypot(self._at[:, np.newaxis, np.newaxis] - moved * _COSINES, moved * _SINES)
+        unrelated = response
+        for _ in range(_ITERATIONS):
+            plateau = float(unrelated[-1])
+            correlation = np.clip(1.0 - unrelated / plateau, 0.0, 1.0)
+            shared = shared_outline(correlation, self._layers)
+            common = np.interp(apart, self._at, shared).mean(axis=(1, 2))
+            left = picture_correlation(common, self._layers)
+            unrelated = response + plateau * (left[0] - left)
+        return unrelated
 
     def _tabulate(self) -> None:
         mean = np.maximum.accumulate(self._sum / self.pairs)

@@ -18,14 +18,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.stages.preprocess.shake_detection import NS, difference_power
-from nanorocks_ros.stages.speed.crowded_paths import CHANGED_SHARE, least_difference
 from nanorocks_ros.stages.speed.structure_calibration import StructureCalibration
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.settings import SpeedSettings
-    from nanorocks_ros.stages.speed.crowded_paths import CrowdedGrains
 
 # Path, in bead diameters, after which two images are taken to be unrelated, but for a share that
 # is corrected for; and the number of such pairs needed before speeds are released.
@@ -49,9 +47,8 @@ _PAIRS_KEPT = 400
 _KEY_INTERVAL_NS = NS // 4
 _KEYS_KEPT = 48
 
-
 # A later and an earlier image, each with its stamp.
-_Pair = tuple[tuple[int, 'NDArray[np.uint8]'], tuple[int, 'NDArray[np.uint8]']]
+ImagePair = tuple[tuple[int, 'NDArray[np.uint8]'], tuple[int, 'NDArray[np.uint8]']]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +63,7 @@ class Sample:
     middles_ns, windows_ns : ndarray of int64, (n_lags,), [ns]
         Middle and length of the time between the two images.
     shifts_px : ndarray (n_lags,), [px]
-        How far the tray moved between them; of crowded grains, what was not moved back.
+        How far the tray moved between them.
     powers : ndarray (n_lags,), [gray levels^2]
         Sums over the image, free of noise.
     """
@@ -93,8 +90,8 @@ class StructureFunction:
         Whether all pairs of images have the same middle, so that species of different speeds can
         have different lags; otherwise all pairs end with the last image, half the longest lag
         earlier.
-    crowd : CrowdedGrains, optional
-        Of grains that hide and hit each other; by default beads that do so rarely.
+    layers : float, >= 0
+        Number of grains above one another, where they hide each other; 0 where they do not.
     """
 
     def __init__(
@@ -104,13 +101,12 @@ class StructureFunction:
         beads: int,
         *,
         centred: bool = False,
-        crowd: CrowdedGrains | None = None,
+        layers: float = 0.0,
     ) -> None:
         self._settings = settings
-        self._saturation = settings.crowded_saturation if crowd else settings.saturation
+        self._saturation = settings.saturation
+        self._layers = layers
         self._centred = centred
-        self._crowd = crowd
-        self._layers = crowd.layers if crowd else 0.0
         self._diameter_px = diameter_px
         self._lags = _ladder(settings.max_lag_frames)
         self._images: deque[tuple[int, NDArray[np.uint8]]] = deque(
@@ -119,8 +115,9 @@ class StructureFunction:
         self._shifts: deque[tuple[float, float]] = deque(maxlen=settings.max_lag_frames + 1)
         self._keys: list[tuple[int, NDArray[np.uint8]]] = []
         self._key_interval_ns = _KEY_INTERVAL_NS
-        self._response = StructureCalibration(diameter_px, beads, self._layers)
-        self._first_guess = StructureCalibration(diameter_px, beads, self._layers)
+        self._response = StructureCalibration(diameter_px, beads, layers)
+        self._first_guess = StructureCalibration(diameter_px, beads, layers)
+        self._unrelated_px = _UNRELATED_PATH * diameter_px
         self._beads = beads
         self._path_stamps: list[int] = []
         self._path: list[float] = []
@@ -200,38 +197,29 @@ class StructureFunction:
             (self._images[end], self._images[end - lag])
             for end, lag in zip(ends, lags, strict=True)
         ]
-        shifts = [
-            (
-                self._shifts[end][0] - self._shifts[end - lag][0],
-                self._shifts[end][1] - self._shifts[end - lag][1],
-            )
-            for end, lag in zip(ends, lags, strict=True)
-        ]
-        powers, left = self._differences(pairs, shifts)
+        shifts = np.array(
+            [
+                (self._shifts[end], self._shifts[end - lag])
+                for end, lag in zip(ends, lags, strict=True)
+            ]
+        ).reshape(-1, 2, 2)
+        powers, shifts_px = self._differences(pairs, shifts[:, 0] - shifts[:, 1])
         return Sample(
             cycle=cycle[0],
             cycle_start_ns=cycle[1],
             noise_power=noise_power,
             middles_ns=np.array([(later[0] + earlier[0]) // 2 for later, earlier in pairs]),
             windows_ns=np.array([later[0] - earlier[0] for later, earlier in pairs]),
-            shifts_px=left,
+            shifts_px=shifts_px,
             powers=powers - noise_power * self._images[-1][1].size,
         )
 
     def _differences(
-        self, pairs: list[_Pair], shifts: list[tuple[float, float]]
+        self, pairs: list[ImagePair], shifts: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Squared differences of pairs of images, and how far the tray moved past the beads."""
-        if self._crowd is None:
-            powers = [difference_power(later[1], earlier[1]) for later, earlier in pairs]
-            return np.array(powers), np.hypot(*np.array(shifts).reshape(-1, 2).T)
-        differences = [
-            least_difference(later[1], earlier[1], shift)
-            for (later, earlier), shift in zip(pairs, shifts, strict=True)
-        ]
-        return np.array([power for power, _ in differences]), np.array(
-            [left for _, left in differences]
-        )
+        powers = [difference_power(later[1], earlier[1]) for later, earlier in pairs]
+        return np.array(powers), np.hypot(*shifts.T)
 
     def longest_lag(self, sample: Sample) -> int:
         """Index of the longest lag over which the displacement can be read."""
@@ -250,18 +238,12 @@ class StructureFunction:
         pixels = self._images[-1][1].size
         apparent = float(self._response.displacement(power)[0])
         error = float(self._response.displacement_error(power, sample.noise_power, pixels)[0])
-        if self._crowd is not None:
-            changed = CHANGED_SHARE * self._response.plateau
-            ends = self._response.displacement(power[0] + np.array([-changed, changed]))
-            error = math.hypot(error, 0.5 * float(ends[1] - ends[0]))
         # Beads move past the camera, and the images follow the tray: so grows the mean of Rayleigh
         # distributed distances when all beads are shifted.
         square = apparent**2 - 0.25 * np.pi * float(sample.shifts_px[lag]) ** 2
         if square > 0.0:
             error *= apparent / np.sqrt(square)
         left = float(np.sqrt(max(square, 0.0)))
-        if self._crowd is not None:
-            return self._crowd.path(left, error)
         loss = min(0.5, _DEFLECTION_LOSS * left / self._diameter_px)
         scatter = np.sqrt(_DEFLECTION_SCATTER * loss / self._beads) * left
         systematic = (_DEFLECTION_ERROR * loss * left, _SHIFT_ERROR * (apparent - left))
@@ -285,12 +267,14 @@ class StructureFunction:
         path_now = self._path[-1]
         for key_stamp, key in self._keys:
             path = path_now - float(np.interp(key_stamp, self._path_stamps, self._path))
-            if self._crowd is not None and self._crowd.unrelated(path, self._diameter_px):
-                self._response.add(gray, key, noise_power)
+            displacement = self._displacement_of(path)
+            if displacement >= self._unrelated_px:
+                self._response.add(gray, key, noise_power, displacement)
                 return
-            if self._crowd is None and path >= _UNRELATED_PATH * self._diameter_px:
-                self._response.add(gray, key, noise_power, path)
-                return
+
+    def _displacement_of(self, path_px: float) -> float:
+        """Mean displacement of the beads after a path, [px]."""
+        return path_px
 
     def _keep_key(self, stamp_ns: int, gray: NDArray[np.uint8]) -> None:
         self._keys.append((stamp_ns, gray))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import Measured, Quality, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.stages.preprocess.shake_detection import NS, NoiseMeter
-from nanorocks_ros.stages.speed.crowded_paths import CrowdedGrains
+from nanorocks_ros.stages.speed.crowded_structure_function import CrowdedGrains
 from nanorocks_ros.stages.speed.species_images import SpeciesImages
 from nanorocks_ros.stages.speed.species_speeds import PictureSpeed, SpeciesSpeeds
 
