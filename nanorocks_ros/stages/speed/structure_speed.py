@@ -122,12 +122,28 @@ class StructureSpeed:
             return (image.gray,)
         if image.color is not None:
             self._waited = 0
-            return self._images.images(image.color)
+            return self._species_images(image, image.color)
         self._flags |= Quality.GRAY_CAMERA
         self._waited += 1
         if self._waited > _PATIENCE:
             self._forget_beads()
         return ()
+
+    def _species_images(
+        self, image: TrayImage, color: NDArray[np.uint8]
+    ) -> tuple[NDArray[np.uint8], ...]:
+        """An image of each species; grains that cover the tray are nearly all of its gray image.
+
+        Colours in steps, and those of a codec, change as grains move: speeds from images of the
+        grains alone were 5 % higher.
+        """
+        shown = self._images.images(color)
+        if self._crowd is None:
+            return shown
+        return tuple(
+            species_image if species.properties.hue else image.gray
+            for species, species_image in zip(self._tray.species, shown, strict=True)
+        )
 
     def _learn_beads(self, image: TrayImage) -> bool:
         """Decide whether the species are separated; False until the picture shows it."""
