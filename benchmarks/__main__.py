@@ -24,6 +24,7 @@ ALL = (
     'plate_cost',
     'recorder',
     'speed_trays',
+    'speed_grains',
     'speed_accuracy',
     'area_calibration',
     'autocorrelation',

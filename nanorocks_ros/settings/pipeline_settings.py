@@ -99,7 +99,7 @@ class SpeedSettings:
         high=0.6,
     )
     crowded_saturation: float = setting(
-        0.35,
+        0.25,
         'the same in trays with too many grains to track them',
         low=0.05,
         high=0.6,

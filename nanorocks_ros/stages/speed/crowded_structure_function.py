@@ -35,11 +35,15 @@ if TYPE_CHECKING:
 # Displacement, in diameters, after which two pictures are compared to learn the response; a
 # cooling gas of grains may never come much further. What they share is corrected for.
 _UNRELATED = 1.0
-# Share of the loss of path by collisions that is not known: it depends on the restitution and on
-# the sizes of the grains.
-_LOSS_ERROR = 0.3
+# Share of the elastic loss of path by collisions that is corrected for, and its error. Grains that
+# cool come to move along with their neighbours and are deflected less: benchmark speed_grains has
+# the losses by restitution.
+_LOSS, _LOSS_ERROR = 0.75, 0.35
 # Relative error of a displacement for what pictures differ in: shadows, blur, facets that turn.
-_PICTURE_ERROR = 0.05
+_PICTURE_ERROR = 0.08
+# Share of the way of the tray past the camera that may appear as motion of grains: walls that
+# swing drive waves through them.
+_SWING_ERROR = 0.3
 # What pictures in motion differ by beyond their noise, as a share of the plateau: the range that
 # is tried, and its error once it is known.
 _CHANGES = np.linspace(-0.02, 0.1, 61)
@@ -111,8 +115,9 @@ class CrowdedStructureFunction(StructureFunction):
         power_error = _CHANGE_ERROR * plateau
         powers = np.array([power - power_error, power, power + power_error])
         low, displacement, high = self._displacements(powers, shift)
-        path = self._path_of(displacement)
-        steepness = (self._path_of(1.01 * displacement) / path - 1.0) / 0.01 if path > 0.0 else 1.0
+        path = float(self._paths(displacement))
+        elastic = float(path_of_displacement(displacement, self._persistence))
+        steepness = path / displacement if displacement > 0.0 else 1.0
         error = math.hypot(
             float(
                 self._response.displacement_error(
@@ -122,7 +127,11 @@ class CrowdedStructureFunction(StructureFunction):
             0.5 * (high - low),
             _PICTURE_ERROR * displacement,
         )
-        return path, math.hypot(steepness * error, _LOSS_ERROR * (path - displacement))
+        return path, math.hypot(
+            steepness * error,
+            _LOSS_ERROR * (elastic - displacement),
+            _SWING_ERROR * float(sample.tray_px[lag]),
+        )
 
     def _displacements(
         self, powers: NDArray[np.float64], shift_px: NDArray[np.float64] | float
@@ -131,8 +140,10 @@ class CrowdedStructureFunction(StructureFunction):
         squares = self._response.displacement(powers) ** 2 - 0.25 * np.pi * shift_px**2
         return np.sqrt(np.maximum(squares, 0.0))
 
-    def _path_of(self, displacement: float) -> float:
-        return float(path_of_displacement(displacement, self._persistence))
+    def _paths(self, displacement: NDArray[np.float64] | float) -> NDArray[np.float64]:
+        """Mean paths of the grains, by their mean displacements, [px]."""
+        elastic = path_of_displacement(displacement, self._persistence)
+        return np.asarray(displacement + _LOSS * (elastic - displacement))
 
     def _measure_change(self, sample: Sample, lag: int) -> None:
         """Tell what pictures in motion differ by from motion, which grows with the lag."""
@@ -142,9 +153,8 @@ class CrowdedStructureFunction(StructureFunction):
             return
         changes = _CHANGES * self._response.plateau
         speeds = [
-            path_of_displacement(
-                self._displacements(sample.powers[k] - changes, float(sample.shifts_px[k])),
-                self._persistence,
+            self._paths(
+                self._displacements(sample.powers[k] - changes, float(sample.shifts_px[k]))
             )
             / windows[k]
             for k in (shorter, lag)

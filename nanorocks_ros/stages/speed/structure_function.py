@@ -63,7 +63,9 @@ class Sample:
     middles_ns, windows_ns : ndarray of int64, (n_lags,), [ns]
         Middle and length of the time between the two images.
     shifts_px : ndarray (n_lags,), [px]
-        How far the tray moved between them.
+        How far the tray moved past the beads in the images between them.
+    tray_px : ndarray (n_lags,), [px]
+        How far the tray moved past the camera.
     powers : ndarray (n_lags,), [gray levels^2]
         Sums over the image, free of noise.
     """
@@ -74,6 +76,7 @@ class Sample:
     middles_ns: NDArray[np.int64]
     windows_ns: NDArray[np.int64]
     shifts_px: NDArray[np.float64]
+    tray_px: NDArray[np.float64]
     powers: NDArray[np.float64]
 
 
@@ -211,6 +214,7 @@ class StructureFunction:
             middles_ns=np.array([(later[0] + earlier[0]) // 2 for later, earlier in pairs]),
             windows_ns=np.array([later[0] - earlier[0] for later, earlier in pairs]),
             shifts_px=shifts_px,
+            tray_px=np.hypot(*(shifts[:, 0] - shifts[:, 1]).T),
             powers=powers - noise_power * self._images[-1][1].size,
         )
 
