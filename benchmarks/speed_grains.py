@@ -1,10 +1,11 @@
 """Speeds of the grains of trays 6 and 8 over the truth, by camera and speed, while they cool.
 
-`python -m benchmarks speed_grains` films both trays with each camera for a cycle: shaken once to 15 mm/s, then cooling. Restitutions
-and seeds differ. A cell is estimate over truth, its standard deviation, and in brackets the stated
-error over the truth; `!`: more than half carry a flag other than `few_beads`, which all speeds of
-such trays carry. The last column is the restitution of the cycle, with its truth. A second table holds the
-share of their path that grains of a simulated gas lose by collisions, over that of elastic theory.
+Both trays are filmed with each camera for a cycle: shaken once to 15 mm/s, then cooling.
+Restitutions and seeds differ. A cell is estimate over truth, its standard deviation, and in
+brackets the stated error over the truth; `!`: more than half carry a flag other than `few_beads`,
+which all speeds of such trays carry. The last column is the restitution of the cycle, with its
+truth. A second table holds the path that grains of a simulated gas lose by collisions, over that
+of elastic theory.
 """
 
 from __future__ import annotations
