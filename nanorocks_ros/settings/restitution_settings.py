@@ -148,7 +148,7 @@ class PriorSettings:
         high=1.0,
     )
     grain_speed_bias: float = setting(
-        0.04,
+        0.1,
         '`speed_bias` of structure-function speeds in trays with grains',
         low=0.0,
         high=0.5,
