@@ -23,7 +23,7 @@ from nanorocks_ros.physics.crowded_grains import (
     path_of_displacement,
     persistence_length,
 )
-from nanorocks_ros.stages.preprocess.shake_detection import difference_power
+from nanorocks_ros.stages.preprocess.shake_detection import NS, difference_power
 from nanorocks_ros.stages.speed.structure_function import ImagePair, Sample, StructureFunction
 
 if TYPE_CHECKING:
@@ -44,6 +44,8 @@ _PICTURE_ERROR = 0.08
 # Share of the way of the tray past the camera that may appear as motion of grains: walls that
 # swing drive waves through them.
 _SWING_ERROR = 0.3
+# Rate at which grains may turn, [rad/s]: pictures do not tell it from motion of the outline.
+_TURNING = 0.5
 # What pictures in motion differ by beyond their noise, as a share of the plateau: the range that
 # is tried, and its error once it is known.
 _CHANGES = np.linspace(-0.02, 0.1, 61)
@@ -127,7 +129,10 @@ class CrowdedStructureFunction(StructureFunction):
             0.5 * (high - low),
             _PICTURE_ERROR * displacement,
         )
+        edge = 0.5 * _TURNING * self._diameter_px * float(sample.windows_ns[lag]) / NS
+        turning = path - math.sqrt(max(path**2 - edge**2, 0.0))
         return path, math.hypot(
+            turning,
             steepness * error,
             _LOSS_ERROR * (elastic - displacement),
             _SWING_ERROR * float(sample.tray_px[lag]),
