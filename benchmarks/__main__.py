@@ -28,6 +28,7 @@ ALL = (
     'recorder',
     'foreign_world',
     'speed_trays',
+    'speed_grains',
     'speed_accuracy',
     'area_calibration',
     'autocorrelation',

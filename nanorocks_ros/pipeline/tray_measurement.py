@@ -92,7 +92,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         self._bodies = BodyCounter(settings, tray)
         self._scale = ScaleCheck(settings, tray)
         self._track_speed = TrackSpeed(settings, tray, crowded=self._tracker.crowded)
-        self._structure_speed = StructureSpeed(settings, tray)
+        self._structure_speed = StructureSpeed(settings, tray, crowded=self._tracker.crowded)
         self._area_speed = AreaSpeed(settings, tray)
         self._selector = SpeedSelector(settings.speed, self._track_speed.reliability)
 

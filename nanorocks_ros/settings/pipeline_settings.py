@@ -98,6 +98,12 @@ class SpeedSettings:
         low=0.05,
         high=0.6,
     )
+    crowded_saturation: float = setting(
+        0.25,
+        'the same in trays with too many grains to track them',
+        low=0.05,
+        high=0.6,
+    )
     geometry: str = setting(
         'exact',
         'binarised_area: moving area of a disc, exact or its Taylor expansion',

@@ -146,9 +146,9 @@ class PriorSettings:
         high=0.2,
     )
     grain_scale_error: float = setting(
-        0.3,
-        'relative standard error of structure-function speeds in trays with grains, whose '
-        'outlines change as they rotate',
+        0.1,
+        'relative standard error of structure-function speeds in trays with grains, which hide '
+        'each other, cast shadows and rotate',
         low=0.0,
         high=1.0,
     )

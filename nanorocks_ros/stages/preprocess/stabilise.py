@@ -7,7 +7,6 @@ there.
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,7 +14,6 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.experiment.plate import Region
-from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.quantiles import median
 from nanorocks_ros.stages.preprocess.image_registration import (
     register,
@@ -51,15 +49,6 @@ _INTERPOLATION = 0.02
 _FEWEST_TRAYS = 3
 # Pictures averaged in the reference.
 _MEMORY = 64
-# Displacements whose roughness is measured, and the least roughness of jitter: the medians of
-# fourth over second differences, (2 sin(pi f / rate))^2 for a frequency f. The limit is that of a
-# fourth of the frame rate, faster than trays swing on springs; white jitter has 3.4.
-_ROUGH_FRAMES, _ROUGH = 12, 2.0
-# Least median second difference of a motion, in errors of a displacement. Those of noise have
-# 1.7, their fourth differences 5.6: these must be small beside a swing.
-_MOVING = 10.0
-# Largest ratio of the times between the pictures: uneven ones make a swing rough.
-_EVEN = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,49 +75,6 @@ def shift_of_plate(shifts: Sequence[Shift]) -> Shift | None:
         median([shift.y for shift in shifts]),
         median([shift.error for shift in shifts]),
     )
-
-
-class JitterMeter:
-    """Whether the picture jitters: whether it moves as no tray on springs does.
-
-    Attributes
-    ----------
-    jitters : bool
-        False while there are too few pictures.
-    """
-
-    def __init__(self) -> None:
-        self._recent: deque[tuple[float, float, float]] = deque(maxlen=_ROUGH_FRAMES)
-        self.jitters = False
-
-    def push(self, time: float, x: float, y: float, error: float) -> None:
-        """Take the displacement in the next picture; one that is not finite starts afresh.
-
-        Parameters
-        ----------
-        time : float, [s]
-        x, y, error : float, [px]
-            ``error`` is that of a component.
-        """
-        if not math.isfinite(x + y + error):
-            self._recent.clear()
-            self.jitters = False
-            return
-        self._recent.append((time, x, y))
-        full = len(self._recent) == _ROUGH_FRAMES
-        self.jitters = full and _jitters(np.array(self._recent), error)
-
-
-@compiled
-def _jitters(recent: NDArray[np.float64], error: float) -> bool:
-    steps = recent[1:, 0] - recent[:-1, 0]
-    if not steps.max() < _EVEN * steps.min():
-        return False
-    displacements = recent[:, 1:]
-    second = displacements[2:] - 2.0 * displacements[1:-1] + displacements[:-2]
-    fourth = second[2:] - 2.0 * second[1:-1] + second[:-2]
-    usual = np.median(np.abs(second))
-    return bool(usual > _MOVING * error and np.median(np.abs(fourth)) > _ROUGH * usual)
 
 
 class TrayRegistration:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
+from nanorocks_ros.numerics.picture_jitter import JitterMeter
 from nanorocks_ros.records import UNKNOWN, Quality
 from nanorocks_ros.stages.preprocess.rectify import (
     mix_weights,
@@ -20,7 +21,7 @@ from nanorocks_ros.stages.preprocess.rectify import (
     resample_gray,
 )
 from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter
-from nanorocks_ros.stages.preprocess.stabilise import JitterMeter, Shift, TrayRegistration
+from nanorocks_ros.stages.preprocess.stabilise import Shift, TrayRegistration
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -187,10 +187,6 @@ class DecayLibraryMethod:
         """
         if (decay.time - decay.time.mean()) @ np.log(decay.speed) >= 0.0:
             raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
-        if decay.of_grains and not contacts.rebounds and not contacts.collisions:
-            # The bias of such speeds changes while grains slow down: intervals of filmed trays 6
-            # and 8 missed the truth, and over many cycles that does not average out.
-            return self._speeds(decay, final=final)
         likelihood = decay_likelihood(
             self._tables, decay.time, decay.speed, decay.error, self._camera[decay.of_grains]
         )

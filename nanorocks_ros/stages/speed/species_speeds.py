@@ -10,6 +10,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.stages.preprocess.difference_noise import NS
+from nanorocks_ros.stages.speed.crowded_structure_function import (
+    CrowdedGrains,
+    CrowdedStructureFunction,
+)
 from nanorocks_ros.stages.speed.structure_function import Sample, StructureFunction
 
 if TYPE_CHECKING:
@@ -64,6 +68,8 @@ class SpeciesSpeeds:
         Beads of each species.
     factors : sequence of (float, float)
         Factor for the speed of each species, and its error.
+    crowd : CrowdedGrains, optional
+        Of grains that hide and hit each other.
     """
 
     def __init__(
@@ -72,11 +78,14 @@ class SpeciesSpeeds:
         diameters_px: Sequence[float],
         counts: Sequence[int],
         factors: Sequence[tuple[float, float]],
+        crowd: CrowdedGrains | None = None,
     ) -> None:
         self._counts = tuple(counts)
         self._factors = tuple(factors)
         self._parts = [
             StructureFunction(settings, diameter, count, centred=len(self._counts) > 1)
+            if crowd is None
+            else CrowdedStructureFunction(settings, diameter, count, crowd)
             for diameter, count in zip(diameters_px, counts, strict=True)
         ]
         self._held: list[tuple[Sample, ...]] = []

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import fft, special
 
+from nanorocks_ros.physics.crowded_grains import picture_correlation, shared_outline
 from nanorocks_ros.physics.moving_area import RAYLEIGH_NODES
 
 if TYPE_CHECKING:
@@ -28,6 +29,12 @@ _STEP_PX = 0.25
 _WAVENUMBERS = 600
 # Where the response no longer grows, relative errors grow by so much at most.
 _FLAT = 100.0
+# Quadrature over the displacements of grains between two pictures that are not quite unrelated:
+# every so many of the Rayleigh nodes, and directions in half a turn; and rounds of its solution.
+_EVERY_NODE = 8
+_ANGLES = (np.arange(12) + 0.5) * (np.pi / 12)
+_COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
+_ITERATIONS = 3
 
 
 @cache
@@ -94,9 +101,12 @@ class StructureCalibration:
         Mean bead diameter; beads further apart than this in two images share nothing.
     beads : int
         Number of beads, for the error of a mean over so many displacements.
+    layers : float, >= 0
+        Number of grains above one another, where they hide each other; 0 where they do not.
     """
 
-    def __init__(self, diameter_px: float, beads: int) -> None:
+    def __init__(self, diameter_px: float, beads: int, layers: float = 0.0) -> None:
+        self._layers = layers
         self._longest = max(2.0, float(np.ceil(diameter_px)))
         self._beads = beads
         self._at = _bessel(self._longest)[0]
@@ -123,11 +133,14 @@ class StructureCalibration:
             Mean squared difference per pixel of a scene at rest.
         path_px : float, [px]
             Mean displacement between the two: some beads have hardly moved, and are made
-            up for.
+            up for. Of grains that hide each other it may be a diameter.
         """
         difference = later.astype(np.float32) - earlier.astype(np.float32)
         response = displacement_response(difference, noise_power, self._longest)[1]
-        response /= self._moved_share(response, path_px)
+        if self._layers > 0.0:
+            response = self._unrelated(response, path_px)
+        else:
+            response /= self._moved_share(response, path_px)
         self._sum += response
         self._squares += response**2
         self.pairs += 1
@@ -139,16 +152,52 @@ class StructureCalibration:
         moved = np.interp(path_px * RAYLEIGH_NODES, self._at, response)
         return float(max(moved.mean() / response[-1], 0.1))
 
+    def _unrelated(
+        self, response: NDArray[np.float64], displacement_px: float
+    ) -> NDArray[np.float64]:
+        """Response of unrelated pictures, from that of two which still have grains in common.
+
+        The difference of two pictures has the autocovariance 2 C(d) - 2 X(d), with X the
+        covariance of one with the other: of the same grains, displaced.
+        """
+        if not np.isfinite(displacement_px) or response[-1] <= 0.0:
+            return response
+        moved = displacement_px * RAYLEIGH_NODES[_EVERY_NODE // 2 :: _EVERY_NODE, np.newaxis]
+        apart = np.hypot(self._at[:, np.newaxis, np.newaxis] - moved * _COSINES, moved * _SINES)
+        unrelated = response
+        for _ in range(_ITERATIONS):
+            plateau = float(unrelated[-1])
+            correlation = np.clip(1.0 - unrelated / plateau, 0.0, 1.0)
+            shared = shared_outline(correlation, self._layers)
+            common = np.interp(apart, self._at, shared).mean(axis=(1, 2))
+            left = picture_correlation(common, self._layers)
+            unrelated = response + plateau * (left[0] - left)
+        return unrelated
+
     def _tabulate(self) -> None:
         mean = np.maximum.accumulate(self._sum / self.pairs)
         at = np.interp(self._grid[:, np.newaxis] * RAYLEIGH_NODES, self._at, mean)
-        self._power = at.mean(axis=1)
+        self._power = at.mean(axis=1) if self._layers == 0.0 else self._hidden_power(mean)
         slope = np.gradient(self._power, self._grid)
         residual = at - slope[:, np.newaxis] * self._grid[:, np.newaxis] * RAYLEIGH_NODES
         steep = slope > 1e-3 * slope.max()
         self._scatter = np.divide(
             residual.std(axis=1), slope * np.sqrt(self._beads), where=steep, out=self._grid.copy()
         )
+
+    def _hidden_power(self, response: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Squared difference of grains that hide each other, on the grid.
+
+        Together, as in the response, they uncover less than when each moves by itself.
+        """
+        plateau = float(response[-1])
+        if plateau <= 0.0:
+            return np.zeros_like(self._grid)
+        correlation = np.clip(1.0 - response / plateau, 0.0, 1.0)
+        shared = shared_outline(correlation, self._layers)
+        displaced = self._grid[:, np.newaxis] * RAYLEIGH_NODES
+        mean_share = np.interp(displaced, self._at, shared).mean(axis=1)
+        return plateau * (1.0 - picture_correlation(mean_share, self._layers))
 
     @property
     def plateau(self) -> float:

@@ -47,6 +47,9 @@ _PAIRS_KEPT = 400
 _KEY_INTERVAL_NS = NS // 4
 _KEYS_KEPT = 48
 
+# A later and an earlier image, each with its stamp.
+ImagePair = tuple[tuple[int, 'NDArray[np.uint8]'], tuple[int, 'NDArray[np.uint8]']]
+
 
 @dataclass(frozen=True, slots=True)
 class Sample:
@@ -60,7 +63,9 @@ class Sample:
     middles_ns, windows_ns : ndarray of int64, (n_lags,), [ns]
         Middle and length of the time between the two images.
     shifts_px : ndarray (n_lags,), [px]
-        How far the tray moved between them.
+        How far the tray moved past the beads in the images between them.
+    tray_px : ndarray (n_lags,), [px]
+        How far the tray moved past the camera.
     powers : ndarray (n_lags,), [gray levels^2]
         Sums over the image, free of noise.
     """
@@ -71,6 +76,7 @@ class Sample:
     middles_ns: NDArray[np.int64]
     windows_ns: NDArray[np.int64]
     shifts_px: NDArray[np.float64]
+    tray_px: NDArray[np.float64]
     powers: NDArray[np.float64]
 
 
@@ -87,12 +93,22 @@ class StructureFunction:
         Whether all pairs of images have the same middle, so that species of different speeds can
         have different lags; otherwise all pairs end with the last image, half the longest lag
         earlier.
+    layers : float, >= 0
+        Number of grains above one another, where they hide each other; 0 where they do not.
     """
 
     def __init__(
-        self, settings: SpeedSettings, diameter_px: float, beads: int, centred: bool = False
+        self,
+        settings: SpeedSettings,
+        diameter_px: float,
+        beads: int,
+        *,
+        centred: bool = False,
+        layers: float = 0.0,
     ) -> None:
         self._settings = settings
+        self._saturation = settings.saturation
+        self._layers = layers
         self._centred = centred
         self._diameter_px = diameter_px
         self._lags = _ladder(settings.max_lag_frames)
@@ -102,8 +118,9 @@ class StructureFunction:
         self._shifts: deque[tuple[float, float]] = deque(maxlen=settings.max_lag_frames + 1)
         self._keys: list[tuple[int, NDArray[np.uint8]]] = []
         self._key_interval_ns = _KEY_INTERVAL_NS
-        self._response = StructureCalibration(diameter_px, beads)
-        self._first_guess = StructureCalibration(diameter_px, beads)
+        self._response = StructureCalibration(diameter_px, beads, layers)
+        self._first_guess = StructureCalibration(diameter_px, beads, layers)
+        self._unrelated_px = _UNRELATED_PATH * diameter_px
         self._beads = beads
         self._path_stamps: list[int] = []
         self._path: list[float] = []
@@ -183,24 +200,30 @@ class StructureFunction:
             (self._images[end], self._images[end - lag])
             for end, lag in zip(ends, lags, strict=True)
         ]
-        quiet = noise_power * self._images[-1][1].size
         shifts = np.array(
             [
                 (self._shifts[end], self._shifts[end - lag])
                 for end, lag in zip(ends, lags, strict=True)
             ]
         ).reshape(-1, 2, 2)
+        powers, shifts_px = self._differences(pairs, shifts[:, 0] - shifts[:, 1])
         return Sample(
             cycle=cycle[0],
             cycle_start_ns=cycle[1],
             noise_power=noise_power,
             middles_ns=np.array([(later[0] + earlier[0]) // 2 for later, earlier in pairs]),
             windows_ns=np.array([later[0] - earlier[0] for later, earlier in pairs]),
-            shifts_px=np.hypot(*(shifts[:, 0] - shifts[:, 1]).T),
-            powers=np.array(
-                [difference_power(later[1], earlier[1]) - quiet for later, earlier in pairs]
-            ),
+            shifts_px=shifts_px,
+            tray_px=np.hypot(*(shifts[:, 0] - shifts[:, 1]).T),
+            powers=powers - noise_power * self._images[-1][1].size,
         )
+
+    def _differences(
+        self, pairs: list[ImagePair], shifts: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Squared differences of pairs of images, and how far the tray moved past the beads."""
+        powers = [difference_power(later[1], earlier[1]) for later, earlier in pairs]
+        return np.array(powers), np.hypot(*shifts.T)
 
     def longest_lag(self, sample: Sample) -> int:
         """Index of the longest lag over which the displacement can be read."""
@@ -235,7 +258,7 @@ class StructureFunction:
         return bool(sample.powers[lag] <= _OUT_OF_RANGE * self._response.plateau)
 
     def _lag_below_plateau(self, sample: Sample, response: StructureCalibration) -> int:
-        low_enough = sample.powers <= self._settings.saturation * response.plateau
+        low_enough = sample.powers <= self._saturation * response.plateau
         # Up to the first lag that is too long: a later one may return below it by chance.
         return max(0, int(np.argmin(np.append(low_enough, False))) - 1)
 
@@ -248,9 +271,14 @@ class StructureFunction:
         path_now = self._path[-1]
         for key_stamp, key in self._keys:
             path = path_now - float(np.interp(key_stamp, self._path_stamps, self._path))
-            if path >= _UNRELATED_PATH * self._diameter_px:
-                self._response.add(gray, key, noise_power, path)
+            displacement = self._displacement_of(path)
+            if displacement >= self._unrelated_px:
+                self._response.add(gray, key, noise_power, displacement)
                 return
+
+    def _displacement_of(self, path_px: float) -> float:
+        """Mean displacement of the beads after a path, [px]."""
+        return path_px
 
     def _keep_key(self, stamp_ns: int, gray: NDArray[np.uint8]) -> None:
         self._keys.append((stamp_ns, gray))
@@ -261,7 +289,7 @@ class StructureFunction:
 
     def _guess_response(self, gray: NDArray[np.uint8], noise_power: float) -> None:
         """A response from the two images furthest apart, until there is a better one."""
-        self._first_guess = StructureCalibration(self._diameter_px, self._beads)
+        self._first_guess = StructureCalibration(self._diameter_px, self._beads, self._layers)
         self._first_guess.add(gray, self._keys[0][1], noise_power)
 
     def _extend_path(self, stamp_ns: int, noise_power: float) -> None:

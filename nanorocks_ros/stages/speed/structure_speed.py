@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import Measured, Quality, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.stages.preprocess.difference_noise import NS, NoiseMeter
+from nanorocks_ros.stages.speed.crowded_structure_function import CrowdedGrains
 from nanorocks_ros.stages.speed.species_images import SpeciesImages
 from nanorocks_ros.stages.speed.species_speeds import PictureSpeed, SpeciesSpeeds
 
@@ -40,12 +41,15 @@ class StructureSpeed:
     ----------
     settings : PipelineSettings
     tray : Tray
+    crowded : bool
+        Whether a species has too many grains to be tracked.
     """
 
-    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+    def __init__(self, settings: PipelineSettings, tray: Tray, *, crowded: bool = False) -> None:
         self._settings = settings.speed
         self._scale = settings.preprocess.pixels_per_metre
         self._tray = tray
+        self._crowd = CrowdedGrains.of_tray(tray, self._scale) if crowded else None
         self.reset()
 
     def reset(self, stamp_ns: int | None = None) -> None:
@@ -118,12 +122,28 @@ class StructureSpeed:
             return (image.gray,)
         if image.color is not None:
             self._waited = 0
-            return self._images.images(image.color)
+            return self._species_images(image, image.color)
         self._flags |= Quality.GRAY_CAMERA
         self._waited += 1
         if self._waited > _PATIENCE:
             self._forget_beads()
         return ()
+
+    def _species_images(
+        self, image: TrayImage, color: NDArray[np.uint8]
+    ) -> tuple[NDArray[np.uint8], ...]:
+        """An image of each species; grains that cover the tray are nearly all of its gray image.
+
+        Colours in steps, and those of a codec, change as grains move: speeds from images of the
+        grains alone were 5 % higher.
+        """
+        shown = self._images.images(color)
+        if self._crowd is None:
+            return shown
+        return tuple(
+            species_image if species.properties.hue else image.gray
+            for species, species_image in zip(self._tray.species, shown, strict=True)
+        )
 
     def _learn_beads(self, image: TrayImage) -> bool:
         """Decide whether the species are separated; False until the picture shows it."""
@@ -144,7 +164,7 @@ class StructureSpeed:
         self._separated = separated
         self._waited = 0
         self._noise = [NoiseMeter() for _ in diameters]
-        self._speeds = SpeciesSpeeds(self._settings, diameters, counts, factors)
+        self._speeds = SpeciesSpeeds(self._settings, diameters, counts, factors, self._crowd)
         return True
 
     def _estimates(self, speeds: tuple[PictureSpeed, ...]) -> tuple[SpeedEstimate, ...]:

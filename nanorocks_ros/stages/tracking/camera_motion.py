@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.stages.preprocess.stabilise import JitterMeter
+from nanorocks_ros.numerics.picture_jitter import JitterMeter
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
