@@ -77,11 +77,12 @@ FLAGS = {
         'part of a frame was missing', 'the estimate bridges it; check the recording'
     ),
     Quality.WRONG_SCALE: Words(
-        'the trays are not where the settings say, or not as large',
+        'the trays are not where the settings say, or rulers of the scale differ by more than 5 %; '
+        'a notice says which',
         f'{_LOOK}; set --preprocess-pixels-per-metre or --preprocess-regions-px, or calibrate',
     ),
     Quality.UNCERTAIN: Words(
-        'speeds may be wrong by more than 20 %',
+        'speeds may be wrong by more than 20 %, or 10 % for crowded grains',
         'use their errors; film at a higher rate, or closer',
     ),
     Quality.UNCALIBRATED: Words(
@@ -93,6 +94,11 @@ FLAGS = {
         'simulated, such as friction, sticking or drag',
         'do not use the restitutions of this cycle; compare contacts and decay with '
         '--cooling-rebounds false and --cooling-collisions false',
+    ),
+    Quality.DOUBTFUL_SCALE: Words(
+        'rulers of the scale (told, radii, contacts, walls) differ by more than 2 %; a notice says '
+        'which',
+        'correct what the notice names: --preprocess-pixels-per-metre, or sizes in the trays file',
     ),
 }
 """Meaning and remedy of each flag."""

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 # Relative error of the mean speed of a mixture measured as one species: fast light beads count too
 # little.
 _UNKNOWN_MIXTURE = 0.25
+# Relative error of a speed of crowded grains above which it is flagged: films of drawn cameras have
+# speeds that are wrong by more without a larger stated error.
+_CROWDED_ERROR = 0.1
 # Pictures that do not show every species, after which all beads are measured together; and
 # pictures without colour in a row, after which colour is given up.
 _PATIENCE = 30
@@ -176,7 +179,8 @@ class StructureSpeed:
     def _estimate(self, speed: PictureSpeed) -> SpeedEstimate:
         scale = self._scale
         species = speed.species if self._separated else ()
-        out_of_range = Quality(0) if speed.in_range else Quality.UNCERTAIN
+        rough = self._crowd is not None and speed.error > _CROWDED_ERROR * abs(speed.speed)
+        uncertain = Quality.UNCERTAIN if rough or not speed.in_range else Quality(0)
         return SpeedEstimate(
             stamp_ns=speed.stamp_ns,
             tray=self._tray.number,
@@ -185,7 +189,7 @@ class StructureSpeed:
             mean_projected_speed=Measured(speed.speed / scale, speed.error / scale),
             window=speed.window_ns / NS,
             method=SpeedMethod.STRUCTURE_FUNCTION,
-            quality=self._flags | out_of_range,
+            quality=self._flags | uncertain,
             species_speeds=tuple(
                 Measured(value / scale, error / scale) for value, error in species[:2]
             ),
