@@ -77,8 +77,8 @@ FLAGS = {
         'part of a frame was missing', 'the estimate bridges it; check the recording'
     ),
     Quality.WRONG_SCALE: Words(
-        'the trays are not where the settings say, or rulers of the scale differ by more than 5 %; '
-        'a notice says which',
+        'the trays are not where the settings say, or rulers of the scale differ by more than '
+        '5 %; a notice says which',
         f'{_LOOK}; set --preprocess-pixels-per-metre or --preprocess-regions-px, or calibrate',
     ),
     Quality.UNCERTAIN: Words(
@@ -96,8 +96,8 @@ FLAGS = {
         '--cooling-rebounds false and --cooling-collisions false',
     ),
     Quality.DOUBTFUL_SCALE: Words(
-        'rulers of the scale (told, radii, contacts, walls) differ by more than 2 %; a notice says '
-        'which',
+        'rulers of the scale (told, radii, contacts, walls) differ by more than 2 %; a notice '
+        'says which',
         'correct what the notice names: --preprocess-pixels-per-metre, or sizes in the trays file',
     ),
 }

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 # Relative error of the mean speed of a mixture measured as one species: fast light beads count too
 # little.
 _UNKNOWN_MIXTURE = 0.25
-# Relative error of a speed of crowded grains above which it is flagged: films of drawn cameras have
-# speeds that are wrong by more without a larger stated error.
+# Relative error of a speed of crowded grains above which it is flagged: some speeds in films of
+# drawn cameras are wrong by more than 10 %, and their stated error is not larger.
 _CROWDED_ERROR = 0.1
 # Pictures that do not show every species, after which all beads are measured together; and
 # pictures without colour in a row, after which colour is given up.
