@@ -14,6 +14,7 @@ from nanorocks_ros.stages.tracking.detection.background_model import (
 )
 from nanorocks_ros.stages.tracking.detection.circle_fit import refit_circles
 from nanorocks_ros.stages.tracking.detection.disc_scores import DiscSearch
+from nanorocks_ros.stages.tracking.detection.floor_coverage import FloorCoverage
 from nanorocks_ros.stages.tracking.detection.greedy_disc_cover import cover_with_discs
 from nanorocks_ros.stages.tracking.detection.pixel_classes import (
     BLUE,
@@ -96,6 +97,12 @@ class BeadDetector:
         self._searches = [
             self._search_parameters(tray, species, pixels_per_metre) for species in tray.species
         ]
+        self._coverages = [
+            None
+            if self._chalky or _class_of(species) == GRAY
+            else FloorCoverage(_class_of(species), species.properties.color)
+            for species in tray.species
+        ]
         largest = max(species.diameter_high for species in tray.species)
         self._largest_diameter = max(3, round(largest * pixels_per_metre))
         self._frame = 0
@@ -126,14 +133,19 @@ class BeadDetector:
         if self._background is None or self._background.mean.shape != color.shape:
             self._background = self._initial_background(color)
         maps = self._classify(color, self._background)
-        discs_and_fits = self._find_discs(maps, hints or [np.empty((0, 4))] * len(self._searches))
+        own_maps = self._own_maps(color, self._background, maps)
+        discs_and_fits = self._find_discs(
+            own_maps, hints or [np.empty((0, 4))] * len(self._searches)
+        )
         discs_of_all = np.concatenate([discs for discs, _ in discs_and_fits])
         detections = []
         first = 0
-        for search, (discs, fits) in zip(self._searches, discs_and_fits, strict=True):
+        for own, search, (discs, fits) in zip(
+            own_maps, self._searches, discs_and_fits, strict=True
+        ):
             end = first + len(discs)
             refit_circles(
-                maps, search.hue_sign, discs_of_all, first, len(discs), search.expected, fits
+                own, search.hue_sign, discs_of_all, first, len(discs), search.expected, fits
             )
             detections.append(_detections(discs_of_all[first:end], fits))
             first = end
@@ -163,8 +175,23 @@ class BeadDetector:
         maps.covered[:] = 0
         return maps
 
+    def _own_maps(
+        self, color: NDArray[np.uint8], background: _Background, maps: PixelMaps
+    ) -> list[PixelMaps]:
+        """The maps for each species: edges of a coloured bead are those of its coverage."""
+        own = []
+        for coverage in self._coverages:
+            if coverage is None:
+                own.append(maps)
+                continue
+            coverage.update(color, maps.pixel_class)
+            own.append(
+                maps._replace(darkness=coverage.map(color, background.levels, maps.darkness))
+            )
+        return own
+
     def _find_discs(
-        self, maps: PixelMaps, hints: Sequence[NDArray[np.float64]]
+        self, maps: Sequence[PixelMaps], hints: Sequence[NDArray[np.float64]]
     ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Find the discs of each species, with their fits."""
         discs_and_fits = [
@@ -174,7 +201,7 @@ class BeadDetector:
         # Gray beads last: the outline of a coloured bead looks gray.
         for k in sorted(range(len(discs_and_fits)), key=lambda k: self._searches[k].kind == GRAY):
             discs, fits = discs_and_fits[k]
-            count = cover_with_discs(maps, self._searches[k], hints[k], discs, fits)
+            count = cover_with_discs(maps[k], self._searches[k], hints[k], discs, fits)
             discs_and_fits[k] = discs[:count], fits[:count]
         return discs_and_fits
 
