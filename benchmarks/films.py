@@ -21,7 +21,11 @@ from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm, without_e
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
+
+    from nanorocks_ros.records import Notice
 
 SCALE = 12500.0
 RATE = 30.0
@@ -71,16 +75,22 @@ def filmed(
     view = View(camera=film.camera.geometry.camera)
     stage = Preprocessor(settings, {n: flown[n] for n in trays}, 'film', view)
     shots = []
+    by_stamp: dict[int, dict[int, TrayImage]] = {}
     for moment in film.moments(frames):
         jpeg = cv2.imencode('.jpg', moment.frame.image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
         image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR) if effects else moment.frame.image
         frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
-        images = [record for record in stage.push(frame) if isinstance(record, TrayImage)]
-        shots.append(
-            Shot(
-                jpeg,
-                {record.tray: record for record in images},
-                {bead.tray: bead for bead in moment.beads},
-            )
-        )
+        images = by_stamp[frame.stamp_ns] = {}
+        shots.append(Shot(jpeg, images, {bead.tray: bead for bead in moment.beads}))
+        _sort_images(by_stamp, stage.push(frame))
+    _sort_images(by_stamp, stage.flush())
     return shots, film
+
+
+def _sort_images(
+    by_stamp: dict[int, dict[int, TrayImage]], records: Iterable[TrayImage | Notice]
+) -> None:
+    """Give each image, which may come some frames late, to its shot."""
+    for record in records:
+        if isinstance(record, TrayImage):
+            by_stamp[record.stamp_ns][record.tray] = record

@@ -51,11 +51,13 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fit, print and write, and return the exit code."""
-    from nanorocks_ros.cli.flags import bag_settings
+    from nanorocks_ros.cli.flags import bag_settings, settings_from
     from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.calibration.area_calibration import calibrate_area
     from nanorocks_ros.studies.calibration.manual_tracks import read_manual_tracks
 
+    _check_outputs(options, settings_from(options, PipelineSettings(), options.parameters))
     settings, assumed, _ = bag_settings(options, options.bag)
     _check_outputs(options, settings)
     manual = read_manual_tracks(options.tracks)

@@ -28,12 +28,13 @@ from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.studies.analysis.result_tables import read_columns
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.records import Notice
     from nanorocks_ros.settings import SimulationSettings
 
 # Level areas are taken together over this time, [s]; of a cycle the last part is its end.
@@ -255,21 +256,37 @@ def simulated_packing(
     )
     stage = Preprocessor(pipeline, {tray.number: tray}, 'simulated tray')
     frames = round(cycles * settings.shake_period / interval)
-    rows = []
+    rows: list[tuple[float, ...]] = []
+    # Level areas by stamp: images may come some frames late.
+    areas: dict[int, float] = {}
+    stamps = []
     for number, moment in enumerate(gas.moments(frames)):
         image = camera.picture(moment.positions, number)
         stamp_ns = moment.truth.stamp_ns
-        area = math.nan
-        for record in stage.push(Frame(stamp_ns=stamp_ns, encoding='bgr8', image=image)):
-            if isinstance(record, TrayImage):
-                # As the paper looks at pictures.
-                seen = correlated_with_shadows(record.gray, scale)
-                area = seen.region(pipeline.clusters.level).area * seen.side**2
+        frame = Frame(stamp_ns=stamp_ns, encoding='bgr8', image=image)
+        areas |= _level_areas(stage.push(frame), scale, pipeline.clusters.level)
+        stamps.append(stamp_ns)
         age = stamp_ns / 1e9 - (gas.origin or 0.0)
-        rows.append((gas.cycle, age, area, *_truth(tray, gas, moment.positions)))
+        rows.append((gas.cycle, age, math.nan, *_truth(tray, gas, moment.positions)))
         if progress is not None:
             progress(number + 1, frames)
-    return _curves(tray.number, np.array(rows))
+    areas |= _level_areas(stage.flush(), scale, pipeline.clusters.level)
+    table = np.array(rows)
+    table[:, 2] = [areas.get(stamp_ns, math.nan) for stamp_ns in stamps]
+    return _curves(tray.number, table)
+
+
+def _level_areas(
+    records: Iterable[TrayImage | Notice], scale: float, level: float
+) -> dict[int, float]:
+    """Level area of the autocorrelation of each tray image by its stamp, [m^2]."""
+    areas = {}
+    for record in records:
+        if isinstance(record, TrayImage):
+            # As the paper looks at pictures.
+            seen = correlated_with_shadows(record.gray, scale)
+            areas[record.stamp_ns] = seen.region(level).area * seen.side**2
+    return areas
 
 
 def _truth(

@@ -19,8 +19,7 @@ import numpy as np
 from nanorocks_ros import __version__
 from nanorocks_ros.experiment.view import View
 from nanorocks_ros.inference.cluster_size.cluster_curve import curve_key
-from nanorocks_ros.inference.cluster_size.size_from_width import Width
-from nanorocks_ros.records import Frame, TrayImage
+from nanorocks_ros.records import Frame, Notice, TrayImage
 from nanorocks_ros.settings import (
     PipelineSettings,
     SceneSettings,
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.simulation.plate_scene.plate_film import SceneMoment
 
 # Since the shaking event, [s]; the growth of clusters slows down.
 TIMES = (0.4, 0.8, 1.2, 1.7, 2.3, 3.0, 4.0, 5.5, 7.5, 10.0, 14.0, 19.0, 25.0, 32.0)
@@ -207,30 +205,30 @@ def filmed_run(
     settings = with_values(PipelineSettings(), names, 'cluster films')
     view = View(camera=film.camera.geometry.camera)
     preprocessor = Preprocessor(settings, cells, 'cluster film', view)
-    rows = []
+    # Images may come some frames late.
+    truths: dict[int, tuple[float, dict[int, float]]] = {}
+    records: list[TrayImage | Notice] = []
     for time in times:
         number = round((_FIRST_SHAKE + time) * simulation.frame_rate)
         moment = film.at(number, round(_NS * number / simulation.frame_rate))
-        for tray, size, width in _measured(moment, preprocessor, plan.level, scene):
-            rows.append((tray, run, time, size, *width))
+        sizes = {beads.tray: cluster_sizes(beads.bodies)[0] for beads in moment.beads}
+        truths[moment.frame.stamp_ns] = time, sizes
+        records += preprocessor.push(_compressed(moment.frame))
+    rows = []
+    for record in (*records, *preprocessor.flush()):
+        if isinstance(record, TrayImage):
+            time, sizes = truths[record.stamp_ns]
+            correlation = correlated(record.gray, scene.pixels_per_metre)
+            width = correlation.width(correlation.region(plan.level).area)
+            rows.append((record.tray, run, time, sizes[record.tray], *width))
     return np.array(rows, dtype=np.float32).reshape(-1, 8)
 
 
-def _measured(
-    moment: SceneMoment, preprocessor: Preprocessor, level: float, scene: SceneSettings
-) -> list[tuple[int, float, Width]]:
-    """Tray, weight-averaged size and width of each tray image of a frame, after JPEG."""
-    jpeg = cv2.imencode('.jpg', moment.frame.image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1]
+def _compressed(frame: Frame) -> Frame:
+    """The frame after JPEG."""
+    jpeg = cv2.imencode('.jpg', frame.image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1]
     image = np.asarray(cv2.imdecode(jpeg, cv2.IMREAD_COLOR), dtype=np.uint8)
-    frame = Frame(stamp_ns=moment.frame.stamp_ns, encoding='bgr8', image=image)
-    sizes = {beads.tray: cluster_sizes(beads.bodies)[0] for beads in moment.beads}
-    measured = []
-    for record in preprocessor.push(frame):
-        if isinstance(record, TrayImage):
-            correlation = correlated(record.gray, scene.pixels_per_metre)
-            width = correlation.width(correlation.region(level).area)
-            measured.append((record.tray, sizes[record.tray], width))
-    return measured
+    return Frame(stamp_ns=frame.stamp_ns, encoding='bgr8', image=image)
 
 
 def _settings(

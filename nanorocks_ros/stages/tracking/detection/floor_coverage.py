@@ -1,10 +1,10 @@
 """Coverage of the floor by beads of one colour, whatever their shading.
 
 The pixels of a bead lie on a line in colour space: light and shade change the brightness, not the
-ratio of the channels. The deviation from that line, over that of the floor, is the share of a pixel
-in which the floor is visible. A dark limb, a lit side and a shadow on the bead therefore do not move
-its outline, while half of the darkness lies outside the outline where the limb is darker than the
-rest of the bead: 0.1 px, in films of shaded spheres.
+ratio of the channels. The deviation from that line, over that of the floor, is the share of a
+pixel in which the floor is visible. A dark limb, a lit side and a shadow on the bead therefore do
+not move its outline, while half of the darkness lies outside the outline where the limb is darker
+than the rest of the bead: 0.1 px, in films of shaded spheres.
 
 Tested by ``test/stages/tracking/detection/test_floor_coverage.py``.
 """
@@ -27,9 +27,9 @@ FULL_COVERAGE, NO_COVERAGE = 230, 25
 
 # The line is updated in one frame of so many, with this weight: a time constant of about 1 s.
 _UPDATE_FRAMES, _UPDATE_WEIGHT = 8, 0.3
-# Side of the square by which patches of a species are eroded, so that no blurred edge is left, [px].
+# Side of the square by which patches of a species are eroded, which removes blurred edges, [px].
 _EROSION_PX = 5
-# Standard deviation of the brightness at which the slope is half that through black, [gray levels].
+# Standard deviation of brightness at which the slope is half that through black, [gray levels].
 _PRIOR_SPREAD = 8.0
 # Deviation from the line, in gray levels, above which a pixel is a highlight or another bead.
 _MAX_DEVIATION = 25.0
