@@ -19,7 +19,7 @@ from nanorocks_ros.stages.preprocess.scale_advice import (
     scale_source,
     scale_text,
 )
-from nanorocks_ros.stages.scale.beads_and_walls import beads_around
+from nanorocks_ros.stages.scale.beads_and_walls import SeenBeads, beads_around
 from nanorocks_ros.stages.scale.picture_scale import around
 
 if TYPE_CHECKING:
@@ -183,10 +183,8 @@ def position_problem(
         beads = beads_around(image, regions[0], trays[0], settings.tracking, scale)
     shares, best = _fit_edges(image, view, regions)
     numbers = frozenset(tray.number for tray in trays)
-    if best is not None and not (
-        beads is not None and beads.contradict(_floor_at(regions[0], image.shape, best))
-    ):
-        text = _edge_text(image, regions, trays, settings, best, beads is not None)
+    if best is not None:
+        text = _edge_text(image, regions, trays, settings, best, beads)
         if text:
             return text, numbers
     if beads is not None and beads.contradict(regions[0]):
@@ -230,19 +228,23 @@ def _edge_text(
     trays: Sequence[Tray],
     settings: PipelineSettings,
     best: NDArray[np.float64],
-    colored: bool,
+    seen: SeenBeads | None,
 ) -> str:
     """What looks wrong by the edges; '' where it does not matter or the beads contradict it."""
     _, scale, x, y = (float(number) for number in best)
     boxes = np.array(regions, dtype=np.float64) / _REDUCED
     extent = float(((boxes[:, :2] + boxes[:, 2:]).max(axis=0) - boxes[:, :2].min(axis=0)).max())
     told = settings.preprocess
+    cut = seen is not None and seen.contradict(_floor_at(regions[0], image.shape, best))
     if abs(scale - 1.0) > max(_SCALE_MATTERS, _RESOLVED / extent):
         beads = None
-        if colored:
+        if seen is not None:
             beads = scale_of_beads(around(image, regions[0]), trays[0], settings, scale)
+        # Where the sizes of the beads contradict what is told as well, edges are but inexact.
+        if cut and (beads is None or beads.agrees(told.pixels_per_metre)):
+            return ''
         return scale_text(told, told.pixels_per_metre * scale, beads)
-    if max(abs(x), abs(y)) * _REDUCED > _SHIFT_MATTERS_PX:
+    if not cut and max(abs(x), abs(y)) * _REDUCED > _SHIFT_MATTERS_PX:
         return (
             f'{scale_source(told)} looks wrong: the trays look shifted by {x * _REDUCED:.0f}, '
             f'{y * _REDUCED:.0f} px; {remedy_for(told)}'
