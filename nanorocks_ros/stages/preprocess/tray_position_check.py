@@ -1,6 +1,6 @@
 """Check of the tray positions in a frame against the settings.
 
-Tested by ``test/stages/preprocess/test_preprocessor.py``.
+Tested by ``test/stages/preprocess/test_tray_position_check.py``.
 """
 
 from __future__ import annotations
