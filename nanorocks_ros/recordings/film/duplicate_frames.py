@@ -95,8 +95,8 @@ class DuplicateFilter:
         self._compared = 0
         # Number of runs at turning points of an oscillation, and of other runs.
         self._turning_runs = self._other_runs = 0
-        # Number of frames that changed, and of those in which a codec found hardly anything new.
-        self._changed = self._skipped = 0
+        # Number of frames compared, and of those in which a codec found hardly anything new.
+        self._judgements = self._skipped = 0
         # Brightness of the last frames, and of the frame before the original of a run.
         self._grays: deque[NDArray[np.uint8]] = deque(maxlen=3)
         self._gray_ahead: NDArray[np.uint8] | None = None
@@ -124,6 +124,7 @@ class DuplicateFilter:
             if change == _NONE:
                 self.still_ns = max(self.still_ns, frame.stamp_ns - since_ns)
                 if frame.stamp_ns - kept_ns < _STILL_NS:
+                    self._judgements += 1
                     self.dropped += 1
                     continue
                 yield from self._release()
@@ -158,7 +159,7 @@ class DuplicateFilter:
 
     def _judged(self, frame: Stamped[FilmFrame], change: _Change) -> Iterator[Stamped[FilmFrame]]:
         """Hold back frames with a small change until a larger change follows."""
-        self._changed += 1
+        self._judgements += 1
         if self._before is None or self._is_candidate(change):
             change = change._replace(shifted=shifted_share(self._grays[-2], self._grays[-1]))
             self._skipped += self._before is not None and change.is_skipped_beside(self._before)
@@ -187,7 +188,7 @@ class DuplicateFilter:
 
     @property
     def _often(self) -> bool:
-        return repeats_often(self._skipped + self.dropped, self._changed + self.dropped)
+        return repeats_often(max(self._skipped, self.dropped), self._judgements)
 
     def _is_turning_point(self, after: _Change) -> bool:
         """Whether the frames around a run are alike, as around most runs so far."""

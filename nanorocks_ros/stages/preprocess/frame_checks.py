@@ -163,7 +163,7 @@ class FrameChecks:
             skipped = change <= _SKIPPED * usual
             self._skipped += skipped
             frames = self._changed_frames + self.duplicates
-            often = repeats_often(self._skipped + self.duplicates, frames)
+            often = repeats_often(max(self._skipped, self.duplicates), frames)
             if not is_shifted(share) or (skipped and often):
                 return True
         self._usual_change = self._changes.push(change)

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 _MARGIN = 1.0
 # Less of the outline of a disc may be that of a shadow or of an edge of the tray.
 _VISIBLE = 0.5
-# Beads are oval by some 12 %, and seen at an angle: share of the radius that may lie beyond a wall,
-# beside the error of a side, [px].
+# Beads are oval by some 12 %, and seen at an angle: share of the radius that may lie beyond a
+# wall, beside the error of a side, [px].
 _BEYOND, _SIDE_PX = 0.3, 2.0
 # A single disc may be a stain or a shadow.
 _LEAST_CUT = 2
