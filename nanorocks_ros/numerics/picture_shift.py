@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 # Shifts explain 0.5 to 0.9 of the difference of distinct frames, and 0.02 of compression noise.
 _SHIFTED = 0.3
+# A file that holds more frames a second than the camera took repeats at least one in 25 (24 in 25
+# frames a second): fewer are no repeats. Among so few frames one cannot tell.
+_REPEATED, _FEW = 0.03, 30
 # Beads that move differently lie in different blocks of so many pixels.
 _BLOCK_PX = 16
 # Smallest determinant of a gradient matrix, relative to the square of its trace: below it, only
@@ -68,6 +71,15 @@ def shifted_share(before: NDArray[np.uint8], now: NDArray[np.uint8]) -> float:
 def is_shifted(share: float) -> bool:
     """Whether the difference of two alike pictures is motion, by its `shifted_share`."""
     return share >= _SHIFTED
+
+
+def repeats_often(repeats: int, frames: int) -> bool:
+    """Whether so many frames that show hardly anything new are repeats of a picture.
+
+    A camera that jitters comes back to its place now and then, and a codec then skips most of a
+    picture in which beads have moved a little.
+    """
+    return frames < _FEW or repeats >= _REPEATED * frames
 
 
 def _block_means(values: NDArray[np.float32]) -> NDArray[np.float32]:

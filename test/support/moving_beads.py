@@ -48,6 +48,17 @@ def pictures(positions, *, radius=7.0, noise=1.5, gains=None, floor=90.0, seed=2
         yield np.clip(image, 0, 255).astype(np.uint8)
 
 
+def jittered(grays, spread, returns, seed=3):
+    """The pictures as a camera that jitters sees them; it comes back at the frames `returns`."""
+    rng = np.random.default_rng(seed)
+    across = down = 0.0
+    for number, gray in enumerate(grays):
+        if number not in returns:
+            across, down = rng.normal(0.0, spread, 2)
+        shift = np.float32([[1, 0, across], [0, 1, down]])
+        yield cv2.warpAffine(gray, shift, gray.shape[::-1], borderMode=cv2.BORDER_REFLECT)
+
+
 def encoded(grays, codec, rate=30, **options):
     """The pictures as a codec gives them back."""
     grays, file = list(grays), io.BytesIO()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
 
-from nanorocks_ros.numerics.picture_shift import is_shifted, shifted_share
+from nanorocks_ros.numerics.picture_shift import is_shifted, repeats_often, shifted_share
 from nanorocks_ros.recordings.film.film_source import EncodedImage
 from nanorocks_ros.recordings.storage import NS
 
@@ -56,13 +56,19 @@ class _Change(NamedTuple):
     maximum: float
     shifted: float = 0.0
 
-    def is_small_beside(self, other: _Change) -> bool:
+    def is_small_beside(self, other: _Change, often: bool) -> bool:
+        """Whether another picture would have changed more; `often`: as many frames as repeats."""
         if other.maximum < _MIN_CHANGE:
             return False
         mean, maximum = self.mean / other.mean, self.maximum / other.maximum
         if max(mean, maximum) > _MAX_RATIO or mean * maximum > _MAX_PRODUCT:
             return False
-        return mean * maximum <= _SKIPPED_PRODUCT or not is_shifted(self.shifted)
+        skipped = mean * maximum <= _SKIPPED_PRODUCT
+        return (skipped and often) or not is_shifted(self.shifted)
+
+    def is_skipped_beside(self, other: _Change) -> bool:
+        product = self.mean * self.maximum
+        return product <= _SKIPPED_PRODUCT * other.mean * other.maximum
 
 
 _NONE = _Change(0.0, 0.0)
@@ -89,6 +95,8 @@ class DuplicateFilter:
         self._compared = 0
         # Number of runs at turning points of an oscillation, and of other runs.
         self._turning_runs = self._other_runs = 0
+        # Number of frames compared, and of those in which a codec found hardly anything new.
+        self._judgements = self._skipped = 0
         # Brightness of the last frames, and of the frame before the original of a run.
         self._grays: deque[NDArray[np.uint8]] = deque(maxlen=3)
         self._gray_ahead: NDArray[np.uint8] | None = None
@@ -116,6 +124,7 @@ class DuplicateFilter:
             if change == _NONE:
                 self.still_ns = max(self.still_ns, frame.stamp_ns - since_ns)
                 if frame.stamp_ns - kept_ns < _STILL_NS:
+                    self._judgements += 1
                     self.dropped += 1
                     continue
                 yield from self._release()
@@ -150,10 +159,12 @@ class DuplicateFilter:
 
     def _judged(self, frame: Stamped[FilmFrame], change: _Change) -> Iterator[Stamped[FilmFrame]]:
         """Hold back frames with a small change until a larger change follows."""
+        self._judgements += 1
         if self._before is None or self._is_candidate(change):
             change = change._replace(shifted=shifted_share(self._grays[-2], self._grays[-1]))
+            self._skipped += self._before is not None and change.is_skipped_beside(self._before)
         if self._run:
-            if all(small.is_small_beside(change) for _, small in self._run):
+            if all(small.is_small_beside(change, self._often) for _, small in self._run):
                 if self._is_turning_point(change):
                     yield from self._release()
                 else:
@@ -173,7 +184,11 @@ class DuplicateFilter:
         yield frame
 
     def _is_candidate(self, change: _Change) -> bool:
-        return self._before is not None and change.is_small_beside(self._before)
+        return self._before is not None and change.is_small_beside(self._before, self._often)
+
+    @property
+    def _often(self) -> bool:
+        return repeats_often(max(self._skipped, self.dropped), self._judgements)
 
     def _is_turning_point(self, after: _Change) -> bool:
         """Whether the frames around a run are alike, as around most runs so far."""

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.numerics.picture_shift import is_shifted, shifted_share
+from nanorocks_ros.numerics.picture_shift import is_shifted, repeats_often, shifted_share
 from nanorocks_ros.numerics.quantiles import Quantile, median
 from nanorocks_ros.records import Notice, Quality
 
@@ -31,7 +31,8 @@ _FROZEN_NOTICE_NS = NS
 # A duplicate that was compressed again differs a little: by less than this share of the usual
 # change from frame to frame, where that is so many gray levels.
 _RECODED, _NOISY = 0.1, 0.5
-# Below this share, a codec found nothing new, and may shift what it had drawn coarsely.
+# Below this share, a codec found nothing new, and may shift what it had drawn coarsely: where that
+# happens often, pictures are repeated.
 _SKIPPED = 0.05
 _USUAL = 0.75
 # Smallest number of filled rows, as a share of the height, beyond the usual number.
@@ -89,6 +90,7 @@ class FrameChecks:
         self._changes = Quantile(_USUAL, _USUAL_FRAMES)
         self._usual_change = 0.0
         self._changed_frames = 0
+        self._skipped = 0
         self._changed_ns = 0
         self._ends: deque[int] = deque(maxlen=_USUAL_FRAMES)
         self._whole: deque[NDArray[np.uint8]] = deque(maxlen=_CHANGES + 1)
@@ -158,7 +160,11 @@ class FrameChecks:
         usual = self._usual_change if self._changed_frames >= _HISTORY else 0.0
         if usual >= _NOISY and change <= _RECODED * usual:
             share = shifted_share(_one_channel(self._image), _one_channel(frame.image))
-            if change <= _SKIPPED * usual or not is_shifted(share):
+            skipped = change <= _SKIPPED * usual
+            self._skipped += skipped
+            frames = self._changed_frames + self.duplicates
+            often = repeats_often(max(self._skipped, self.duplicates), frames)
+            if not is_shifted(share) or (skipped and often):
                 return True
         self._usual_change = self._changes.push(change)
         self._changed_frames += 1

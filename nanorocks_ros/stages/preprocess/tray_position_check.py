@@ -1,6 +1,6 @@
 """Check of the tray positions in a frame against the settings.
 
-Tested by ``test/stages/preprocess/test_preprocessor.py``.
+Tested by ``test/stages/preprocess/test_tray_position_check.py``.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from nanorocks_ros.stages.preprocess.scale_advice import (
     scale_source,
     scale_text,
 )
+from nanorocks_ros.stages.scale.beads_and_walls import SeenBeads, beads_around
 from nanorocks_ros.stages.scale.picture_scale import around
 
 if TYPE_CHECKING:
@@ -162,9 +163,10 @@ def position_problem(
 ) -> tuple[str, frozenset[int]]:
     """What looks wrong with scale or regions, in one line, and the trays; '' when nothing does.
 
-    Only when the trays are clearly seen somewhere else: a picture without clear edges tells
-    nothing. The edges of a single tray may be those of the outside of its rim, so that its beads
-    must tell the same scale.
+    Edges tell where the trays are clearly seen somewhere else: a picture without clear edges tells
+    nothing. The edges of a single tray may be those of its rim, of the walls seen from inside or
+    of a shadow, so that its beads must agree: the sides of a floor cut none of them, and they tell
+    the same scale.
 
     Parameters
     ----------
@@ -174,38 +176,94 @@ def position_problem(
     trays : sequence of Tray
     settings : PipelineSettings
     """
-    numbers = [tray.number for tray in trays]
+    told = settings.preprocess
+    beads = None
+    if len(trays) == 1 and isinstance(view.camera, IdentityLens) and image.shape[2] == 3:
+        scale = told.pixels_per_metre
+        beads = beads_around(image, regions[0], trays[0], settings.tracking, scale)
+    shares, best = _fit_edges(image, view, regions)
+    numbers = frozenset(tray.number for tray in trays)
+    if best is not None:
+        text = _edge_text(image, regions, trays, settings, best, beads)
+        if text:
+            return text, numbers
+    if beads is not None and beads.contradict(regions[0]):
+        text = (
+            f'{scale_source(told)} looks wrong: the sides of the floor of tray '
+            f'{trays[0].number} would cut {beads.cut_by(regions[0])} beads; {remedy_for(told)}'
+        )
+        return text, numbers
+    if best is None and shares is not None:
+        return _one_tray(shares, [tray.number for tray in trays], told)
+    return '', frozenset()
+
+
+def _fit_edges(
+    image: NDArray[np.uint8], view: View, regions: Sequence[Region]
+) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
+    """Shares of the sides on edges where the trays are seen at all, and a fit that is better.
+
+    The fit is that of `_best`; None where the regions are as good.
+    """
     boxes = np.array(regions, dtype=np.float64) / _REDUCED
     ends = boxes[:, :2] + boxes[:, 2:]
     room = min(boxes[:, :2].min(), (np.array(image.shape[1::-1]) / _REDUCED - ends).min())
     if room < _ROOM:
-        return '', frozenset()
+        return None, None
     across, down = _edge_sums(image, view)
     shares = np.empty(len(boxes))
     own = _coverage(across, down, boxes, 1.0, (0.0, 0.0), shares)
     best = np.empty(4)
     _best(across, down, boxes, _SCALES, _SHIFT, best)
-    share, scale, x, y = (float(number) for number in best)
+    share, scale = float(best[0]), float(best[1])
     near = 1.0 / _FAR < scale < _FAR
     if share < (_FOUND if near else _FOUND_FAR):
-        return '', frozenset()
-    if own >= share - _CLEARLY:
-        return _one_tray(shares, numbers, settings.preprocess)
-    subject = scale_source(settings.preprocess)
-    extent = float((ends.max(axis=0) - boxes[:, :2].min(axis=0)).max())
+        return None, None
+    return shares, None if own >= share - _CLEARLY else best
+
+
+def _edge_text(
+    image: NDArray[np.uint8],
+    regions: Sequence[Region],
+    trays: Sequence[Tray],
+    settings: PipelineSettings,
+    best: NDArray[np.float64],
+    seen: SeenBeads | None,
+) -> str:
+    """What looks wrong by the edges; '' where it does not matter or the beads contradict it."""
+    _, scale, x, y = (float(number) for number in best)
+    boxes = np.array(regions, dtype=np.float64) / _REDUCED
+    extent = float(((boxes[:, :2] + boxes[:, 2:]).max(axis=0) - boxes[:, :2].min(axis=0)).max())
+    told = settings.preprocess
+    cut = seen is not None and seen.contradict(_floor_at(regions[0], image.shape, best))
     if abs(scale - 1.0) > max(_SCALE_MATTERS, _RESOLVED / extent):
         beads = None
-        if len(trays) == 1 and isinstance(view.camera, IdentityLens) and image.shape[2] == 3:
+        if seen is not None:
             beads = scale_of_beads(around(image, regions[0]), trays[0], settings, scale)
-        text = scale_text(settings.preprocess, settings.preprocess.pixels_per_metre * scale, beads)
-        return text, frozenset(numbers if text else ())
-    if max(abs(x), abs(y)) * _REDUCED > _SHIFT_MATTERS_PX:
-        text = (
-            f'{subject} looks wrong: the trays look shifted by {x * _REDUCED:.0f}, '
-            f'{y * _REDUCED:.0f} px; {remedy_for(settings.preprocess)}'
+        # Where the sizes of the beads contradict what is told as well, edges are but inexact.
+        if cut and (beads is None or beads.agrees(told.pixels_per_metre)):
+            return ''
+        return scale_text(told, told.pixels_per_metre * scale, beads)
+    if not cut and max(abs(x), abs(y)) * _REDUCED > _SHIFT_MATTERS_PX:
+        return (
+            f'{scale_source(told)} looks wrong: the trays look shifted by {x * _REDUCED:.0f}, '
+            f'{y * _REDUCED:.0f} px; {remedy_for(told)}'
         )
-        return text, frozenset(numbers)
-    return '', frozenset()
+    return ''
+
+
+def _floor_at(
+    region: Region, shape: tuple[int, ...], best: NDArray[np.float64]
+) -> tuple[float, float, float, float]:
+    """The region at the scale and shift that `_best` found, [px]."""
+    scale = float(best[1])
+    # The middle of the picture as `_coverage` takes it.
+    middle = [0.5 * _REDUCED * (side // _REDUCED) for side in shape[1::-1]]
+    left, top = (
+        centre + scale * (corner - centre) + _REDUCED * float(shift)
+        for centre, corner, shift in zip(middle, region[:2], best[2:], strict=True)
+    )
+    return left, top, scale * region.width, scale * region.height
 
 
 def _one_tray(

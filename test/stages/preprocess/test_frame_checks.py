@@ -8,7 +8,7 @@ import pytest
 
 from nanorocks_ros.records import Frame, Quality
 from nanorocks_ros.stages.preprocess.frame_checks import FrameChecks
-from test.support.moving_beads import encoded, pictures, places
+from test.support.moving_beads import encoded, jittered, pictures, places
 
 NS = 1_000_000_000
 STEP = NS // 30
@@ -173,6 +173,18 @@ def test_a_camera_that_jitters_stores_no_frame_twice():
         frames.append(frame(k, moved, encoding='mono8'))
     _, verdicts, _ = judged(frames)
     assert all(verdict.usable for verdict in verdicts)
+
+
+def test_what_a_codec_skips_when_such_a_camera_comes_back_is_no_duplicate():
+    times = np.arange(300) / 120
+    grays = jittered(pictures(places(times, [10.0] * 300)), 2.0, (100, 150, 220, 261))
+    film = [
+        frame(k, gray, encoding='mono8')
+        for k, gray in enumerate(encoded(grays, 'libx264', rate=120, crf='28'))
+    ]
+    _, verdicts, texts = judged(film)
+    assert all(verdict.usable for verdict in verdicts)
+    assert texts == []
 
 
 def test_gray_pictures_are_flagged_whether_they_are_called_gray_or_not():
