@@ -80,16 +80,12 @@ class TrayMotion:
         Whether this was decided anew with this frame: positions in space before it do not count.
     uncertain : bool
         Whether the beads contradict what is assumed, as where tray and camera both move.
-    error : float, [px]
-        Of a component of the motion of the picture: that stated, and where the camera moves at
-        least that which the beads show. Where the tray moves it is in no position in space.
     """
 
     displacement: NDArray[np.float64]
     camera_moves: bool
     changed: bool
     uncertain: bool
-    error: float
 
 
 class _Fate(Enum):
@@ -145,7 +141,7 @@ class CameraMotion:
             self._moments.popleft()
         # Compressed pictures that jitter are registered worse than the walls of one of them say.
         self._shared.push(self._moments)
-        stated, error = error, max(error, self._shared.error)
+        error = max(error, self._shared.error)
         self._evidence *= math.exp(-step / _MEMORY)
         fates = [self._weigh(lag, step, error) for lag in _LAGS]
         self._jitter.push(time, float(displacement[0]), float(displacement[1]), error)
@@ -159,7 +155,6 @@ class CameraMotion:
             self.camera_moves,
             changed,
             self._misfit > _LARGEST_MISFIT or self._undecided > _UNDECIDED,
-            error if self.camera_moves else stated,
         )
 
     def of_lost_tray(self) -> TrayMotion:
@@ -168,7 +163,7 @@ class CameraMotion:
         Uncertain where the camera moves: then the beads move with it.
         """
         return TrayMotion(
-            np.zeros(2), self.camera_moves, changed=False, uncertain=self.camera_moves, error=0.0
+            np.zeros(2), self.camera_moves, changed=False, uncertain=self.camera_moves
         )
 
     def _decide(self) -> bool:

@@ -1,7 +1,4 @@
-"""Error of registration and detection that all beads of a frame share.
-
-Tested by ``test/stages/tracking/test_camera_motion.py``.
-"""
+"""Error of registration and detection that all beads of a frame share."""
 
 from __future__ import annotations
 

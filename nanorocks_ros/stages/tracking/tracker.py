@@ -90,6 +90,7 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
                 self._linker_of(species, record.gray.shape) for species in self._tray.species
             ]
         # Beads fly straight in space, not in the frame of a swinging tray.
+        registration = _zero_if_nan(record.displacement_error) * self._scale
         rest = self._camera.camera_moves or math.isnan(record.displacement[0])
         expected = np.zeros(2) if rest else self._scale * np.array(record.displacement)
         hints = [linker.hints(time, expected) for linker in self._linkers]
@@ -105,7 +106,7 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
             ]
         shift = motion.displacement
         for linker, detections in zip(self._linkers, detected, strict=True):
-            errors = np.hypot(detections.position_errors, motion.error)
+            errors = np.hypot(detections.position_errors, registration)
             shifted = replace(
                 detections, positions=detections.positions + shift, position_errors=errors
             )
@@ -180,3 +181,8 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
         counts = count_seen(species, seen, self._expected.size)
         is_short = (counts < _MIN_VISIBLE_SHARE * self._expected).any()
         return Quality.FEW_BEADS if is_short else Quality(0)
+
+
+def _zero_if_nan(value: float) -> float:
+    """The value, or 0 for NaN."""
+    return 0.0 if math.isnan(value) else value

