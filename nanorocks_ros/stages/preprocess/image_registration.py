@@ -29,6 +29,8 @@ _ROUNDING = 0.3
 # A point whose squared change of level is so many times the usual has half the weight: something
 # passes in front of it, or the light changes there.
 _SUSPECT = 3.0
+# Pictures over which a change of level is averaged: what passes in front must count soon.
+_SUSPECT_PICTURES = 64
 UNKNOWNS = 4
 
 
@@ -226,10 +228,11 @@ def update_reference(
     trust : ndarray, (n,), 0 to 1
         Written.
     """
+    recent = min(seen, _SUSPECT_PICTURES)
     for k in range(values.size):
         difference = values[k] - reference[k]
         reference[k] += difference / seen
-        powers[k] += (difference * difference - powers[k]) / seen
+        powers[k] += (difference * difference - powers[k]) / recent
     usual = np.median(powers)
     for k in range(values.size):
         ratio = powers[k] / (_SUSPECT * usual)

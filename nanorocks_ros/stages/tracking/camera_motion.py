@@ -20,8 +20,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.picture_jitter import JitterMeter
+from nanorocks_ros.stages.tracking.bead_paths import (
+    Moment,
+    bend,
+    body_means,
+    nearest_rows,
+    paths_of,
+)
+from nanorocks_ros.stages.tracking.shared_error import SharedError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,8 +39,6 @@ _LAGS = (0.1, 0.3)
 _FEWEST_BODIES = 2
 # The scatter of n bodies is uncertain by itself: its error is larger by 1 + this / (n - 1).
 _FEW_BODIES = 2.0
-# Beads this much further from each other than their radii touch: a share of that, and [px].
-_GAP_SHARE, _GAP_PX = 0.04, 0.5
 # Error of a median of normal variates over that of their mean, and their standard deviation over
 # the median of their absolute values.
 _MEDIAN_ERROR = 1.2533
@@ -43,6 +48,9 @@ _LEAST_ERROR = 0.05
 # Least bend of the motion of the picture that is evidence, in errors of a registered bend.
 _SIGNIFICANT = 4.0
 _BEND_ERROR = math.sqrt(6.0)
+# Share of the motion of the picture by which that of the beads may differ from that of the walls:
+# a lens that is not calibrated enlarges by some per cent more or less away from its centre.
+_LENS_SHARE = 0.04
 # Largest ratio of the two times between three moments.
 _EVEN = 1.25
 # Largest log likelihood ratio of a frame: no single frame decides.
@@ -80,17 +88,6 @@ class TrayMotion:
     uncertain: bool
 
 
-@dataclass(frozen=True, slots=True)
-class _Moment:
-    """Beads of a frame in the frame of the tray, and the row of each in the frame before."""
-
-    time: float
-    positions: NDArray[np.float64]
-    radii: NDArray[np.float64]
-    before: NDArray[np.int64]
-    displacement: NDArray[np.float64]
-
-
 class _Fate(Enum):
     """What three moments say: the picture is still, it moves, or beads say what moves."""
 
@@ -103,8 +100,9 @@ class CameraMotion:
     """Decides from frame to frame whether the tray or the camera moves; at first the tray."""
 
     def __init__(self) -> None:
-        self._moments: deque[_Moment] = deque()
+        self._moments: deque[Moment] = deque()
         self._jitter = JitterMeter()
+        self._shared = SharedError()
         self._evidence = 0.0
         self._misfit = 1.0
         self._undecided = 0.0
@@ -136,11 +134,14 @@ class CameraMotion:
         rows = np.full(len(positions), -1)
         step = 0.0
         if last is not None:
-            _nearest_rows(positions, last.positions, rows)
+            nearest_rows(positions, last.positions, rows)
             step = time - last.time
-        self._moments.append(_Moment(time, positions, radii, rows, displacement))
+        self._moments.append(Moment(time, positions, radii, rows, displacement))
         while time - self._moments[0].time > 2.0 * _LAGS[-1] + _MEMORY:
             self._moments.popleft()
+        # Compressed pictures that jitter are registered worse than the walls of one of them say.
+        self._shared.push(self._moments)
+        error = max(error, self._shared.error)
         self._evidence *= math.exp(-step / _MEMORY)
         fates = [self._weigh(lag, step, error) for lag in _LAGS]
         self._jitter.push(time, float(displacement[0]), float(displacement[1]), error)
@@ -186,7 +187,7 @@ class CameraMotion:
         if not 1.0 / _EVEN < ratio < _EVEN:
             return _Fate.STILL
         share = min(1.0, step / _MEMORY)
-        moved = _bend(later.displacement, middle.displacement, earlier.displacement, ratio)
+        moved = bend(later.displacement, middle.displacement, earlier.displacement, ratio)
         still = math.hypot(moved[0], moved[1]) < _SIGNIFICANT * _BEND_ERROR * error
         bends = np.empty((0, 2)) if still else self._bends(frames, ratio)
         if len(bends) < _FEWEST_BODIES:
@@ -195,6 +196,7 @@ class CameraMotion:
         common, noise = _common_bend(bends)
         # A shift of the tray that was registered wrongly seems to be one of all beads.
         noise = np.hypot(noise, _BEND_ERROR * error)
+        noise = np.hypot(noise, _LENS_SHARE * math.hypot(moved[0], moved[1]))
         of_tray = float(np.sum(((common + moved) / noise) ** 2))
         of_camera = float(np.sum((common / noise) ** 2))
         likelihood = min(max(0.5 * (of_tray - of_camera), -_LARGEST_RATIO), _LARGEST_RATIO)
@@ -206,27 +208,9 @@ class CameraMotion:
 
     def _bends(self, frames: int, ratio: float) -> NDArray[np.float64]:
         """Bends of the paths of all bodies that are in all frames from the first on, (n, 2)."""
-        last = self._moments[-1]
-        rows = [np.arange(len(last.positions))]
-        for k in range(2 * frames):
-            # A row more for beads that have none: index -1.
-            before = np.append(self._moments[-1 - k].before, -1)
-            rows.append(before[rows[-1]])
-        seen = rows[-1] >= 0
-        later, middle, earlier = (
-            self._moments[-1 - k * frames].positions[rows[k * frames][seen]] for k in range(3)
-        )
-        return _body_means(_bend(later, middle, earlier, ratio), later, last.radii[seen])
-
-
-def _bend(
-    later: NDArray[np.float64],
-    middle: NDArray[np.float64],
-    earlier: NDArray[np.float64],
-    ratio: float,
-) -> NDArray[np.float64]:
-    """Distance of the later position from where straight motion would have led."""
-    return later - middle - ratio * (middle - earlier)
+        lags = (0, frames, 2 * frames)
+        (later, middle, earlier), radii = paths_of(self._moments, lags)
+        return body_means(bend(later, middle, earlier, ratio), later, radii)
 
 
 def _common_bend(bends: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -236,63 +220,3 @@ def _common_bend(bends: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArr
     count = len(bends)
     error = _MEDIAN_ERROR * deviation / math.sqrt(count) * (1.0 + _FEW_BODIES / (count - 1))
     return common, np.hypot(error, _LEAST_ERROR)
-
-
-@compiled
-def _nearest_rows(
-    positions: NDArray[np.float64], before: NDArray[np.float64], rows: NDArray[np.int64]
-) -> None:
-    """Row of each bead in the frame before: that nearest to it, if it is also nearest to that.
-
-    -1 for a bead that has none.
-    """
-    taken = np.full(before.shape[0], -1, np.int64)
-    nearest = np.full(before.shape[0], np.inf)
-    for k in range(positions.shape[0]):
-        rows[k] = -1
-        best = np.inf
-        for j in range(before.shape[0]):
-            dx = positions[k, 0] - before[j, 0]
-            dy = positions[k, 1] - before[j, 1]
-            square = dx * dx + dy * dy
-            if square < best:
-                best, rows[k] = square, j
-        j = rows[k]
-        if j >= 0 and best < nearest[j]:
-            if taken[j] >= 0:
-                rows[taken[j]] = -1
-            taken[j], nearest[j] = k, best
-        else:
-            rows[k] = -1
-
-
-@compiled
-def _body_means(
-    bends: NDArray[np.float64], positions: NDArray[np.float64], radii: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Mean bend of each group of beads that touch, weighted by their volumes, (bodies, 2)."""
-    n = radii.size
-    bodies = np.arange(n)
-    for k in range(n):
-        for j in range(k):
-            reach = (1.0 + _GAP_SHARE) * (radii[k] + radii[j]) + _GAP_PX
-            dx = positions[k, 0] - positions[j, 0]
-            dy = positions[k, 1] - positions[j, 1]
-            if dx * dx + dy * dy < reach * reach and bodies[j] != bodies[k]:
-                merged, kept = bodies[k], bodies[j]
-                for m in range(n):
-                    if bodies[m] == merged:
-                        bodies[m] = kept
-    sums, weights = np.zeros((n, 2)), np.zeros(n)
-    for k in range(n):
-        volume = radii[k] ** 3
-        weights[bodies[k]] += volume
-        sums[bodies[k], 0] += volume * bends[k, 0]
-        sums[bodies[k], 1] += volume * bends[k, 1]
-    count = 0
-    means = np.empty((n, 2))
-    for k in range(n):
-        if weights[k] > 0.0:
-            means[count] = sums[k] / weights[k]
-            count += 1
-    return means[:count]

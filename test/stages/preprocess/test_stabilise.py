@@ -9,6 +9,7 @@ from plates import SCALE, Plate
 from nanorocks_ros.experiment.lens import Camera
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.experiment.view import IdentityLens, View
+from nanorocks_ros.stages.preprocess.image_registration import update_reference
 from nanorocks_ros.stages.preprocess.stabilise import Shift, TrayRegistration
 
 MIX = np.array([0.3, 0.4, 0.3])
@@ -108,3 +109,16 @@ def test_the_error_that_is_stated_covers_what_is_seen(plate):
         shift = tracker.push(plate.picture(d, seed=k), None)
         pulls += [(shift.x - d[0]) / shift.error, (shift.y - d[1]) / shift.error]
     assert 0.2 < np.std(pulls) < 1.5
+
+
+def test_a_point_that_changes_is_doubted_soon_in_a_reference_of_many_pictures():
+    rng = np.random.default_rng(0)
+    reference, powers, trust = np.full(50, 100.0), np.ones(50), np.ones(50)
+    for seen in range(1, 1001):
+        values = 100.0 + rng.normal(0.0, 2.0, 50)
+        if seen > 990:
+            values[7] = 130.0
+        update_reference(values, seen, reference, powers, trust)
+    assert trust[7] < 0.05
+    assert np.median(trust) > 0.8
+    assert reference[7] - 100.0 < 0.1 * 30.0

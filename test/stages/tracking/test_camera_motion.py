@@ -32,7 +32,7 @@ def knock():
     return motion
 
 
-def motions(tray, camera, beads=15, speed=30.0, seed=1):
+def motions(tray, camera, beads=15, speed=30.0, seed=1, registration=REGISTRATION):
     """What is said of each frame; beads fly straight and turn round at the walls."""
     rng = np.random.default_rng(seed)
     start, velocity = rng.uniform(0.0, 200.0, (beads, 2)), rng.normal(0.0, speed, (beads, 2))
@@ -40,8 +40,10 @@ def motions(tray, camera, beads=15, speed=30.0, seed=1):
     said = []
     for time, moved, shaken in zip(TIMES, tray, camera, strict=True):
         path = (start + velocity * time) % 400.0
-        places = np.minimum(path, 400.0 - path) - moved + rng.normal(0.0, PLACES, (beads, 2))
-        in_picture = moved + shaken + rng.normal(0.0, REGISTRATION, 2)
+        wrong = rng.normal(0.0, registration, 2)
+        places = np.minimum(path, 400.0 - path) - moved - wrong
+        places += rng.normal(0.0, PLACES, (beads, 2))
+        in_picture = moved + shaken + wrong
         said.append(
             judge.push(
                 time, rng.permutation(places), np.full(beads, RADIUS), in_picture, REGISTRATION
@@ -70,6 +72,24 @@ def test_motion_of_the_camera_is_not_that_of_the_tray(camera, speed):
     assert all(motion.camera_moves for motion in said)
     assert not any(motion.uncertain or motion.changed for motion in said)
     assert not np.any([motion.displacement for motion in said])
+
+
+@pytest.mark.parametrize('speed', [1.0, 30.0])
+def test_an_error_of_registration_larger_than_stated_is_no_doubt(speed):
+    wrong = 5.0 * REGISTRATION
+    said = settled(motions(REST, jitter(), beads=60, speed=speed, registration=wrong))
+    assert all(motion.camera_moves and not motion.uncertain for motion in said)
+
+
+def test_a_lens_that_enlarges_the_motion_at_the_walls_is_no_doubt():
+    beads, rng, judge = 60, np.random.default_rng(3), CameraMotion()
+    start = rng.uniform(0.0, 200.0, (beads, 2))
+    said = []
+    for time, shaken in zip(TIMES, 4.0 * SWAY, strict=True):
+        places = start - 0.03 * shaken + rng.normal(0.0, PLACES, (beads, 2))
+        in_picture = 1.03 * shaken + rng.normal(0.0, REGISTRATION, 2)
+        said.append(judge.push(time, places, np.full(beads, RADIUS), in_picture, REGISTRATION))
+    assert all(motion.camera_moves and not motion.uncertain for motion in settled(said))
 
 
 def test_a_knock_of_the_camera_is_noticed_within_four_frames():
