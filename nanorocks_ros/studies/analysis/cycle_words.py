@@ -226,6 +226,6 @@ def _clusters_lines(clusters: ClusterEstimate) -> list[str]:
     if not (math.isfinite(size.value) and math.isfinite(clusters.bodies.value)):
         return []
     return [
-        f'  at the end: {clusters.bodies.value:.0f} bodies, {size.value:.2f} beads in that of a '
-        'bead on average'
+        f'  at the end: {clusters.bodies.value:.0f} bodies (beads or clusters); on average a bead '
+        f'belongs to a body of {size.value:.2f}'
     ]
