@@ -1,0 +1,35 @@
+"""Films by other code, imported and analysed as a user does it: right, or flagged."""
+
+import pytest
+from shared_films import foreign_film
+
+from benchmarks.film_measurement import is_flagged, measure
+from benchmarks.film_truth import read_truth
+from nanorocks_ros.records import CorStatus
+
+
+def measured(name):
+    film = read_truth(foreign_film(name))
+    result = measure(film)
+    assert result.refusal == ''
+    return film, result
+
+
+# Ordinary H.264 with key frames, and a camera that jitters by 2 px.
+@pytest.mark.parametrize('name', ['a1_75_95k', 'b1_jitter'])
+def test_a_codec_and_a_camera_that_jitters_leave_one_cycle_and_its_restitution(name):
+    film, result = measured(name)
+    (cycle,) = result.cycles
+    assert cycle.status is CorStatus.FINAL
+    assert not is_flagged(cycle)
+    assert cycle.restitution.lower <= film.beads <= cycle.restitution.upper
+    assert cycle.wall_restitution.lower <= film.walls <= cycle.wall_restitution.upper
+    assert result.speed_ratios[1:] == pytest.approx([1.0] * 3, abs=0.04)
+    assert result.counts == pytest.approx((1.0,), abs=0.03)
+    assert result.radii == pytest.approx((1.0,), abs=0.006)
+
+
+def test_clusters_that_turn_are_not_taken_for_a_gas():
+    _, result = measured('s1_turn')
+    (cycle,) = result.cycles
+    assert cycle.status is CorStatus.UNDETERMINED
