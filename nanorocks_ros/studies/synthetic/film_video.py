@@ -216,8 +216,7 @@ def _h264(
     with av.open(str(path), 'w', options={'movflags': '+faststart'}) as container:
         container.metadata['comment'] = f'nanorocks_ros {__version__}, seed {settings.seed}'
         rate = Fraction(settings.frame_rate).limit_denominator(_TICKS)
-        # With several threads the stream may depend on the load of the machine.
-        options = {'crf': f'{quality.crf:g}', 'threads': '1'}
+        options = {'crf': f'{quality.crf:g}'}
         stream = container.add_stream('libx264', rate=rate, options=options)
         # The yuv420p format, which players need, has even sides.
         stream.width, stream.height = settings.width_px // 2 * 2, settings.height_px // 2 * 2
