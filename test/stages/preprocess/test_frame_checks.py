@@ -5,10 +5,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from moving_beads import encoded, jittered, pictures, places
 
 from nanorocks_ros.records import Frame, Quality
 from nanorocks_ros.stages.preprocess.frame_checks import FrameChecks
-from test.support.moving_beads import encoded, jittered, pictures, places
 
 NS = 1_000_000_000
 STEP = NS // 30

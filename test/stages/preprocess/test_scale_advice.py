@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from shared_films import first_picture
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.experiment.trays import load_trays
@@ -13,7 +14,6 @@ from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.scale_advice import scale_text
 from nanorocks_ros.stages.scale.picture_scale import PictureScale
-from test.support.shared_films import first_picture
 
 TOLD = PipelineSettings().preprocess
 

@@ -7,11 +7,11 @@ import math
 
 import numpy as np
 import pytest
+from moving_beads import encoded, pictures, places
 
 from nanorocks_ros.stages.preprocess.difference_noise import noise_power
 from nanorocks_ros.stages.preprocess.onset_confirmation import Onsets
 from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter, PlateMeter
-from test.support.moving_beads import encoded, pictures, places
 
 NS = 1_000_000_000
 STEP = NS // 30

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from moving_beads import images, pictures, places
 
 from nanorocks_ros.stages.preprocess.onset_confirmation import Onsets
 from nanorocks_ros.stages.preprocess.shaking_cycles import (
@@ -13,7 +14,6 @@ from nanorocks_ros.stages.preprocess.shaking_cycles import (
     HeldImages,
     ShakeCounter,
 )
-from test.support.moving_beads import images, pictures, places
 
 NS = 1_000_000_000
 STEP = NS // 30

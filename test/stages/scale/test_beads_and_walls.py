@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tracking_films import SCALE, tray_film
 
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.stages.scale.beads_and_walls import SeenBeads, beads_around
-from test.support.tracking_films import SCALE, tray_film
 
 TRACKING = PipelineSettings().tracking
 FLOOR = (100.0, 50.0, 200.0, 150.0)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from shared_films import first_picture
+from tracking_films import SCALE, tray_film
 
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.stages.scale.picture_scale import around, scale_near, scale_of_picture
-from test.support.shared_films import first_picture
-from test.support.tracking_films import SCALE, tray_film
 
 TRACKING = PipelineSettings().tracking
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from contact_draws import RADIUS, drawn_collision
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import Quality, Tracks
@@ -15,7 +16,6 @@ from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.stages.scale.bead_radii import measurable, radius_scale
 from nanorocks_ros.stages.scale.contact_distances import contact_scale
 from nanorocks_ros.stages.scale.scale_check import ScaleCheck
-from test.support.contact_draws import RADIUS, drawn_collision
 
 TRAYS = load_trays()
 TRUE = 13500.0
