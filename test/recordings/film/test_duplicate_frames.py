@@ -115,8 +115,8 @@ def test_blocks_that_a_codec_skips_where_a_camera_jitters_are_no_duplicates(copi
     ]
     kept = list(DuplicateFilter().filter(frames))
     moments = {frame.stamp_ns // STEP_NS // copies for frame in kept}
-    # Without a look at the motion a dozen frames are lost. The encoder does not give the same stream
-    # each time, and what a camera sees twice cannot be told from what such a file repeats.
+    # Without a look at the motion a dozen frames are lost. The encoder does not give the same
+    # stream each time; what a camera sees twice cannot be told from what such a file repeats.
     assert len(moments) >= (298 if copies == 1 else 294)
     # Of repeats, four in five are dropped.
     assert len(kept) - len(moments) <= 60 * (copies - 1)
