@@ -183,7 +183,7 @@ def test_what_a_codec_skips_when_such_a_camera_comes_back_is_no_duplicate():
         for k, gray in enumerate(encoded(grays, 'libx264', rate=120, crf='28'))
     ]
     _, verdicts, _ = judged(film)
-    # Without a look at the motion it is a dozen. The encoder does not give one stream each time.
+    # Without a look at the motion it is five. The encoder does not give one stream each time.
     assert sum(not verdict.usable for verdict in verdicts) <= 2
 
 
