@@ -68,8 +68,6 @@ class FilmResult:
         Of each species: beads seen over true beads, mean over frames.
     radii : tuple of float
         Of each species: median of the measured radii over the mean true one.
-    sticking : tuple of float, [m/s]
-        Of the last cluster estimate: sticking speed, lower and upper limit.
     """
 
     refusal: str = ''
@@ -80,7 +78,6 @@ class FilmResult:
     flagged_speeds: float = 0.0
     counts: tuple[float, ...] = ()
     radii: tuple[float, ...] = ()
-    sticking: tuple[float, ...] = ()
 
     @property
     def final(self) -> CorEstimate | None:
@@ -130,7 +127,6 @@ class _Reading:
         self._film, self._settings = film, settings
         self._tracks: list[Tracks] = []
         self._records: list[ArrayRecord] = []
-        self._sticking: tuple[float, ...] = ()
 
     def of(self, bag: Path) -> FilmResult:
         source, epoch_ns, view = open_camera(bag, self._settings)
